@@ -1,0 +1,1 @@
+//! Authoring: placing taxels on a surface and growing fields over them.

@@ -1,0 +1,320 @@
+//! A glTF file taken apart: its JSON, its buffers, and accessors read with every bound checked.
+//!
+//! The crate `gltf` knows the format's structure and validates it. Accessors are read here, because its own reader
+//! refuses legal ones (without a bufferView, sparse on top of that) and trusts lengths that a damaged file gets wrong.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use base64::Engine as _;
+use gltf::json;
+use json::accessor::{ComponentType, Type};
+use json::validation::{Checked, Validate};
+
+use crate::error::{Error, Result};
+
+/// Elements an accessor without any data may claim before it is taken for a damaged file.
+const MOST_ZERO_ELEMENTS: u64 = 1 << 24;
+
+/// The file's JSON and the bytes of its buffers.
+pub(crate) struct Document {
+    pub(crate) root: json::Root,
+    buffers: Vec<Vec<u8>>,
+}
+
+impl Document {
+    /// Takes `bytes` apart; buffers in files of their own are looked for in `folder`.
+    pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
+        let (text, chunk) = split(bytes)?;
+        let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        let root: json::Root = json::deserialize::from_slice(text)
+            .map_err(|e| Error::failed(format!("not a glTF: its JSON does not hold what glTF asks for: {e}")))?;
+        refuse_what_is_compressed(&root)?;
+        validate(&root)?;
+        let mut chunk = chunk;
+        let mut buffers = Vec::with_capacity(root.buffers.len());
+        for (index, buffer) in root.buffers.iter().enumerate() {
+            let bytes = match &buffer.uri {
+                Some(uri) => fetch(uri, folder).map_err(|e| e.at(format!("buffer {index}")))?,
+                None if index == 0 => chunk.take().map(<[u8]>::to_vec).unwrap_or_default(),
+                None => Vec::new(),
+            };
+            if (bytes.len() as u64) < buffer.byte_length.0 {
+                return Err(Error::failed(format!(
+                    "buffer {index} holds {} of its {} bytes: the file is cut short; export or copy it again",
+                    bytes.len(),
+                    buffer.byte_length.0
+                )));
+            }
+            buffers.push(bytes);
+        }
+        Ok(Self { root, buffers })
+    }
+
+    /// Accessor `index` as rows of `N` numbers, integers normalised where the file says so.
+    pub(crate) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
+        let elements = self.elements(index)?;
+        elements.expect_width(N).map_err(|e| e.at(format!("accessor {index}")))?;
+        let scale = |max: f32| if elements.normalized { 1.0 / max } else { 1.0 };
+        let number: &dyn Fn(&[u8]) -> f32 = match elements.component {
+            ComponentType::F32 => &|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            ComponentType::U8 => &|b| f32::from(b[0]) * scale(255.0),
+            ComponentType::U16 => &|b| f32::from(u16::from_le_bytes([b[0], b[1]])) * scale(65535.0),
+            ComponentType::I8 => &|b| (f32::from(b[0].cast_signed()) * scale(127.0)).max(-1.0),
+            ComponentType::I16 => &|b| (f32::from(i16::from_le_bytes([b[0], b[1]])) * scale(32767.0)).max(-1.0),
+            ComponentType::U32 => &|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32,
+        };
+        Ok(elements.rows(number))
+    }
+
+    /// Accessor `index` as rows of `N` unsigned integers.
+    pub(crate) fn integers<const N: usize>(&self, index: usize) -> Result<Vec<[u32; N]>> {
+        let elements = self.elements(index)?;
+        elements.expect_width(N).map_err(|e| e.at(format!("accessor {index}")))?;
+        let number: &dyn Fn(&[u8]) -> u32 = match elements.component {
+            ComponentType::U8 => &|b| u32::from(b[0]),
+            ComponentType::U16 => &|b| u32::from(u16::from_le_bytes([b[0], b[1]])),
+            ComponentType::U32 => &|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            _ => return Err(Error::failed(format!("accessor {index} should hold unsigned integers"))),
+        };
+        Ok(elements.rows(number))
+    }
+
+    /// Whether accessor `index` holds single floats, as every attribute of a layout must.
+    pub(crate) fn is_scalar_float(&self, index: usize) -> bool {
+        self.root.accessors.get(index).is_some_and(|accessor| {
+            matches!(accessor.type_, Checked::Valid(Type::Scalar))
+                && matches!(accessor.component_type, Checked::Valid(c) if c.0 == ComponentType::F32)
+        })
+    }
+
+    fn elements(&self, index: usize) -> Result<Elements<'_>> {
+        self.elements_of(index).map_err(|e| e.at(format!("accessor {index}")))
+    }
+
+    fn elements_of(&self, index: usize) -> Result<Elements<'_>> {
+        let damaged = |what: &str| Error::failed(format!("{what}: the file is damaged; export it again"));
+        let accessor = self.root.accessors.get(index).ok_or_else(|| damaged("there is no such accessor"))?;
+        let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
+            return Err(damaged("its type is none that glTF has"));
+        };
+        let component = component.0;
+        let width = shape.multiplicity();
+        let size = component.size() * width;
+        let count = accessor.count.0;
+        let bytes = match accessor.buffer_view {
+            Some(view) => self.strided(view.value(), accessor.byte_offset.map_or(0, |o| o.0), count, size)?,
+            None if count > MOST_ZERO_ELEMENTS => {
+                return Err(damaged(&format!("it claims {count} elements and has no data")));
+            }
+            None => Cow::Owned(vec![0; count as usize * size]),
+        };
+        let bytes = match &accessor.sparse {
+            None => bytes,
+            Some(sparse) => {
+                let Checked::Valid(kind) = sparse.indices.component_type else {
+                    return Err(damaged("its sparse indices have no type that glTF has"));
+                };
+                let (changed, offset) = (sparse.count.0, sparse.indices.byte_offset.0);
+                let places = self.strided(sparse.indices.buffer_view.value(), offset, changed, kind.0.size())?;
+                let view = sparse.values.buffer_view.value();
+                let values = self.strided(view, sparse.values.byte_offset.0, changed, size)?;
+                let mut bytes = bytes.into_owned();
+                for (place, value) in places.chunks_exact(kind.0.size()).zip(values.chunks_exact(size)) {
+                    let place = place.iter().rev().fold(0_usize, |n, &b| n << 8 | usize::from(b));
+                    bytes
+                        .get_mut(place.saturating_mul(size)..)
+                        .and_then(|rest| rest.get_mut(..size))
+                        .ok_or_else(|| damaged("a sparse index lies beyond its end"))?
+                        .copy_from_slice(value);
+                }
+                Cow::Owned(bytes)
+            }
+        };
+        Ok(Elements { bytes, component, width, normalized: accessor.normalized })
+    }
+
+    /// `count` elements of `size` bytes from a buffer view, side by side.
+    fn strided(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Cow<'_, [u8]>> {
+        let beyond = || {
+            Error::failed(format!(
+                "it reaches beyond bufferView {view}: the file is damaged or cut short; export it again"
+            ))
+        };
+        let view = self.root.buffer_views.get(view).ok_or_else(beyond)?;
+        let buffer = self.buffers.get(view.buffer.value()).ok_or_else(beyond)?;
+        let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).map_err(|_| beyond())?;
+        let length = usize::try_from(view.byte_length.0).map_err(|_| beyond())?;
+        let window = start.checked_add(length).and_then(|end| buffer.get(start..end)).ok_or_else(beyond)?;
+        let stride = view.byte_stride.map_or(size, |s| s.0).max(1);
+        let (offset, count) = (usize::try_from(offset), usize::try_from(count));
+        let (Ok(offset), Ok(count)) = (offset, count) else { return Err(beyond()) };
+        if count == 0 {
+            return Ok(Cow::Borrowed(&[]));
+        }
+        let end = (count - 1)
+            .checked_mul(stride)
+            .and_then(|n| n.checked_add(size))
+            .and_then(|n| n.checked_add(offset))
+            .filter(|&end| end <= window.len())
+            .ok_or_else(beyond)?;
+        if stride == size {
+            return Ok(Cow::Borrowed(&window[offset..end]));
+        }
+        let mut packed = Vec::with_capacity(count * size);
+        for element in 0..count {
+            let at = offset + element * stride;
+            packed.extend_from_slice(&window[at..at + size]);
+        }
+        Ok(Cow::Owned(packed))
+    }
+}
+
+/// An accessor's elements, side by side.
+struct Elements<'a> {
+    bytes: Cow<'a, [u8]>,
+    component: ComponentType,
+    width: usize,
+    normalized: bool,
+}
+
+impl Elements<'_> {
+    fn expect_width(&self, width: usize) -> Result<()> {
+        if self.width == width {
+            return Ok(());
+        }
+        Err(Error::failed(format!(
+            "it has {} numbers an element where {width} belong; export the mesh again",
+            self.width
+        )))
+    }
+
+    fn rows<T: Copy + Default, const N: usize>(&self, number: &dyn Fn(&[u8]) -> T) -> Vec<[T; N]> {
+        let size = self.component.size();
+        self.bytes
+            .chunks_exact(size * N)
+            .map(|element| {
+                let mut row = [T::default(); N];
+                for (value, bytes) in row.iter_mut().zip(element.chunks_exact(size)) {
+                    *value = number(bytes);
+                }
+                row
+            })
+            .collect()
+    }
+}
+
+/// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
+fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
+    if bytes.is_empty() {
+        return Err(Error::failed("the file is empty; give a .glb or .gltf"));
+    }
+    if !bytes.starts_with(b"glTF") {
+        let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+        return match text.iter().find(|b| !b.is_ascii_whitespace()) {
+            Some(b'{') => Ok((text, None)),
+            _ => Err(Error::failed("not a glTF: it starts neither with `glTF` nor with `{`; give a .glb or .gltf")),
+        };
+    }
+    // The crate's reader subtracts the header from this length unchecked.
+    let length = bytes.get(8..12).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    if length < 12 {
+        return Err(Error::failed("its glTF header is damaged or cut short; export or copy the file again"));
+    }
+    let cut = bytes.len() < length as usize;
+    let glb = gltf::binary::Glb::from_slice(bytes).map_err(|e| {
+        let why = if cut {
+            format!("the file is cut short, {} of {length} bytes; export or copy it again", bytes.len())
+        } else {
+            format!("its glTF container is damaged: {e}; export it again")
+        };
+        Error::failed(why)
+    })?;
+    // Borrowed from `bytes`, as `from_slice` never copies.
+    match (glb.json, glb.bin) {
+        (Cow::Borrowed(text), Some(Cow::Borrowed(chunk))) => Ok((text, Some(chunk))),
+        (Cow::Borrowed(text), _) => Ok((text, None)),
+        (Cow::Owned(_), _) => Err(Error::failed("its glTF container could not be read; export it again")),
+    }
+}
+
+fn refuse_what_is_compressed(root: &json::Root) -> Result<()> {
+    const KNOWN: [&str; 8] = [
+        "KHR_materials_unlit",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
+        "KHR_materials_transmission",
+        "KHR_materials_volume",
+        "KHR_texture_transform",
+        "KHR_lights_punctual",
+    ];
+    for name in &root.extensions_required {
+        let remedy = match name.as_str() {
+            "KHR_draco_mesh_compression" => {
+                "its meshes are compressed with Draco; export without compression, or run `gltf-transform copy IN OUT`"
+            }
+            "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                "its meshes are compressed with meshopt; export without compression, or run `gltf-transform copy IN OUT`"
+            }
+            "KHR_mesh_quantization" => {
+                "its meshes are quantized; export without, or run `gltf-transform dequantize IN OUT`"
+            }
+            name if KNOWN.contains(&name) => continue,
+            _ => "it needs an extension that is not supported here; export without it",
+        };
+        return Err(Error::failed(format!("{remedy} (extension {name})")));
+    }
+    Ok(())
+}
+
+/// The crate's own validation, less the one rule where it is stricter than glTF.
+fn validate(root: &json::Root) -> Result<()> {
+    let mut first = None;
+    root.validate(root, json::Path::new, &mut |path, error| {
+        let path = path().to_string();
+        let no_view = path.starts_with("accessors[") && path.ends_with("].bufferView");
+        let extension = path.starts_with("extensionsRequired");
+        if first.is_none() && !extension && !(no_view && error == json::validation::Error::Missing) {
+            first = Some((path, error));
+        }
+    });
+    match first {
+        None => Ok(()),
+        Some((path, error)) => {
+            let what = match error {
+                json::validation::Error::IndexOutOfBounds => "points at something that is not in the file",
+                json::validation::Error::Missing => "is missing",
+                json::validation::Error::Oversize => "is larger than this machine can address",
+                _ => "is not what glTF allows",
+            };
+            Err(Error::failed(format!("not a sound glTF: `{path}` {what}; export it again")))
+        }
+    }
+}
+
+fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (kind, body) =
+            data.split_once(',').ok_or_else(|| Error::failed("its data URI has no data; export it again"))?;
+        if !kind.ends_with(";base64") {
+            return Err(Error::failed("its data URI is not base64; export it again"));
+        }
+        return base64::engine::general_purpose::STANDARD
+            .decode(body)
+            .map_err(|e| Error::failed(format!("its data URI is not base64: {e}; export it again")));
+    }
+    if uri.contains("://") {
+        return Err(Error::failed(format!(
+            "it lies at {uri}, and nothing is fetched from a network; save it beside the file"
+        )));
+    }
+    let folder = folder.ok_or_else(|| {
+        Error::failed(format!("it lies in a file of its own, `{uri}`; give a .glb, which holds everything"))
+    })?;
+    let name = percent_encoding::percent_decode_str(uri)
+        .decode_utf8()
+        .map_err(|_| Error::failed(format!("its name `{uri}` is not UTF-8; rename it")))?;
+    let path = folder.join(name.as_ref());
+    std::fs::read(&path).map_err(|e| Error::io(&path, &e))
+}

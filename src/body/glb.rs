@@ -1,0 +1,256 @@
+//! Writing glTF: a `.glb` held open as JSON and bytes, to which meshes, taxels and fields are added.
+//!
+//! Nothing already in the file is understood or touched: accessors and bytes are appended, nodes are added.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use serde_json::{Map, Value, json};
+
+use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
+use super::{FieldSpec, Taxel};
+use crate::error::{Error, Result};
+
+const FLOAT: u32 = 5126;
+const UNSIGNED_INT: u32 = 5125;
+const UNSIGNED_SHORT: u32 = 5123;
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+
+/// A `.glb` being written.
+pub struct Glb {
+    json: Map<String, Value>,
+    bin: Vec<u8>,
+}
+
+/// A triangle mesh to write, in metres.
+#[derive(Clone, Debug, Default)]
+pub struct MeshData {
+    /// Vertices.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, one a vertex.
+    pub normals: Vec<[f32; 3]>,
+    /// Counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// What carries each vertex, for a skinned mesh.
+    pub skinning: Option<Skinning>,
+}
+
+/// The four joints that carry each vertex most, and how much; weights of a vertex sum to 1.
+#[derive(Clone, Debug, Default)]
+pub struct Skinning {
+    /// Indices into the skin's joints.
+    pub joints: Vec<[u16; 4]>,
+    /// Weights in the same order.
+    pub weights: Vec<[f32; 4]>,
+}
+
+impl Default for Glb {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Glb {
+    /// An empty file with one empty scene.
+    #[must_use]
+    pub fn new() -> Self {
+        let json = json!({
+            "asset": {"version": "2.0", "generator": concat!("somatic ", env!("CARGO_PKG_VERSION"))},
+            "scene": 0,
+            "scenes": [{"nodes": []}],
+        });
+        let Value::Object(json) = json else { unreachable!("it was written as an object") };
+        Self { json, bin: Vec::new() }
+    }
+
+    fn list(&mut self, key: &str) -> &mut Vec<Value> {
+        self.json.entry(key).or_insert_with(|| Value::Array(Vec::new())).as_array_mut().expect("glTF keeps a list here")
+    }
+
+    fn push(&mut self, key: &str, value: Value) -> usize {
+        let list = self.list(key);
+        list.push(value);
+        list.len() - 1
+    }
+
+    /// Appends `bytes` as a buffer view of their own, and an accessor over them.
+    fn accessor(&mut self, bytes: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
+        while !self.bin.len().is_multiple_of(4) {
+            self.bin.push(0);
+        }
+        let mut view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        if let Some(target) = target {
+            view["target"] = target.into();
+        }
+        self.bin.extend_from_slice(bytes);
+        accessor["bufferView"] = self.push("bufferViews", view).into();
+        self.push("accessors", accessor)
+    }
+
+    fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
+        let extreme = |better: fn(f32, f32) -> f32, start: f32| {
+            positions.iter().fold([start; 3], |m, p| [better(m[0], p[0]), better(m[1], p[1]), better(m[2], p[2])])
+        };
+        let accessor = json!({
+            "componentType": FLOAT, "count": positions.len(), "type": "VEC3",
+            "min": extreme(f32::min, f32::INFINITY), "max": extreme(f32::max, f32::NEG_INFINITY),
+        });
+        self.accessor(bytemuck::cast_slice(positions), Some(ARRAY_BUFFER), accessor)
+    }
+
+    fn vectors(&mut self, kind: &str, count: usize, bytes: &[u8]) -> usize {
+        self.accessor(bytes, Some(ARRAY_BUFFER), json!({"componentType": FLOAT, "count": count, "type": kind}))
+    }
+
+    fn scalars(&mut self, values: &[f32]) -> usize {
+        self.vectors("SCALAR", values.len(), bytemuck::cast_slice(values))
+    }
+
+    /// Adds a node under `parent`, or to the scene, and returns its index.
+    pub fn node(&mut self, name: &str, parent: Option<usize>, translation: DVec3) -> usize {
+        let mut node = json!({"name": name});
+        if translation != DVec3::ZERO {
+            node["translation"] = json!(translation.as_vec3().to_array());
+        }
+        let index = self.push("nodes", node);
+        let (owner, key) = match parent {
+            Some(parent) => (&mut self.list("nodes")[parent], "children"),
+            None => (&mut self.list("scenes")[0], "nodes"),
+        };
+        match owner.get_mut(key).and_then(Value::as_array_mut) {
+            Some(children) => children.push(index.into()),
+            None => owner[key] = json!([index]),
+        }
+        index
+    }
+
+    /// Adds a plain material and returns its index.
+    pub fn material(&mut self, name: &str, rgb: [f32; 3], roughness: f32) -> usize {
+        let [r, g, b] = rgb;
+        let material = json!({
+            "name": name,
+            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": roughness},
+        });
+        self.push("materials", material)
+    }
+
+    /// Adds a skin whose joints are the nodes `joints`; `inverse_binds` are column-major, one a joint.
+    pub fn skin(&mut self, name: &str, joints: &[usize], inverse_binds: &[[f32; 16]]) -> usize {
+        let accessor = json!({"componentType": FLOAT, "count": inverse_binds.len(), "type": "MAT4"});
+        let binds = self.accessor(bytemuck::cast_slice(inverse_binds), None, accessor);
+        self.push("skins", json!({"name": name, "joints": joints, "inverseBindMatrices": binds}))
+    }
+
+    /// Shows `mesh` at `node`.
+    pub fn mesh(&mut self, node: usize, name: &str, mesh: &MeshData, material: Option<usize>, skin: Option<usize>) {
+        let indices = json!({"componentType": UNSIGNED_INT, "count": 3 * mesh.triangles.len(), "type": "SCALAR"});
+        let mut attributes = json!({
+            "POSITION": self.positions(&mesh.positions),
+            "NORMAL": self.vectors("VEC3", mesh.normals.len(), bytemuck::cast_slice(&mesh.normals)),
+        });
+        if let Some(skinning) = &mesh.skinning {
+            self.skinning(&mut attributes, skinning);
+        }
+        let indices = self.accessor(bytemuck::cast_slice(&mesh.triangles), Some(ELEMENT_ARRAY_BUFFER), indices);
+        let mut primitive = json!({"attributes": attributes, "indices": indices});
+        if let Some(material) = material {
+            primitive["material"] = material.into();
+        }
+        self.show(node, name, &primitive, skin);
+    }
+
+    fn skinning(&mut self, attributes: &mut Value, skinning: &Skinning) {
+        let joints = json!({"componentType": UNSIGNED_SHORT, "count": skinning.joints.len(), "type": "VEC4"});
+        attributes["JOINTS_0"] =
+            self.accessor(bytemuck::cast_slice(&skinning.joints), Some(ARRAY_BUFFER), joints).into();
+        attributes["WEIGHTS_0"] =
+            self.vectors("VEC4", skinning.weights.len(), bytemuck::cast_slice(&skinning.weights)).into();
+    }
+
+    fn show(&mut self, node: usize, name: &str, primitive: &Value, skin: Option<usize>) {
+        let mesh = self.push("meshes", json!({"name": name, "primitives": [primitive]}));
+        let node = &mut self.list("nodes")[node];
+        node["mesh"] = mesh.into();
+        if let Some(skin) = skin {
+            node["skin"] = skin.into();
+        }
+    }
+
+    /// Adds `taxels` as points of a node of their own under `parent`. Their positions and normals are read as being in
+    /// that node's frame; on a skin, in the skinned mesh's, and `skinning` says what carries each.
+    pub fn taxels(
+        &mut self,
+        name: &str,
+        parent: Option<usize>,
+        taxels: &[Taxel],
+        skin: Option<(usize, &Skinning)>,
+    ) -> usize {
+        let node = self.node(name, parent, DVec3::ZERO);
+        let positions: Vec<[f32; 3]> = taxels.iter().map(|t| t.position_in_link.as_vec3().to_array()).collect();
+        let mut attributes = json!({"POSITION": self.positions(&positions)});
+        if let Some((_, skinning)) = skin {
+            self.skinning(&mut attributes, skinning);
+        }
+        let mut column = |name: &str, value: &dyn Fn(&Taxel) -> f64| {
+            let values: Vec<f32> = taxels.iter().map(|t| value(t) as f32).collect();
+            attributes[format!("_{name}")] = self.scalars(&values).into();
+        };
+        column(TAXEL_ID, &|t| t.id.into());
+        column(NORMAL[0], &|t| t.normal_in_link.x);
+        column(NORMAL[1], &|t| t.normal_in_link.y);
+        column(NORMAL[2], &|t| t.normal_in_link.z);
+        column(AREA, &|t| t.area);
+        column(MODALITY, &|t| t.modality.code().into());
+        let primitive = json!({"attributes": attributes, "mode": 0});
+        self.show(node, name, &primitive, skin.map(|(skin, _)| skin));
+        node
+    }
+
+    /// Adds `field` as an empty node under `parent`, at `origin` in that node's frame.
+    pub fn field(&mut self, field: &FieldSpec, parent: Option<usize>, origin: DVec3) -> usize {
+        let node = self.node(&field.name, parent, origin);
+        self.list("nodes")[node]["extras"] = json!({FIELD_KEY: field.to_json()});
+        node
+    }
+
+    /// Sets how the scene introduces itself, for people who open the file.
+    pub fn describe(&mut self, notes: &BTreeMap<&str, &str>) {
+        self.list("scenes")[0]["extras"] = json!(notes);
+    }
+
+    /// The whole file.
+    ///
+    /// # Errors
+    /// The file would pass the 4 GiB a `.glb` can hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let mut json = self.json.clone();
+        if !self.bin.is_empty() {
+            let length = self.bin.len().next_multiple_of(4);
+            json.insert("buffers".into(), json!([{"byteLength": length}]));
+        }
+        let mut bin = self.bin.clone();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let text = serde_json::to_vec(&json).expect("JSON values print");
+        if text.len() + bin.len() > u32::MAX as usize - 64 {
+            return Err(Error::failed("the body would pass the 4 GiB that a .glb can hold; split it"));
+        }
+        gltf::binary::Glb {
+            header: gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 },
+            json: text.into(),
+            bin: (!bin.is_empty()).then(|| bin.into()),
+        }
+        .to_vec()
+        .map_err(|e| Error::failed(e.to_string()))
+    }
+
+    /// Writes the file at `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// The folder cannot be written to, or the disk is full.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        crate::write_whole(path, &self.to_bytes()?)
+    }
+}

@@ -1,0 +1,200 @@
+//! The layout's own words inside a glTF: names of attributes and keys, and the JSON that a field carries.
+//!
+//! `docs/layout.md` is the specification. What reads and what writes both use these.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+
+/// Version of the field JSON that this crate writes, and the latest it reads.
+pub(crate) const VERSION: u32 = 1;
+
+/// Key in a node's `extras` whose value is the field's JSON, as one string.
+pub(crate) const FIELD_KEY: &str = "somatic_field";
+
+/// The attributes of a taxel primitive, without the underscore that glTF puts before custom names.
+pub(crate) const TAXEL_ID: &str = "TAXEL_ID";
+pub(crate) const NORMAL: [&str; 3] = ["NX", "NY", "NZ"];
+pub(crate) const AREA: &str = "AREA";
+pub(crate) const MODALITY: &str = "MODALITY";
+
+/// A receptive field as a layout outlines it, before a body gives it an anchor and a chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FieldSpec {
+    /// Unique name; slashes make it readable (`hand/palm`) and mean nothing.
+    pub name: String,
+    /// Name of the parent field. A parent holds all taxels of its descendants beside its own.
+    pub parent: Option<String>,
+    /// Its own members by taxel id.
+    pub members: BTreeMap<u32, MemberSpec>,
+    /// Its chart; without one the default tangent plane is laid.
+    pub chart: Option<ChartSpec>,
+}
+
+/// What a field says of one of its taxels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MemberSpec {
+    /// Weight w > 0 in every sum of the field.
+    pub weight: f64,
+    /// Chart coordinates (u, v) in metres, for charts that positions alone do not give.
+    pub uv: Option<[f64; 2]>,
+}
+
+impl Default for MemberSpec {
+    fn default() -> Self {
+        Self { weight: 1.0, uv: None }
+    }
+}
+
+/// How a field's chart is laid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChartKind {
+    /// Orthogonal projection on the tangent plane at the origin.
+    Plane,
+    /// No chart, by the author's wish.
+    None,
+}
+
+/// A chart that the layout fixes instead of leaving it to the default.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChartSpec {
+    /// How coordinates come about.
+    pub kind: ChartKind,
+    /// Origin in the anchor's frame, m.
+    pub origin_in_anchor: Option<[f64; 3]>,
+    /// Direction of +u in the anchor's frame; its part along the normal is ignored.
+    pub u_in_anchor: Option<[f64; 3]>,
+}
+
+/// The JSON string under [`FIELD_KEY`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FieldJson {
+    version: u32,
+    name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    parent: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    chart: Option<ChartJson>,
+    /// Taxel id → `[weight]` or `[weight, u, v]`.
+    #[serde(default)]
+    members: BTreeMap<String, Vec<f64>>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ChartJson {
+    kind: ChartKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    origin: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    u: Option<[f64; 3]>,
+}
+
+impl FieldSpec {
+    /// The field in the JSON string `text`.
+    pub(crate) fn from_json(text: &str) -> Result<Self> {
+        let bad = |what: String| Error::failed(what);
+        let version = serde_json::from_str::<serde_json::Value>(text)
+            .ok()
+            .and_then(|value| value.get("version").and_then(serde_json::Value::as_u64));
+        if let Some(version) = version.filter(|&v| v > u64::from(VERSION)) {
+            return Err(bad(format!("layout version {version} is newer than this program; update it")));
+        }
+        let json: FieldJson = serde_json::from_str(text)
+            .map_err(|e| bad(format!("its field JSON is not as docs/layout.md has it: {e}")))?;
+        if json.name.is_empty() {
+            return Err(bad("a field has an empty name; give it one".into()));
+        }
+        let finite = |v: Option<[f64; 3]>| v.is_none_or(|v| v.iter().all(|x| x.is_finite()));
+        if let Some(chart) = &json.chart
+            && !(finite(chart.origin) && finite(chart.u))
+        {
+            return Err(bad("its chart has a number that is not finite".into()));
+        }
+        let mut members = BTreeMap::new();
+        for (key, row) in json.members {
+            let id: u32 =
+                key.parse().map_err(|_| bad(format!("member `{key}` is not a taxel id; ids are whole numbers")))?;
+            let (weight, uv) = match row[..] {
+                [weight] => (weight, None),
+                [weight, u, v] => (weight, Some([u, v])),
+                _ => return Err(bad(format!("member {id} should be [weight] or [weight, u, v]"))),
+            };
+            if !(weight.is_finite() && (MIN_WEIGHT..=MAX_WEIGHT).contains(&weight)) {
+                return Err(bad(format!(
+                    "member {id} has weight {weight}; weights lie between {MIN_WEIGHT:e} and {MAX_WEIGHT:e}"
+                )));
+            }
+            if uv.is_some_and(|uv| uv.iter().any(|x| !x.is_finite())) {
+                return Err(bad(format!("member {id} has a chart coordinate that is not finite")));
+            }
+            members.insert(id, MemberSpec { weight, uv });
+        }
+        Ok(Self {
+            name: json.name,
+            parent: json.parent,
+            members,
+            chart: json.chart.map(|c| ChartSpec { kind: c.kind, origin_in_anchor: c.origin, u_in_anchor: c.u }),
+        })
+    }
+
+    /// The JSON string that [`FieldSpec::from_json`] reads back.
+    pub(crate) fn to_json(&self) -> String {
+        let json = FieldJson {
+            version: VERSION,
+            name: self.name.clone(),
+            parent: self.parent.clone(),
+            chart: self.chart.map(|c| ChartJson { kind: c.kind, origin: c.origin_in_anchor, u: c.u_in_anchor }),
+            members: self
+                .members
+                .iter()
+                .map(|(id, m)| {
+                    let row = match m.uv {
+                        Some([u, v]) => vec![m.weight, u, v],
+                        None => vec![m.weight],
+                    };
+                    (id.to_string(), row)
+                })
+                .collect(),
+        };
+        serde_json::to_string(&json).expect("a field is plain data")
+    }
+}
+
+/// Weights beyond these would take products out of single precision.
+pub(crate) const MIN_WEIGHT: f64 = 1.0 / 1_048_576.0;
+pub(crate) const MAX_WEIGHT: f64 = 1_048_576.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_survives_its_json() {
+        let spec = FieldSpec {
+            name: "hand/palm".into(),
+            parent: Some("hand".into()),
+            members: [(3, MemberSpec::default()), (12, MemberSpec { weight: 0.5, uv: Some([0.01, -0.02]) })].into(),
+            chart: Some(ChartSpec {
+                kind: ChartKind::Plane,
+                origin_in_anchor: Some([0.0, 0.1, 0.2]),
+                u_in_anchor: None,
+            }),
+        };
+        assert_eq!(FieldSpec::from_json(&spec.to_json()).unwrap(), spec);
+    }
+
+    #[test]
+    fn what_a_field_may_not_say_is_named() {
+        let why = |text: &str| FieldSpec::from_json(text).unwrap_err().to_string();
+        assert!(why(r#"{"version":1,"name":"a","members":{"x":[1]}}"#).contains("member `x`"));
+        assert!(why(r#"{"version":1,"name":"a","members":{"3":[0]}}"#).contains("weight 0"));
+        assert!(why(r#"{"version":1,"name":"a","members":{"3":[1,2]}}"#).contains("member 3"));
+        assert!(why(r#"{"version":2,"name":"a"}"#).contains("newer"));
+        assert!(why(r#"{"version":1,"nam":"a"}"#).contains("nam"));
+    }
+}

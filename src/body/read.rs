@@ -1,0 +1,454 @@
+//! From a glTF document to a [`Body`].
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use gltf::json;
+use json::mesh::{Mode, Primitive, Semantic};
+use json::validation::Checked;
+
+use super::document::Document;
+use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
+use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, rigid_part};
+use crate::error::{Error, Result};
+
+/// Reads the body called `name` from a whole file's bytes.
+pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
+    let document = Document::parse(bytes, folder)?;
+    let nodes = Nodes::of(&document)?;
+    let mut body = Body {
+        name: name.to_owned(),
+        links: nodes.links(),
+        surfaces: Vec::new(),
+        taxels: Vec::new(),
+        fields: Vec::new(),
+        findings: Vec::new(),
+    };
+    for &node in &nodes.in_order {
+        read_meshes(&document, &nodes, node, &mut body)?;
+    }
+    complete_normals(&mut body)?;
+    body.taxels.sort_by_key(|taxel| taxel.id);
+    if let Some(pair) = body.taxels.windows(2).find(|pair| pair[0].id == pair[1].id) {
+        return Err(Error::failed(format!(
+            "taxel id {} is there twice, on links `{}` and `{}`; give each taxel an id of its own",
+            pair[0].id, body.links[pair[0].link].name, body.links[pair[1].link].name
+        )));
+    }
+    body.fields = read_fields(&document, &nodes, &body)?;
+    if body.taxels.is_empty() && !body.fields.is_empty() {
+        body.findings.push(
+            "it has fields and no taxels: if it comes from Blender, export again with `Attributes`, `Loose Points` \
+             (use_mesh_vertices) and `Custom Properties` on"
+                .into(),
+        );
+    }
+    Ok(body)
+}
+
+/// The node tree, with every transform worked out.
+struct Nodes<'a> {
+    raw: &'a [json::Node],
+    parent: Vec<Option<usize>>,
+    /// Every node, a parent before its children.
+    in_order: Vec<usize>,
+    world_from_node: Vec<DAffine3>,
+    /// The link that a node is; `None` for nodes that hold taxels or a field.
+    link: Vec<Option<usize>>,
+    field: Vec<Option<String>>,
+}
+
+impl<'a> Nodes<'a> {
+    fn of(document: &'a Document) -> Result<Self> {
+        let raw = &document.root.nodes[..];
+        let mut parent = vec![None; raw.len()];
+        for (index, node) in raw.iter().enumerate() {
+            for child in node.children.iter().flatten() {
+                if parent[child.value()].replace(index).is_some() {
+                    return Err(Error::failed(format!(
+                        "node {} has two parents: the file is damaged; export it again",
+                        child.value()
+                    )));
+                }
+            }
+        }
+        let mut in_order = Vec::with_capacity(raw.len());
+        let mut to_visit: Vec<usize> = (0..raw.len()).rev().filter(|&n| parent[n].is_none()).collect();
+        while let Some(node) = to_visit.pop() {
+            in_order.push(node);
+            to_visit.extend(raw[node].children.iter().flatten().rev().map(|child| child.value()));
+        }
+        if in_order.len() < raw.len() {
+            return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
+        }
+        let mut world_from_node = vec![DAffine3::IDENTITY; raw.len()];
+        for &node in &in_order {
+            let local = local_transform(&raw[node]);
+            if !local.is_finite() {
+                return Err(Error::failed(format!("node {node} has a transform that is not finite; export it again")));
+            }
+            world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
+        }
+        let field: Vec<Option<String>> = raw.iter().map(field_text).collect();
+        let mut link = vec![None; raw.len()];
+        let mut links = 0;
+        for &node in &in_order {
+            if field[node].is_none() && !(holds_taxels(document, &raw[node]) && parent[node].is_some()) {
+                link[node] = Some(links);
+                links += 1;
+            }
+        }
+        Ok(Self { raw, parent, in_order, world_from_node, link, field })
+    }
+
+    fn links(&self) -> Vec<Link> {
+        let mut taken = HashSet::new();
+        let mut links: Vec<Link> = Vec::new();
+        for &node in self.in_order.iter().filter(|&&node| self.link[node].is_some()) {
+            let wanted = self.raw[node].name.clone().unwrap_or_else(|| format!("node_{node}"));
+            let mut name = wanted.clone();
+            for number in 2.. {
+                if taken.insert(name.clone()) {
+                    break;
+                }
+                name = format!("{wanted}#{number}");
+            }
+            let world_from_link = rigid_part(&self.world_from_node[node]);
+            links.push(Link {
+                name,
+                parent: self.parent[node].and_then(|up| self.link_above(up)),
+                world_from_link,
+                link_from_node: world_from_link.inverse() * self.world_from_node[node],
+            });
+        }
+        links
+    }
+
+    /// The link that `node` is, or its nearest ancestor that is one.
+    fn link_above(&self, node: usize) -> Option<usize> {
+        let mut at = Some(node);
+        while let Some(node) = at {
+            if self.link[node].is_some() {
+                return self.link[node];
+            }
+            at = self.parent[node];
+        }
+        None
+    }
+}
+
+fn local_transform(node: &json::Node) -> DAffine3 {
+    if let Some(m) = node.matrix {
+        return DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from)));
+    }
+    let three = |v: Option<[f32; 3]>, or: f32| DVec3::from_array(v.unwrap_or([or; 3]).map(f64::from));
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |q| {
+        let q = DQuat::from_array(q.0.map(f64::from));
+        if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
+    });
+    DAffine3::from_scale_rotation_translation(three(node.scale, 1.0), rotation, three(node.translation, 0.0))
+}
+
+/// The field's JSON in a node's extras, if it carries one.
+fn field_text(node: &json::Node) -> Option<String> {
+    let extras: serde_json::Value = serde_json::from_str(node.extras.as_ref()?.get()).ok()?;
+    Some(extras.get(FIELD_KEY)?.as_str()?.to_owned())
+}
+
+fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
+    primitive
+        .attributes
+        .iter()
+        .find(|(key, _)| matches!(key, Checked::Valid(s) if s == semantic))
+        .map(|(_, accessor)| accessor.value())
+}
+
+fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
+    attribute(primitive, &Semantic::Extras(name.to_owned()))
+}
+
+fn is_taxels(primitive: &Primitive) -> bool {
+    matches!(primitive.mode, Checked::Valid(Mode::Points)) && custom(primitive, TAXEL_ID).is_some()
+}
+
+fn holds_taxels(document: &Document, node: &json::Node) -> bool {
+    node.mesh.is_some_and(|mesh| {
+        let primitives = &document.root.meshes[mesh.value()].primitives;
+        !primitives.is_empty() && primitives.iter().all(is_taxels)
+    })
+}
+
+/// How the joints of a skinned node carry its points: per joint its link, and link_from_mesh.
+fn joints_of(
+    document: &Document,
+    nodes: &Nodes<'_>,
+    node: usize,
+    links: &[Link],
+) -> Result<Option<Vec<(usize, DAffine3)>>> {
+    let Some(skin) = nodes.raw[node].skin else { return Ok(None) };
+    let skin = &document.root.skins[skin.value()];
+    let inverse_binds: Vec<[f32; 16]> = match skin.inverse_bind_matrices {
+        Some(accessor) => document.floats(accessor.value())?,
+        None => Vec::new(),
+    };
+    let mut joints = Vec::with_capacity(skin.joints.len());
+    for (index, joint) in skin.joints.iter().enumerate() {
+        let link = nodes
+            .link_above(joint.value())
+            .ok_or_else(|| Error::failed("a joint is no link; export the file again"))?;
+        let joint_from_mesh = match inverse_binds.get(index) {
+            Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
+            None => DAffine3::IDENTITY,
+        };
+        if !joint_from_mesh.is_finite() {
+            return Err(Error::failed(format!(
+                "the inverse bind matrix of joint `{}` is not finite; export the file again",
+                links[link].name
+            )));
+        }
+        joints.push((link, links[link].link_from_node * joint_from_mesh));
+    }
+    Ok(Some(joints))
+}
+
+/// For each point of a skinned primitive, the joint that carries it most.
+fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, joints: usize) -> Result<Vec<usize>> {
+    let mut best = vec![(0.0_f32, 0_usize); points];
+    for set in 0.. {
+        let (Some(indices), Some(weights)) =
+            (attribute(primitive, &Semantic::Joints(set)), attribute(primitive, &Semantic::Weights(set)))
+        else {
+            break;
+        };
+        let (indices, weights) = (document.integers::<4>(indices)?, document.floats::<4>(weights)?);
+        for (best, (indices, weights)) in best.iter_mut().zip(indices.iter().zip(&weights)) {
+            for (&joint, &weight) in indices.iter().zip(weights) {
+                if weight > best.0 {
+                    *best = (weight, joint as usize);
+                }
+            }
+        }
+    }
+    if let Some((_, joint)) = best.iter().find(|(_, joint)| *joint >= joints) {
+        return Err(Error::failed(format!("a vertex hangs on joint {joint} of {joints}; export the file again")));
+    }
+    Ok(best.into_iter().map(|(_, joint)| joint).collect())
+}
+
+fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut Body) -> Result<()> {
+    let Some(mesh) = nodes.raw[node].mesh else { return Ok(()) };
+    let mesh_name = document.root.meshes[mesh.value()].name.clone();
+    let place = nodes.raw[node].name.clone().or(mesh_name).unwrap_or_else(|| format!("node_{node}"));
+    let in_place = |e: Error| e.at(format!("node `{place}`"));
+    let joints = joints_of(document, nodes, node, &body.links).map_err(in_place)?;
+    let carrier = nodes.link_above(node).expect("a node without a link above it is a link");
+    for primitive in &document.root.meshes[mesh.value()].primitives {
+        let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
+        let positions = document.floats::<3>(positions).map_err(in_place)?;
+        if let Some(bad) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(in_place(Error::failed(format!(
+                "vertex {bad} has a position that is not a finite number; repair the mesh and export it again"
+            ))));
+        }
+        let heaviest = match &joints {
+            Some(joints) if !joints.is_empty() => {
+                heaviest_joints(document, primitive, positions.len(), joints.len()).map_err(in_place)?
+            }
+            _ => Vec::new(),
+        };
+        // link_from_mesh of a point: its heaviest joint's, or its node's.
+        let link_from_node = body.links[carrier].world_from_link.inverse() * nodes.world_from_node[node];
+        let of_point = |point: usize| match (&joints, heaviest.get(point)) {
+            (Some(joints), Some(&joint)) => joints[joint],
+            _ => (carrier, link_from_node),
+        };
+        if is_taxels(primitive) {
+            let taxels = read_taxels(document, primitive, &positions, of_point).map_err(in_place)?;
+            body.taxels.extend(taxels);
+            continue;
+        }
+        let triangles = read_triangles(document, primitive, positions.len()).map_err(in_place)?;
+        if triangles.is_empty() {
+            continue;
+        }
+        let home = match &joints {
+            Some(joints) if !heaviest.is_empty() => Home::Skinned { joints: joints.clone(), heaviest },
+            _ => Home::Rigid { link: carrier, link_from_mesh: link_from_node },
+        };
+        body.surfaces.push(Surface {
+            name: place.clone(),
+            positions: positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect(),
+            triangles,
+            home,
+        });
+    }
+    Ok(())
+}
+
+fn read_triangles(document: &Document, primitive: &Primitive, vertices: usize) -> Result<Vec<[u32; 3]>> {
+    let Checked::Valid(mode) = primitive.mode else { return Ok(Vec::new()) };
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(Vec::new());
+    }
+    let order: Vec<u32> = match primitive.indices {
+        Some(indices) => document.integers::<1>(indices.value())?.into_iter().map(|[i]| i).collect(),
+        None => (0..u32::try_from(vertices).unwrap_or(u32::MAX)).collect(),
+    };
+    if let Some(beyond) = order.iter().find(|&&i| i as usize >= vertices) {
+        return Err(Error::failed(format!(
+            "a triangle names vertex {beyond} of {vertices}: the file is damaged; export it again"
+        )));
+    }
+    let triangles: Vec<[u32; 3]> = match mode {
+        Mode::Triangles => order.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        Mode::TriangleStrip => order
+            .windows(3)
+            .enumerate()
+            .map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })
+            .collect(),
+        _ => order.get(1..).unwrap_or(&[]).windows(2).map(|t| [order[0], t[0], t[1]]).collect(),
+    };
+    // A triangle that names a vertex twice covers nothing.
+    Ok(triangles.into_iter().filter(|[a, b, c]| a != b && b != c && c != a).collect())
+}
+
+fn read_taxels(
+    document: &Document,
+    primitive: &Primitive,
+    positions: &[[f32; 3]],
+    of_point: impl Fn(usize) -> (usize, DAffine3),
+) -> Result<Vec<Taxel>> {
+    let column = |name: &str| -> Result<Option<Vec<f32>>> {
+        let Some(accessor) = custom(primitive, name) else { return Ok(None) };
+        if !document.is_scalar_float(accessor) {
+            return Err(Error::failed(format!(
+                "attribute _{name} is not SCALAR FLOAT; docs/layout.md says why it must be"
+            )));
+        }
+        let column: Vec<f32> = document.floats::<1>(accessor)?.into_iter().map(|[x]| x).collect();
+        if column.len() != positions.len() {
+            return Err(Error::failed(format!(
+                "attribute _{name} has {} values for {} points; export the file again",
+                column.len(),
+                positions.len()
+            )));
+        }
+        Ok(Some(column))
+    };
+    let ids = column(TAXEL_ID)?.unwrap_or_default();
+    let normals = [column(NORMAL[0])?, column(NORMAL[1])?, column(NORMAL[2])?];
+    let areas = column(AREA)?;
+    let modalities = column(MODALITY)?;
+    let mut taxels = Vec::with_capacity(ids.len());
+    for (point, (&id, position)) in ids.iter().zip(positions).enumerate() {
+        if !(id >= 0.0 && id <= MAX_TAXEL_ID as f32 && id.fract() == 0.0) {
+            return Err(Error::failed(format!(
+                "point {point} has taxel id {id}; ids are whole numbers from 0 to {MAX_TAXEL_ID}"
+            )));
+        }
+        let (link, link_from_mesh) = of_point(point);
+        let normal = match &normals {
+            [Some(x), Some(y), Some(z)] => DVec3::new(x[point].into(), y[point].into(), z[point].into()),
+            _ => DVec3::ZERO,
+        };
+        // Normals go by the inverse transpose; an area by how much the plane across its normal is stretched.
+        let m: DMat3 = link_from_mesh.matrix3;
+        let cofactor = m.inverse().transpose() * m.determinant().abs();
+        let stretched = cofactor * normal.normalize_or_zero();
+        let area = areas.as_ref().map_or(0.0, |areas| f64::from(areas[point]));
+        if !(area.is_finite() && area >= 0.0) {
+            return Err(Error::failed(format!("taxel {id} has area {area}; areas are m², 0 where unknown")));
+        }
+        let stretch = if normal == DVec3::ZERO { 1.0 } else { stretched.length() };
+        let modality = modalities.as_ref().map_or(0.0, |m| m[point]);
+        taxels.push(Taxel {
+            id: id as u32,
+            link,
+            position_in_link: link_from_mesh.transform_point3(DVec3::from_array(position.map(f64::from))),
+            normal_in_link: if stretched.is_finite() { stretched.normalize_or_zero() } else { DVec3::ZERO },
+            area: area * stretch,
+            modality: Modality::from_code(if modality >= 0.0 { modality as u32 } else { 0 }),
+        });
+    }
+    Ok(taxels)
+}
+
+/// A taxel whose normal the file leaves out, or has as zero, takes that of the surface beneath it.
+fn complete_normals(body: &mut Body) -> Result<()> {
+    let mut without: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (index, taxel) in body.taxels.iter().enumerate() {
+        if taxel.normal_in_link == DVec3::ZERO {
+            without.entry(taxel.link).or_default().push(index);
+        }
+    }
+    for (link, taxels) in without {
+        let surface = body.surface_in_link(link, None);
+        if surface.is_empty() {
+            return Err(Error::failed(format!(
+                "taxel {} has no normal, and there is no surface to take it from; add _NX, _NY, _NZ or a mesh",
+                body.taxels[taxels[0]].id
+            )));
+        }
+        body.findings.push(format!(
+            "{} taxels on link `{}` have no normal of their own; taken from the surface",
+            taxels.len(),
+            body.links[link].name
+        ));
+        for taxel in taxels {
+            let hit = surface.nearest(body.taxels[taxel].position_in_link);
+            body.taxels[taxel].normal_in_link = hit.map_or(DVec3::Z, |hit| hit.normal);
+        }
+    }
+    Ok(())
+}
+
+fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &Body) -> Result<Vec<FieldSpec>> {
+    let mut fields: Vec<FieldSpec> = Vec::new();
+    for &node in &nodes.in_order {
+        let Some(text) = &nodes.field[node] else { continue };
+        let place = document.root.nodes[node].name.clone().unwrap_or_else(|| format!("node_{node}"));
+        fields.push(FieldSpec::from_json(text).map_err(|e| e.at(format!("field node `{place}`")))?);
+    }
+    fields.sort_by(|a, b| a.name.cmp(&b.name));
+    if let Some(pair) = fields.windows(2).find(|pair| pair[0].name == pair[1].name) {
+        return Err(Error::failed(format!("two fields are called `{}`; rename one", pair[0].name)));
+    }
+    for field in &fields {
+        if let Some(id) = field.members.keys().find(|&&id| body.taxel_index(id).is_none())
+            && !body.taxels.is_empty()
+        {
+            return Err(Error::failed(format!(
+                "field `{}` names taxel {id}, which the body does not have; remove it from the field or add the taxel",
+                field.name
+            )));
+        }
+    }
+    parents_first(fields)
+}
+
+/// The fields by name, but every parent before its children.
+fn parents_first(fields: Vec<FieldSpec>) -> Result<Vec<FieldSpec>> {
+    let names: HashMap<&str, usize> = fields.iter().enumerate().map(|(i, f)| (f.name.as_str(), i)).collect();
+    let mut depths = Vec::with_capacity(fields.len());
+    for field in &fields {
+        let mut depth = 0;
+        let mut at = field;
+        while let Some(parent) = &at.parent {
+            depth += 1;
+            at = names.get(parent.as_str()).map(|&i| &fields[i]).ok_or_else(|| {
+                Error::failed(format!(
+                    "field `{}` has the parent `{parent}`, which is no field of this body; name one that is",
+                    at.name
+                ))
+            })?;
+            if depth > fields.len() {
+                return Err(Error::failed(format!("field `{}` is its own ancestor; break the ring", field.name)));
+            }
+        }
+        depths.push(depth);
+    }
+    let mut in_order: Vec<(usize, FieldSpec)> = depths.into_iter().zip(fields).collect();
+    in_order.sort_by_key(|(depth, _)| *depth);
+    Ok(in_order.into_iter().map(|(_, field)| field).collect())
+}

@@ -1,0 +1,226 @@
+//! A body's triangles, and the two questions asked of them: what is nearest, and what does a ray hit.
+
+use glam::{DAffine3, DVec3};
+use rstar::primitives::GeomWithData;
+use rstar::{AABB, PointDistance, RTree, RTreeObject};
+
+use super::Body;
+
+/// The triangles of one mesh, in the mesh's own coordinates.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Name of the node that shows it.
+    pub name: String,
+    /// Vertices in the mesh's coordinates.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// What carries it.
+    pub home: Home,
+}
+
+/// What carries a mesh.
+#[derive(Clone, Debug)]
+pub enum Home {
+    /// One link carries all of it.
+    Rigid {
+        /// The link.
+        link: usize,
+        /// Takes mesh coordinates to the link's frame.
+        link_from_mesh: DAffine3,
+    },
+    /// Joints carry it, each vertex by several; its node's transform means nothing.
+    Skinned {
+        /// Per joint its link, and link_from_mesh at bind.
+        joints: Vec<(usize, DAffine3)>,
+        /// Per vertex the joint that carries it most.
+        heaviest: Vec<usize>,
+    },
+}
+
+impl Surface {
+    /// Takes mesh coordinates to the frame of `link`: at bind for a skinned mesh, at rest for a rigid one.
+    fn link_from_mesh(&self, body: &Body, link: usize) -> Option<DAffine3> {
+        match &self.home {
+            Home::Rigid { link: carrier, link_from_mesh } => {
+                Some(body.rest_transform(link, *carrier) * *link_from_mesh)
+            }
+            Home::Skinned { joints, .. } => joints
+                .iter()
+                .find(|(joint, _)| *joint == link)
+                .or(joints.first())
+                .map(|(joint, joint_from_mesh)| body.rest_transform(link, *joint) * *joint_from_mesh),
+        }
+    }
+
+    /// The link that carries vertex `vertex` most.
+    #[must_use]
+    pub fn carrier(&self, vertex: usize) -> usize {
+        match &self.home {
+            Home::Rigid { link, .. } => *link,
+            Home::Skinned { joints, heaviest } => joints[heaviest[vertex]].0,
+        }
+    }
+}
+
+impl Body {
+    /// The surface in the frame of `link`, searchable. With `reach`, only triangles that touch the ball (centre, radius).
+    #[must_use]
+    pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
+        let mut triangles = Vec::new();
+        for surface in &self.surfaces {
+            let Some(link_from_mesh) = surface.link_from_mesh(self, link) else { continue };
+            let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
+            let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
+            for &[a, b, c] in &surface.triangles {
+                let [a, b, c] = [points[a as usize], points[b as usize], points[c as usize]];
+                let triangle = Triangle(if mirrored { [a, c, b] } else { [a, b, c] });
+                let near = |(centre, radius): (DVec3, f64)| {
+                    triangle.envelope().distance_2(&centre.to_array()) <= radius * radius
+                };
+                if reach.is_none_or(near) && triangle.unit_normal().is_some() {
+                    triangles.push(triangle);
+                }
+            }
+        }
+        SurfaceIndex::new(triangles)
+    }
+}
+
+/// Three corners, counter-clockwise seen from outside.
+#[derive(Clone, Copy, Debug)]
+struct Triangle([DVec3; 3]);
+
+impl Triangle {
+    /// The outward normal; `None` for a triangle without area.
+    fn unit_normal(&self) -> Option<DVec3> {
+        let [a, b, c] = self.0;
+        (b - a).cross(c - a).try_normalize()
+    }
+
+    /// The point of the triangle that is nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+    fn nearest(&self, p: DVec3) -> DVec3 {
+        let [a, b, c] = self.0;
+        let (ab, ac, ap) = (b - a, c - a, p - a);
+        let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+        if d1 <= 0.0 && d2 <= 0.0 {
+            return a;
+        }
+        let bp = p - b;
+        let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+        if d3 >= 0.0 && d4 <= d3 {
+            return b;
+        }
+        let vc = d1 * d4 - d3 * d2;
+        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+            return a + ab * (d1 / (d1 - d3));
+        }
+        let cp = p - c;
+        let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+        if d6 >= 0.0 && d5 <= d6 {
+            return c;
+        }
+        let vb = d5 * d2 - d1 * d6;
+        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+            return a + ac * (d2 / (d2 - d6));
+        }
+        let va = d3 * d6 - d5 * d4;
+        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+            return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+        }
+        let scale = 1.0 / (va + vb + vc);
+        a + ab * (vb * scale) + ac * (vc * scale)
+    }
+
+    /// Where the line `origin + t·direction` pierces the triangle, as t (Möller and Trumbore).
+    fn pierced(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let [a, b, c] = self.0;
+        let (ab, ac) = (b - a, c - a);
+        let across = direction.cross(ac);
+        let determinant = ab.dot(across);
+        // Edge-on, or so near to it that the division means nothing.
+        if determinant.abs() <= 1e-12 * ab.length() * ac.length() * direction.length() {
+            return None;
+        }
+        let from_a = origin - a;
+        let beta = from_a.dot(across) / determinant;
+        let turned = from_a.cross(ab);
+        let gamma = direction.dot(turned) / determinant;
+        // A ray along a shared edge must not slip between the two triangles.
+        let inside = beta >= -1e-9 && gamma >= -1e-9 && beta + gamma <= 1.0 + 1e-9;
+        inside.then(|| ac.dot(turned) / determinant)
+    }
+}
+
+impl RTreeObject for Triangle {
+    type Envelope = AABB<[f64; 3]>;
+
+    fn envelope(&self) -> Self::Envelope {
+        AABB::from_points(&self.0.map(|p| p.to_array()))
+    }
+}
+
+impl PointDistance for Triangle {
+    fn distance_2(&self, point: &[f64; 3]) -> f64 {
+        let p = DVec3::from_array(*point);
+        p.distance_squared(self.nearest(p))
+    }
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Where, in the frame the index was made in.
+    pub position: DVec3,
+    /// The outward unit normal of the triangle there.
+    pub normal: DVec3,
+}
+
+/// A surface's triangles in one frame, in a tree.
+#[derive(Debug)]
+pub struct SurfaceIndex {
+    tree: RTree<GeomWithData<Triangle, DVec3>>,
+}
+
+impl SurfaceIndex {
+    fn new(triangles: Vec<Triangle>) -> Self {
+        let triangles = triangles
+            .into_iter()
+            .filter_map(|triangle| Some(GeomWithData::new(triangle, triangle.unit_normal()?)))
+            .collect();
+        Self { tree: RTree::bulk_load(triangles) }
+    }
+
+    /// A searchable surface of the triangles whose corners `triangles` gives; those without area are left out.
+    #[must_use]
+    pub fn of_triangles(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
+        Self::new(triangles.into_iter().map(Triangle).collect())
+    }
+
+    /// Whether there is no surface at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.tree.size() == 0
+    }
+
+    /// The surface point nearest to `p`.
+    #[must_use]
+    pub fn nearest(&self, p: DVec3) -> Option<Hit> {
+        let triangle = self.tree.nearest_neighbor(p.to_array())?;
+        Some(Hit { position: triangle.geom().nearest(p), normal: triangle.data })
+    }
+
+    /// Where the line through `p` along the unit vector `direction` meets the surface nearest to `p`, among places
+    /// within `reach` of `p` whose outward normal does not look away from `direction`.
+    #[must_use]
+    pub fn along(&self, p: DVec3, direction: DVec3, reach: f64) -> Option<Hit> {
+        let ends = AABB::from_corners((p - direction * reach).to_array(), (p + direction * reach).to_array());
+        self.tree
+            .locate_in_envelope_intersecting(ends)
+            .filter(|triangle| triangle.data.dot(direction) > 0.0)
+            .filter_map(|triangle| Some((triangle.geom().pierced(p, direction)?, triangle.data)))
+            .filter(|(t, _)| t.abs() <= reach)
+            .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+            .map(|(t, normal)| Hit { position: p + direction * t, normal })
+    }
+}

@@ -1,0 +1,163 @@
+//! The one error of this crate.
+//!
+//! An [`Error`] is one line a person can act on: which file, where in it, what is wrong, what to do. Programs ask it
+//! questions ([`Error::is_usage`], [`Error::is_not_found`]) instead of matching on its insides.
+
+use std::fmt;
+use std::path::Path;
+
+/// `Result` with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What went wrong, in one line.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Error {
+    kind: Kind,
+    place: Option<String>,
+    what: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Failed,
+    Usage,
+    NotFound,
+    NoAdapter,
+}
+
+impl Error {
+    /// Something that was read cannot be used, or something that was tried did not succeed.
+    #[must_use]
+    pub fn failed(what: impl Into<String>) -> Self {
+        Self::new(Kind::Failed, what.into())
+    }
+
+    /// The caller asked for something that makes no sense, or not together.
+    #[must_use]
+    pub fn usage(what: impl Into<String>) -> Self {
+        Self::new(Kind::Usage, what.into())
+    }
+
+    /// The machine has no adapter that the GPU backend can run on.
+    #[must_use]
+    pub fn no_adapter(what: impl Into<String>) -> Self {
+        Self::new(Kind::NoAdapter, what.into())
+    }
+
+    /// An operation on the file at `path` failed in the operating system.
+    #[must_use]
+    pub fn io(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
+        let (kind, what) = match error.kind() {
+            std::io::ErrorKind::NotFound => (Kind::NotFound, "no such file or directory".to_owned()),
+            std::io::ErrorKind::IsADirectory => (Kind::Failed, "this is a folder; name a file".to_owned()),
+            _ => (Kind::Failed, error.to_string()),
+        };
+        Self::new(kind, what).at(path.as_ref().display().to_string())
+    }
+
+    fn new(kind: Kind, what: String) -> Self {
+        Self { kind, place: None, what }
+    }
+
+    /// The same error, told to be at `place` (a file, a row, a key). Called again, the outer place comes first.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        self.place = Some(match self.place.take() {
+            Some(inner) => format!("{place}: {inner}"),
+            None => place.to_string(),
+        });
+        self
+    }
+
+    /// True when the request itself was wrong: arguments that do not exist or do not go together.
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        self.kind == Kind::Usage
+    }
+
+    /// True when a file that was named is not there.
+    #[must_use]
+    pub fn is_not_found(&self) -> bool {
+        self.kind == Kind::NotFound
+    }
+
+    /// True when the GPU backend was asked for and no adapter can run it.
+    #[must_use]
+    pub fn is_no_adapter(&self) -> bool {
+        self.kind == Kind::NoAdapter
+    }
+
+    /// The exit code that a command ends with on this error: 2 for usage, else 1.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        if self.is_usage() { 2 } else { 1 }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let line = match &self.place {
+            Some(place) => format!("{place}: {}", self.what),
+            None => self.what.clone(),
+        };
+        // Whatever a library or a file name put in, an error stays one line.
+        let words: Vec<&str> = line.split(['\n', '\r']).map(str::trim).filter(|s| !s.is_empty()).collect();
+        f.write_str(&words.join(" "))
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Error({self})")
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// The name among `known` that is nearest to `asked`, if one is near enough to be a slip of the hand.
+///
+/// Near is an edit distance of at most a third of the longer word.
+#[must_use]
+pub fn nearest<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|name| (edit_distance(asked, name), name))
+        .filter(|&(distance, name)| 3 * distance <= asked.chars().count().max(name.chars().count()))
+        .min()
+        .map(|(_, name)| name)
+}
+
+/// Levenshtein's distance between `a` and `b`, in characters.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &cb) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line_with_its_place() {
+        let error = Error::failed("bad\n  value").at("row 3").at("a.csv");
+        assert_eq!(error.to_string(), "a.csv: row 3: bad value");
+        assert_eq!(error.exit_code(), 1);
+        assert_eq!(Error::usage("x").exit_code(), 2);
+    }
+
+    #[test]
+    fn a_slip_of_the_hand_finds_its_word() {
+        assert_eq!(nearest("centriod", ["total", "centroid", "axis"]), Some("centroid"));
+        assert_eq!(nearest("banana", ["total", "centroid", "axis"]), None);
+    }
+}

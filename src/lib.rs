@@ -1,0 +1,24 @@
+//! A sense of touch for whole robots: touch frames in, percepts out.
+
+pub mod author;
+pub mod body;
+pub mod error;
+pub mod percept;
+pub mod signal;
+pub mod sink;
+pub mod source;
+
+pub use body::Body;
+pub use error::{Error, Result};
+
+use std::io::Write as _;
+use std::path::Path;
+
+/// Writes `bytes` at `path`, whole or not at all: to a temporary file beside it, then renamed over it.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))?;
+    file.write_all(bytes).map_err(|e| Error::io(path, &e))?;
+    file.persist(path).map_err(|e| Error::io(path, &e.error))?;
+    Ok(())
+}

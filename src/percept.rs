@@ -1,0 +1,325 @@
+//! What a field reports for a frame: quantities that are present or absent with a reason.
+//!
+//! [`Percepts`] holds a whole batch in columns, in the precision of the backend that made it; [`Percept`] is one field
+//! in one frame, copied out for reading. A quantity is `Some` or it is absent, and then [`Flags`] say why; nothing here
+//! is ever NaN or infinite.
+
+use bitflags::bitflags;
+
+bitflags! {
+    /// Why a quantity is absent or in doubt, and what was wrong with the input.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub struct Flags: u32 {
+        /// The field is not in contact: everything that needs a touch is absent.
+        const NO_CONTACT = 1 << 0;
+        /// Only one taxel is pressed: there is no line through two points, and no spread.
+        const ONE_TAXEL = 1 << 1;
+        /// The second and third farthest points are as good as equally far (R₂ − R₃ ≤ 2⁻¹⁴ R₁): orientation is in doubt.
+        const TIE = 1 << 2;
+        /// The points that would define a line fall together: orientation (or axis) is absent.
+        const COINCIDENT = 1 << 3;
+        /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
+        const ISOTROPIC = 1 << 4;
+        /// The centroid did not move: there is no direction of motion.
+        const STILL = 1 << 5;
+        /// A pressed taxel is above its P_max; its value is kept.
+        const SATURATED = 1 << 6;
+        /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
+        const FAULTY_INPUT = 1 << 7;
+        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept.
+        const OUT_OF_RANGE = 1 << 8;
+        /// A taxel's value is missing and left out of every sum.
+        const INCOMPLETE = 1 << 9;
+        /// The field has no chart: what needs (u, v) is absent.
+        const NO_CHART = 1 << 10;
+        /// There is no previous frame to measure motion from.
+        const NO_PREVIOUS = 1 << 11;
+        /// The time step is zero, negative, or longer than the scene allows.
+        const BAD_DT = 1 << 12;
+        /// The field's channels have not been heard from for too long.
+        const STALE = 1 << 13;
+        /// The field is touched in several places: its centroid may lie where nobody touches.
+        const SEVERAL = 1 << 14;
+    }
+}
+
+impl Flags {
+    /// The flags' names as percept NDJSON spells them, in order.
+    pub fn names(self) -> impl Iterator<Item = String> {
+        self.iter_names().map(|(name, _)| name.to_lowercase())
+    }
+}
+
+bitflags! {
+    /// Quantities a percept can hold: what is asked for, and what is present.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub struct Outputs: u32 {
+        /// S = Σ wᵢPᵢ.
+        const TOTAL = 1 << 0;
+        /// max Pᵢ.
+        const PEAK = 1 << 1;
+        /// Number of taxels with P > 0.
+        const ACTIVE = 1 << 2;
+        /// Summed area of the taxels with P > 0, m².
+        const AREA = 1 << 3;
+        /// Pressure-weighted mean (u, v) in the field's chart, m (eq. 1–2).
+        const CENTROID = 1 << 4;
+        /// The same point on the surface, m.
+        const POSITION = 1 << 5;
+        /// The outward unit normal there.
+        const NORMAL = 1 << 6;
+        /// Angle of the line through the two farthest points, rad in [0, π) (eq. 9–19).
+        const ORIENTATION = 1 << 7;
+        /// Principal axis of the pressure-weighted second moments, rad in [0, π).
+        const AXIS = 1 << 8;
+        /// (λ₁ − λ₂)/(λ₁ + λ₂) of those moments, in [0, 1].
+        const ANISOTROPY = 1 << 9;
+    }
+}
+
+impl Outputs {
+    /// The outputs' names as the command line and NDJSON spell them, in order.
+    pub fn names(self) -> impl Iterator<Item = String> {
+        self.iter_names().map(|(name, _)| name.to_lowercase())
+    }
+
+    /// The one output called `name`, if there is one.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
+    }
+}
+
+/// The arithmetic that made the numbers, and so the digits worth printing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// IEEE 754 binary32: backends `cpu` and `gpu`.
+    F32,
+    /// IEEE 754 binary64: backend `reference`.
+    F64,
+}
+
+/// One field's percept for one frame. Lengths in metres, angles in radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Percept {
+    /// Index of the field.
+    pub field: usize,
+    /// Whether the field is touched.
+    pub contact: bool,
+    /// Why quantities are absent, or in doubt.
+    pub flags: Flags,
+    /// S = Σ wᵢPᵢ, in the unit of P.
+    pub total: Option<f64>,
+    /// max Pᵢ, in the unit of P.
+    pub peak: Option<f64>,
+    /// Number of taxels with P > 0.
+    pub active: Option<u32>,
+    /// Summed area of those taxels, m².
+    pub area: Option<f64>,
+    /// Centroid (u, v) in the field's chart, m.
+    pub centroid: Option<[f64; 2]>,
+    /// The touched point, m: on the surface, or for a field without a chart the pressure-weighted mean.
+    pub position: Option<[f64; 3]>,
+    /// Outward unit normal at that point.
+    pub normal: Option<[f64; 3]>,
+    /// Two-point orientation, rad in [0, π).
+    pub orientation: Option<f64>,
+    /// Principal axis, rad in [0, π).
+    pub axis: Option<f64>,
+    /// Anisotropy, in [0, 1].
+    pub anisotropy: Option<f64>,
+    /// Whether position and normal are in the world, because the frame carried a pose, or in the field's anchor.
+    pub in_world: bool,
+}
+
+/// One precision's columns, a value per cell; a cell is `frame · fields + field`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Columns<T> {
+    pub(crate) total: Vec<T>,
+    pub(crate) peak: Vec<T>,
+    pub(crate) area: Vec<T>,
+    /// (u, v, depth) in the chart; of a field without one, along its anchor's axes from the field's origin.
+    pub(crate) centroid: Vec<[T; 3]>,
+    pub(crate) orientation: Vec<T>,
+    pub(crate) axis: Vec<T>,
+    pub(crate) anisotropy: Vec<T>,
+}
+
+impl<T: Clone + Default> Columns<T> {
+    fn resize(&mut self, wanted: Outputs, cells: usize) {
+        fn column<V: Clone + Default>(column: &mut Vec<V>, wanted: bool, cells: usize) {
+            column.clear();
+            column.resize(if wanted { cells } else { 0 }, V::default());
+        }
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        column(&mut self.total, wanted.contains(Outputs::TOTAL), cells);
+        column(&mut self.peak, wanted.contains(Outputs::PEAK), cells);
+        column(&mut self.area, wanted.contains(Outputs::AREA), cells);
+        column(&mut self.centroid, wanted.intersects(place), cells);
+        column(&mut self.orientation, wanted.contains(Outputs::ORIENTATION), cells);
+        column(&mut self.axis, wanted.contains(Outputs::AXIS), cells);
+        column(&mut self.anisotropy, wanted.contains(Outputs::ANISOTROPY), cells);
+    }
+}
+
+/// The columns in the precision of the backend that made them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    F32(Columns<f32>),
+    F64(Columns<f64>),
+}
+
+/// The percepts of a batch: `frames × fields` cells, only the outputs that were asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Percepts {
+    outputs: Outputs,
+    fields: usize,
+    pub(crate) first_frame: u64,
+    pub(crate) t_s: Vec<f64>,
+    pub(crate) in_world: Vec<bool>,
+    pub(crate) flags: Vec<Flags>,
+    pub(crate) present: Vec<Outputs>,
+    pub(crate) active: Vec<u32>,
+    pub(crate) values: Values,
+    pub(crate) position: Vec<[f64; 3]>,
+    pub(crate) normal: Vec<[f64; 3]>,
+}
+
+impl Percepts {
+    /// An empty batch for `fields` fields that holds `outputs`.
+    #[must_use]
+    pub fn new(outputs: Outputs, fields: usize, precision: Precision) -> Self {
+        Self {
+            outputs,
+            fields,
+            first_frame: 0,
+            t_s: Vec::new(),
+            in_world: Vec::new(),
+            flags: Vec::new(),
+            present: Vec::new(),
+            active: Vec::new(),
+            values: match precision {
+                Precision::F32 => Values::F32(Columns::default()),
+                Precision::F64 => Values::F64(Columns::default()),
+            },
+            position: Vec::new(),
+            normal: Vec::new(),
+        }
+    }
+
+    /// Makes room for `frames` frames, every cell empty. Allocates only when a batch is larger than all before it.
+    pub(crate) fn reset(&mut self, frames: usize) {
+        fn refill<V: Clone>(column: &mut Vec<V>, length: usize, value: V) {
+            column.clear();
+            column.resize(length, value);
+        }
+        let cells = frames * self.fields;
+        let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
+        refill(&mut self.t_s, frames, 0.0);
+        refill(&mut self.in_world, frames, false);
+        refill(&mut self.flags, cells, Flags::empty());
+        refill(&mut self.present, cells, Outputs::empty());
+        refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
+        refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
+        refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        match &mut self.values {
+            Values::F32(columns) => columns.resize(self.outputs, cells),
+            Values::F64(columns) => columns.resize(self.outputs, cells),
+        }
+    }
+
+    /// The outputs that were asked for.
+    #[must_use]
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// The arithmetic the numbers were made with.
+    #[must_use]
+    pub fn precision(&self) -> Precision {
+        match self.values {
+            Values::F32(_) => Precision::F32,
+            Values::F64(_) => Precision::F64,
+        }
+    }
+
+    /// Number of frames in the batch.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Number of fields in every frame.
+    #[must_use]
+    pub fn fields(&self) -> usize {
+        self.fields
+    }
+
+    /// Number of the batch's frame `frame` since the engine started.
+    #[must_use]
+    pub fn frame_number(&self, frame: usize) -> u64 {
+        self.first_frame + frame as u64
+    }
+
+    /// Time of the batch's frame `frame`, s.
+    #[must_use]
+    pub fn t_s(&self, frame: usize) -> f64 {
+        self.t_s[frame]
+    }
+
+    /// The percept of field `field` in the batch's frame `frame`.
+    #[must_use]
+    pub fn get(&self, frame: usize, field: usize) -> Percept {
+        let cell = frame * self.fields + field;
+        let flags = self.flags[cell];
+        let present = self.present[cell];
+        let has = |output| present.contains(output);
+        let mut percept = Percept {
+            field,
+            contact: !flags.contains(Flags::NO_CONTACT),
+            flags,
+            total: None,
+            peak: None,
+            active: has(Outputs::ACTIVE).then(|| self.active[cell]),
+            area: None,
+            centroid: None,
+            position: has(Outputs::POSITION).then(|| self.position[cell]),
+            normal: has(Outputs::NORMAL).then(|| self.normal[cell]),
+            orientation: None,
+            axis: None,
+            anisotropy: None,
+            in_world: self.in_world[frame],
+        };
+        match &self.values {
+            Values::F32(columns) => columns.fill(&mut percept, present, cell),
+            Values::F64(columns) => columns.fill(&mut percept, present, cell),
+        }
+        percept
+    }
+
+    /// All percepts of the batch's frame `frame`, in field order.
+    pub fn frame(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
+        (0..self.fields).map(move |field| self.get(frame, field))
+    }
+
+    /// The percepts of the fields in contact in the batch's frame `frame`.
+    pub fn touched(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
+        self.frame(frame).filter(|percept| percept.contact)
+    }
+}
+
+impl<T: Copy + Into<f64>> Columns<T> {
+    fn fill(&self, percept: &mut Percept, present: Outputs, cell: usize) {
+        let scalar = |output, column: &[T]| present.contains(output).then(|| column[cell].into());
+        percept.total = scalar(Outputs::TOTAL, &self.total);
+        percept.peak = scalar(Outputs::PEAK, &self.peak);
+        percept.area = scalar(Outputs::AREA, &self.area);
+        percept.orientation = scalar(Outputs::ORIENTATION, &self.orientation);
+        percept.axis = scalar(Outputs::AXIS, &self.axis);
+        percept.anisotropy = scalar(Outputs::ANISOTROPY, &self.anisotropy);
+        percept.centroid = present.contains(Outputs::CENTROID).then(|| {
+            let [u, v, _] = self.centroid[cell];
+            [u.into(), v.into()]
+        });
+    }
+}

@@ -1,0 +1,118 @@
+//! Frames: a time stamp and the raw values of some taxels.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DQuat, DVec3};
+
+/// One taxel's raw value as it travels to a backend: a single-precision number, or missing, or faulty.
+///
+/// Kept as bits, because shader compilers may assume that NaN never occurs; each backend tells the cases apart by
+/// integer comparison.
+#[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct RawValue(u32);
+
+impl RawValue {
+    /// No value arrived.
+    pub const MISSING: Self = Self(0xFFFF_FFFF);
+    /// Something arrived that is no number.
+    pub const FAULTY: Self = Self(0x7FC0_0000);
+
+    /// The value `value`, rounded to single precision. NaN and infinities are faulty. What is not zero stays not zero:
+    /// an underflow becomes the smallest denormal, so that calibration can see that it alters the value.
+    #[must_use]
+    pub fn new(value: f64) -> Self {
+        let single = value as f32;
+        if !single.is_finite() {
+            return Self::FAULTY;
+        }
+        if single == 0.0 && value != 0.0 {
+            return Self(f32::from_bits(1).copysign(single).to_bits());
+        }
+        Self(single.to_bits())
+    }
+
+    /// The bits a backend reads.
+    #[must_use]
+    pub fn to_bits(self) -> u32 {
+        self.0
+    }
+
+    /// Whether no value arrived.
+    #[must_use]
+    pub fn is_missing(self) -> bool {
+        self == Self::MISSING
+    }
+
+    /// The number, if it is one.
+    #[must_use]
+    pub fn number(self) -> Option<f64> {
+        let value = f32::from_bits(self.0);
+        value.is_finite().then(|| value.into())
+    }
+}
+
+impl Default for RawValue {
+    fn default() -> Self {
+        Self::MISSING
+    }
+}
+
+impl std::fmt::Debug for RawValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.number() {
+            Some(value) => write!(f, "{value}"),
+            None if self.is_missing() => f.write_str("missing"),
+            None => f.write_str("faulty"),
+        }
+    }
+}
+
+/// A rigid pose in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Translation, m.
+    pub translation: DVec3,
+    /// Rotation, a unit quaternion.
+    pub rotation: DQuat,
+}
+
+/// The raw values of one instant. Values stand in the order of the taxel ids that source and engine agreed on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// Time, s.
+    pub t_s: f64,
+    /// One value a taxel, [`RawValue::MISSING`] where none arrived.
+    pub values: Vec<RawValue>,
+    /// Poses of links by name, where the frame carries them: world_from_link.
+    pub pose: Vec<(String, Pose)>,
+}
+
+impl Frame {
+    /// A frame at `t_s` in which all of `taxels` values are missing.
+    #[must_use]
+    pub fn missing(t_s: f64, taxels: usize) -> Self {
+        Self { t_s, values: vec![RawValue::MISSING; taxels], pose: Vec::new() }
+    }
+
+    /// Makes every value missing and drops the pose, keeping the allocations.
+    pub fn clear(&mut self) {
+        self.values.fill(RawValue::MISSING);
+        self.pose.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_raw_value_keeps_what_it_was() {
+        assert_eq!(RawValue::new(1023.0).number(), Some(1023.0));
+        assert_eq!(RawValue::new(f64::NAN), RawValue::FAULTY);
+        assert_eq!(RawValue::new(1e39), RawValue::FAULTY);
+        assert!(RawValue::default().is_missing());
+        assert_eq!(RawValue::MISSING.number(), None);
+        assert_ne!(RawValue::new(1e-60).number(), Some(0.0));
+        assert!(RawValue::new(-1e-60).number().unwrap() < 0.0);
+    }
+}

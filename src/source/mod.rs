@@ -1,0 +1,28 @@
+//! Sources: where frames come from.
+//!
+//! A source knows the taxel ids it delivers and nothing of bodies or engines.
+
+use crate::error::Result;
+use crate::signal::Frame;
+
+/// Something that delivers frames.
+pub trait Source {
+    /// The taxel ids whose values its frames hold, in the order of [`Frame::values`].
+    fn taxels(&self) -> &[u32];
+
+    /// Reads the next frame into `frame`, whose `values` already have the right length. `false` at the end.
+    ///
+    /// # Errors
+    /// What arrived cannot be understood; the message names the place.
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool>;
+
+    /// How much of the whole has been read, in 0..=1, where that is known.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
+
+    /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.
+    fn losses(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
