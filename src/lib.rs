@@ -1,15 +1,29 @@
 //! A sense of touch for whole robots: touch frames in, percepts out.
 
+#![deny(missing_docs)]
+#![warn(unreachable_pub)]
+
 pub mod author;
+pub mod backend;
 pub mod body;
+mod engine;
 pub mod error;
+pub mod field;
 pub mod percept;
+pub mod scene;
 pub mod signal;
 pub mod sink;
 pub mod source;
+mod stage;
 
+pub use backend::BackendKind;
+pub use backend::agreement::{Agreement, Comparison};
 pub use body::Body;
+pub use engine::{Engine, Options};
 pub use error::{Error, Result};
+pub use percept::{Flags, Outputs, Percept, Percepts, Precision};
+pub use scene::{Plan, Scene};
+pub use signal::{Calibration, Frame, Pose, RawValue};
 
 use std::io::Write as _;
 use std::path::Path;

@@ -216,7 +216,7 @@ impl Percepts {
         let cells = frames * self.fields;
         let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
         refill(&mut self.t_s, frames, 0.0);
-        refill(&mut self.in_world, frames, false);
+        refill(&mut self.in_world, cells, false);
         refill(&mut self.flags, cells, Flags::empty());
         refill(&mut self.present, cells, Outputs::empty());
         refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
@@ -288,7 +288,7 @@ impl Percepts {
             orientation: None,
             axis: None,
             anisotropy: None,
-            in_world: self.in_world[frame],
+            in_world: self.in_world[cell],
         };
         match &self.values {
             Values::F32(columns) => columns.fill(&mut percept, present, cell),
@@ -321,5 +321,94 @@ impl<T: Copy + Into<f64>> Columns<T> {
             let [u, v, _] = self.centroid[cell];
             [u.into(), v.into()]
         });
+    }
+}
+
+/// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
+pub(crate) struct CellsMut<'a> {
+    fields: usize,
+    flags: &'a mut [Flags],
+    present: &'a mut [Outputs],
+    pub(crate) active: &'a mut [u32],
+    pub(crate) total: &'a mut [f32],
+    pub(crate) peak: &'a mut [f32],
+    pub(crate) area: &'a mut [f32],
+    pub(crate) centroid: &'a mut [[f32; 3]],
+    pub(crate) orientation: &'a mut [f32],
+    pub(crate) axis: &'a mut [f32],
+    pub(crate) anisotropy: &'a mut [f32],
+}
+
+impl Percepts {
+    /// All cells of single-precision percepts; `None` for double precision.
+    pub(crate) fn cells_f32(&mut self) -> Option<CellsMut<'_>> {
+        let Values::F32(columns) = &mut self.values else { return None };
+        Some(CellsMut {
+            fields: self.fields,
+            flags: &mut self.flags,
+            present: &mut self.present,
+            active: &mut self.active,
+            total: &mut columns.total,
+            peak: &mut columns.peak,
+            area: &mut columns.area,
+            centroid: &mut columns.centroid,
+            orientation: &mut columns.orientation,
+            axis: &mut columns.axis,
+            anisotropy: &mut columns.anisotropy,
+        })
+    }
+}
+
+impl CellsMut<'_> {
+    /// The first `frames` frames, and the rest.
+    pub(crate) fn split_at(self, frames: usize) -> (Self, Self) {
+        fn split<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
+            column.split_at_mut(cells.min(column.len()))
+        }
+        let cells = frames * self.fields;
+        let (flags, later_flags) = split(self.flags, cells);
+        let (present, later_present) = split(self.present, cells);
+        let (active, later_active) = split(self.active, cells);
+        let (total, later_total) = split(self.total, cells);
+        let (peak, later_peak) = split(self.peak, cells);
+        let (area, later_area) = split(self.area, cells);
+        let (centroid, later_centroid) = split(self.centroid, cells);
+        let (orientation, later_orientation) = split(self.orientation, cells);
+        let (axis, later_axis) = split(self.axis, cells);
+        let (anisotropy, later_anisotropy) = split(self.anisotropy, cells);
+        (
+            Self {
+                fields: self.fields,
+                flags,
+                present,
+                active,
+                total,
+                peak,
+                area,
+                centroid,
+                orientation,
+                axis,
+                anisotropy,
+            },
+            Self {
+                fields: self.fields,
+                flags: later_flags,
+                present: later_present,
+                active: later_active,
+                total: later_total,
+                peak: later_peak,
+                area: later_area,
+                centroid: later_centroid,
+                orientation: later_orientation,
+                axis: later_axis,
+                anisotropy: later_anisotropy,
+            },
+        )
+    }
+
+    /// Sets a cell's flags and the quantities it holds, by their bits.
+    pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
+        self.flags[cell] = Flags::from_bits_truncate(flags);
+        self.present[cell] = Outputs::from_bits_truncate(present);
     }
 }

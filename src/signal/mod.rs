@@ -1,5 +1,9 @@
 //! Signals: what arrives from the sensors, and what a robot's calibration makes of it.
 
+mod calibration;
 mod frame;
+mod intake;
 
+pub use calibration::{Calibration, Checks, TaxelCalibration};
 pub use frame::{Frame, Pose, RawValue};
+pub(crate) use intake::Intake;

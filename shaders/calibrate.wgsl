@@ -1,0 +1,63 @@
+// calibrate: raw values to pressures, one invocation a taxel and frame (src/stage/calibrate.rs).
+
+@group(0) @binding(0) var<uniform> batch: Batch;
+@group(0) @binding(1) var<storage, read> taxels: array<Taxel>;
+// As recordings have it: a frame's values side by side.
+@group(0) @binding(2) var<storage, read> raw: array<u32>;
+// As the fields read it: a taxel's frames side by side.
+@group(0) @binding(3) var<storage, read_write> pressures: array<f32>;
+@group(0) @binding(4) var<storage, read_write> statuses: array<u32>;
+
+const MISSING = 0xffffffffu;
+const SIZE_BITS = 0x7fffffffu;
+const HUGE_BITS = 0x5d800000u;
+const TINY_BITS = 0x21800000u;
+
+fn is_tiny(size: u32) -> bool {
+    return size != 0u && size < TINY_BITS;
+}
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let index = invocation(group, groups, local);
+    if index >= batch.frames * batch.slots {
+        return;
+    }
+    let slot = index / batch.frames;
+    let frame = index % batch.frames;
+    let bits = raw[frame * batch.slots + slot];
+    let taxel = taxels[slot];
+    let size = bits & SIZE_BITS;
+
+    var pressure = 0.0;
+    var status = 0u;
+    if bits == MISSING {
+        status = INCOMPLETE | UNUSABLE;
+    } else if size > HUGE_BITS || taxel.masked != 0u {
+        // Infinity and NaN have larger bits than any number.
+        status = FAULTY_INPUT | UNUSABLE;
+    } else {
+        let value = bitcast<f32>(select(bits, 0u, is_tiny(size)));
+        // The range is asked of the value as it came; where it came too small to compute with, its sign decides at 0.
+        let low = value < taxel.raw_low || (is_tiny(size) && taxel.raw_low == 0.0 && bits != size);
+        let high = value > taxel.raw_high || (is_tiny(size) && taxel.raw_high == 0.0 && bits == size);
+        status |= select(0u, OUT_OF_RANGE, low || high);
+        let p = (value - taxel.baseline) * taxel.gain;
+        let p_size = bitcast<u32>(p) & SIZE_BITS;
+        if p_size > HUGE_BITS {
+            status = FAULTY_INPUT | UNUSABLE;
+        } else {
+            status |= select(0u, FAULTY_INPUT, is_tiny(size) || is_tiny(p_size));
+            if !is_tiny(p_size) && p > taxel.dead_band {
+                pressure = p;
+                status |= select(0u, SATURATED, p > taxel.p_max);
+            }
+        }
+    }
+    pressures[index] = pressure;
+    statuses[index] = status;
+}

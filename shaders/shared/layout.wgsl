@@ -1,0 +1,68 @@
+// The structs of src/stage/layout.rs, and the bits of src/percept.rs and src/stage/calibrate.rs.
+
+struct Batch {
+    frames: u32,
+    slots: u32,
+    fields: u32,
+    unused: u32,
+}
+
+struct Taxel {
+    baseline: f32,
+    gain: f32,
+    dead_band: f32,
+    p_max: f32,
+    raw_low: f32,
+    raw_high: f32,
+    area: f32,
+    masked: u32,
+}
+
+struct Field {
+    first: u32,
+    count: u32,
+    charted: u32,
+    area_known: u32,
+}
+
+struct Member {
+    slot: u32,
+    weight: f32,
+    u: f32,
+    v: f32,
+}
+
+const NO_CONTACT = 1u << 0u;
+const ONE_TAXEL = 1u << 1u;
+const TIE = 1u << 2u;
+const COINCIDENT = 1u << 3u;
+const ISOTROPIC = 1u << 4u;
+const SATURATED = 1u << 6u;
+const FAULTY_INPUT = 1u << 7u;
+const OUT_OF_RANGE = 1u << 8u;
+const INCOMPLETE = 1u << 9u;
+const NO_CHART = 1u << 10u;
+const FLAGS = 0x7fffu;
+
+// A cell's status holds its flags below and, from this bit on, which quantities are present.
+const PRESENT = 16u;
+const TOTAL = 1u << 0u;
+const PEAK = 1u << 1u;
+const ACTIVE = 1u << 2u;
+const AREA = 1u << 3u;
+const CENTROID = 1u << 4u;
+const POSITION = 1u << 5u;
+const NORMAL = 1u << 6u;
+const ORIENTATION = 1u << 7u;
+const AXIS = 1u << 8u;
+const ANISOTROPY = 1u << 9u;
+
+// Bit of a taxel's status that leaves it out of every sum.
+const UNUSABLE = 1u << 31u;
+
+override GROUP = 64u;
+
+// A dispatch is folded into rows, as one row may not be longer than 65,535 groups.
+fn invocation(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
+    return (group.y * groups.x + group.x) * GROUP + local;
+}

@@ -1,0 +1,186 @@
+//! Holding a single-precision backend to the reference, cell by cell, by derived bounds.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::reference::CellBound;
+use crate::percept::{Flags, Outputs, Percept, Percepts};
+use crate::stage::angle::between_lines;
+
+/// How a backend's percepts compare with the reference's on the same input.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// Cells (a field in a frame) looked at.
+    pub cells: u64,
+    /// Per quantity, what came of comparing it.
+    pub quantities: BTreeMap<String, Comparison>,
+    /// Cells in which a flag or a quantity's presence was not compared, as the reference's own margin to that decision is
+    /// below the bound.
+    pub undecided_flags: u64,
+    /// Cells that break a bound, differ in a certain flag, or lack a quantity.
+    pub failed: u64,
+    /// The first of those, in words.
+    pub failures: Vec<String>,
+}
+
+/// What came of comparing one quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Comparison {
+    /// Values compared.
+    pub compared: u64,
+    /// Values not compared, as the reference's own margin to a choice they hang on is below the bound.
+    pub undecided: u64,
+    /// Largest error, in the quantity's unit.
+    pub worst_error: f64,
+    /// Largest share of its bound that an error took: over 1 is a failure.
+    pub worst_share: f64,
+}
+
+impl Agreement {
+    /// Whether nothing failed.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.failed == 0
+    }
+
+    /// Adds what another batch gave.
+    pub fn merge(&mut self, other: Self) {
+        self.cells += other.cells;
+        self.undecided_flags += other.undecided_flags;
+        self.failed += other.failed;
+        self.failures.extend(other.failures);
+        self.failures.truncate(MOST_WORDS);
+        for (name, more) in other.quantities {
+            let sum = self.quantities.entry(name).or_default();
+            sum.compared += more.compared;
+            sum.undecided += more.undecided;
+            sum.worst_error = sum.worst_error.max(more.worst_error);
+            sum.worst_share = sum.worst_share.max(more.worst_share);
+        }
+    }
+}
+
+impl fmt::Display for Agreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = if self.holds() { "agrees" } else { "DISAGREES" };
+        write!(f, "{verdict} with the reference in {} of {} percepts", self.cells - self.failed, self.cells)?;
+        for (name, c) in &self.quantities {
+            write!(f, "\n  {name:<12} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
+            write!(f, "; {} compared, {} too close to call", c.compared, c.undecided)?;
+        }
+        write!(f, "\n  {} percepts with a flag too close to call", self.undecided_flags)?;
+        for failure in &self.failures {
+            write!(f, "\n  {failure}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Failures that are put in words; the rest is counted.
+const MOST_WORDS: usize = 10;
+
+/// Compares `candidate` with `reference`, whose cells may differ by `bounds`.
+pub(crate) fn compare(reference: &Percepts, bounds: &[CellBound], candidate: &Percepts, names: &[&str]) -> Agreement {
+    let mut agreement = Agreement::default();
+    for frame in 0..reference.frames() {
+        for (field, name) in names.iter().enumerate() {
+            let bound = &bounds[frame * names.len() + field];
+            let mut cell = Cell { agreement: &mut agreement, failure: None };
+            cell.compare(&reference.get(frame, field), bound, &candidate.get(frame, field));
+            let failure = cell.failure;
+            agreement.cells += 1;
+            if let Some(what) = failure {
+                agreement.failed += 1;
+                if agreement.failures.len() < MOST_WORDS {
+                    agreement.failures.push(format!("frame {}, `{name}`: {what}", reference.frame_number(frame)));
+                }
+            }
+        }
+    }
+    agreement
+}
+
+struct Cell<'a> {
+    agreement: &'a mut Agreement,
+    failure: Option<String>,
+}
+
+impl Cell<'_> {
+    fn fail(&mut self, what: String) {
+        self.failure.get_or_insert(what);
+    }
+
+    fn compare(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
+        if !bound.in_doubt.is_empty() {
+            self.agreement.undecided_flags += 1;
+        }
+        let certain = !bound.in_doubt;
+        if (right.flags ^ got.flags).intersects(certain) {
+            let names = |flags: Flags| (flags & certain).names().collect::<Vec<_>>().join(" ");
+            self.fail(format!("flags [{}], but the reference has [{}]", names(got.flags), names(right.flags)));
+        }
+        // When the input itself lies on a threshold, another set of taxels may be pressed, and nothing is comparable.
+        if bound.in_doubt == Flags::all() {
+            return;
+        }
+        if right.active != got.active {
+            self.fail(format!("active is {:?}, not {:?}", got.active, right.active));
+        }
+        let distance = |a: &f64, b: &f64| (a - b).abs();
+        self.quantity(Outputs::TOTAL, right.total, got.total, bound.total, distance);
+        self.quantity(Outputs::PEAK, right.peak, got.peak, bound.peak, distance);
+        self.quantity(Outputs::AREA, right.area, got.area, bound.area, distance);
+        for axis in 0..2 {
+            let part = |centroid: Option<[f64; 2]>| centroid.map(|c| c[axis]);
+            let bound = bound.centroid.map(|c| c[axis]);
+            self.quantity(Outputs::CENTROID, part(right.centroid), part(got.centroid), bound, distance);
+        }
+        let apart = |a: &[f64; 3], b: &[f64; 3]| glam::DVec3::from_array(*a).distance(glam::DVec3::from_array(*b));
+        // Poses and far origins add the rounding of f64, on both sides.
+        let far = right.position.map_or(0.0, |p| 4e-15 * glam::DVec3::from_array(p).length());
+        self.quantity(Outputs::POSITION, right.position, got.position, bound.position.map(|b| b + far), apart);
+        self.quantity(Outputs::NORMAL, right.normal, got.normal, bound.normal, apart);
+        let between = |a: &f64, b: &f64| between_lines(*a, *b);
+        self.quantity(Outputs::ORIENTATION, right.orientation, got.orientation, bound.orientation, between);
+        self.quantity(Outputs::ANISOTROPY, right.anisotropy, got.anisotropy, bound.anisotropy, distance);
+        self.quantity(Outputs::AXIS, right.axis, got.axis, bound.axis, between);
+    }
+
+    fn quantity<T: fmt::Debug>(
+        &mut self,
+        output: Outputs,
+        right: Option<T>,
+        got: Option<T>,
+        bound: Option<f64>,
+        distance: impl Fn(&T, &T) -> f64,
+    ) {
+        let name = output.names().next().unwrap_or_default();
+        let (right, got) = match (right, got) {
+            (None, None) => return,
+            (Some(right), Some(got)) => (right, got),
+            (right, got) => {
+                // Present in one of them: fine only where the flag that explains it may differ.
+                if bound.is_some() {
+                    self.fail(format!("{name} is {got:?}, not {right:?}"));
+                } else {
+                    self.agreement.quantities.entry(name).or_default().undecided += 1;
+                }
+                return;
+            }
+        };
+        let error = distance(&right, &got);
+        let comparison = self.agreement.quantities.entry(name.clone()).or_default();
+        let Some(bound) = bound else {
+            comparison.undecided += 1;
+            return;
+        };
+        comparison.compared += 1;
+        let share = if error == 0.0 { 0.0 } else { error / bound };
+        comparison.worst_error = comparison.worst_error.max(error);
+        comparison.worst_share = comparison.worst_share.max(share);
+        // Written so that a NaN fails.
+        if !(share <= 1.0) {
+            self.fail(format!("{name} is {got:?}, not {right:?}: off by {error:.3e}, bound {bound:.3e}"));
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Backend `cpu`: single precision, up to [`LANES`] frames side by side, all cores.
+//!
+//! Every lane does the operations of its frame in one fixed order, never fused, so that percepts have the same bits
+//! however a recording is cut and whatever instructions the compiler picks.
+
+mod axis;
+mod calibrate;
+mod centroid;
+mod contact;
+mod orientation;
+
+use super::{Backend, RawBatch};
+use crate::error::Result;
+use crate::percept::{CellsMut, Outputs, Percepts};
+use crate::scene::{Plan, PlanField};
+use crate::signal::RawValue;
+
+/// Frames that are computed side by side.
+const LANES: usize = 16;
+/// Frames that one task takes; a multiple of [`LANES`].
+const TASK: usize = 8 * LANES;
+
+/// The backend, with the memory it needs from frame to frame.
+pub(crate) struct Cpu {
+    plan: Plan,
+    single: Scratch<1>,
+}
+
+impl Cpu {
+    pub(crate) fn new(plan: &Plan) -> Self {
+        Self { plan: plan.clone(), single: Scratch::new(plan.slots()) }
+    }
+}
+
+impl Backend for Cpu {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn describe(&self) -> String {
+        format!("single precision, {} threads", rayon::current_num_threads())
+    }
+
+    fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
+        let Some(mut cells) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        if raw.frames < LANES {
+            for frame in raw.values.chunks_exact(self.plan.slots().max(1)) {
+                let (mut first, rest) = cells.split_at(1);
+                self.single.block(&self.plan, frame, 1, &mut first);
+                cells = rest;
+            }
+        } else {
+            batch(&self.plan, raw.values, raw.frames, cells);
+        }
+        Ok(())
+    }
+}
+
+/// Halves the batch until a task remains, and runs the halves in parallel.
+fn batch(plan: &Plan, raw: &[RawValue], frames: usize, cells: CellsMut<'_>) {
+    if frames > TASK {
+        let left = (frames / TASK).div_ceil(2) * TASK;
+        let (left_raw, right_raw) = raw.split_at(left * plan.slots());
+        let (left_cells, right_cells) = cells.split_at(left);
+        rayon::join(|| batch(plan, left_raw, left, left_cells), || batch(plan, right_raw, frames - left, right_cells));
+        return;
+    }
+    let mut scratch = Scratch::<LANES>::new(plan.slots());
+    let mut rest = cells;
+    for (block, raw) in raw.chunks(LANES * plan.slots()).enumerate() {
+        let count = LANES.min(frames - block * LANES);
+        let (mut cells, later) = rest.split_at(count);
+        scratch.block(plan, raw, count, &mut cells);
+        rest = later;
+    }
+}
+
+/// Pressures and statuses of `L` frames, taxel by taxel.
+struct Scratch<const L: usize> {
+    pressures: Vec<[f32; L]>,
+    statuses: Vec<[u32; L]>,
+}
+
+/// What a field's stages know of `L` frames, each filled by the stage of its name.
+#[derive(Clone, Copy)]
+struct Lanes<const L: usize> {
+    /// Flags, as [`crate::percept::Flags`].
+    flags: [u32; L],
+    /// Quantities present, as [`Outputs`].
+    present: [u32; L],
+    total: [f32; L],
+    peak: [f32; L],
+    area: [f32; L],
+    active: [u32; L],
+    centroid: [[f32; L]; 3],
+    orientation: [f32; L],
+    axis: [f32; L],
+    anisotropy: [f32; L],
+}
+
+impl<const L: usize> Scratch<L> {
+    fn new(slots: usize) -> Self {
+        Self { pressures: vec![[0.0; L]; slots], statuses: vec![[0; L]; slots] }
+    }
+
+    /// All stages for `count ≤ L` frames of `raw`, frame by frame as recordings have them.
+    fn block(&mut self, plan: &Plan, raw: &[RawValue], count: usize, cells: &mut CellsMut<'_>) {
+        calibrate::lanes(&plan.taxels, raw, count, &mut self.pressures, &mut self.statuses);
+        let stages = plan.stages();
+        for (index, field) in plan.fields.iter().enumerate() {
+            let members = plan.members_of(field);
+            let mut lanes = contact::lanes(plan, field, members, &self.pressures, &self.statuses);
+            let touched = lanes.active.iter().any(|&active| active > 0);
+            if touched && stages.centroid {
+                centroid::lanes(field, members, &self.pressures, &mut lanes);
+            }
+            if touched && stages.orientation && field.charted {
+                orientation::lanes(members, &self.pressures, &mut lanes);
+            }
+            if touched && stages.axis && field.charted {
+                axis::lanes(members, &self.pressures, &mut lanes);
+            }
+            for lane in 0..count {
+                store(plan, field, &lanes, lane, cells, lane * plan.fields.len() + index);
+            }
+        }
+    }
+}
+
+/// Copies one lane into its cell: lengths in metres, only what was asked for.
+fn store<const L: usize>(
+    plan: &Plan,
+    field: &PlanField,
+    lanes: &Lanes<L>,
+    lane: usize,
+    cells: &mut CellsMut<'_>,
+    cell: usize,
+) {
+    let outputs = plan.outputs;
+    cells.set_status(cell, lanes.flags[lane], lanes.present[lane] & outputs.bits());
+    let write = |output, column: &mut [f32], value: f32| {
+        if outputs.contains(output) {
+            column[cell] = value;
+        }
+    };
+    write(Outputs::TOTAL, cells.total, lanes.total[lane]);
+    write(Outputs::PEAK, cells.peak, lanes.peak[lane]);
+    write(Outputs::AREA, cells.area, lanes.area[lane]);
+    write(Outputs::ORIENTATION, cells.orientation, lanes.orientation[lane]);
+    write(Outputs::AXIS, cells.axis, lanes.axis[lane]);
+    write(Outputs::ANISOTROPY, cells.anisotropy, lanes.anisotropy[lane]);
+    if outputs.contains(Outputs::ACTIVE) {
+        cells.active[cell] = lanes.active[lane];
+    }
+    if let Some(centroid) = cells.centroid.get_mut(cell) {
+        *centroid = lanes.centroid.map(|axis| axis[lane] * field.unit_m);
+    }
+}
+
+/// The power of two that brings `total` into [1, 2).
+fn scale_of(total: f32) -> f32 {
+    f32::from_bits((254 << 23) - (total.to_bits() & 0x7F80_0000))
+}

@@ -1,0 +1,385 @@
+//! Backend `gpu`: WGSL compute shaders through wgpu, the only place that knows wgpu.
+//!
+//! One submission takes a batch: the raw values go up, every stage runs over all fields and frames at once, and the
+//! columns that were asked for come back. Pipelines, buffers and bind groups are made once; a call allocates no device
+//! memory. On the device a taxel's frames, and a field's, lie side by side, so that neighbouring invocations read
+//! neighbouring words whether the batch is one frame or many.
+
+pub(crate) mod adapter;
+pub(crate) mod shaders;
+
+use std::sync::mpsc;
+
+pub use adapter::{AdapterSummary, adapters};
+use bytemuck::{Pod, cast_slice};
+
+use self::adapter::Device;
+use self::shaders::StageShader;
+use super::{Backend, RawBatch};
+use crate::error::{Error, Result};
+use crate::percept::{CellsMut, Outputs, Percepts};
+use crate::scene::Plan;
+use crate::stage::layout;
+
+/// Invocations a group; any power of two up to 256 is valid, this one did best on lavapipe.
+const GROUP: u32 = 64;
+/// Bytes before the raw values in the upload buffer: the batch's uniform block.
+const HEADER: u64 = size_of::<layout::Batch>() as u64;
+
+/// The backend, with everything it needs on the device.
+pub(crate) struct Gpu {
+    plan: Plan,
+    device: Device,
+    /// Frames that one submission takes at most.
+    capacity: usize,
+    upload: wgpu::Buffer,
+    batch: wgpu::Buffer,
+    raw: wgpu::Buffer,
+    stages: Vec<Stage>,
+    results: Vec<Column>,
+    readback: wgpu::Buffer,
+}
+
+/// A stage's pipeline, with its buffers bound.
+struct Stage {
+    name: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    bound: wgpu::BindGroup,
+    /// One invocation a taxel and frame, or one a field and frame.
+    over: Over,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Over {
+    Taxels,
+    Fields,
+}
+
+/// A result that is read back.
+struct Column {
+    what: What,
+    buffer: wgpu::Buffer,
+    /// Bytes a cell.
+    stride: u64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum What {
+    Cells,
+    Contacts,
+    Centroids,
+    Orientations,
+    Axes,
+}
+
+impl Gpu {
+    /// The backend for `plan` on the process's device, for calls of about `batch` frames.
+    ///
+    /// # Errors
+    /// No adapter, or a plan whose tables are beyond what every WebGPU device can bind.
+    pub(crate) fn new(plan: &Plan, batch: usize) -> Result<Self> {
+        Self::on(adapter::shared()?, plan, batch)
+    }
+
+    pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
+        let limit = device.device.limits().max_storage_buffer_binding_size;
+        let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
+        let widest = (slots * 4).max(fields * 16);
+        let tables = (plan.members.len() * size_of::<layout::Member>()) as u64;
+        if tables > limit || widest > limit {
+            return Err(Error::failed(format!(
+                "{} memberships and {slots} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+                plan.members.len()
+            )));
+        }
+        let capacity = batch.clamp(1, (limit / widest) as usize);
+        let frames = capacity as u64;
+
+        let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages, mapped: bool| {
+            device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(name),
+                size: size.max(16).next_multiple_of(16),
+                usage,
+                mapped_at_creation: mapped,
+            })
+        };
+        let working = |name: &str, size: u64| {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            buffer(name, size, usage, false)
+        };
+        let upload = buffer(
+            "upload",
+            HEADER + frames * slots * 4,
+            wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
+            true,
+        );
+        let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let batch = buffer("batch", HEADER, uniform, false);
+        let raw = working("raw", frames * slots * 4);
+        let taxels = table(&device, "taxels", &plan.taxels);
+        let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
+        let field_table = table(&device, "fields", &gpu_fields);
+        let members = table(&device, "members", &plan.members);
+        let all_depths: Vec<f32> = plan.fields.iter().flat_map(|field| field.depths.iter().copied()).collect();
+        let depths = table(&device, "depths", &all_depths);
+        let pressures = working("pressures", frames * slots * 4);
+        let statuses = working("statuses", frames * slots * 4);
+        let cells = working("cells", frames * fields * 4);
+        let contacts = working("contacts", frames * fields * 16);
+        let centroids = working("centroids", frames * fields * 16);
+        let orientations = working("orientations", frames * fields * 4);
+        let axes = working("axes", frames * fields * 8);
+
+        let wanted = plan.stages();
+        let stage = |shader: &StageShader, over, buffers: &[&wgpu::Buffer]| Stage::new(&device, shader, over, buffers);
+        let mut stages = vec![
+            stage(&shaders::CALIBRATE, Over::Taxels, &[&batch, &taxels, &raw, &pressures, &statuses]),
+            stage(
+                &shaders::CONTACT,
+                Over::Fields,
+                &[&batch, &taxels, &field_table, &members, &pressures, &statuses, &cells, &contacts],
+            ),
+        ];
+        if wanted.centroid {
+            let buffers = [&batch, &field_table, &members, &depths, &pressures, &contacts, &cells, &centroids];
+            stages.push(stage(&shaders::CENTROID, Over::Fields, &buffers));
+        }
+        if wanted.orientation {
+            let buffers = [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, &orientations];
+            stages.push(stage(&shaders::ORIENTATION, Over::Fields, &buffers));
+        }
+        if wanted.axis {
+            let buffers = [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, &axes];
+            stages.push(stage(&shaders::AXIS, Over::Fields, &buffers));
+        }
+
+        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        let results: Vec<Column> = [
+            (true, What::Cells, cells, 4),
+            (plan.outputs.intersects(sums), What::Contacts, contacts, 16),
+            (plan.outputs.intersects(place), What::Centroids, centroids, 16),
+            (wanted.orientation, What::Orientations, orientations, 4),
+            (wanted.axis, What::Axes, axes, 8),
+        ]
+        .into_iter()
+        .filter(|(read, ..)| *read)
+        .map(|(_, what, buffer, stride)| Column { what, buffer, stride })
+        .collect();
+        let bytes_back = results.iter().map(|column| column.stride).sum::<u64>() * frames * fields;
+        let readback =
+            buffer("readback", bytes_back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false);
+        Ok(Self { plan: plan.clone(), device, capacity, upload, batch, raw, stages, results, readback })
+    }
+
+    /// One submission: `raw.frames` is at most the capacity.
+    fn submit(&self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
+        let (frames, slots, fields) = (raw.frames as u32, self.plan.slots() as u32, self.plan.fields.len() as u32);
+        let header = layout::Batch { frames, slots, fields, unused: 0 };
+        let values: &[u8] = cast_slice(raw.values);
+        let lost =
+            |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
+        {
+            let end = HEADER + values.len() as u64;
+            let mut mapped = self.upload.get_mapped_range_mut(0..end.next_multiple_of(4)).map_err(|e| lost(&e))?;
+            let mut mapped = mapped.slice(..);
+            mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(&header));
+            mapped.slice(HEADER as usize..end as usize).copy_from_slice(values);
+        }
+        self.upload.unmap();
+
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.upload, 0, &self.batch, 0, HEADER);
+        encoder.copy_buffer_to_buffer(&self.upload, HEADER, &self.raw, 0, values.len() as u64);
+        for stage in &self.stages {
+            let mut pass = encoder
+                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
+            let invocations = frames * if stage.over == Over::Taxels { slots } else { fields };
+            let (wide, tall) = groups(invocations.div_ceil(GROUP));
+            pass.set_pipeline(&stage.pipeline);
+            pass.set_bind_group(0, &stage.bound, &[]);
+            pass.dispatch_workgroups(wide, tall, 1);
+        }
+        let count = u64::from(frames) * u64::from(fields);
+        let mut end = 0;
+        for column in &self.results {
+            encoder.copy_buffer_to_buffer(&column.buffer, 0, &self.readback, end, count * column.stride);
+            end += count * column.stride;
+        }
+        self.device.queue.submit([encoder.finish()]);
+
+        let (told, outcome) = mpsc::channel();
+        let told_too = told.clone();
+        self.readback.map_async(wgpu::MapMode::Read, 0..end, move |result| {
+            let _ = told.send(result);
+        });
+        self.upload.map_async(wgpu::MapMode::Write, .., move |result| {
+            let _ = told_too.send(result);
+        });
+        self.device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
+        for _ in 0..2 {
+            outcome.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
+        }
+        {
+            let mapped = self.readback.get_mapped_range(0..end).map_err(|e| lost(&e))?;
+            let mut start = 0;
+            for column in &self.results {
+                let length = (count * column.stride) as usize;
+                self.unpack(column.what, &mapped[start..start + length], raw.frames, cells);
+                start += length;
+            }
+        }
+        self.readback.unmap();
+        Ok(())
+    }
+
+    /// From the device's order (field by field) to the percepts' (frame by frame), lengths in metres.
+    fn unpack(&self, what: What, bytes: &[u8], frames: usize, cells: &mut CellsMut<'_>) {
+        let fields = self.plan.fields.len();
+        let units: Vec<f32> = self.plan.fields.iter().map(|field| field.unit_m).collect();
+        let each = |f: &mut dyn FnMut(usize, usize, usize)| {
+            for field in 0..fields {
+                for frame in 0..frames {
+                    f(field, field * frames + frame, frame * fields + field);
+                }
+            }
+        };
+        let wants = |output| self.plan.outputs.contains(output);
+        match what {
+            What::Cells => {
+                let statuses: &[u32] = cast_slice(bytes);
+                let (outputs, flag_bits) = (self.plan.outputs.bits(), (1 << PRESENT) - 1);
+                each(&mut |_, from, to| {
+                    cells.set_status(to, statuses[from] & flag_bits, (statuses[from] >> PRESENT) & outputs);
+                });
+            }
+            What::Contacts => {
+                let contacts: &[[f32; 4]] = cast_slice(bytes);
+                let scalar = |output, column: &mut [f32], part: usize| {
+                    if wants(output) {
+                        each(&mut |_, from, to| column[to] = contacts[from][part]);
+                    }
+                };
+                scalar(Outputs::TOTAL, cells.total, 0);
+                scalar(Outputs::PEAK, cells.peak, 1);
+                scalar(Outputs::AREA, cells.area, 2);
+                if wants(Outputs::ACTIVE) {
+                    each(&mut |_, from, to| cells.active[to] = contacts[from][3].to_bits());
+                }
+            }
+            What::Centroids => {
+                let centroids: &[[f32; 4]] = cast_slice(bytes);
+                each(&mut |field, from, to| {
+                    let [u, v, depth, _] = centroids[from];
+                    cells.centroid[to] = [u, v, depth].map(|x| x * units[field]);
+                });
+            }
+            What::Orientations => {
+                let angles: &[f32] = cast_slice(bytes);
+                each(&mut |_, from, to| cells.orientation[to] = angles[from]);
+            }
+            What::Axes => {
+                let axes: &[[f32; 2]] = cast_slice(bytes);
+                if wants(Outputs::AXIS) {
+                    each(&mut |_, from, to| cells.axis[to] = axes[from][0]);
+                }
+                if wants(Outputs::ANISOTROPY) {
+                    each(&mut |_, from, to| cells.anisotropy[to] = axes[from][1]);
+                }
+            }
+        }
+    }
+}
+
+/// The bit of a cell's status from which on it says which quantities are present.
+const PRESENT: u32 = 16;
+
+impl Stage {
+    fn new(device: &Device, shader: &StageShader, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
+        let pipeline = pipeline(device, shader);
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
+            .iter()
+            .enumerate()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding: binding as u32,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        let bound = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(shader.name),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        Self { name: shader.name, pipeline, bound, over }
+    }
+}
+
+/// The compute pipeline of one stage.
+pub(crate) fn pipeline(device: &Device, shader: &StageShader) -> wgpu::ComputePipeline {
+    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(shader.name),
+        source: wgpu::ShaderSource::Wgsl(shader.source.into()),
+    });
+    device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(shader.name),
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants: &[("GROUP", f64::from(GROUP))],
+            ..wgpu::PipelineCompilationOptions::default()
+        },
+        cache: None,
+    })
+}
+
+/// A read-only table on the device.
+fn table<T: Pod>(device: &Device, name: &str, rows: &[T]) -> wgpu::Buffer {
+    let bytes: &[u8] = cast_slice(rows);
+    let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size: (bytes.len() as u64).max(16).next_multiple_of(16),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    device.queue.write_buffer(&buffer, 0, bytes);
+    buffer
+}
+
+fn gpu_field(field: &crate::scene::PlanField) -> layout::Field {
+    layout::Field {
+        first: field.first as u32,
+        count: field.count as u32,
+        charted: field.charted.into(),
+        area_known: field.area_known.into(),
+    }
+}
+
+/// Folds a row of groups into a rectangle, as no side may be longer than 65,535.
+fn groups(count: u32) -> (u32, u32) {
+    const LONGEST: u32 = 65_535;
+    let tall = count.div_ceil(LONGEST).max(1);
+    (count.div_ceil(tall).max(1), tall)
+}
+
+impl Backend for Gpu {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn describe(&self) -> String {
+        let summary = adapter::summary(&self.device.info);
+        format!("{}, {} ({}, {})", summary.name, summary.kind, summary.api, summary.driver)
+    }
+
+    fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
+        let Some(mut rest) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        for values in raw.values.chunks(self.capacity * self.plan.slots()) {
+            let frames = values.len() / self.plan.slots();
+            let (mut cells, later) = rest.split_at(frames);
+            self.submit(&RawBatch { frames, values }, &mut cells)?;
+            rest = later;
+        }
+        Ok(())
+    }
+}

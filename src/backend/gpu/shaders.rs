@@ -1,0 +1,32 @@
+//! The shaders' text: one file a stage, each after what they share.
+
+/// A stage's name and its whole WGSL.
+pub(crate) struct StageShader {
+    /// The stage, as everywhere.
+    pub(crate) name: &'static str,
+    /// WGSL, ready to compile.
+    pub(crate) source: &'static str,
+}
+
+macro_rules! stage {
+    ($name:literal $(, $shared:literal)*) => {
+        StageShader {
+            name: $name,
+            source: concat!(
+                include_str!("../../../shaders/shared/layout.wgsl"),
+                $(include_str!(concat!("../../../shaders/shared/", $shared, ".wgsl")),)*
+                include_str!(concat!("../../../shaders/", $name, ".wgsl")),
+            ),
+        }
+    };
+}
+
+pub(crate) const CALIBRATE: StageShader = stage!("calibrate");
+pub(crate) const CONTACT: StageShader = stage!("contact");
+pub(crate) const CENTROID: StageShader = stage!("centroid");
+pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle");
+pub(crate) const AXIS: StageShader = stage!("axis", "angle");
+
+/// All of them, in the order they run.
+#[cfg(test)]
+pub(crate) const ALL: [StageShader; 5] = [CALIBRATE, CONTACT, CENTROID, ORIENTATION, AXIS];

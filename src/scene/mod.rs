@@ -1,0 +1,25 @@
+//! Scenes: what a user asks for; and the plan made of it.
+
+mod plan;
+
+pub use plan::Plan;
+pub(crate) use plan::PlanField;
+
+use crate::percept::Outputs;
+
+/// What a user asks of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The quantities wanted.
+    pub outputs: Outputs,
+    /// The fields wanted, as globs over their names (`hand/palm*`, `**/forearm/*`); none means all.
+    pub fields: Vec<String>,
+    /// How long a channel that is absent from a frame keeps its last value, s. Recordings say 0.
+    pub max_age_s: f64,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self { outputs: Outputs::all(), fields: Vec::new(), max_age_s: 0.0 }
+    }
+}

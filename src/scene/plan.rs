@@ -1,0 +1,200 @@
+//! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+use globset::{GlobBuilder, GlobSetBuilder};
+
+use super::Scene;
+use crate::body::Body;
+use crate::error::{Error, Result, nearest};
+use crate::field::{Chart, FieldSet, Lift, WORLD};
+use crate::percept::Outputs;
+use crate::signal::{Calibration, TaxelCalibration};
+use crate::stage::layout;
+
+/// Which stages run beside calibrate and contact, which every percept needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Stages {
+    pub(crate) centroid: bool,
+    pub(crate) orientation: bool,
+    pub(crate) axis: bool,
+    pub(crate) position: bool,
+}
+
+/// What a backend runs: only the taxels, fields and stages that the scene needs.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub(crate) outputs: Outputs,
+    /// The body's taxels that are read, by ascending id; a *slot* is an index into this.
+    pub(crate) body_taxels: Vec<usize>,
+    /// Per slot.
+    pub(crate) calibrations: Vec<TaxelCalibration>,
+    /// Per slot, m².
+    pub(crate) areas: Vec<f64>,
+    /// Per slot, as the f32 backends read them.
+    pub(crate) taxels: Vec<layout::Taxel>,
+    pub(crate) fields: Vec<PlanField>,
+    /// All fields' members, one field after the other, each by ascending id.
+    pub(crate) members: Vec<layout::Member>,
+}
+
+/// A field as a backend sees it.
+#[derive(Clone, Debug)]
+pub(crate) struct PlanField {
+    pub(crate) name: String,
+    /// Name of the anchor, or [`WORLD`].
+    pub(crate) link: String,
+    /// The anchor's index in the body.
+    pub(crate) anchor: Option<usize>,
+    pub(crate) first: usize,
+    pub(crate) count: usize,
+    pub(crate) charted: bool,
+    pub(crate) area_known: bool,
+    /// The power of two, at least the field's radius, that coordinates are counted in, m.
+    pub(crate) unit_m: f32,
+    /// Members' places in the unit, in double precision.
+    pub(crate) places: Vec<DVec3>,
+    /// Members' third coordinate in the unit.
+    pub(crate) depths: Vec<f32>,
+    pub(crate) origin_in_anchor: DVec3,
+    pub(crate) chart: Option<Chart>,
+    /// The surface over the chart, where positions are wanted.
+    pub(crate) lift: Option<Lift>,
+}
+
+impl Plan {
+    /// The plan for `scene` on `body`, whose fields are `fields`, with one robot's `calibration`.
+    ///
+    /// # Errors
+    /// The body has no taxels or no fields; a glob is malformed or matches nothing.
+    pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
+        if body.taxels.is_empty() {
+            let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
+            return Err(Error::failed(format!("the body has no taxels: {hint}")).at(&body.name));
+        }
+        if fields.fields.is_empty() {
+            return Err(Error::failed("the body has no fields: add some, see docs/layout.md").at(&body.name));
+        }
+        let chosen = choose(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
+        let read: BTreeSet<usize> =
+            chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
+        let body_taxels: Vec<usize> = read.into_iter().collect();
+        let slot_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
+        let mut plan = Self {
+            outputs: scene.outputs,
+            calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
+            areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
+            taxels: Vec::new(),
+            fields: Vec::with_capacity(chosen.len()),
+            members: Vec::new(),
+            body_taxels: Vec::new(),
+        };
+        plan.taxels = plan.calibrations.iter().zip(&plan.areas).map(|(c, &area)| taxel(c, area)).collect();
+        for field in chosen.into_iter().map(|index| &fields.fields[index]) {
+            let unit_m = unit_of(field.radius_m());
+            let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
+            plan.fields.push(PlanField {
+                name: field.name.clone(),
+                link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
+                anchor: field.anchor,
+                first: plan.members.len(),
+                count: field.members.len(),
+                charted: field.chart.is_ok(),
+                area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
+                unit_m,
+                depths: places.iter().map(|place| place.z as f32).collect(),
+                origin_in_anchor: field.origin_in_anchor,
+                chart: field.chart.as_ref().ok().cloned(),
+                lift: plan.stages().position.then(|| Lift::new(body, field)).flatten(),
+                places,
+            });
+            let places = &plan.fields[plan.fields.len() - 1].places;
+            plan.members.extend(field.members.iter().zip(places).map(|(member, place)| layout::Member {
+                slot: slot_of(member.taxel),
+                weight: member.weight as f32,
+                u: place.x as f32,
+                v: place.y as f32,
+            }));
+        }
+        plan.body_taxels = body_taxels;
+        Ok(plan)
+    }
+
+    /// Number of taxels that are read.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.taxels.len()
+    }
+
+    /// Number of (field, taxel) pairs: the work of a frame.
+    #[must_use]
+    pub fn memberships(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Names of the fields, in the order of the percepts, each with the link it answers in.
+    pub fn fields(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
+        self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
+    }
+
+    pub(crate) fn members_of(&self, field: &PlanField) -> &[layout::Member] {
+        &self.members[field.first..field.first + field.count]
+    }
+
+    pub(crate) fn stages(&self) -> Stages {
+        let wants = |outputs| self.outputs.intersects(outputs);
+        let position = wants(Outputs::POSITION | Outputs::NORMAL);
+        let orientation = wants(Outputs::ORIENTATION);
+        let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
+        Stages { centroid: wants(Outputs::CENTROID) || position || orientation || axis, orientation, axis, position }
+    }
+}
+
+/// Indices of the fields that `globs` name, in order.
+fn choose(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> {
+    let mut set = GlobSetBuilder::new();
+    for glob in globs {
+        let glob = GlobBuilder::new(glob)
+            .literal_separator(true)
+            .build()
+            .map_err(|e| Error::usage(format!("`{glob}` is no glob over field names: {}", e.kind())))?;
+        set.add(glob);
+    }
+    let set = set.build().map_err(|e| Error::usage(e.to_string()))?;
+    let mut matched = vec![false; globs.len()];
+    let mut chosen = Vec::new();
+    for (index, field) in fields.fields.iter().enumerate() {
+        let matches = set.matches(&field.name);
+        matches.iter().for_each(|&glob| matched[glob] = true);
+        if globs.is_empty() || !matches.is_empty() {
+            chosen.push(index);
+        }
+    }
+    if let Some(glob) = matched.iter().position(|matched| !matched).map(|index| &globs[index]) {
+        let near = nearest(glob, fields.fields.iter().map(|field| field.name.as_str()));
+        let hint =
+            near.map_or("`somatic inspect` lists the fields".to_owned(), |near| format!("did you mean `{near}`?"));
+        return Err(Error::usage(format!("no field matches `{glob}`: {hint}")));
+    }
+    Ok(chosen)
+}
+
+fn taxel(calibration: &TaxelCalibration, area: f64) -> layout::Taxel {
+    layout::Taxel {
+        baseline: calibration.baseline,
+        gain: calibration.gain,
+        dead_band: calibration.dead_band,
+        p_max: calibration.p_max,
+        raw_low: calibration.raw_range[0],
+        raw_high: calibration.raw_range[1],
+        area: area as f32,
+        masked: calibration.mask.into(),
+    }
+}
+
+/// The least power of two that is at least `radius_m`, within what single precision can square.
+fn unit_of(radius_m: f64) -> f32 {
+    let exponent = if radius_m > 0.0 { radius_m.log2().ceil().clamp(-60.0, 60.0) } else { 0.0 };
+    exponent.exp2() as f32
+}

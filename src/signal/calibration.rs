@@ -1,0 +1,265 @@
+//! Calibration: what turns a robot's raw values into pressures, and which raw values are not to be believed.
+//!
+//! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::error::{Error, Result, nearest};
+
+/// Gains beyond these would take products out of single precision.
+const GAINS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+/// Baselines and dead bands beyond this are beyond belief, as values are.
+const MOST: f64 = 1.15e18;
+
+/// How one taxel's raw value becomes a pressure: P = gain · (raw − baseline), then 0 unless over the dead band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaxelCalibration {
+    /// Raw value at rest.
+    pub baseline: f32,
+    /// Pressure per raw unit; negative for a sensor that falls when pressed (`invert`).
+    pub gain: f32,
+    /// Pressures up to this one, in the unit of P, count as 0.
+    pub dead_band: f32,
+    /// The largest pressure the sensor is good for: kept above it, but flagged `saturated`.
+    pub p_max: f32,
+    /// The raw values the sensor can deliver: kept beyond them, but flagged `out_of_range`.
+    pub raw_range: [f32; 2],
+    /// Never believe this taxel.
+    pub mask: bool,
+}
+
+impl Default for TaxelCalibration {
+    fn default() -> Self {
+        Self {
+            baseline: 0.0,
+            gain: 1.0,
+            dead_band: 0.0,
+            p_max: f32::MAX,
+            raw_range: [-f32::MAX, f32::MAX],
+            mask: false,
+        }
+    }
+}
+
+/// Which frames and values are not to be believed, judged before any field is looked at. All off by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Checks {
+    /// The first frames of a source that are not believed, for sensors that begin with partial ones.
+    pub settle_frames: u64,
+    /// A frame in which more than this share of the values lies outside the raw range is not believed at all.
+    pub broken_frame_share: Option<f64>,
+    /// A raw value this many times the largest of its neighbours' is not believed, if also over `isolated_above`.
+    pub isolated_ratio: Option<f64>,
+    /// Values up to this one (raw units above baseline) are never isolated.
+    pub isolated_above: f64,
+}
+
+/// A robot's calibration, for the taxels of one body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// One entry a taxel, in the body's order.
+    pub taxels: Vec<TaxelCalibration>,
+    /// Which input is not to be believed.
+    pub checks: Checks,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    all: Keys,
+    #[serde(default)]
+    taxel: HashMap<Spanned<String>, Keys>,
+    #[serde(default)]
+    checks: Checks,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    baseline: Option<Spanned<f64>>,
+    gain: Option<Spanned<f64>>,
+    invert: Option<bool>,
+    dead_band: Option<Spanned<f64>>,
+    p_max: Option<Spanned<f64>>,
+    raw_range: Option<Spanned<[f64; 2]>>,
+    mask: Option<bool>,
+}
+
+impl Calibration {
+    /// The calibration of a robot without a file: P is the raw value.
+    #[must_use]
+    pub fn identity(taxels: usize) -> Self {
+        Self { taxels: vec![TaxelCalibration::default(); taxels], checks: Checks::default() }
+    }
+
+    /// Reads the file at `path` for a body whose taxels have the ids `ids`, ascending.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, has a key this version does not know or a value that makes no sense, or
+    /// names a taxel that the body does not have. The message has the line.
+    pub fn load(path: impl AsRef<Path>, ids: &[u32]) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        Self::parse(&text, ids).map_err(|e| e.at(path.display()))
+    }
+
+    /// Reads the calibration in `text`, as [`Calibration::load`] does.
+    ///
+    /// # Errors
+    /// As [`Calibration::load`].
+    pub fn parse(text: &str, ids: &[u32]) -> Result<Self> {
+        let file: File = toml::from_str(text).map_err(|e| {
+            let line = e.span().map_or(1, |span| line_of(text, span.start));
+            Error::failed(explain(e.message())).at(format!("line {line}"))
+        })?;
+        let mut all = TaxelCalibration::default();
+        file.all.apply(&mut all, text)?;
+        let mut taxels = vec![all; ids.len()];
+        let mut named: Vec<_> = file.taxel.into_iter().collect();
+        named.sort_by_key(|(id, _)| id.span().start);
+        for (id, keys) in named {
+            let at = |e: Error| e.at(format!("line {}", line_of(text, id.span().start)));
+            let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
+                at(Error::failed(format!(
+                    "[taxel.{}] names a taxel that the body does not have; remove it",
+                    id.get_ref()
+                )))
+            })?;
+            keys.apply(&mut taxels[index], text)?;
+        }
+        check_checks(&file.checks)?;
+        Ok(Self { taxels, checks: file.checks })
+    }
+}
+
+impl Keys {
+    fn apply(&self, taxel: &mut TaxelCalibration, text: &str) -> Result<()> {
+        let number =
+            |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f32>> {
+                let Some(value) = value else { return Ok(None) };
+                if fits(*value.get_ref()) {
+                    return Ok(Some(*value.get_ref() as f32));
+                }
+                let line = line_of(text, value.span().start);
+                Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref()))
+                    .at(format!("line {line}")))
+            };
+        if let Some(x) = number("baseline", &self.baseline, &|x| x.abs() <= MOST, "a finite number of raw units")? {
+            taxel.baseline = x;
+        }
+        if let Some(x) = number(
+            "gain",
+            &self.gain,
+            &|x| GAINS.contains(&x),
+            "over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)",
+        )? {
+            taxel.gain = x.copysign(taxel.gain);
+        }
+        if let Some(invert) = self.invert {
+            taxel.gain = if invert { -taxel.gain.abs() } else { taxel.gain.abs() };
+        }
+        if let Some(x) =
+            number("dead_band", &self.dead_band, &|x| (0.0..=MOST).contains(&x), "0 or more, in the unit of P")?
+        {
+            taxel.dead_band = x;
+        }
+        if let Some(x) = number("p_max", &self.p_max, &|x| x > 0.0 && x <= MOST, "over 0, in the unit of P")? {
+            taxel.p_max = x;
+        }
+        if let Some(range) = &self.raw_range {
+            let [low, high] = *range.get_ref();
+            if !(low < high && low.abs() <= MOST && high.abs() <= MOST) {
+                let line = line_of(text, range.span().start);
+                return Err(Error::failed(format!(
+                    "`raw_range` is [{low}, {high}]; give the lowest and the highest raw value"
+                ))
+                .at(format!("line {line}")));
+            }
+            taxel.raw_range = [low as f32, high as f32];
+        }
+        if let Some(mask) = self.mask {
+            taxel.mask = mask;
+        }
+        Ok(())
+    }
+}
+
+fn check_checks(checks: &Checks) -> Result<()> {
+    let wrong = |key: &str, must: &str| Err(Error::failed(format!("[checks] `{key}` must be {must}")));
+    if checks.broken_frame_share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
+        return wrong("broken_frame_share", "between 0 and 1");
+    }
+    if checks.isolated_ratio.is_some_and(|ratio| !(ratio.is_finite() && ratio >= 1.0)) {
+        return wrong("isolated_ratio", "1 or more");
+    }
+    if !(checks.isolated_above.is_finite() && checks.isolated_above >= 0.0) {
+        return wrong("isolated_above", "0 or more");
+    }
+    Ok(())
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
+}
+
+/// The parser's message, with the nearest key where it met one that it does not know.
+fn explain(message: &str) -> String {
+    let known = [
+        "all",
+        "taxel",
+        "checks",
+        "baseline",
+        "gain",
+        "invert",
+        "dead_band",
+        "p_max",
+        "raw_range",
+        "mask",
+        "settle_frames",
+        "broken_frame_share",
+        "isolated_ratio",
+        "isolated_above",
+    ];
+    let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
+    match unknown.and_then(|word| Some((word, nearest(word, known)?))) {
+        Some((word, near)) => format!("there is no key `{word}`; did you mean `{near}`?"),
+        None => message.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_taxel_overrides_what_holds_for_all() {
+        let text =
+            "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\n[taxel.7]\nbaseline = 200\nmask = true\n";
+        let calibration = Calibration::parse(text, &[3, 7]).unwrap();
+        assert_eq!(calibration.taxels[0].gain, -2.0);
+        assert_eq!(calibration.taxels[0].baseline, 240.0);
+        assert_eq!(calibration.taxels[1].baseline, 200.0);
+        assert!(calibration.taxels[1].mask && !calibration.taxels[0].mask);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_named_with_its_line() {
+        let why = |text: &str| Calibration::parse(text, &[3, 7]).unwrap_err().to_string();
+        assert_eq!(
+            why("[all]\ngain = 0"),
+            "line 2: `gain` is 0; it must be over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)"
+        );
+        assert!(why("[all]\ngain = nan").contains("line 2"));
+        assert!(why("[taxel.5]\ngain = 1").contains("[taxel.5] names a taxel"));
+        assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
+        assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
+        assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
+        assert!(why("all = 3").contains("line 1"));
+    }
+}

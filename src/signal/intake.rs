@@ -1,0 +1,173 @@
+//! Intake: from a source's frames to the raw values that a plan reads, with what is missing held or left missing, and
+//! what is not to be believed marked faulty.
+//!
+//! It runs on the host for every backend, in the order of the frames, so that all backends see the same input however a
+//! recording is cut.
+
+use super::{Calibration, Frame, RawValue};
+
+/// The state between frames.
+#[derive(Clone, Debug)]
+pub(crate) struct Intake {
+    calibration: Calibration,
+    /// Per taxel those beside it, for the check on isolated ones; empty where that is off.
+    neighbours: Vec<Vec<u32>>,
+    max_age_s: f64,
+    /// Per value of a source's frame, the taxel it belongs to.
+    taxel_of_value: Vec<usize>,
+    /// Per taxel, the last value that arrived, and when.
+    last: Vec<(RawValue, f64)>,
+    /// Per taxel, what this frame says.
+    now: Vec<RawValue>,
+    /// Per taxel, how far it is pressed, in raw units; only for the check on isolated ones.
+    rise: Vec<f64>,
+    frames_seen: u64,
+}
+
+impl Intake {
+    /// For a body of as many taxels as `calibration` has, in whose order a source delivers unless told otherwise.
+    pub(crate) fn new(calibration: Calibration, neighbours: Vec<Vec<u32>>, max_age_s: f64) -> Self {
+        let taxels = calibration.taxels.len();
+        Self {
+            calibration,
+            neighbours,
+            max_age_s,
+            taxel_of_value: (0..taxels).collect(),
+            last: vec![(RawValue::MISSING, 0.0); taxels],
+            now: vec![RawValue::MISSING; taxels],
+            rise: vec![0.0; taxels],
+            frames_seen: 0,
+        }
+    }
+
+    /// From now on, value i of a frame belongs to taxel `taxel_of_value[i]`.
+    pub(crate) fn listen(&mut self, taxel_of_value: Vec<usize>) {
+        self.taxel_of_value = taxel_of_value;
+    }
+
+    /// Number of values a frame must have.
+    pub(crate) fn width(&self) -> usize {
+        self.taxel_of_value.len()
+    }
+
+    /// Appends to `out` the values of the taxels `slots` in `frame`.
+    pub(crate) fn take(&mut self, frame: &Frame, slots: &[usize], out: &mut Vec<RawValue>) {
+        self.now.fill(RawValue::MISSING);
+        for (&taxel, &value) in self.taxel_of_value.iter().zip(&frame.values) {
+            self.now[taxel] = value;
+        }
+        if self.max_age_s > 0.0 {
+            self.hold(frame.t_s);
+        }
+        let settling = self.frames_seen < self.calibration.checks.settle_frames;
+        self.frames_seen += 1;
+        if settling || self.is_broken() {
+            out.extend(
+                slots
+                    .iter()
+                    .map(|&slot| if self.now[slot].is_missing() { RawValue::MISSING } else { RawValue::FAULTY }),
+            );
+            return;
+        }
+        if let Some(ratio) = self.calibration.checks.isolated_ratio {
+            self.distrust_isolated(ratio);
+        }
+        out.extend(slots.iter().map(|&slot| self.now[slot]));
+    }
+
+    /// A value that is missing is the last one that arrived, while that is young enough.
+    fn hold(&mut self, t_s: f64) {
+        for (now, (last, at)) in self.now.iter_mut().zip(&mut self.last) {
+            if !now.is_missing() {
+                (*last, *at) = (*now, t_s);
+            } else if (0.0..=self.max_age_s).contains(&(t_s - *at)) {
+                *now = *last;
+            }
+        }
+    }
+
+    /// Whether so many values lie outside the sensor's range that the frame as a whole is garbled.
+    fn is_broken(&self) -> bool {
+        let Some(share) = self.calibration.checks.broken_frame_share else { return false };
+        let (mut there, mut beyond) = (0_u32, 0_u32);
+        for (value, taxel) in self.now.iter().zip(&self.calibration.taxels) {
+            if !value.is_missing() && !taxel.mask {
+                there += 1;
+                let [low, high] = taxel.raw_range.map(f64::from);
+                beyond += u32::from(value.number().is_none_or(|value| !(low..=high).contains(&value)));
+            }
+        }
+        f64::from(beyond) > share * f64::from(there)
+    }
+
+    /// Marks values that rise far above all of their neighbours'.
+    fn distrust_isolated(&mut self, ratio: f64) {
+        for ((rise, value), taxel) in self.rise.iter_mut().zip(&self.now).zip(&self.calibration.taxels) {
+            let above = value.number().map_or(0.0, |value| value - f64::from(taxel.baseline));
+            *rise = if taxel.mask { 0.0 } else { (above * f64::from(taxel.gain.signum())).max(0.0) };
+        }
+        for (index, neighbours) in self.neighbours.iter().enumerate() {
+            let rise = self.rise[index];
+            let highest = neighbours.iter().map(|&n| self.rise[n as usize]).fold(0.0, f64::max);
+            if !neighbours.is_empty() && rise > self.calibration.checks.isolated_above && rise > ratio * highest {
+                self.now[index] = RawValue::FAULTY;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(t_s: f64, values: &[Option<f64>]) -> Frame {
+        let values = values.iter().map(|v| v.map_or(RawValue::MISSING, RawValue::new)).collect();
+        Frame { t_s, values, pose: Vec::new() }
+    }
+
+    fn take(intake: &mut Intake, frame: &Frame) -> Vec<RawValue> {
+        let mut out = Vec::new();
+        intake.take(frame, &[0, 1, 2], &mut out);
+        out
+    }
+
+    fn numbers(values: &[RawValue]) -> Vec<Option<f64>> {
+        values.iter().map(|v| v.number()).collect()
+    }
+
+    #[test]
+    fn a_missing_value_is_held_for_its_age_and_no_longer() {
+        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.5);
+        take(&mut intake, &frame(1.0, &[Some(7.0), None, Some(9.0)]));
+        let held = take(&mut intake, &frame(1.5, &[None, None, Some(10.0)]));
+        assert_eq!(numbers(&held), [Some(7.0), None, Some(10.0)]);
+        let late = take(&mut intake, &frame(1.6, &[None, None, None]));
+        assert_eq!(numbers(&late), [None, None, Some(10.0)]);
+        assert!(late[0].is_missing());
+    }
+
+    #[test]
+    fn a_garbled_frame_and_a_settling_one_are_not_believed() {
+        let text = "[all]\nraw_range = [0, 100]\n[checks]\nsettle_frames = 1\nbroken_frame_share = 0.4";
+        let mut intake = Intake::new(Calibration::parse(text, &[1, 2, 3]).unwrap(), Vec::new(), 0.0);
+        let fine = frame(0.0, &[Some(1.0), Some(200.0), None]);
+        assert_eq!(take(&mut intake, &fine), [RawValue::FAULTY, RawValue::FAULTY, RawValue::MISSING]);
+        let one_of_three = frame(0.0, &[Some(1.0), Some(200.0), Some(3.0)]);
+        assert_eq!(numbers(&take(&mut intake, &one_of_three)), [Some(1.0), Some(200.0), Some(3.0)]);
+        let two_of_three = frame(0.0, &[Some(1.0), Some(200.0), Some(-3.0)]);
+        assert_eq!(take(&mut intake, &two_of_three), [RawValue::FAULTY; 3]);
+    }
+
+    #[test]
+    fn a_hot_taxel_without_company_is_not_believed() {
+        let text = "[checks]\nisolated_ratio = 5\nisolated_above = 50";
+        let calibration = Calibration::parse(text, &[1, 2, 3]).unwrap();
+        let mut intake = Intake::new(calibration, vec![vec![1], vec![0, 2], vec![1]], 0.0);
+        let hot = take(&mut intake, &frame(0.0, &[Some(10.0), Some(100.0), Some(19.0)]));
+        assert_eq!(numbers(&hot), [Some(10.0), None, Some(19.0)]);
+        let in_company = take(&mut intake, &frame(0.0, &[Some(10.0), Some(100.0), Some(21.0)]));
+        assert_eq!(in_company[1].number(), Some(100.0));
+        let faint = take(&mut intake, &frame(0.0, &[Some(0.0), Some(50.0), Some(0.0)]));
+        assert_eq!(faint[1].number(), Some(50.0));
+    }
+}

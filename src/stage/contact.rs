@@ -1,0 +1,40 @@
+//! **contact**: S = Σ wᵢPᵢ, max Pᵢ, the number of taxels with P > 0 and their area; contact is S > 0.
+//!
+//! Weights are at least 2⁻²⁰ and pressures 0 or at least 2⁻⁶⁰, so that S > 0 exactly when a taxel is pressed: contact is
+//! the same on every backend.
+//!
+//! **Bound.** Each wP carries the pressure's 2u and one rounding, n − 1 sums one each: |δS| ≤ (n + 2)u·S.
+//! The peak carries its pressure's error alone; n areas, rounded to f32 and summed: |δA| ≤ n·u·A.
+
+use super::{Pressed, SLACK, U};
+
+/// A field's sums in one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Contact {
+    pub(crate) total: f64,
+    pub(crate) peak: f64,
+    pub(crate) active: u32,
+    pub(crate) area: f64,
+}
+
+/// What is right, in f64.
+pub(crate) fn reference(pressed: &[Pressed]) -> Contact {
+    Contact {
+        total: pressed.iter().map(Pressed::pull).sum(),
+        peak: pressed.iter().map(|taxel| taxel.pressure).fold(0.0, f64::max),
+        active: pressed.len() as u32,
+        area: pressed.iter().map(|taxel| taxel.area).sum(),
+    }
+}
+
+/// How far single precision may be off; `active` is exact.
+pub(crate) fn bound(pressed: &[Pressed]) -> Contact {
+    let right = reference(pressed);
+    let n = pressed.len() as f64;
+    Contact {
+        total: SLACK * (n + 2.0) * U * right.total,
+        peak: SLACK * 2.0 * U * right.peak,
+        active: 0,
+        area: SLACK * (n + 1.0) * U * right.area,
+    }
+}

@@ -1,0 +1,59 @@
+//! Every struct that crosses to the GPU. A test holds each to what naga makes of its WGSL twin.
+
+use bytemuck::{Pod, Zeroable};
+
+/// What changes from batch to batch.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Batch {
+    /// Frames in this batch.
+    pub(crate) frames: u32,
+    /// Taxels in a frame.
+    pub(crate) slots: u32,
+    /// Fields.
+    pub(crate) fields: u32,
+    /// A uniform block's size is a multiple of 16 bytes.
+    pub(crate) unused: u32,
+}
+
+/// A taxel's calibration.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Taxel {
+    pub(crate) baseline: f32,
+    pub(crate) gain: f32,
+    pub(crate) dead_band: f32,
+    pub(crate) p_max: f32,
+    pub(crate) raw_low: f32,
+    pub(crate) raw_high: f32,
+    /// m².
+    pub(crate) area: f32,
+    /// 1: never believed.
+    pub(crate) masked: u32,
+}
+
+/// Where a field's members stand, and what it can answer.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Field {
+    /// Index of its first member.
+    pub(crate) first: u32,
+    /// Number of members.
+    pub(crate) count: u32,
+    /// 1: it has a chart.
+    pub(crate) charted: u32,
+    /// 1: every member's area is known.
+    pub(crate) area_known: u32,
+}
+
+/// A taxel's part in a field.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Member {
+    /// Which taxel of the frame.
+    pub(crate) slot: u32,
+    pub(crate) weight: f32,
+    /// Place in the field's unit; the third coordinate stands apart, as only fields without a chart need it.
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+}

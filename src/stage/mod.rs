@@ -1,0 +1,50 @@
+//! The stages that turn raw values into percepts: one file each, with its equations, its plain f64 reference and the
+//! bound on what single precision may lose.
+//!
+//! A stage has one name everywhere: `src/stage/<stage>.rs` says what is right, `shaders/<stage>.wgsl` and
+//! `src/backend/cpu/<stage>.rs` compute it in f32.
+//!
+//! **Bounds.** u = 2⁻²⁴ is the unit roundoff of single precision. WebGPU promises correctly rounded +, −, ×, and ÷ to
+//! 2.5 ulp (5u); a product may be fused into a sum, which only takes a rounding away. Every bound here is first order in
+//! u times [`SLACK`] for the higher orders, and holds for any order of summation. Coordinates are in the field's unit, a
+//! power of two at least its radius, so that nothing overflows or underflows whatever the body's size.
+
+pub(crate) mod angle;
+pub(crate) mod axis;
+pub(crate) mod calibrate;
+pub(crate) mod centroid;
+pub(crate) mod contact;
+pub(crate) mod layout;
+pub(crate) mod orientation;
+pub(crate) mod position;
+
+use glam::DVec3;
+
+/// Unit roundoff of binary32.
+pub(crate) const U: f64 = 1.0 / 16_777_216.0;
+
+/// Division to 2.5 ulp, as WebGPU promises it.
+pub(crate) const DIVISION: f64 = 5.0 * U;
+
+/// Room for the terms of second and higher order that the bounds leave out: n·u stays under 0.1 for 10⁶ members.
+pub(crate) const SLACK: f64 = 1.1;
+
+/// One pressed taxel of a field in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pressed {
+    /// w > 0.
+    pub(crate) weight: f64,
+    /// P > 0.
+    pub(crate) pressure: f64,
+    /// (u, v, depth) in the field's unit.
+    pub(crate) place: DVec3,
+    /// m².
+    pub(crate) area: f64,
+}
+
+impl Pressed {
+    /// wP.
+    pub(crate) fn pull(&self) -> f64 {
+        self.weight * self.pressure
+    }
+}

@@ -1,0 +1,112 @@
+//! Bodies and backends that several tests share.
+#![allow(dead_code)]
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue};
+
+/// Every backend that can run here. Without an adapter the GPU is left out, loudly, unless it is required.
+pub fn backends() -> Vec<BackendKind> {
+    let mut backends = vec![BackendKind::Reference, BackendKind::Cpu];
+    if has_gpu() {
+        backends.push(BackendKind::Gpu);
+    }
+    backends
+}
+
+/// Whether there is an adapter. With `SOMATIC_REQUIRE_GPU=1` its absence fails the test.
+pub fn has_gpu() -> bool {
+    let found = !somatic::backend::gpu::adapters().is_empty();
+    if !found {
+        assert!(
+            std::env::var("SOMATIC_REQUIRE_GPU").as_deref() != Ok("1"),
+            "SOMATIC_REQUIRE_GPU=1, and no adapter answers"
+        );
+        eprintln!("SKIPPED on the gpu backend: no adapter answers");
+    }
+    found
+}
+
+/// The folder of real recordings and meshes, if this machine has it.
+pub fn data() -> Option<PathBuf> {
+    let folder = PathBuf::from(std::env::var("SOMATIC_DATA").unwrap_or_else(|_| "../shared/data".into()));
+    if !folder.is_dir() {
+        eprintln!("SKIPPED: no real data at {}; set SOMATIC_DATA", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+/// A flat skin of taxels at `uv`, looking along +y, in a body of one link; ids count up from 0.
+pub struct Flat {
+    pub glb: Glb,
+    link: usize,
+}
+
+impl Flat {
+    pub fn new(uv: &[[f64; 2]]) -> Self {
+        Self::at(uv, DVec3::ZERO)
+    }
+
+    /// The same, with everything shifted in the link's frame.
+    pub fn at(uv: &[[f64; 2]], origin: DVec3) -> Self {
+        let mut glb = Glb::new();
+        let link = glb.node("skin", None, DVec3::ZERO);
+        let taxels: Vec<Taxel> = uv
+            .iter()
+            .enumerate()
+            .map(|(id, &[u, v])| Taxel {
+                id: id as u32,
+                link: 0,
+                position_in_link: origin + DVec3::new(u, 0.0, -v),
+                normal_in_link: DVec3::Y,
+                area: 1e-4,
+                modality: Modality::Pressure,
+            })
+            .collect();
+        glb.taxels("taxels", Some(link), &taxels, None);
+        Self { glb, link }
+    }
+
+    /// Adds a square of surface under the taxels.
+    pub fn surface(mut self, half: f32) -> Self {
+        let node = self.glb.node("surface", Some(self.link), DVec3::ZERO);
+        let mesh = MeshData {
+            positions: vec![[-half, 0.0, -half], [-half, 0.0, half], [half, 0.0, half], [half, 0.0, -half]],
+            normals: vec![[0.0, 1.0, 0.0]; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            skinning: None,
+        };
+        self.glb.mesh(node, "surface", &mesh, None, None);
+        self
+    }
+
+    /// Adds a field over `ids`, its chart's origin at the skin's own, +u along +x and so +v along −z.
+    pub fn field(mut self, name: &str, parent: Option<&str>, ids: impl IntoIterator<Item = u32>) -> Self {
+        let chart = ChartSpec {
+            kind: ChartKind::Plane,
+            origin_in_anchor: Some([0.0; 3]),
+            u_in_anchor: Some([1.0, 0.0, 0.0]),
+        };
+        let members = ids.into_iter().map(|id| (id, MemberSpec::default())).collect();
+        let spec =
+            FieldSpec { name: name.into(), parent: parent.map(str::to_owned), members, chart: Some(chart) };
+        self.glb.field(&spec, Some(self.link), DVec3::ZERO);
+        self
+    }
+
+    pub fn body(&self) -> Body {
+        Body::from_bytes("flat", &self.glb.to_bytes().unwrap()).unwrap()
+    }
+}
+
+/// An engine on `kind` with everything else as it comes.
+pub fn engine(body: &Body, kind: BackendKind) -> Engine {
+    Engine::new(body, Options { backend: kind, batch: 64, ..Options::default() }).unwrap()
+}
+
+pub fn frame(t_s: f64, values: &[f64]) -> Frame {
+    Frame { t_s, values: values.iter().map(|&v| RawValue::new(v)).collect(), pose: Vec::new() }
+}
