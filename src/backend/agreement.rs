@@ -184,3 +184,92 @@ impl Cell<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::percept::{Precision, Values};
+
+    const NAMES: [&str; 1] = ["field"];
+
+    /// One field in one frame, in double precision, changed by `change`.
+    fn percepts(change: impl Fn(&mut Percepts, &mut crate::percept::Columns<f64>)) -> Percepts {
+        let mut percepts = Percepts::new(Outputs::all(), 1, Precision::F64);
+        percepts.reset(1);
+        percepts.present[0] = Outputs::all();
+        percepts.active[0] = 3;
+        let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
+        (columns.total[0], columns.peak[0], columns.area[0]) = (10.0, 5.0, 1.0);
+        columns.centroid[0] = [0.1, 0.2, 0.0];
+        (columns.orientation[0], columns.axis[0], columns.anisotropy[0]) = (0.001, 1.0, 0.5);
+        change(&mut percepts, &mut columns);
+        percepts.values = Values::F64(columns);
+        percepts
+    }
+
+    fn bound() -> CellBound {
+        let near = Some(0.01);
+        CellBound {
+            in_doubt: Flags::empty(),
+            total: near,
+            peak: near,
+            area: near,
+            centroid: Some([0.01; 2]),
+            position: near,
+            normal: near,
+            orientation: near,
+            axis: near,
+            anisotropy: near,
+        }
+    }
+
+    fn against(bound: CellBound, change: impl Fn(&mut Percepts, &mut crate::percept::Columns<f64>)) -> Agreement {
+        compare(&percepts(|_, _| {}), &[bound], &percepts(change), &NAMES)
+    }
+
+    #[test]
+    fn the_same_agrees_and_so_does_what_is_within_bounds() {
+        assert!(against(bound(), |_, _| {}).holds());
+        assert!(against(bound(), |_, c| c.total[0] += 0.009).holds());
+        // Either side of the seam is near.
+        assert!(against(bound(), |_, c| c.orientation[0] = std::f64::consts::PI - 0.001).holds());
+    }
+
+    #[test]
+    fn every_quantity_beyond_its_bound_fails() {
+        type Change = fn(&mut Percepts, &mut crate::percept::Columns<f64>);
+        let changes: [(&str, Change); 13] = [
+            ("total", |_, c| c.total[0] += 0.011),
+            ("peak", |_, c| c.peak[0] -= 0.011),
+            ("area", |_, c| c.area[0] = f64::NAN),
+            ("centroid", |_, c| c.centroid[0][0] += 0.011),
+            ("centroid", |_, c| c.centroid[0][1] -= 0.011),
+            ("position", |p, _| p.position[0][2] += 0.011),
+            ("normal", |p, _| p.normal[0][0] += 0.011),
+            ("orientation", |_, c| c.orientation[0] += 0.011),
+            ("axis", |_, c| c.axis[0] += 1.5),
+            ("anisotropy", |_, c| c.anisotropy[0] = 0.6),
+            ("active", |p, _| p.active[0] = 2),
+            ("flags", |p, _| p.flags[0] |= Flags::TIE),
+            ("axis", |p, _| p.present[0] -= Outputs::AXIS),
+        ];
+        for (name, change) in changes {
+            let agreement = against(bound(), change);
+            assert!(!agreement.holds(), "{name}");
+            assert!(agreement.failures[0].contains(name), "{name}: {}", agreement.failures[0]);
+        }
+    }
+
+    #[test]
+    fn what_is_too_close_to_call_is_counted_and_not_compared() {
+        let loose = CellBound { orientation: None, in_doubt: Flags::TIE, ..bound() };
+        let agreement = against(loose, |p, c| {
+            c.orientation[0] = 1.5;
+            p.flags[0] |= Flags::TIE;
+        });
+        assert!(agreement.holds());
+        assert_eq!((agreement.undecided_flags, agreement.quantities["orientation"].undecided), (1, 1));
+        let other_flag = against(loose, |p, _| p.flags[0] |= Flags::COINCIDENT);
+        assert!(!other_flag.holds());
+    }
+}

@@ -85,14 +85,10 @@ impl Flat {
 
     /// Adds a field over `ids`, its chart's origin at the skin's own, +u along +x and so +v along −z.
     pub fn field(mut self, name: &str, parent: Option<&str>, ids: impl IntoIterator<Item = u32>) -> Self {
-        let chart = ChartSpec {
-            kind: ChartKind::Plane,
-            origin_in_anchor: Some([0.0; 3]),
-            u_in_anchor: Some([1.0, 0.0, 0.0]),
-        };
+        let chart =
+            ChartSpec { kind: ChartKind::Plane, origin_in_anchor: Some([0.0; 3]), u_in_anchor: Some([1.0, 0.0, 0.0]) };
         let members = ids.into_iter().map(|id| (id, MemberSpec::default())).collect();
-        let spec =
-            FieldSpec { name: name.into(), parent: parent.map(str::to_owned), members, chart: Some(chart) };
+        let spec = FieldSpec { name: name.into(), parent: parent.map(str::to_owned), members, chart: Some(chart) };
         self.glb.field(&spec, Some(self.link), DVec3::ZERO);
         self
     }

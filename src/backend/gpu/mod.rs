@@ -8,6 +8,9 @@
 pub(crate) mod adapter;
 pub(crate) mod shaders;
 
+#[cfg(test)]
+mod tests;
+
 use std::sync::mpsc;
 
 pub use adapter::{AdapterSummary, adapters};

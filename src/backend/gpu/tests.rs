@@ -1,0 +1,134 @@
+//! What holds the shaders to the Rust beside them, on machines without any driver too.
+
+use std::mem::{offset_of, size_of};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{Module, TypeInner};
+
+use super::shaders::{ALL, StageShader};
+use super::{PRESENT, adapter, groups, pipeline};
+use crate::percept::{Flags, Outputs};
+use crate::stage::{calibrate, layout};
+
+fn parse(shader: &StageShader) -> Module {
+    naga::front::wgsl::parse_str(shader.source)
+        .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(shader.source)))
+}
+
+/// (name, offset) of every member of the WGSL struct `name`, and its size.
+fn members(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let (_, found) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect("the struct is there");
+    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
+    (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
+}
+
+macro_rules! same_layout {
+    ($module:expr, $type:ident { $($field:ident),* $(,)? }) => {
+        let (members, span) = members($module, stringify!($type));
+        let ours = vec![$((stringify!($field).to_owned(), offset_of!(layout::$type, $field) as u32)),*];
+        assert_eq!(members, ours, stringify!($type));
+        assert_eq!(span as usize, size_of::<layout::$type>(), stringify!($type));
+    };
+}
+
+#[test]
+fn structs_lie_as_naga_lays_them() {
+    let module = parse(&ALL[1]);
+    same_layout!(&module, Batch { frames, slots, fields, unused });
+    same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, masked });
+    same_layout!(&module, Field { first, count, charted, area_known });
+    same_layout!(&module, Member { slot, weight, u, v });
+}
+
+/// The value of the integer constant `name`.
+fn constant(module: &Module, name: &str) -> Option<u32> {
+    let (_, found) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
+    match module.global_expressions[found.init] {
+        naga::Expression::Literal(naga::Literal::U32(value)) => Some(value),
+        _ => panic!("{name} is no u32"),
+    }
+}
+
+#[test]
+fn bits_have_one_meaning() {
+    let module = parse(&ALL[0]);
+    for (name, flag) in Flags::all().iter_names() {
+        // A shader names the flags it sets; whatever it names must be the same bit.
+        if let Some(bits) = constant(&module, name) {
+            assert_eq!(bits, flag.bits(), "{name}");
+        }
+    }
+    for name in ["NO_CONTACT", "ONE_TAXEL", "TIE", "COINCIDENT", "ISOTROPIC", "SATURATED", "FAULTY_INPUT", "NO_CHART"] {
+        assert!(constant(&module, name).is_some(), "{name}");
+    }
+    for (name, output) in Outputs::all().iter_names() {
+        assert_eq!(constant(&module, name), Some(output.bits()), "{name}");
+    }
+    assert_eq!(constant(&module, "FLAGS"), Some(Flags::all().bits()));
+    assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
+    assert_eq!(constant(&module, "UNUSABLE"), Some(calibrate::UNUSABLE));
+    assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
+    assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
+    assert_eq!(constant(&module, "MISSING"), Some(crate::signal::RawValue::MISSING.to_bits()));
+    assert!(Flags::all().bits() < 1 << PRESENT && Outputs::all().bits() < 1 << (32 - PRESENT));
+}
+
+#[test]
+fn every_shader_validates_with_no_optional_capability() {
+    for shader in &ALL {
+        let module = parse(shader);
+        let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+        assert!(validated.is_ok(), "{}: {:?}", shader.name, validated.err());
+        assert_eq!(module.entry_points.len(), 1, "{}", shader.name);
+        let storage =
+            module.global_variables.iter().filter(|(_, v)| matches!(v.space, naga::AddressSpace::Storage { .. }));
+        assert!(storage.count() <= 8, "{} binds more than every device can", shader.name);
+    }
+}
+
+#[test]
+fn every_shader_is_the_file_of_its_stage() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files: Vec<String> = std::fs::read_dir(folder.join("shaders"))
+        .unwrap()
+        .filter_map(|entry| Some(entry.unwrap().file_name().to_str()?.strip_suffix(".wgsl")?.to_owned()))
+        .collect();
+    let mut stages: Vec<String> = ALL.iter().map(|shader| shader.name.to_owned()).collect();
+    files.sort();
+    stages.sort();
+    assert_eq!(files, stages);
+    for stage in stages {
+        assert!(folder.join(format!("src/stage/{stage}.rs")).is_file(), "{stage}");
+        assert!(folder.join(format!("src/backend/cpu/{stage}.rs")).is_file(), "{stage}");
+    }
+}
+
+#[test]
+fn pipelines_build_without_any_driver() {
+    let device = adapter::open(wgpu::Backends::NOOP).expect("noop is always there");
+    for shader in &ALL {
+        let built = pipeline(&device, shader);
+        assert!(format!("{built:?}").contains("ComputePipeline"));
+    }
+}
+
+#[test]
+fn a_shader_that_is_wrong_is_caught() {
+    let broken = ALL[1].source.replace("total += member.weight * pressure;", "total += member.weight * status;");
+    assert!(
+        naga::front::wgsl::parse_str(&broken).is_err() || {
+            let module = naga::front::wgsl::parse_str(&broken).unwrap();
+            Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err()
+        }
+    );
+}
+
+#[test]
+fn a_long_dispatch_is_folded() {
+    assert_eq!(groups(1), (1, 1));
+    assert_eq!(groups(65_535), (65_535, 1));
+    for count in [65_536, 1_000_003, u32::MAX / 64] {
+        let (wide, tall) = groups(count);
+        assert!(wide <= 65_535 && tall <= 65_535 && u64::from(wide) * u64::from(tall) >= u64::from(count));
+    }
+}
