@@ -77,7 +77,7 @@ impl<'a> Nodes<'a> {
         let mut to_visit: Vec<usize> = (0..raw.len()).rev().filter(|&n| parent[n].is_none()).collect();
         while let Some(node) = to_visit.pop() {
             in_order.push(node);
-            to_visit.extend(raw[node].children.iter().flatten().rev().map(|child| child.value()));
+            to_visit.extend(raw[node].children.iter().flatten().rev().map(json::Index::value));
         }
         if in_order.len() < raw.len() {
             return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
