@@ -420,7 +420,7 @@ fn accessors_that_claim_what_is_not_there_are_refused() {
     let plate = |change: &dyn Fn(&mut Value)| {
         let mut draft = Draft::default();
         let points = draft.points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-        let mesh = draft.mesh(json!({"attributes": {"POSITION": points}}));
+        let mesh = draft.mesh(&json!({"attributes": {"POSITION": points}}));
         draft.node(json!({"name": "plate", "mesh": mesh}));
         change(&mut draft.json);
         draft.why()
@@ -440,7 +440,7 @@ fn accessors_that_claim_what_is_not_there_are_refused() {
         let mut draft = Draft::default();
         let attributes = json!({"POSITION": draft.points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])});
         let indices = draft.indices(indices);
-        let mesh = draft.mesh(json!({"attributes": attributes, "indices": indices}));
+        let mesh = draft.mesh(&json!({"attributes": attributes, "indices": indices}));
         draft.node(json!({"mesh": mesh}));
         draft.why()
     };

@@ -14,7 +14,7 @@ const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0
 fn plate(primitive: impl FnOnce(&mut Draft) -> Value) -> Body {
     let mut draft = Draft::default();
     let primitive = primitive(&mut draft);
-    let mesh = draft.mesh(primitive);
+    let mesh = draft.mesh(&primitive);
     draft.node(json!({"name": "plate", "mesh": mesh}));
     draft.load().unwrap()
 }
@@ -115,7 +115,7 @@ fn lines_points_and_empty_meshes_are_no_surface() {
 fn millimetres_come_out_in_metres() {
     let mut draft = Draft::default();
     let points = draft.points(&[[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 100.0, 0.0]]);
-    let mesh = draft.mesh(json!({"attributes": {"POSITION": points}}));
+    let mesh = draft.mesh(&json!({"attributes": {"POSITION": points}}));
     let taxels = draft.taxels(&[[20.0, 30.0, 0.0]], &[5.0]);
     draft.json["nodes"] = json!([
         {"name": "root", "scale": [0.001, 0.001, 0.001], "children": [1]},
@@ -141,7 +141,7 @@ fn millimetres_come_out_in_metres() {
 fn a_mirrored_node_keeps_its_outside_outside() {
     let mut draft = Draft::default();
     let points = draft.points(&CORNERS);
-    let mesh = draft.mesh(json!({"mode": 5, "attributes": {"POSITION": points}}));
+    let mesh = draft.mesh(&json!({"mode": 5, "attributes": {"POSITION": points}}));
     let taxels = draft.taxels(&[[0.25, 0.5, 0.0]], &[5.0]);
     draft.json["nodes"] = json!([
         {"name": "left", "scale": [-1.0, 1.0, 1.0], "mesh": mesh, "children": [1]},
@@ -181,7 +181,7 @@ fn a_flattened_node_gives_no_number_that_is_none() {
     for scale in [[0.0, 1.0, 1.0], [0.0, 0.0, 0.0], [1.0, 1.0, 0.0]] {
         let mut draft = Draft::default();
         let points = draft.points(&CORNERS);
-        let plate = draft.mesh(json!({"mode": 5, "attributes": {"POSITION": points}}));
+        let plate = draft.mesh(&json!({"mode": 5, "attributes": {"POSITION": points}}));
         let mesh = draft.taxels(&[[0.5; 3]], &[5.0]);
         draft.json["nodes"] = json!([
             {"name": "base", "mesh": plate, "children": [1]},
@@ -198,7 +198,7 @@ fn a_flattened_node_gives_no_number_that_is_none() {
 fn a_normal_that_is_no_number_is_taken_from_the_surface() {
     let mut draft = Draft::default();
     let points = draft.points(&CORNERS);
-    let plate = draft.mesh(json!({"mode": 5, "attributes": {"POSITION": points}}));
+    let plate = draft.mesh(&json!({"mode": 5, "attributes": {"POSITION": points}}));
     let taxels = draft.taxels(&[[0.5, 0.5, 0.0]], &[5.0]);
     let bad = draft.scalars(&[f32::NAN]);
     draft.json["meshes"][taxels]["primitives"][0]["attributes"]["_NX"] = json!(bad);
@@ -281,6 +281,21 @@ fn fields_without_taxels_are_told_of() {
     draft.field(r#"{"version":1,"name":"palm","members":{"5":[1]}}"#);
     let body = draft.load().unwrap();
     assert!(body.findings[0].contains("use_mesh_vertices"), "{:?}", body.findings);
+}
+
+#[test]
+fn the_example_in_the_specification_is_a_body() {
+    let page = include_str!("../docs/layout.md");
+    let example = page.rsplit("```").nth(1).unwrap().strip_prefix("json").unwrap();
+    let mut json: Value = serde_json::from_str(example).unwrap();
+    let numbers = [0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 17.0, 18.0, 1.0, 1.0, 0.0, 0.0_f32];
+    let mut draft = Draft { bytes: bytemuck::cast_slice(&numbers).to_vec(), ..Draft::default() };
+    std::mem::swap(&mut draft.json, &mut json);
+    let body = draft.load().unwrap();
+    assert_eq!(body.taxels.iter().map(|t| t.id).collect::<Vec<_>>(), [17, 18]);
+    assert_eq!(body.taxels[1].normal_in_link, DVec3::Z);
+    assert_eq!(body.fields[0].members.len(), 2);
+    assert!(body.findings.is_empty(), "{:?}", body.findings);
 }
 
 #[test]

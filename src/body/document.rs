@@ -228,7 +228,12 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
         let why = if cut {
             format!("the file is cut short, {} of {length} bytes; export or copy it again", bytes.len())
         } else {
-            format!("its glTF container is damaged: {e}; export it again")
+            match e {
+                gltf::Error::Io(_) | gltf::Error::Binary(gltf::binary::Error::Io(_)) => {
+                    "its glTF container is damaged: it ends inside a chunk; export it again".to_owned()
+                }
+                e => format!("its glTF container is damaged: {e}; export it again"),
+            }
         };
         Error::failed(why)
     })?;

@@ -304,7 +304,7 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
         };
         let far = positions.iter().enumerate().find(|&(point, p)| {
             let position = of_point(point).1.transform_point3(DVec3::from_array(p.map(f64::from)));
-            !(position.abs().max_element() <= FARTHEST)
+            position.abs().max_element() > FARTHEST
         });
         if let Some((vertex, _)) = far {
             return Err(in_place(Error::failed(format!(

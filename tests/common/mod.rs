@@ -80,7 +80,7 @@ impl Draft {
         self.accessor(U16, "SCALAR", indices.len(), bytemuck::cast_slice(indices))
     }
 
-    pub fn mesh(&mut self, primitive: Value) -> usize {
+    pub fn mesh(&mut self, primitive: &Value) -> usize {
         self.push("meshes", json!({"primitives": [primitive]}))
     }
 
@@ -95,7 +95,7 @@ impl Draft {
             "_NZ": self.scalars(&vec![1.0; count]),
             "_AREA": self.scalars(&vec![1e-6; count]),
         });
-        self.mesh(json!({"mode": 0, "attributes": attributes}))
+        self.mesh(&json!({"mode": 0, "attributes": attributes}))
     }
 
     pub fn field(&mut self, text: &str) -> usize {
@@ -120,6 +120,6 @@ impl Draft {
 
     /// The one line that refuses this file.
     pub fn why(&self) -> String {
-        self.load().err().expect("the file should be refused").to_string()
+        self.load().expect_err("the file should be refused").to_string()
     }
 }
