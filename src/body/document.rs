@@ -14,7 +14,7 @@ use json::validation::{Checked, Validate};
 use crate::error::{Error, Result};
 
 /// Elements an accessor without any data may claim before it is taken for a damaged file.
-const MOST_ZERO_ELEMENTS: u64 = 1 << 24;
+const MOST_ZERO_ELEMENTS: u64 = 1 << 22;
 
 /// The file's JSON and the bytes of its buffers.
 pub(crate) struct Document {
@@ -222,11 +222,18 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
         return Err(Error::failed("its glTF header is damaged or cut short; export or copy the file again"));
     }
     let cut = bytes.len() < length as usize;
-    let glb = gltf::binary::Glb::from_slice(bytes).map_err(|e| {
+    // What follows the container is none of it.
+    let container = bytes.get(..length as usize).unwrap_or(bytes);
+    let glb = gltf::binary::Glb::from_slice(container).map_err(|e| {
         let why = if cut {
             format!("the file is cut short, {} of {length} bytes; export or copy it again", bytes.len())
         } else {
-            format!("its glTF container is damaged: {e}; export it again")
+            match e {
+                gltf::Error::Io(_) | gltf::Error::Binary(gltf::binary::Error::Io(_)) => {
+                    "its glTF container is damaged: it ends inside a chunk; export it again".to_owned()
+                }
+                e => format!("its glTF container is damaged: {e}; export it again"),
+            }
         };
         Error::failed(why)
     })?;
@@ -270,6 +277,16 @@ fn refuse_what_is_compressed(root: &json::Root) -> Result<()> {
 
 /// The crate's own validation, less the one rule where it is stricter than glTF.
 fn validate(root: &json::Root) -> Result<()> {
+    // The crate follows this one index before it has checked it.
+    let positions = Checked::Valid(json::mesh::Semantic::Positions);
+    for (mesh, primitive) in root.meshes.iter().enumerate().flat_map(|(i, m)| m.primitives.iter().map(move |p| (i, p)))
+    {
+        if primitive.attributes.get(&positions).is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
+            return Err(Error::failed(format!(
+                "not a sound glTF: the positions of mesh {mesh} point at something that is not in the file; export it again"
+            )));
+        }
+    }
     let mut first = None;
     root.validate(root, json::Path::new, &mut |path, error| {
         let path = path().to_string();
@@ -316,5 +333,10 @@ fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
         .decode_utf8()
         .map_err(|_| Error::failed(format!("its name `{uri}` is not UTF-8; rename it")))?;
     let path = folder.join(name.as_ref());
+    let kind = std::fs::metadata(&path).map_err(|e| Error::io(&path, &e))?;
+    if !kind.is_file() {
+        // A device would be read without end.
+        return Err(Error::failed("this is no plain file; save the buffer beside the body").at(path.display()));
+    }
     std::fs::read(&path).map_err(|e| Error::io(&path, &e))
 }

@@ -132,7 +132,9 @@ impl FieldSpec {
             if uv.is_some_and(|uv| uv.iter().any(|x| !x.is_finite())) {
                 return Err(bad(format!("member {id} has a chart coordinate that is not finite")));
             }
-            members.insert(id, MemberSpec { weight, uv });
+            if members.insert(id, MemberSpec { weight, uv }).is_some() {
+                return Err(bad(format!("member {id} is there twice; give each taxel once")));
+            }
         }
         Ok(Self {
             name: json.name,

@@ -13,6 +13,9 @@ use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
 use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, rigid_part};
 use crate::error::{Error, Result};
 
+/// Metres beyond which a coordinate is damage. Sums and products of what is nearer stay far from overflow.
+const FARTHEST: f64 = 1e9;
+
 /// Reads the body called `name` from a whole file's bytes.
 pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
     let document = Document::parse(bytes, folder)?;
@@ -77,7 +80,7 @@ impl<'a> Nodes<'a> {
         let mut to_visit: Vec<usize> = (0..raw.len()).rev().filter(|&n| parent[n].is_none()).collect();
         while let Some(node) = to_visit.pop() {
             in_order.push(node);
-            to_visit.extend(raw[node].children.iter().flatten().rev().map(|child| child.value()));
+            to_visit.extend(raw[node].children.iter().flatten().rev().map(json::Index::value));
         }
         if in_order.len() < raw.len() {
             return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
@@ -89,8 +92,13 @@ impl<'a> Nodes<'a> {
                 return Err(Error::failed(format!("node {node} has a transform that is not finite; export it again")));
             }
             world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
+            if !is_near(&world_from_node[node]) {
+                return Err(Error::failed(format!(
+                    "node {node} is moved or scaled by over {FARTHEST:e}; check the scene's units and export it again"
+                )));
+            }
         }
-        let field: Vec<Option<String>> = raw.iter().map(field_text).collect();
+        let field = raw.iter().enumerate().map(|(index, node)| field_text(index, node)).collect::<Result<Vec<_>>>()?;
         let mut link = vec![None; raw.len()];
         let mut links = 0;
         for &node in &in_order {
@@ -104,15 +112,16 @@ impl<'a> Nodes<'a> {
 
     fn links(&self) -> Vec<Link> {
         let mut taken = HashSet::new();
+        let mut numbers: HashMap<&str, u64> = HashMap::new();
         let mut links: Vec<Link> = Vec::new();
         for &node in self.in_order.iter().filter(|&&node| self.link[node].is_some()) {
-            let wanted = self.raw[node].name.clone().unwrap_or_else(|| format!("node_{node}"));
-            let mut name = wanted.clone();
-            for number in 2.. {
-                if taken.insert(name.clone()) {
-                    break;
-                }
-                name = format!("{wanted}#{number}");
+            let unnamed = format!("node_{node}");
+            let wanted = self.raw[node].name.as_deref();
+            let mut name = wanted.unwrap_or(&unnamed).to_owned();
+            while !taken.insert(name.clone()) {
+                let number = numbers.entry(wanted.unwrap_or_default()).or_insert(1);
+                *number += 1;
+                name = format!("{}#{number}", wanted.unwrap_or(&unnamed));
             }
             let world_from_link = rigid_part(&self.world_from_node[node]);
             links.push(Link {
@@ -150,10 +159,24 @@ fn local_transform(node: &json::Node) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(three(node.scale, 1.0), rotation, three(node.translation, 0.0))
 }
 
+/// Whether nothing in `transform` is infinite, undefined, or absurdly large.
+fn is_near(transform: &DAffine3) -> bool {
+    transform.to_cols_array().iter().all(|x| x.abs() <= FARTHEST)
+}
+
 /// The field's JSON in a node's extras, if it carries one.
-fn field_text(node: &json::Node) -> Option<String> {
-    let extras: serde_json::Value = serde_json::from_str(node.extras.as_ref()?.get()).ok()?;
-    Some(extras.get(FIELD_KEY)?.as_str()?.to_owned())
+fn field_text(index: usize, node: &json::Node) -> Result<Option<String>> {
+    let Some(extras) = &node.extras else { return Ok(None) };
+    let Ok(extras) = serde_json::from_str::<serde_json::Value>(extras.get()) else { return Ok(None) };
+    match extras.get(FIELD_KEY) {
+        None => Ok(None),
+        Some(serde_json::Value::String(text)) => Ok(Some(text.clone())),
+        Some(_) => {
+            let name = node.name.clone().unwrap_or_else(|| format!("node_{index}"));
+            Err(Error::failed(format!("`{FIELD_KEY}` should be one string; docs/layout.md says what is in it"))
+                .at(format!("field node `{name}`")))
+        }
+    }
 }
 
 fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
@@ -192,6 +215,13 @@ fn joints_of(
         Some(accessor) => document.floats(accessor.value())?,
         None => Vec::new(),
     };
+    if skin.inverse_bind_matrices.is_some() && inverse_binds.len() < skin.joints.len() {
+        return Err(Error::failed(format!(
+            "the skin has {} inverse bind matrices for {} joints; export the file again",
+            inverse_binds.len(),
+            skin.joints.len()
+        )));
+    }
     let mut joints = Vec::with_capacity(skin.joints.len());
     for (index, joint) in skin.joints.iter().enumerate() {
         let link = nodes
@@ -201,9 +231,9 @@ fn joints_of(
             Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
             None => DAffine3::IDENTITY,
         };
-        if !joint_from_mesh.is_finite() {
+        if !is_near(&joint_from_mesh) {
             return Err(Error::failed(format!(
-                "the inverse bind matrix of joint `{}` is not finite; export the file again",
+                "the inverse bind matrix of joint `{}` is not finite or beyond {FARTHEST:e}; export the file again",
                 links[link].name
             )));
         }
@@ -222,6 +252,13 @@ fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, jo
             break;
         };
         let (indices, weights) = (document.integers::<4>(indices)?, document.floats::<4>(weights)?);
+        if indices.len() != points || weights.len() != points {
+            return Err(Error::failed(format!(
+                "{} joint and {} weight rows for {points} vertices; export the file again",
+                indices.len(),
+                weights.len()
+            )));
+        }
         for (best, (indices, weights)) in best.iter_mut().zip(indices.iter().zip(&weights)) {
             for (&joint, &weight) in indices.iter().zip(weights) {
                 if weight > best.0 {
@@ -242,7 +279,9 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
     let place = nodes.raw[node].name.clone().or(mesh_name).unwrap_or_else(|| format!("node_{node}"));
     let in_place = |e: Error| e.at(format!("node `{place}`"));
     let joints = joints_of(document, nodes, node, &body.links).map_err(in_place)?;
-    let carrier = nodes.link_above(node).expect("a node without a link above it is a link");
+    let Some(carrier) = nodes.link_above(node) else {
+        return Err(in_place(Error::failed("a field at the root of the scene carries it; put it under a link")));
+    };
     for primitive in &document.root.meshes[mesh.value()].primitives {
         let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
         let positions = document.floats::<3>(positions).map_err(in_place)?;
@@ -263,6 +302,15 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
             (Some(joints), Some(&joint)) => joints[joint],
             _ => (carrier, link_from_node),
         };
+        let far = positions.iter().enumerate().find(|&(point, p)| {
+            let position = of_point(point).1.transform_point3(DVec3::from_array(p.map(f64::from)));
+            position.abs().max_element() > FARTHEST
+        });
+        if let Some((vertex, _)) = far {
+            return Err(in_place(Error::failed(format!(
+                "vertex {vertex} lies over {FARTHEST:e} m away; check the scene's units and export it again"
+            ))));
+        }
         if is_taxels(primitive) {
             let taxels = read_taxels(document, primitive, &positions, of_point).map_err(in_place)?;
             body.taxels.extend(taxels);
@@ -351,11 +399,14 @@ fn read_taxels(
         let normal = match &normals {
             [Some(x), Some(y), Some(z)] => DVec3::new(x[point].into(), y[point].into(), z[point].into()),
             _ => DVec3::ZERO,
-        };
-        // Normals go by the inverse transpose; an area by how much the plane across its normal is stretched.
-        let m: DMat3 = link_from_mesh.matrix3;
-        let cofactor = m.inverse().transpose() * m.determinant().abs();
-        let stretched = cofactor * normal.normalize_or_zero();
+        }
+        .normalize_or_zero();
+        // Normals go by the inverse transpose; an area by how much the plane across its normal is stretched. The
+        // cofactors are both in one, and exist for a flattened node too.
+        let DMat3 { x_axis: x, y_axis: y, z_axis: z } = link_from_mesh.matrix3;
+        let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+        let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
+        let stretched = cofactor * if mirrored { -normal } else { normal };
         let area = areas.as_ref().map_or(0.0, |areas| f64::from(areas[point]));
         if !(area.is_finite() && area >= 0.0) {
             return Err(Error::failed(format!("taxel {id} has area {area}; areas are m², 0 where unknown")));
@@ -366,7 +417,7 @@ fn read_taxels(
             id: id as u32,
             link,
             position_in_link: link_from_mesh.transform_point3(DVec3::from_array(position.map(f64::from))),
-            normal_in_link: if stretched.is_finite() { stretched.normalize_or_zero() } else { DVec3::ZERO },
+            normal_in_link: stretched.normalize_or_zero(),
             area: area * stretch,
             modality: Modality::from_code(if modality >= 0.0 { modality as u32 } else { 0 }),
         });

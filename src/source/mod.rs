@@ -2,6 +2,14 @@
 //!
 //! A source knows the taxel ids it delivers and nothing of bodies or engines.
 
+mod csv;
+mod ndjson;
+mod spec;
+
+pub use self::csv::CsvSource;
+pub use ndjson::NdjsonSource;
+pub use spec::SourceSpec;
+
 use crate::error::Result;
 use crate::signal::Frame;
 

@@ -1,0 +1,423 @@
+//! Percepts as NDJSON, one line a frame, for programs and people with `jq`.
+//!
+//! What is absent is left out. Numbers have the digits of the arithmetic that made them, the fewest that read back to
+//! the same bits.
+
+use std::fs::File;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::{FieldNames, Flow, Sink};
+use crate::error::{Error, Result};
+use crate::percept::{Flags, Percept, Percepts, Precision};
+
+/// Writes percepts as NDJSON.
+pub struct NdjsonSink {
+    name: String,
+    // Dropped before `part`, so that the file is closed when it is renamed or removed.
+    writer: BufWriter<Box<dyn Write + Send>>,
+    part: Option<Part>,
+    heads: Vec<Head>,
+    flags: Vec<(Flags, String)>,
+    all_fields: bool,
+    line: Vec<u8>,
+    closed: bool,
+}
+
+/// How a field's object begins, up to the value of `contact`.
+struct Head {
+    in_anchor: String,
+    in_world: String,
+}
+
+impl Head {
+    fn new(names: &FieldNames) -> Self {
+        let begin = |link: &str| {
+            let text = |text: &str| serde_json::Value::from(text).to_string();
+            format!("{{\"field\":{},\"link\":{},\"contact\":", text(&names.field), text(link))
+        };
+        Self { in_anchor: begin(&names.link), in_world: begin("world") }
+    }
+}
+
+impl NdjsonSink {
+    /// Writes to `path`, which is replaced when the sink is finished and untouched until then. Fields without contact
+    /// are listed only with `all_fields`.
+    ///
+    /// # Errors
+    /// The file cannot be made.
+    pub fn to_file(path: impl AsRef<Path>, names: &[FieldNames], all_fields: bool) -> Result<Self> {
+        let path = path.as_ref();
+        let kind = std::fs::metadata(path).map(|m| m.file_type());
+        if kind.as_ref().is_ok_and(std::fs::FileType::is_dir) {
+            return Err(Error::io(path, &io::Error::from(ErrorKind::IsADirectory)));
+        }
+        let name = path.display().to_string();
+        if kind.is_ok_and(|kind| !kind.is_file()) {
+            // A device or a named pipe: there is nothing to rename over.
+            let file = File::options().write(true).open(path).map_err(|e| Error::io(path, &e))?;
+            return Ok(Self::new(name, Box::new(file), None, names, all_fields));
+        }
+        let part = Part::beside(path);
+        let file = File::create(&part.path).map_err(|e| Error::io(path, &e))?;
+        Ok(Self::new(name, Box::new(file), Some(part), names, all_fields))
+    }
+
+    /// Writes to `writer`, which messages call `name`.
+    #[must_use]
+    pub fn to_writer(
+        name: impl Into<String>,
+        writer: impl Write + Send + 'static,
+        names: &[FieldNames],
+        all_fields: bool,
+    ) -> Self {
+        Self::new(name.into(), Box::new(writer), None, names, all_fields)
+    }
+
+    fn new(
+        name: String,
+        writer: Box<dyn Write + Send>,
+        part: Option<Part>,
+        names: &[FieldNames],
+        all_fields: bool,
+    ) -> Self {
+        Self {
+            name,
+            writer: BufWriter::with_capacity(1 << 16, writer),
+            part,
+            heads: names.iter().map(Head::new).collect(),
+            flags: Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
+            all_fields,
+            line: Vec::new(),
+            closed: false,
+        }
+    }
+
+    /// Puts the line of the batch's frame `frame` into `self.line`.
+    fn compose(&mut self, percepts: &Percepts, frame: usize) {
+        let Self { heads, flags, all_fields, line, .. } = self;
+        line.clear();
+        line.extend_from_slice(b"{\"t\":");
+        print(line, &percepts.t_s(frame));
+        line.extend_from_slice(b",\"frame\":");
+        print(line, &percepts.frame_number(frame));
+        line.extend_from_slice(b",\"fields\":[");
+        let mut first = true;
+        for percept in percepts.frame(frame).filter(|percept| *all_fields || percept.contact) {
+            if !std::mem::take(&mut first) {
+                line.push(b',');
+            }
+            let head = &heads[percept.field];
+            let head = if percept.in_world { &head.in_world } else { &head.in_anchor };
+            line.extend_from_slice(head.as_bytes());
+            print(line, &percept.contact);
+            print_quantities(line, &percept, percepts.precision());
+            line.extend_from_slice(b",\"flags\":[");
+            let mut first = true;
+            for (_, name) in flags.iter().filter(|(flag, _)| percept.flags.contains(*flag)) {
+                if !std::mem::take(&mut first) {
+                    line.push(b',');
+                }
+                line.push(b'"');
+                line.extend_from_slice(name.as_bytes());
+                line.push(b'"');
+            }
+            line.extend_from_slice(b"]}");
+        }
+        line.extend_from_slice(b"]}\n");
+    }
+
+    fn settle(&mut self, written: io::Result<()>) -> Result<Flow> {
+        match written {
+            Ok(()) => Ok(Flow::Open),
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => {
+                self.closed = true;
+                Ok(Flow::Closed)
+            }
+            Err(e) => Err(Error::failed(format!("cannot write: {e}")).at(&self.name)),
+        }
+    }
+}
+
+impl Sink for NdjsonSink {
+    fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
+        assert_eq!(percepts.fields(), self.heads.len(), "a sink is told the name of every field");
+        for frame in 0..percepts.frames() {
+            if self.closed {
+                return Ok(Flow::Closed);
+            }
+            self.compose(percepts, frame);
+            let written = self.writer.write_all(&self.line);
+            if self.settle(written)? == Flow::Closed {
+                return Ok(Flow::Closed);
+            }
+        }
+        Ok(Flow::Open)
+    }
+
+    fn flush(&mut self) -> Result<Flow> {
+        if self.closed {
+            return Ok(Flow::Closed);
+        }
+        let flushed = self.writer.flush();
+        self.settle(flushed)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        let flow = self.flush()?;
+        let Self { writer, part, name, .. } = *self;
+        if flow == Flow::Closed {
+            // What is still in the buffer has no reader; dropping the writer would try again.
+            let _ = writer.into_parts();
+            return Ok(());
+        }
+        drop(writer);
+        part.map_or(Ok(()), Part::keep).map_err(|e| Error::failed(format!("cannot write: {e}")).at(name))
+    }
+}
+
+/// A file on its way to become another, gone unless it is kept.
+struct Part {
+    path: PathBuf,
+    target: PathBuf,
+    kept: bool,
+}
+
+impl Part {
+    fn beside(path: &Path) -> Self {
+        // Through a link to the file itself, or the link would be what is replaced.
+        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let mut name = target.clone().into_os_string();
+        name.push(".part");
+        Self { path: name.into(), target, kept: false }
+    }
+
+    fn keep(mut self) -> io::Result<()> {
+        std::fs::rename(&self.path, &self.target)?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        if !self.kept {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision) {
+    let scalar = |line: &mut Vec<u8>, value: f64| match precision {
+        Precision::F32 => print(line, &(value as f32)),
+        Precision::F64 => print(line, &value),
+    };
+    let named = |line: &mut Vec<u8>, name: &str, value: Option<f64>| {
+        if let Some(value) = value {
+            key(line, name);
+            scalar(line, value);
+        }
+    };
+    named(line, "total", percept.total);
+    named(line, "peak", percept.peak);
+    if let Some(active) = percept.active {
+        key(line, "active");
+        print(line, &active);
+    }
+    named(line, "area", percept.area);
+    if let Some([u, v]) = percept.centroid {
+        key(line, "centroid");
+        line.push(b'[');
+        scalar(line, u);
+        line.push(b',');
+        scalar(line, v);
+        line.push(b']');
+    }
+    for (name, vector) in [("position", percept.position), ("normal", percept.normal)] {
+        if let Some(vector) = vector {
+            key(line, name);
+            print(line, &vector);
+        }
+    }
+    named(line, "orientation", percept.orientation);
+    named(line, "axis", percept.axis);
+    named(line, "anisotropy", percept.anisotropy);
+}
+
+fn key(line: &mut Vec<u8>, name: &str) {
+    line.extend_from_slice(b",\"");
+    line.extend_from_slice(name.as_bytes());
+    line.extend_from_slice(b"\":");
+}
+
+fn print(line: &mut Vec<u8>, value: &impl Serialize) {
+    serde_json::to_writer(line, value).expect("plain data prints into memory");
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::percept::{Outputs, Values};
+
+    fn names() -> Vec<FieldNames> {
+        [("hand/palm", "hand"), ("say \"hi\"", "arm")]
+            .map(|(field, link)| FieldNames { field: field.into(), link: link.into() })
+            .into()
+    }
+
+    /// Two frames of two fields; the first field is touched, in the second frame in the world.
+    fn percepts(precision: Precision) -> Percepts {
+        let mut percepts = Percepts::new(Outputs::all(), 2, precision);
+        percepts.reset(2);
+        percepts.first_frame = 7;
+        percepts.t_s = vec![0.05, 0.1];
+        percepts.in_world = vec![false, true];
+        percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
+        percepts.present = vec![Outputs::all(), Outputs::TOTAL, Outputs::TOTAL | Outputs::POSITION, Outputs::empty()];
+        percepts.active[0] = 3;
+        percepts.position = vec![[0.1, -0.2, 1e-9]; 4];
+        percepts.normal = vec![[0.0, 0.0, 1.0]; 4];
+        macro_rules! fill {
+            ($columns:expr) => {{
+                $columns.total = vec![0.1, 0.0, 12.0, 0.0];
+                $columns.peak[0] = 1e-30;
+                $columns.area[0] = 2.5e-5;
+                $columns.centroid[0] = [0.3, -0.7, 9.0];
+                $columns.orientation[0] = 1.5;
+                $columns.axis[0] = 0.0;
+                $columns.anisotropy[0] = 1.0;
+            }};
+        }
+        match &mut percepts.values {
+            Values::F32(columns) => fill!(columns),
+            Values::F64(columns) => fill!(columns),
+        }
+        percepts
+    }
+
+    #[derive(Clone, Default)]
+    struct Shared(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn written(percepts: &Percepts, all_fields: bool) -> String {
+        let shared = Shared::default();
+        let mut sink = Box::new(NdjsonSink::to_writer("out", shared.clone(), &names(), all_fields));
+        assert_eq!(sink.write(percepts).unwrap(), Flow::Open);
+        sink.finish().unwrap();
+        String::from_utf8(shared.0.lock().unwrap().clone()).unwrap()
+    }
+
+    #[test]
+    fn a_frame_is_a_line_of_the_fields_in_contact() {
+        let wanted = concat!(
+            r#"{"t":0.05,"frame":7,"fields":[{"field":"hand/palm","link":"hand","contact":true,"total":0.1,"#,
+            r#""peak":1e-30,"active":3,"area":0.000025,"centroid":[0.3,-0.7],"position":[0.1,-0.2,1e-9],"#,
+            r#""normal":[0.0,0.0,1.0],"orientation":1.5,"axis":0.0,"anisotropy":1.0,"flags":["tie","saturated"]}]}"#,
+            "\n",
+            r#"{"t":0.1,"frame":8,"fields":[{"field":"hand/palm","link":"world","contact":true,"total":12.0,"#,
+            r#""position":[0.1,-0.2,1e-9],"flags":[]}]}"#,
+            "\n"
+        );
+        // The fewest digits of either precision are the same here, though the values are not.
+        for precision in [Precision::F32, Precision::F64] {
+            let text = written(&percepts(precision), false).replace("2.5e-5", "0.000025");
+            assert_eq!(text, wanted, "{precision:?}");
+        }
+    }
+
+    #[test]
+    fn all_fields_are_listed_where_asked_for() {
+        let text = written(&percepts(Precision::F32), true);
+        assert!(
+            text.contains(r#"{"field":"say \"hi\"","link":"arm","contact":false,"total":0.0,"flags":["no_contact"]}"#)
+        );
+        for line in text.lines() {
+            let line: serde_json::Value = serde_json::from_str(line).unwrap();
+            assert_eq!(line["fields"].as_array().unwrap().len(), 2);
+        }
+    }
+
+    #[test]
+    fn a_frame_without_contact_is_still_a_line() {
+        let mut percepts = Percepts::new(Outputs::TOTAL, 2, Precision::F32);
+        percepts.reset(1);
+        percepts.flags = vec![Flags::NO_CONTACT; 2];
+        assert_eq!(written(&percepts, false), "{\"t\":0.0,\"frame\":0,\"fields\":[]}\n");
+    }
+
+    #[test]
+    fn a_file_is_whole_or_not_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.ndjson");
+        let files = || std::fs::read_dir(folder.path()).unwrap().count();
+        let mut sink = NdjsonSink::to_file(&path, &names(), false).unwrap();
+        let _ = sink.write(&percepts(Precision::F32)).unwrap();
+        assert!(!path.exists() && folder.path().join("out.ndjson.part").exists());
+        drop(sink);
+        assert_eq!(files(), 0);
+
+        std::fs::write(&path, "old").unwrap();
+        let mut sink = Box::new(NdjsonSink::to_file(&path, &names(), false).unwrap());
+        let _ = sink.write(&percepts(Precision::F32)).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        sink.finish().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 2);
+        assert_eq!(files(), 1);
+
+        let nowhere = NdjsonSink::to_file(folder.path().join("no/such/out"), &names(), false);
+        assert!(nowhere.err().unwrap().is_not_found());
+        assert!(NdjsonSink::to_file(folder.path(), &names(), false).err().unwrap().to_string().contains("folder"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_and_links_stay_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        Box::new(NdjsonSink::to_file("/dev/null", &names(), false).unwrap()).finish().unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        Box::new(NdjsonSink::to_file(&link, &names(), false).unwrap()).finish().unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "");
+    }
+
+    struct Failing(ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_closed_pipe_is_an_end_and_a_full_disk_an_error() {
+        let percepts = percepts(Precision::F32);
+        let mut sink = Box::new(NdjsonSink::to_writer("out", Failing(ErrorKind::BrokenPipe), &names(), false));
+        assert_eq!(sink.write(&percepts).unwrap(), Flow::Open, "it is buffered");
+        assert_eq!(sink.flush().unwrap(), Flow::Closed);
+        assert_eq!(sink.write(&percepts).unwrap(), Flow::Closed);
+        sink.finish().unwrap();
+        let mut sink = Box::new(NdjsonSink::to_writer("out", Failing(ErrorKind::StorageFull), &names(), false));
+        let _ = sink.write(&percepts).unwrap();
+        assert!(sink.finish().unwrap_err().to_string().starts_with("out: cannot write"));
+    }
+}

@@ -1,0 +1,87 @@
+//! What a person writes to name a sink.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use super::{FieldNames, NdjsonSink, Sink};
+use crate::error::{Error, Result, nearest};
+
+const FORMS: &str = "ndjson:FILE, mcap:FILE, or - for NDJSON on standard output";
+
+/// A sink as named on a command line or in a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SinkSpec {
+    /// `ndjson:FILE`, or a bare `FILE.ndjson`: a line of JSON a frame.
+    Ndjson(PathBuf),
+    /// `mcap:FILE`: a recording in MCAP.
+    Mcap(PathBuf),
+    /// `-`: NDJSON on standard output.
+    Stdout,
+}
+
+impl FromStr for SinkSpec {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if text == "-" {
+            return Ok(Self::Stdout);
+        }
+        let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
+        let (kind, rest) = text.split_once(':').unwrap_or(("", text));
+        match kind {
+            "ndjson" | "mcap" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
+            "ndjson" => Ok(Self::Ndjson(rest.into())),
+            "mcap" => Ok(Self::Mcap(rest.into())),
+            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("ndjson")) => {
+                Ok(Self::Ndjson(text.into()))
+            }
+            kind => match nearest(kind, ["ndjson", "mcap"]) {
+                Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
+                None => bad(format!("a sink is one of {FORMS}")),
+            },
+        }
+    }
+}
+
+impl SinkSpec {
+    /// Opens the sink for fields called `names`. Fields without contact are written only with `all_fields`.
+    ///
+    /// # Errors
+    /// It cannot be opened, or this version does not write it.
+    pub fn open(&self, names: &[FieldNames], all_fields: bool) -> Result<Box<dyn Sink + Send>> {
+        match self {
+            Self::Ndjson(path) => Ok(Box::new(NdjsonSink::to_file(path, names, all_fields)?)),
+            Self::Stdout => {
+                Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
+            }
+            Self::Mcap(path) => {
+                Err(Error::failed("this version does not write MCAP yet; use ndjson:FILE").at(path.display()))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sink_is_named_as_people_write_it() {
+        let parsed = |text: &str| text.parse::<SinkSpec>().unwrap();
+        assert_eq!(parsed("-"), SinkSpec::Stdout);
+        assert_eq!(parsed("ndjson:a/b"), SinkSpec::Ndjson("a/b".into()));
+        assert_eq!(parsed("a.ndjson"), SinkSpec::Ndjson("a.ndjson".into()));
+        assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
+        let why = |text: &str| {
+            let error = text.parse::<SinkSpec>().unwrap_err();
+            assert!(error.is_usage());
+            error.to_string()
+        };
+        assert!(why("json:a").contains("did you mean `ndjson:`"));
+        assert!(why("ndjson:").contains("nothing follows"));
+        assert!(why("a.csv").contains("ndjson:FILE"));
+        let error = parsed("mcap:a.mcap").open(&[], false).err().unwrap().to_string();
+        assert_eq!(error, "a.mcap: this version does not write MCAP yet; use ndjson:FILE");
+    }
+}

@@ -1,0 +1,509 @@
+//! Live frames as NDJSON, one line each:
+//! `{"t":s,"values":{"<taxel id>":raw},"pose":{"<link>":[x,y,z,qx,qy,qz,qw]}}`.
+//!
+//! A taxel that a line leaves out, or gives as `null`, is missing; `"nan"` and `"inf"` are values that a sensor got
+//! wrong. A line goes straight into the frame, without a tree of JSON values in between.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::io::{BufRead, Read as _};
+
+use glam::{DQuat, DVec3};
+use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+use super::Source;
+use crate::error::{Error, Result};
+use crate::signal::{Frame, Pose, RawValue};
+
+/// Bytes a line may have, so that garbage does not fill the memory.
+const MAX_LINE: u64 = 64 << 20;
+
+/// Lengths of a quaternion that is a rotation written without care; others are damage.
+const QUATERNION_LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+
+/// Frames read from NDJSON.
+pub struct NdjsonSource {
+    name: String,
+    reader: Box<dyn BufRead + Send>,
+    line: Vec<u8>,
+    line_number: u64,
+    taxels: Taxels,
+    losses: Vec<String>,
+}
+
+/// The taxels that frames may name, and on which line each was named last.
+struct Taxels {
+    ids: Vec<u32>,
+    index: HashMap<u32, usize>,
+    last_line: Vec<u64>,
+}
+
+impl NdjsonSource {
+    /// Reads frames from `reader`, which messages call `name`. Frames may give the taxels `ids`, and no others.
+    #[must_use]
+    pub fn new(name: impl Into<String>, reader: impl BufRead + Send + 'static, ids: Vec<u32>) -> Self {
+        let index = ids.iter().enumerate().map(|(index, &id)| (id, index)).collect();
+        let last_line = vec![0; ids.len()];
+        Self {
+            name: name.into(),
+            reader: Box::new(reader),
+            line: Vec::new(),
+            line_number: 0,
+            taxels: Taxels { ids, index, last_line },
+            losses: Vec::new(),
+        }
+    }
+
+    /// Reads the next line that is not blank into `self.line`. `None` at the end, else whether it has its newline.
+    fn read_line(&mut self) -> Result<Option<bool>> {
+        loop {
+            self.line.clear();
+            self.line_number += 1;
+            let read = (&mut self.reader)
+                .take(MAX_LINE + 1)
+                .read_until(b'\n', &mut self.line)
+                .map_err(|e| Error::failed(e.to_string()))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            if self.line.len() as u64 > MAX_LINE {
+                return Err(Error::failed(format!(
+                    "a line of over {} MiB; frames are one line of JSON each",
+                    MAX_LINE >> 20
+                ))
+                .at(format!("line {}", self.line_number)));
+            }
+            let whole = self.line.last() == Some(&b'\n');
+            if !self.line.trim_ascii().is_empty() {
+                return Ok(Some(whole));
+            }
+        }
+    }
+
+    fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        let Some(whole) = self.read_line()? else { return Ok(false) };
+        frame.clear();
+        frame.values.resize(self.taxels.ids.len(), RawValue::MISSING);
+        let line = if self.line_number == 1 {
+            self.line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&self.line)
+        } else {
+            &self.line
+        };
+        let mut json = serde_json::Deserializer::from_slice(line);
+        let seed = FrameSeed { frame, taxels: &mut self.taxels, line: self.line_number };
+        match seed.deserialize(&mut json).and_then(|()| json.end()) {
+            Ok(()) => Ok(true),
+            Err(e) if e.is_eof() && !whole => {
+                self.losses.push(format!(
+                    "{}: line {}: last line truncated after {} bytes",
+                    self.name,
+                    self.line_number,
+                    self.line.len()
+                ));
+                Ok(false)
+            }
+            Err(e) => Err(explained(&e, self.line_number)),
+        }
+    }
+}
+
+impl Source for NdjsonSource {
+    fn taxels(&self) -> &[u32] {
+        &self.taxels.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        self.read_frame(frame).map_err(|e| e.at(&self.name))
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.losses.clone()
+    }
+}
+
+/// `error`, told to be where a person finds it: the parser saw one line only.
+fn explained(error: &serde_json::Error, line: u64) -> Error {
+    let text = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    let what = text.strip_suffix(&place).unwrap_or(&text);
+    let what = if error.is_data() {
+        what.to_owned()
+    } else {
+        format!("{what}; a frame is one line like {{\"t\":0.5,\"values\":{{\"7\":12}}}}")
+    };
+    Error::failed(what).at(format!("line {line}, column {}", error.column()))
+}
+
+/// Puts a line's object into `frame`.
+struct FrameSeed<'a> {
+    frame: &'a mut Frame,
+    taxels: &'a mut Taxels,
+    line: u64,
+}
+
+impl<'de> DeserializeSeed<'de> for FrameSeed<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_map(self)
+    }
+}
+
+impl<'de> Visitor<'de> for FrameSeed<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a frame, {\"t\":seconds,\"values\":{\"<taxel id>\":number}}")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let (mut has_time, mut has_values, mut has_pose) = (false, false, false);
+        while let Some(key) = map.next_key_seed(KeySeed)? {
+            let seen = match key {
+                Key::Time => {
+                    self.frame.t_s = map.next_value()?;
+                    &mut has_time
+                }
+                Key::Values => {
+                    map.next_value_seed(ValuesSeed { frame: self.frame, taxels: self.taxels, line: self.line })?;
+                    &mut has_values
+                }
+                Key::Pose => {
+                    map.next_value_seed(PosesSeed { poses: &mut self.frame.pose })?;
+                    &mut has_pose
+                }
+            };
+            if std::mem::replace(seen, true) {
+                return Err(A::Error::custom(format!("`{key}` is there twice; give it once")));
+            }
+        }
+        if !has_time {
+            return Err(A::Error::custom("the frame has no `t`; give its time in seconds"));
+        }
+        Ok(())
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Key {
+    Time,
+    Values,
+    Pose,
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Time => "t",
+            Self::Values => "values",
+            Self::Pose => "pose",
+        })
+    }
+}
+
+struct KeySeed;
+
+impl<'de> DeserializeSeed<'de> for KeySeed {
+    type Value = Key;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Key, D::Error> {
+        deserializer.deserialize_str(self)
+    }
+}
+
+impl Visitor<'_> for KeySeed {
+    type Value = Key;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("`t`, `values` or `pose`")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<Key, E> {
+        match key {
+            "t" => Ok(Key::Time),
+            "values" => Ok(Key::Values),
+            "pose" => Ok(Key::Pose),
+            other => Err(E::custom(format!("a frame has no `{other}`; its keys are `t`, `values` and `pose`"))),
+        }
+    }
+}
+
+struct ValuesSeed<'a> {
+    frame: &'a mut Frame,
+    taxels: &'a mut Taxels,
+    line: u64,
+}
+
+impl<'de> DeserializeSeed<'de> for ValuesSeed<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_map(self)
+    }
+}
+
+impl<'de> Visitor<'de> for ValuesSeed<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("values by taxel id, {\"<taxel id>\":number}")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some(id) = map.next_key_seed(IdSeed)? {
+            let Some(&index) = self.taxels.index.get(&id) else {
+                return Err(A::Error::custom(format!(
+                    "the body has no taxel {id}; leave it out, or give the body that has it"
+                )));
+            };
+            if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
+                return Err(A::Error::custom(format!("taxel {id} is there twice; give each taxel once")));
+            }
+            self.frame.values[index] = map.next_value_seed(ValueSeed { id })?;
+        }
+        Ok(())
+    }
+}
+
+struct IdSeed;
+
+impl<'de> DeserializeSeed<'de> for IdSeed {
+    type Value = u32;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<u32, D::Error> {
+        deserializer.deserialize_str(self)
+    }
+}
+
+impl Visitor<'_> for IdSeed {
+    type Value = u32;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a taxel id")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<u32, E> {
+        key.parse().map_err(|_| E::custom(format!("`{key}` is no taxel id; ids are whole numbers in quotes")))
+    }
+}
+
+struct ValueSeed {
+    id: u32,
+}
+
+impl<'de> DeserializeSeed<'de> for ValueSeed {
+    type Value = RawValue;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<RawValue, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl Visitor<'_> for ValueSeed {
+    type Value = RawValue;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a number, null, \"nan\" or \"inf\" for taxel {}", self.id)
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<RawValue, E> {
+        Ok(RawValue::new(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<RawValue, E> {
+        Ok(RawValue::new(value as f64))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<RawValue, E> {
+        Ok(RawValue::new(value as f64))
+    }
+
+    fn visit_unit<E>(self) -> Result<RawValue, E> {
+        Ok(RawValue::MISSING)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<RawValue, E> {
+        let unsigned = word.strip_prefix('-').unwrap_or(word);
+        if unsigned.eq_ignore_ascii_case("nan") || unsigned.eq_ignore_ascii_case("inf") {
+            return Ok(RawValue::FAULTY);
+        }
+        Err(E::custom(format!(
+            "taxel {} is `{word}`; give a number without quotes, null where it is missing, \"nan\" where it is faulty",
+            self.id
+        )))
+    }
+}
+
+struct PosesSeed<'a> {
+    poses: &'a mut Vec<(String, Pose)>,
+}
+
+impl<'de> DeserializeSeed<'de> for PosesSeed<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for PosesSeed<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("poses by link, {\"<link>\":[x,y,z,qx,qy,qz,qw]}")
+    }
+
+    fn visit_unit<E>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some(link) = map.next_key::<String>()? {
+            let pose = map.next_value_seed(PoseSeed { link: &link })?;
+            if self.poses.iter().any(|(known, _)| *known == link) {
+                return Err(A::Error::custom(format!("the pose of `{link}` is there twice; give it once")));
+            }
+            self.poses.push((link, pose));
+        }
+        Ok(())
+    }
+}
+
+struct PoseSeed<'a> {
+    link: &'a str,
+}
+
+impl<'de> DeserializeSeed<'de> for PoseSeed<'_> {
+    type Value = Pose;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Pose, D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de> Visitor<'de> for PoseSeed<'_> {
+    type Value = Pose;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "[x,y,z,qx,qy,qz,qw] for link `{}`", self.link)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Pose, A::Error> {
+        let wrong = |found: usize| {
+            A::Error::custom(format!("the pose of `{}` has {found} numbers; give x,y,z,qx,qy,qz,qw", self.link))
+        };
+        let mut numbers = [0.0; 7];
+        for (found, number) in numbers.iter_mut().enumerate() {
+            *number = seq.next_element::<f64>()?.ok_or_else(|| wrong(found))?;
+        }
+        let mut found = numbers.len();
+        while seq.next_element::<IgnoredAny>()?.is_some() {
+            found += 1;
+        }
+        if found > numbers.len() {
+            return Err(wrong(found));
+        }
+        let [x, y, z, qx, qy, qz, qw] = numbers;
+        let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
+        if !QUATERNION_LENGTHS.contains(&rotation.length()) {
+            return Err(A::Error::custom(format!(
+                "the quaternion of `{}` has length {:e}; give a unit quaternion qx,qy,qz,qw",
+                self.link,
+                rotation.length()
+            )));
+        }
+        Ok(Pose { translation: DVec3::new(x, y, z), rotation: rotation.normalize() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(text: &str) -> NdjsonSource {
+        NdjsonSource::new("stdin", std::io::Cursor::new(text.as_bytes().to_vec()), vec![4, 7, 9])
+    }
+
+    fn read(text: &str) -> Result<(Vec<Frame>, Vec<String>)> {
+        let mut source = source(text);
+        let mut frame = Frame::missing(0.0, 3);
+        let mut frames = Vec::new();
+        while source.next_frame(&mut frame)? {
+            frames.push(frame.clone());
+        }
+        Ok((frames, source.losses()))
+    }
+
+    fn why(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_line_is_a_frame() {
+        let text = "\u{feff}{\"t\":0.5,\"values\":{\"9\":12,\"4\":-1.5}}\r\n\n\
+            {\"values\":{\"7\":\"nan\",\"4\":\"-INF\",\"9\":null},\"t\":1}\n{\"t\":2,\"values\":{\"7\":1e60,\"9\":0}}";
+        let (frames, losses) = read(text).unwrap();
+        let words: Vec<String> = frames.iter().map(|f| format!("{} {:?}", f.t_s, f.values)).collect();
+        assert_eq!(words, ["0.5 [-1.5, missing, 12]", "1 [faulty, faulty, missing]", "2 [missing, faulty, 0]"]);
+        assert!(losses.is_empty());
+    }
+
+    #[test]
+    fn a_frame_may_carry_poses() {
+        let (frames, _) =
+            read("{\"t\":0,\"pose\":{\"hand\":[1,2,3,0,0,0,2],\"arm\":[0,0,0,0,0,1,0]},\"values\":{}}\n{\"t\":1,\"pose\":null}\n").unwrap();
+        let (link, pose) = &frames[0].pose[0];
+        assert_eq!((link.as_str(), pose.translation), ("hand", DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!(pose.rotation, DQuat::IDENTITY);
+        assert_eq!(frames[0].pose[1].0, "arm");
+        assert!(frames[1].pose.is_empty());
+        let pose = |numbers: &str| why(&format!("{{\"t\":0,\"pose\":{{\"hand\":[{numbers}]}}}}\n"));
+        assert!(pose("1,2,3").contains("`hand` has 3 numbers"), "{}", pose("1,2,3"));
+        assert!(pose("1,2,3,0,0,0,1,9").contains("has 8 numbers"));
+        assert!(pose("1,2,3,0,0,0,0").contains("length 0e0"));
+        assert!(pose("1,2,3,0,0,0,1e4").contains("length 1e4"));
+        assert!(pose("1,2,3,0,0,0,null").contains("null"));
+        assert!(why("{\"t\":0,\"pose\":{\"a\":[0,0,0,0,0,0,1],\"a\":[0,0,0,0,0,0,1]}}\n").contains("twice"));
+    }
+
+    #[test]
+    fn errors_name_line_and_what_is_wrong() {
+        let second = |line: &str| why(&format!("{{\"t\":0}}\n{line}\n"));
+        assert!(second("{\"t\":1,\"values\":{\"5\":1}}").starts_with("stdin: line 2, column"));
+        assert!(second("{\"t\":1,\"values\":{\"5\":1}}").contains("no taxel 5; leave it out"));
+        assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").contains("taxel 4 is there twice"));
+        assert!(second("{\"t\":1,\"values\":{\"palm\":1}}").contains("`palm` is no taxel id"));
+        assert!(second("{\"t\":1,\"values\":{\"4\":\"1\"}}").contains("without quotes"));
+        assert!(second("{\"t\":1,\"values\":{\"4\":true}}").contains("for taxel 4"));
+        assert!(second("{\"t\":1,\"values\":[1,2]}").contains("values by taxel id"));
+        assert!(second("{\"t\":1,\"t\":1}").contains("`t` is there twice"));
+        assert!(second("{\"t\":1,\"vals\":{}}").contains("no `vals`"));
+        assert!(second("{\"values\":{}}").contains("no `t`"));
+        assert!(second("{\"t\":\"now\"}").starts_with("stdin: line 2"));
+        assert!(second("{\"t\":1}}").contains("line 2"));
+        assert!(second("hello").contains("one line like"));
+        // With its newline, a line that is cut short is an error.
+        assert!(second("{\"t\":1,\"val").contains("line 2"));
+        // The same taxel on the next line is no duplicate.
+        assert_eq!(read("{\"t\":0,\"values\":{\"4\":1}}\n{\"t\":1,\"values\":{\"4\":1}}\n").unwrap().0.len(), 2);
+    }
+
+    #[test]
+    fn a_last_line_cut_short_anywhere_is_a_loss() {
+        let last =
+            "{\"t\":1.25,\"values\":{\"4\":null,\"7\":\"nan\",\"9\":-1.5e-3},\"pose\":{\"hand\":[0,0,0,0,0,0,1]}}";
+        for cut in 1..last.len() {
+            let (frames, losses) = read(&format!("{{\"t\":0}}\n{}", &last[..cut])).unwrap();
+            assert_eq!((frames.len(), losses.len()), (1, 1), "cut at {cut}");
+            assert!(losses[0].starts_with("stdin: line 2: last line truncated"));
+        }
+        assert_eq!(read(&format!("{{\"t\":0}}\n{last}")).unwrap().0.len(), 2);
+    }
+
+    #[test]
+    fn a_line_without_end_does_not_fill_the_memory() {
+        let endless = std::io::BufReader::new(std::io::repeat(b' '));
+        let error = NdjsonSource::new("stdin", endless, vec![]).next_frame(&mut Frame::default()).unwrap_err();
+        assert!(error.to_string().contains("line 1: a line of over 64 MiB"), "{error}");
+    }
+}

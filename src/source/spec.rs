@@ -1,0 +1,146 @@
+//! What a person writes to name a source.
+
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use super::{CsvSource, NdjsonSource, Source};
+use crate::error::{Error, Result, nearest};
+
+const FORMS: &str = "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, or - for NDJSON on standard input";
+
+/// A source as named on a command line or in a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SourceSpec {
+    /// `csv:FILE`, or a bare `FILE.csv`: a recording.
+    Csv(PathBuf),
+    /// `serial:PORT[@BAUD]`: a board on a serial line.
+    Serial {
+        /// The port's name, such as `/dev/ttyUSB0`.
+        port: String,
+        /// Its speed, where one is given.
+        baud: Option<u32>,
+    },
+    /// `mcap:FILE`: a recording in MCAP.
+    Mcap(PathBuf),
+    /// `sim:FILE.toml`: simulated touches.
+    Sim(PathBuf),
+    /// `-`: NDJSON frames on standard input.
+    Stdin,
+}
+
+impl FromStr for SourceSpec {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if text == "-" {
+            return Ok(Self::Stdin);
+        }
+        let bad = |what: String| Err(Error::usage(what).at(format!("source `{text}`")));
+        let (kind, rest) = text.split_once(':').unwrap_or(("", text));
+        match kind {
+            "csv" | "serial" | "mcap" | "sim" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
+            "csv" => Ok(Self::Csv(rest.into())),
+            "mcap" => Ok(Self::Mcap(rest.into())),
+            "sim" => Ok(Self::Sim(rest.into())),
+            "serial" => match rest.rsplit_once('@') {
+                None => Ok(Self::Serial { port: rest.to_owned(), baud: None }),
+                Some((port, baud)) => match baud.parse() {
+                    Ok(baud) if baud > 0 && !port.is_empty() => {
+                        Ok(Self::Serial { port: port.to_owned(), baud: Some(baud) })
+                    }
+                    _ => bad(format!("`{baud}` is no baud rate; write serial:PORT@115200")),
+                },
+            },
+            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) => {
+                Ok(Self::Csv(text.into()))
+            }
+            kind => match nearest(kind, ["csv", "serial", "mcap", "sim"]) {
+                Some(near) => bad(format!("there is no source `{kind}:`; did you mean `{near}:`?")),
+                None => bad(format!("a source is one of {FORMS}")),
+            },
+        }
+    }
+}
+
+impl SourceSpec {
+    /// Opens the source. `taxels` are the ids that the body has, `rate_hz` the rate of a CSV without a column `t`.
+    ///
+    /// # Errors
+    /// It cannot be opened, or this version does not read it; a usage error where a rate makes no sense.
+    pub fn open(&self, taxels: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
+        if rate_hz.is_some() && !matches!(self, Self::Csv(_)) {
+            return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
+        }
+        let not_yet = |what: &str, place: String| {
+            Err(Error::failed(format!("this version does not read {what} yet; record to CSV, or pipe NDJSON to `-`"))
+                .at(place))
+        };
+        match self {
+            Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
+            Self::Stdin => {
+                let reader = BufReader::with_capacity(1 << 16, std::io::stdin());
+                Ok(Box::new(NdjsonSource::new("stdin", reader, taxels.to_vec())))
+            }
+            Self::Mcap(path) => not_yet("MCAP", path.display().to_string()),
+            Self::Sim(path) => not_yet("simulated touches", path.display().to_string()),
+            Self::Serial { port, .. } => not_yet(&format!("serial lines ({})", ports()), port.clone()),
+        }
+    }
+}
+
+/// The serial ports of this machine, in words.
+#[cfg(feature = "cli")]
+fn ports() -> String {
+    let names: Vec<String> =
+        serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect();
+    if names.is_empty() { "no port found".to_owned() } else { format!("ports found: {}", names.join(", ")) }
+}
+
+#[cfg(not(feature = "cli"))]
+fn ports() -> String {
+    "ports are looked for only with feature `cli`".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_is_named_as_people_write_it() {
+        let parsed = |text: &str| text.parse::<SourceSpec>().unwrap();
+        assert_eq!(parsed("csv:a/b.txt"), SourceSpec::Csv("a/b.txt".into()));
+        assert_eq!(parsed("a/b.CSV"), SourceSpec::Csv("a/b.CSV".into()));
+        assert_eq!(parsed("C:\\b.csv"), SourceSpec::Csv("C:\\b.csv".into()));
+        assert_eq!(parsed("-"), SourceSpec::Stdin);
+        assert_eq!(parsed("sim:touch.toml"), SourceSpec::Sim("touch.toml".into()));
+        assert_eq!(parsed("serial:COM3"), SourceSpec::Serial { port: "COM3".into(), baud: None });
+        let port = "/dev/ttyUSB0".to_owned();
+        assert_eq!(parsed("serial:/dev/ttyUSB0@921600"), SourceSpec::Serial { port, baud: Some(921_600) });
+    }
+
+    #[test]
+    fn what_is_no_source_is_a_usage_error_with_a_way_out() {
+        let why = |text: &str| {
+            let error = text.parse::<SourceSpec>().unwrap_err();
+            assert!(error.is_usage());
+            error.to_string()
+        };
+        assert!(why("csv:").contains("nothing follows"));
+        assert!(why("seril:a").contains("did you mean `serial:`"));
+        assert!(why("a.txt").contains("csv:FILE"));
+        assert!(why("").contains("csv:FILE"));
+        assert!(why("serial:a@fast").contains("baud"));
+    }
+
+    #[test]
+    fn what_is_not_read_yet_says_so() {
+        let why = |text: &str| text.parse::<SourceSpec>().unwrap().open(&[1], None).err().unwrap().to_string();
+        assert!(why("serial:/dev/ttyX").starts_with("/dev/ttyX: this version does not read serial lines"));
+        assert!(why("mcap:a.mcap").contains("does not read MCAP yet"));
+        assert!(why("sim:a.toml").contains("does not read simulated touches yet"));
+        assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());
+        assert!(SourceSpec::Csv("no/such.csv".into()).open(&[1], None).err().unwrap().is_not_found());
+    }
+}
