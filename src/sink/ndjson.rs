@@ -275,7 +275,7 @@ mod tests {
         percepts.reset(2);
         percepts.first_frame = 7;
         percepts.t_s = vec![0.05, 0.1];
-        percepts.in_world = vec![false, true];
+        percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
         percepts.present = vec![Outputs::all(), Outputs::TOTAL, Outputs::TOTAL | Outputs::POSITION, Outputs::empty()];
         percepts.active[0] = 3;

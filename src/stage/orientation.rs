@@ -139,7 +139,7 @@ mod tests {
         let square = line(&[(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (1.0, -1.0, 1.0)]);
         assert_eq!(square, Line { angle: Some(0.0), flags: Flags::TIE });
         // Two equal points on one side of the centroid: the line through them, though it misses the centroid.
-        let one_side = line(&[(2.0, 1.0, 1.0), (2.0, -1.0, 1.0), (0.0, 0.0, 2.0)]);
+        let one_side = line(&[(2.0, 1.0, 3.0), (2.0, -1.0, 3.0), (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)]);
         assert!((one_side.angle.unwrap() - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
     }
 
