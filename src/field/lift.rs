@@ -7,8 +7,11 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Field;
-use crate::body::Body;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::{Chart, Field, anchor_from_link};
+use crate::body::{Body, SurfaceIndex};
 
 /// A field's grid has at most this many nodes a side.
 const MOST_NODES: f64 = 96.0;
@@ -47,12 +50,22 @@ impl Lift {
         let (columns, rows) = (cells.x as usize + 1, cells.y as usize + 1);
 
         let reach = 2.0 * field.radius_m() + 1e-3;
-        let surface = body.surface_in_link(anchor, Some((field.origin_in_anchor, reach)));
+        let members = field.members.iter().enumerate();
+        let sampler = Sampler {
+            body,
+            field,
+            chart,
+            surface: body.surface_in_link(anchor, Some((field.origin_in_anchor, reach))),
+            reach,
+            members: RTree::bulk_load(
+                members.map(|(i, m)| GeomWithData::new(m.place.truncate().to_array(), i)).collect(),
+            ),
+        };
         let mut nodes = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             for column in 0..columns {
                 let uv = low + cell_m * DVec2::new(column as f64, row as f64);
-                nodes.push(node(body, field, chart, &surface, uv, reach));
+                nodes.push(sampler.at(uv));
             }
         }
         let mut lift = Self { corner: low, cell_m, columns, rows, nodes, steepest: (0.0, 0.0) };
@@ -107,31 +120,32 @@ impl Lift {
     }
 }
 
-/// Depth and normal of the surface over one node: where the line along the chart's normal meets it, nearest to the
-/// members' own depth there; off the surface's edge, or without a surface, those of the nearest member.
-fn node(
-    body: &Body,
-    field: &Field,
-    chart: &super::Chart,
-    surface: &crate::body::SurfaceIndex,
-    uv: DVec2,
+/// What a node's depth and normal are made from.
+struct Sampler<'a> {
+    body: &'a Body,
+    field: &'a Field,
+    chart: &'a Chart,
+    surface: SurfaceIndex,
     reach: f64,
-) -> (f64, DVec3) {
-    let nearest = field
-        .members
-        .iter()
-        .min_by(|a, b| {
-            let distance = |m: &super::Member| m.place.truncate().distance_squared(uv);
-            distance(a).total_cmp(&distance(b))
-        })
-        .expect("a field has members");
-    let start = field.origin_in_anchor + chart.unproject(uv.extend(nearest.place.z));
-    match surface.along(start, chart.normal_in_anchor, reach) {
-        Some(hit) => (chart.project(hit.position - field.origin_in_anchor).z, chart.project(hit.normal)),
-        None => {
-            let taxel = &body.taxels[nearest.taxel];
-            let anchor_from_link = super::anchor_from_link(body, field.anchor, taxel.link);
-            (nearest.place.z, chart.project(anchor_from_link.transform_vector3(taxel.normal_in_link)))
+    members: RTree<GeomWithData<[f64; 2], usize>>,
+}
+
+impl Sampler<'_> {
+    /// Depth and normal of the surface over `uv`: where the line along the chart's normal meets it, nearest to the
+    /// members' own depth there; off the surface's edge, or without a surface, those of the nearest member.
+    fn at(&self, uv: DVec2) -> (f64, DVec3) {
+        let nearest = self.members.nearest_neighbor(uv.to_array()).expect("a field has members").data;
+        let nearest = &self.field.members[nearest];
+        let start = self.field.origin_in_anchor + self.chart.unproject(uv.extend(nearest.place.z));
+        match self.surface.along(start, self.chart.normal_in_anchor, self.reach) {
+            Some(hit) => {
+                (self.chart.project(hit.position - self.field.origin_in_anchor).z, self.chart.project(hit.normal))
+            }
+            None => {
+                let taxel = &self.body.taxels[nearest.taxel];
+                let anchor_from_link = anchor_from_link(self.body, self.field.anchor, taxel.link);
+                (nearest.place.z, self.chart.project(anchor_from_link.transform_vector3(taxel.normal_in_link)))
+            }
         }
     }
 }
