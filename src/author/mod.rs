@@ -1,1 +1,37 @@
 //! Authoring: placing taxels on a surface and growing fields over them.
+//!
+//! ```
+//! use glam::DVec3;
+//! use somatic::author::{PatchRules, SurfacePoint, place_evenly, split_into_patches};
+//!
+//! // A sheet of 0.2 m × 0.1 m with 50 taxels on it, in four patches.
+//! let corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)].map(|(x, y)| DVec3::new(x, y, 0.0));
+//! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1)?;
+//! let points: Vec<SurfacePoint> = placed.iter().map(|p| p.point).collect();
+//! let patches = split_into_patches(&points, &PatchRules { patches: 4, ..PatchRules::default() })?;
+//! assert_eq!(patches.iter().map(Vec::len).sum::<usize>(), 50);
+//! # Ok::<(), somatic::Error>(())
+//! ```
+//!
+//! Everything here gives the same answer on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties
+//! go to the lower index.
+
+mod grow;
+mod place;
+mod random;
+
+use glam::DVec3;
+
+pub use grow::{PatchRules, mean_normal, split_into_patches};
+pub use place::{Placed, blend_skinning, heaviest_four, place_evenly, widest_radius};
+
+/// A point of a surface that a taxel sits on, or could. Coordinates are those of the mesh it was made from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Where it is, m.
+    pub position: DVec3,
+    /// Outward unit normal.
+    pub normal: DVec3,
+    /// Surface that is nearer to it than to any other, m².
+    pub area: f64,
+}

@@ -178,8 +178,7 @@ impl Cell<'_> {
         let share = if error == 0.0 { 0.0 } else { error / bound };
         comparison.worst_error = comparison.worst_error.max(error);
         comparison.worst_share = comparison.worst_share.max(share);
-        // Written so that a NaN fails.
-        if !(share <= 1.0) {
+        if share.is_nan() || share > 1.0 {
             self.fail(format!("{name} is {got:?}, not {right:?}: off by {error:.3e}, bound {bound:.3e}"));
         }
     }

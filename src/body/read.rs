@@ -102,7 +102,9 @@ impl<'a> Nodes<'a> {
         let mut link = vec![None; raw.len()];
         let mut links = 0;
         for &node in &in_order {
-            if field[node].is_none() && !(holds_taxels(document, &raw[node]) && parent[node].is_some()) {
+            // What carries taxels is a link above them, or the joints of their skin.
+            let carried = parent[node].is_some() || raw[node].skin.is_some();
+            if field[node].is_none() && !(holds_taxels(document, &raw[node]) && carried) {
                 link[node] = Some(links);
                 links += 1;
             }
@@ -279,9 +281,10 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
     let place = nodes.raw[node].name.clone().or(mesh_name).unwrap_or_else(|| format!("node_{node}"));
     let in_place = |e: Error| e.at(format!("node `{place}`"));
     let joints = joints_of(document, nodes, node, &body.links).map_err(in_place)?;
-    let Some(carrier) = nodes.link_above(node) else {
-        return Err(in_place(Error::failed("a field at the root of the scene carries it; put it under a link")));
-    };
+    let carrier = nodes
+        .link_above(node)
+        .or_else(|| joints.as_ref()?.first().map(|(link, _)| *link))
+        .ok_or_else(|| in_place(Error::failed("nothing carries it: put it under a link, or give its skin joints")))?;
     for primitive in &document.root.meshes[mesh.value()].primitives {
         let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
         let positions = document.floats::<3>(positions).map_err(in_place)?;

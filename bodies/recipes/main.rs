@@ -1,0 +1,52 @@
+//! Makes the bodies in `bodies/`. With `--check`, compares them with what is there instead of writing.
+
+pub(crate) mod figure;
+pub(crate) mod hand;
+pub(crate) mod humanoid;
+pub(crate) mod mat;
+pub(crate) mod solid;
+pub(crate) mod touch;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use somatic::Result;
+
+/// Every file that the recipes make: its name in `bodies/`, and its bytes.
+pub(crate) fn files() -> Result<Vec<(&'static str, Vec<u8>)>> {
+    let hand = hand::make();
+    Ok(vec![
+        ("hand.glb", hand.glb.to_bytes()?),
+        ("touch.csv", touch::csv(&hand.sensors).into_bytes()),
+        ("mat.glb", mat::make().to_bytes()?),
+        ("humanoid.glb", humanoid::make()?.to_bytes()?),
+    ])
+}
+
+fn main() -> ExitCode {
+    let check = std::env::args().any(|argument| argument == "--check");
+    match files().and_then(|files| put(&files, check)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn put(files: &[(&str, Vec<u8>)], check: bool) -> Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("bodies");
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        if check {
+            let there = std::fs::read(&path).map_err(|e| somatic::Error::io(&path, &e))?;
+            if there != *bytes {
+                return Err(somatic::Error::failed("not what its recipe makes; run without --check").at(path.display()));
+            }
+        } else {
+            std::fs::write(&path, bytes).map_err(|e| somatic::Error::io(&path, &e))?;
+        }
+        println!("{name}: {} bytes", bytes.len());
+    }
+    Ok(())
+}

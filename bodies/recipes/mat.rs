@@ -1,0 +1,146 @@
+//! A pressure mat for a bed: 64 rows of 32 taxels, an inch apart; taxel id = 32 · row + column.
+//!
+//! The mat's frame: y up, origin in the middle of its underside. Row 0 is at the head, at −z; column 0 is at −x. Left
+//! and right in the fields' names are those of somebody who looks down on the mat with the head end up.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+
+const ROWS: u32 = 64;
+const COLUMNS: u32 = 32;
+/// Distance between neighbours, m.
+const PITCH: f64 = 0.0254;
+const THICKNESS: f64 = 0.008;
+/// From the outermost taxels' cells to the edge, m.
+const BORDER: f64 = 0.02;
+/// Radius of the outline's corners, m.
+const CORNER: f64 = 0.03;
+/// Radius of the rounded edges, m.
+const EDGE: f64 = 0.003;
+
+fn position(row: u32, column: u32) -> DVec3 {
+    let from_middle = |index: u32, count: u32| PITCH * (f64::from(index) - (f64::from(count) - 1.0) / 2.0);
+    DVec3::new(from_middle(column, COLUMNS), THICKNESS, from_middle(row, ROWS))
+}
+
+/// A slab: the same outline at several heights, drawn in where the edges are rounded, closed by a fan at each end.
+fn slab() -> MeshData {
+    let half = [PITCH * f64::from(COLUMNS) / 2.0 + BORDER, PITCH * f64::from(ROWS) / 2.0 + BORDER];
+    let quarter = |steps: u32| {
+        (0..=steps).map(move |k| {
+            let angle = f64::from(k) / f64::from(steps) * std::f64::consts::FRAC_PI_2;
+            (libm::sin(angle), libm::cos(angle))
+        })
+    };
+    // From the middle of the underside outward, up, and in again: (inset, height, how far the normal looks up).
+    let mut rings: Vec<(f64, f64, f64, f64)> =
+        quarter(4).map(|(sin, cos)| (EDGE * (1.0 - sin), EDGE * (1.0 - cos), sin, -cos)).collect();
+    rings.extend(quarter(4).map(|(sin, cos)| (EDGE * (1.0 - cos), THICKNESS - EDGE * (1.0 - sin), cos, sin)));
+    let mut outline: Vec<([f64; 2], [f64; 2])> = Vec::new();
+    for (corner, (x, z)) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].into_iter().enumerate() {
+        let arc: Vec<[f64; 2]> = quarter(6).map(|(sin, cos)| [x * cos, z * sin]).collect();
+        let centre = [x * (half[0] - CORNER), z * (half[1] - CORNER)];
+        // Each second arc runs the other way, so that the outline goes round once.
+        let arc: Box<dyn Iterator<Item = [f64; 2]>> =
+            if corner % 2 == 0 { Box::new(arc.into_iter()) } else { Box::new(arc.into_iter().rev()) };
+        outline.extend(arc.map(|outward| (centre, outward)));
+    }
+    let mut mesh = MeshData::default();
+    let mut vertex = |position: DVec3, normal: DVec3| {
+        mesh.positions.push(position.as_vec3().to_array());
+        mesh.normals.push(normal.as_vec3().to_array());
+        mesh.positions.len() as u32 - 1
+    };
+    let bottom = vertex(DVec3::ZERO, DVec3::NEG_Y);
+    let top = vertex(DVec3::Y * THICKNESS, DVec3::Y);
+    let mut loops: Vec<Vec<u32>> = Vec::new();
+    for (inset, height, out, up) in rings {
+        let radius = CORNER - inset;
+        let corners = outline.iter().map(|(centre, outward)| {
+            let place = DVec3::new(centre[0] + outward[0] * radius, height, centre[1] + outward[1] * radius);
+            vertex(place, DVec3::new(outward[0] * out, up, outward[1] * out))
+        });
+        loops.push(corners.collect());
+    }
+    let around =
+        |ring: &[u32]| -> Vec<(u32, u32)> { ring.iter().copied().zip(ring.iter().copied().cycle().skip(1)).collect() };
+    for (a, b) in around(&loops[0]) {
+        mesh.triangles.push([bottom, a, b]);
+    }
+    for pair in loops.windows(2) {
+        for ((a, b), (c, d)) in around(&pair[0]).into_iter().zip(around(&pair[1])) {
+            mesh.triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    for (a, b) in around(&loops[loops.len() - 1]) {
+        mesh.triangles.push([top, b, a]);
+    }
+    mesh
+}
+
+/// A field of the taxels in `rows` × `columns`, at their middle.
+fn add_field(
+    glb: &mut Glb,
+    mat: usize,
+    name: &str,
+    parent: &str,
+    rows: std::ops::Range<u32>,
+    columns: std::ops::Range<u32>,
+) {
+    let middle = (position(rows.start, columns.start) + position(rows.end - 1, columns.end - 1)) / 2.0;
+    let ids = rows.flat_map(|row| columns.clone().map(move |column| COLUMNS * row + column));
+    let field = FieldSpec {
+        name: name.to_owned(),
+        parent: Some(parent.to_owned()),
+        members: ids.map(|id| (id, MemberSpec::default())).collect(),
+        chart: None,
+    };
+    glb.field(&field, Some(mat), middle);
+}
+
+/// Makes the mat.
+pub(crate) fn make() -> Glb {
+    let mut glb = Glb::new();
+    glb.describe(&BTreeMap::from([
+        ("title", "A pressure mat of 64 rows and 32 columns"),
+        ("taxel_id", "32 * row + column; row 0 at the head"),
+    ]));
+    let fabric = glb.material("fabric", [0.25, 0.32, 0.42], 0.9);
+    let mat = glb.node("mat", None, DVec3::ZERO);
+    glb.mesh(mat, "mat", &slab(), Some(fabric), None);
+    let taxels: Vec<Taxel> = (0..ROWS * COLUMNS)
+        .map(|id| Taxel {
+            id,
+            link: 0,
+            position_in_link: position(id / COLUMNS, id % COLUMNS),
+            normal_in_link: DVec3::Y,
+            area: PITCH * PITCH,
+            modality: Modality::Pressure,
+        })
+        .collect();
+    glb.taxels("mat taxels", Some(mat), &taxels, None);
+
+    let whole = FieldSpec { name: "mat".to_owned(), ..FieldSpec::default() };
+    glb.field(&whole, Some(mat), DVec3::Y * THICKNESS);
+    for band in 0..7 {
+        add_field(&mut glb, mat, &format!("mat/band_{}", band + 1), "mat", 8 * band..8 * band + 16, 0..COLUMNS);
+    }
+    // Quadrants reach four taxels into each other; the patches under each tile the quarter that is its own.
+    for (half, rows) in [("head", 0..36), ("foot", 28..64)] {
+        for (side, columns) in [("left", 0..18), ("right", 14..32)] {
+            add_field(&mut glb, mat, &format!("mat/quadrant_{half}_{side}"), "mat", rows.clone(), columns);
+        }
+    }
+    for row in 0..16 {
+        for column in 0..8 {
+            let half = if row < 8 { "head" } else { "foot" };
+            let side = if column < 4 { "left" } else { "right" };
+            let name = format!("mat/patch_r{row:02}_c{column:02}");
+            let parent = format!("mat/quadrant_{half}_{side}");
+            add_field(&mut glb, mat, &name, &parent, 4 * row..4 * row + 4, 4 * column..4 * column + 4);
+        }
+    }
+    glb
+}
