@@ -1,4 +1,4 @@
-// axis: principal axis of the second moments, one invocation a field and frame (src/stage/axis.rs).
+// axis: principal axis of the second moments (src/stage/axis.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> fields: array<Field>;
@@ -9,54 +9,38 @@
 @group(0) @binding(6) var<storage, read_write> cells: array<u32>;
 // axis, anisotropy
 @group(0) @binding(7) var<storage, read_write> axes: array<vec2<f32>>;
+@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
 
 const TOGETHER = 9.313225746154785e-10f;
 const ISOTROPIC_UNDER = 1e-3f;
 
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = invocation(group, groups, local);
-    if cell >= batch.frames * batch.fields {
-        return;
-    }
-    let field = fields[cell / batch.frames];
-    let frame = cell % batch.frames;
+// a, b and d of the moments (a b; b d).
+fn add(so_far: vec3<f32>, m: u32, frame: u32, scale: f32, centroid: vec2<f32>) -> vec3<f32> {
+    let member = members[m];
+    let q = (member.weight * pressures[member.slot * batch.frames + frame]) * scale;
+    let x = member.u - centroid.x;
+    let y = member.v - centroid.y;
+    let qx = q * x;
+    return so_far + vec3<f32>(qx * x, qx * y, (q * y) * y);
+}
+
+fn join(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return a + b;
+}
+
+fn finish(cell: u32, field: Field, moments: vec3<f32>) {
     axes[cell] = vec2<f32>();
-    if (cells[cell] & (NO_CONTACT | NO_CHART)) != 0u {
-        return;
-    }
-    if bitcast<u32>(contacts[cell].w) == 1u {
-        cells[cell] |= ONE_TAXEL;
+    if !is_pressed(cell) {
         return;
     }
     let total = contacts[cell].x;
-    // Scaled by a power of two so that q lies in [0, 2) and its moments cannot overflow.
-    let scale = bitcast<f32>((254u << 23u) - (bitcast<u32>(total) & 0x7f800000u));
-    let centroid = centroids[cell].xy;
-    var a = 0.0;
-    var b = 0.0;
-    var d = 0.0;
-    for (var m = field.first; m < field.first + field.count; m++) {
-        let member = members[m];
-        let q = (member.weight * pressures[member.slot * batch.frames + frame]) * scale;
-        let x = member.u - centroid.x;
-        let y = member.v - centroid.y;
-        let qx = q * x;
-        a += qx * x;
-        b += qx * y;
-        d += (q * y) * y;
-    }
-    let trace = a + d;
-    if trace <= TOGETHER * (total * scale) {
+    let trace = moments.x + moments.z;
+    if trace <= TOGETHER * (total * scale_of(total)) {
         cells[cell] |= COINCIDENT;
         return;
     }
-    let x = a - d;
-    let y = 2.0 * b;
+    let x = moments.x - moments.z;
+    let y = 2.0 * moments.y;
     let h = sqrt(x * x + y * y);
     let anisotropy = min(h / trace, 1.0);
     if anisotropy < ISOTROPIC_UNDER {
@@ -68,4 +52,64 @@ fn main(
     let axis = select(line_angle(y, h - x), line_angle(h + x, y), x >= 0.0);
     axes[cell] = vec2<f32>(axis, anisotropy);
     cells[cell] |= (AXIS | ANISOTROPY) << PRESENT;
+}
+
+// One invocation a field and frame.
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let cell = invocation(group, groups, local);
+    if cell >= batch.frames * batch.fields {
+        return;
+    }
+    let field = fields[cell / batch.frames];
+    if field.count > WIDE {
+        return;
+    }
+    let contact = contacts[cell];
+    let scale = scale_of(contact.x);
+    let centroid = centroids[cell].xy;
+    var sum = vec3<f32>();
+    for (var m = field.first; m < field.first + field.count; m++) {
+        sum = add(sum, m, cell % batch.frames, scale, centroid);
+    }
+    finish(cell, field, sum);
+}
+
+var<workgroup> parts: array<vec3<f32>, GROUP>;
+
+// One group a wide field and frame.
+@compute @workgroup_size(GROUP)
+fn wide(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = group_number(group, groups);
+    if number >= batch.frames * batch.wide {
+        return;
+    }
+    let index = wide_fields[number / batch.frames];
+    let cell = index * batch.frames + number % batch.frames;
+    let field = fields[index];
+    let contact = contacts[cell];
+    let scale = scale_of(contact.x);
+    let centroid = centroids[cell].xy;
+    var sum = vec3<f32>();
+    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
+        sum = add(sum, m, cell % batch.frames, scale, centroid);
+    }
+    parts[local] = sum;
+    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if local < half {
+            parts[local] = join(parts[local], parts[local + half]);
+        }
+    }
+    if local == 0u {
+        finish(cell, field, parts[0]);
+    }
 }

@@ -1,4 +1,4 @@
-// contact: sums over a field, one invocation a field and frame (src/stage/contact.rs).
+// contact: sums over a field (src/stage/contact.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> taxels: array<Taxel>;
@@ -9,7 +9,59 @@
 @group(0) @binding(6) var<storage, read_write> cells: array<u32>;
 // total, peak, area, and the bits of the number of pressed taxels
 @group(0) @binding(7) var<storage, read_write> contacts: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
 
+struct Sums {
+    total: f32,
+    peak: f32,
+    area: f32,
+    pressed: u32,
+    flags: u32,
+    // UNUSABLE as long as every taxel is.
+    unusable: u32,
+}
+
+fn add(so_far: Sums, m: u32, frame: u32) -> Sums {
+    var sums = so_far;
+    let member = members[m];
+    let at = member.slot * batch.frames + frame;
+    let pressure = pressures[at];
+    let status = statuses[at];
+    sums.flags |= status;
+    sums.unusable &= status;
+    sums.total += member.weight * pressure;
+    sums.peak = max(sums.peak, pressure);
+    if pressure > 0.0 {
+        sums.pressed += 1u;
+        sums.area += taxels[member.slot].area;
+    }
+    return sums;
+}
+
+fn join(a: Sums, b: Sums) -> Sums {
+    return Sums(
+        a.total + b.total,
+        max(a.peak, b.peak),
+        a.area + b.area,
+        a.pressed + b.pressed,
+        a.flags | b.flags,
+        a.unusable & b.unusable,
+    );
+}
+
+fn finish(cell: u32, field: Field, sums: Sums) {
+    var flags = sums.flags & FLAGS;
+    flags |= select(NO_CONTACT, 0u, sums.pressed > 0u);
+    flags |= select(NO_CHART, 0u, field.charted != 0u);
+    var present = 0u;
+    if (sums.unusable & UNUSABLE) == 0u {
+        present = TOTAL | PEAK | ACTIVE | select(0u, AREA, field.area_known != 0u);
+    }
+    cells[cell] = flags | (present << PRESENT);
+    contacts[cell] = vec4<f32>(sums.total, sums.peak, sums.area, bitcast<f32>(sums.pressed));
+}
+
+// One invocation a field and frame.
 @compute @workgroup_size(GROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -21,34 +73,44 @@ fn main(
         return;
     }
     let field = fields[cell / batch.frames];
-    let frame = cell % batch.frames;
-    var total = 0.0;
-    var peak = 0.0;
-    var area = 0.0;
-    var pressed = 0u;
-    var usable = false;
-    var flags = 0u;
+    if field.count > WIDE {
+        return;
+    }
+    var sum = Sums(0.0, 0.0, 0.0, 0u, 0u, UNUSABLE);
     for (var m = field.first; m < field.first + field.count; m++) {
-        let member = members[m];
-        let at = member.slot * batch.frames + frame;
-        let pressure = pressures[at];
-        let status = statuses[at];
-        flags |= status;
-        usable |= (status & UNUSABLE) == 0u;
-        total += member.weight * pressure;
-        peak = max(peak, pressure);
-        if pressure > 0.0 {
-            pressed += 1u;
-            area += taxels[member.slot].area;
+        sum = add(sum, m, cell % batch.frames);
+    }
+    finish(cell, field, sum);
+}
+
+var<workgroup> parts: array<Sums, GROUP>;
+
+// One group a wide field and frame.
+@compute @workgroup_size(GROUP)
+fn wide(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = group_number(group, groups);
+    if number >= batch.frames * batch.wide {
+        return;
+    }
+    let index = wide_fields[number / batch.frames];
+    let cell = index * batch.frames + number % batch.frames;
+    let field = fields[index];
+    var sum = Sums(0.0, 0.0, 0.0, 0u, 0u, UNUSABLE);
+    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
+        sum = add(sum, m, cell % batch.frames);
+    }
+    parts[local] = sum;
+    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if local < half {
+            parts[local] = join(parts[local], parts[local + half]);
         }
     }
-    flags &= FLAGS;
-    flags |= select(NO_CONTACT, 0u, pressed > 0u);
-    flags |= select(NO_CHART, 0u, field.charted != 0u);
-    var present = 0u;
-    if usable {
-        present = TOTAL | PEAK | ACTIVE | select(0u, AREA, field.area_known != 0u);
+    if local == 0u {
+        finish(cell, field, parts[0]);
     }
-    cells[cell] = flags | (present << PRESENT);
-    contacts[cell] = vec4<f32>(total, peak, area, bitcast<f32>(pressed));
 }

@@ -1,4 +1,4 @@
-// orientation: the line through the two farthest points, one invocation a field and frame (src/stage/orientation.rs).
+// orientation: the line through the two farthest points (src/stage/orientation.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> fields: array<Field>;
@@ -8,9 +8,78 @@
 @group(0) @binding(5) var<storage, read> centroids: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read_write> cells: array<u32>;
 @group(0) @binding(7) var<storage, read_write> orientations: array<f32>;
+@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
 
 const NEAR = 6.103515625e-5f;
+const NOBODY = 0xffffffffu;
 
+// The three largest squared distances, and the points and members of the two largest. Of equals the lower member is the
+// larger.
+struct Farthest {
+    r1: f32,
+    r2: f32,
+    r3: f32,
+    m1: u32,
+    m2: u32,
+    e1: vec2<f32>,
+    e2: vec2<f32>,
+}
+
+fn put(so_far: Farthest, r: f32, m: u32, e: vec2<f32>) -> Farthest {
+    var far = so_far;
+    if r > far.r1 || (r == far.r1 && m < far.m1) {
+        far.r3 = far.r2;
+        far.r2 = far.r1;
+        far.m2 = far.m1;
+        far.e2 = far.e1;
+        far.r1 = r;
+        far.m1 = m;
+        far.e1 = e;
+    } else if r > far.r2 || (r == far.r2 && m < far.m2) {
+        far.r3 = far.r2;
+        far.r2 = r;
+        far.m2 = m;
+        far.e2 = e;
+    } else {
+        far.r3 = max(far.r3, r);
+    }
+    return far;
+}
+
+fn add(so_far: Farthest, m: u32, frame: u32, scale: f32, centroid: vec2<f32>) -> Farthest {
+    let member = members[m];
+    let pressure = pressures[member.slot * batch.frames + frame];
+    if pressure <= 0.0 {
+        return so_far;
+    }
+    let q = (member.weight * pressure) * scale;
+    let e = (vec2<f32>(member.u, member.v) - centroid) * q;
+    return put(so_far, e.x * e.x + e.y * e.y, m, e);
+}
+
+fn join(a: Farthest, b: Farthest) -> Farthest {
+    var far = put(put(a, b.r1, b.m1, b.e1), b.r2, b.m2, b.e2);
+    far.r3 = max(far.r3, b.r3);
+    return far;
+}
+
+fn finish(cell: u32, field: Field, far: Farthest) {
+    orientations[cell] = 0.0;
+    if !is_pressed(cell) {
+        return;
+    }
+    let along = far.e1 - far.e2;
+    let near = NEAR * sqrt(far.r1);
+    if sqrt(along.x * along.x + along.y * along.y) <= near {
+        cells[cell] |= COINCIDENT;
+        return;
+    }
+    let tie = far.r3 >= 0.0 && sqrt(far.r2) - sqrt(max(far.r3, 0.0)) <= near;
+    orientations[cell] = line_angle(along.x, along.y);
+    cells[cell] |= select(0u, TIE, tie) | (ORIENTATION << PRESENT);
+}
+
+// One invocation a field and frame.
 @compute @workgroup_size(GROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -22,52 +91,50 @@ fn main(
         return;
     }
     let field = fields[cell / batch.frames];
-    let frame = cell % batch.frames;
-    orientations[cell] = 0.0;
-    if (cells[cell] & (NO_CONTACT | NO_CHART)) != 0u {
+    if field.count > WIDE {
         return;
     }
-    let pressed = bitcast<u32>(contacts[cell].w);
-    if pressed == 1u {
-        cells[cell] |= ONE_TAXEL;
-        return;
-    }
-    // Scaled by a power of two so that q lies in [0, 2) and its square cannot overflow.
-    let scale = bitcast<f32>((254u << 23u) - (bitcast<u32>(contacts[cell].x) & 0x7f800000u));
+    let contact = contacts[cell];
+    let scale = scale_of(contact.x);
     let centroid = centroids[cell].xy;
-    // The three largest squared distances, and the points of the two largest. Strictly larger, so that the lower id stays.
-    var r1 = -1.0;
-    var r2 = -1.0;
-    var r3 = -1.0;
-    var e1 = vec2<f32>();
-    var e2 = vec2<f32>();
+    var sum = Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
     for (var m = field.first; m < field.first + field.count; m++) {
-        let member = members[m];
-        let pressure = pressures[member.slot * batch.frames + frame];
-        let q = (member.weight * pressure) * scale;
-        let e = (vec2<f32>(member.u, member.v) - centroid) * q;
-        let r = select(-1.0, e.x * e.x + e.y * e.y, pressure > 0.0);
-        if r > r1 {
-            r3 = r2;
-            r2 = r1;
-            e2 = e1;
-            r1 = r;
-            e1 = e;
-        } else if r > r2 {
-            r3 = r2;
-            r2 = r;
-            e2 = e;
-        } else if r > r3 {
-            r3 = r;
+        sum = add(sum, m, cell % batch.frames, scale, centroid);
+    }
+    finish(cell, field, sum);
+}
+
+var<workgroup> parts: array<Farthest, GROUP>;
+
+// One group a wide field and frame.
+@compute @workgroup_size(GROUP)
+fn wide(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = group_number(group, groups);
+    if number >= batch.frames * batch.wide {
+        return;
+    }
+    let index = wide_fields[number / batch.frames];
+    let cell = index * batch.frames + number % batch.frames;
+    let field = fields[index];
+    let contact = contacts[cell];
+    let scale = scale_of(contact.x);
+    let centroid = centroids[cell].xy;
+    var sum = Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
+    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
+        sum = add(sum, m, cell % batch.frames, scale, centroid);
+    }
+    parts[local] = sum;
+    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if local < half {
+            parts[local] = join(parts[local], parts[local + half]);
         }
     }
-    let along = e1 - e2;
-    let near = NEAR * sqrt(r1);
-    if sqrt(along.x * along.x + along.y * along.y) <= near {
-        cells[cell] |= COINCIDENT;
-        return;
+    if local == 0u {
+        finish(cell, field, parts[0]);
     }
-    let tie = pressed > 2u && sqrt(r2) - sqrt(max(r3, 0.0)) <= near;
-    orientations[cell] = line_angle(along.x, along.y);
-    cells[cell] |= select(0u, TIE, tie) | (ORIENTATION << PRESENT);
 }

@@ -1,13 +1,17 @@
 //! Bodies that are damaged or meant to do damage: each is refused in one line or read, and nothing panics, hangs or
 //! fills the memory.
 
+#[path = "it/common.rs"]
 mod common;
+#[path = "it/draft.rs"]
+mod draft;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use common::{Draft, FLOAT, data};
+use common::data;
+use draft::{Draft, FLOAT};
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Skinning, Taxel};

@@ -4,7 +4,7 @@ struct Batch {
     frames: u32,
     slots: u32,
     fields: u32,
-    unused: u32,
+    wide: u32,
 }
 
 struct Taxel {
@@ -60,9 +60,18 @@ const ANISOTROPY = 1u << 9u;
 // Bit of a taxel's status that leaves it out of every sum.
 const UNUSABLE = 1u << 31u;
 
-override GROUP = 64u;
+// Invocations of a group.
+const GROUP = 64u;
+
+// A field of more members than this is taken by a whole group, each invocation a part of it. Besides being faster, it
+// must be so: lavapipe ends any shader's loops after 65,535 rounds in all, without a word.
+const WIDE = 4096u;
 
 // A dispatch is folded into rows, as one row may not be longer than 65,535 groups.
+fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
+    return group.y * groups.x + group.x;
+}
+
 fn invocation(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-    return (group.y * groups.x + group.x) * GROUP + local;
+    return group_number(group, groups) * GROUP + local;
 }

@@ -10,6 +10,7 @@
 mod document;
 mod glb;
 mod layout;
+mod nodes;
 mod read;
 mod surface;
 

@@ -1,20 +1,18 @@
 //! From a glTF document to a [`Body`].
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
 use gltf::json;
 use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::Document;
-use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
-use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, rigid_part};
+use super::layout::{AREA, MODALITY, NORMAL, TAXEL_ID};
+use super::nodes::{FARTHEST, Nodes, is_near};
+use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
 use crate::error::{Error, Result};
-
-/// Metres beyond which a coordinate is damage. Sums and products of what is nearer stay far from overflow.
-const FARTHEST: f64 = 1e9;
 
 /// Reads the body called `name` from a whole file's bytes.
 pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
@@ -50,137 +48,6 @@ pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Bo
     Ok(body)
 }
 
-/// The node tree, with every transform worked out.
-struct Nodes<'a> {
-    raw: &'a [json::Node],
-    parent: Vec<Option<usize>>,
-    /// Every node, a parent before its children.
-    in_order: Vec<usize>,
-    world_from_node: Vec<DAffine3>,
-    /// The link that a node is; `None` for nodes that hold taxels or a field.
-    link: Vec<Option<usize>>,
-    field: Vec<Option<String>>,
-}
-
-impl<'a> Nodes<'a> {
-    fn of(document: &'a Document) -> Result<Self> {
-        let raw = &document.root.nodes[..];
-        let mut parent = vec![None; raw.len()];
-        for (index, node) in raw.iter().enumerate() {
-            for child in node.children.iter().flatten() {
-                if parent[child.value()].replace(index).is_some() {
-                    return Err(Error::failed(format!(
-                        "node {} has two parents: the file is damaged; export it again",
-                        child.value()
-                    )));
-                }
-            }
-        }
-        let mut in_order = Vec::with_capacity(raw.len());
-        let mut to_visit: Vec<usize> = (0..raw.len()).rev().filter(|&n| parent[n].is_none()).collect();
-        while let Some(node) = to_visit.pop() {
-            in_order.push(node);
-            to_visit.extend(raw[node].children.iter().flatten().rev().map(json::Index::value));
-        }
-        if in_order.len() < raw.len() {
-            return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
-        }
-        let mut world_from_node = vec![DAffine3::IDENTITY; raw.len()];
-        for &node in &in_order {
-            let local = local_transform(&raw[node]);
-            if !local.is_finite() {
-                return Err(Error::failed(format!("node {node} has a transform that is not finite; export it again")));
-            }
-            world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
-            if !is_near(&world_from_node[node]) {
-                return Err(Error::failed(format!(
-                    "node {node} is moved or scaled by over {FARTHEST:e}; check the scene's units and export it again"
-                )));
-            }
-        }
-        let field = raw.iter().enumerate().map(|(index, node)| field_text(index, node)).collect::<Result<Vec<_>>>()?;
-        let mut link = vec![None; raw.len()];
-        let mut links = 0;
-        for &node in &in_order {
-            // What carries taxels is a link above them, or the joints of their skin.
-            let carried = parent[node].is_some() || raw[node].skin.is_some();
-            if field[node].is_none() && !(holds_taxels(document, &raw[node]) && carried) {
-                link[node] = Some(links);
-                links += 1;
-            }
-        }
-        Ok(Self { raw, parent, in_order, world_from_node, link, field })
-    }
-
-    fn links(&self) -> Vec<Link> {
-        let mut taken = HashSet::new();
-        let mut numbers: HashMap<&str, u64> = HashMap::new();
-        let mut links: Vec<Link> = Vec::new();
-        for &node in self.in_order.iter().filter(|&&node| self.link[node].is_some()) {
-            let unnamed = format!("node_{node}");
-            let wanted = self.raw[node].name.as_deref();
-            let mut name = wanted.unwrap_or(&unnamed).to_owned();
-            while !taken.insert(name.clone()) {
-                let number = numbers.entry(wanted.unwrap_or_default()).or_insert(1);
-                *number += 1;
-                name = format!("{}#{number}", wanted.unwrap_or(&unnamed));
-            }
-            let world_from_link = rigid_part(&self.world_from_node[node]);
-            links.push(Link {
-                name,
-                parent: self.parent[node].and_then(|up| self.link_above(up)),
-                world_from_link,
-                link_from_node: world_from_link.inverse() * self.world_from_node[node],
-            });
-        }
-        links
-    }
-
-    /// The link that `node` is, or its nearest ancestor that is one.
-    fn link_above(&self, node: usize) -> Option<usize> {
-        let mut at = Some(node);
-        while let Some(node) = at {
-            if self.link[node].is_some() {
-                return self.link[node];
-            }
-            at = self.parent[node];
-        }
-        None
-    }
-}
-
-fn local_transform(node: &json::Node) -> DAffine3 {
-    if let Some(m) = node.matrix {
-        return DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from)));
-    }
-    let three = |v: Option<[f32; 3]>, or: f32| DVec3::from_array(v.unwrap_or([or; 3]).map(f64::from));
-    let rotation = node.rotation.map_or(DQuat::IDENTITY, |q| {
-        let q = DQuat::from_array(q.0.map(f64::from));
-        if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
-    });
-    DAffine3::from_scale_rotation_translation(three(node.scale, 1.0), rotation, three(node.translation, 0.0))
-}
-
-/// Whether nothing in `transform` is infinite, undefined, or absurdly large.
-fn is_near(transform: &DAffine3) -> bool {
-    transform.to_cols_array().iter().all(|x| x.abs() <= FARTHEST)
-}
-
-/// The field's JSON in a node's extras, if it carries one.
-fn field_text(index: usize, node: &json::Node) -> Result<Option<String>> {
-    let Some(extras) = &node.extras else { return Ok(None) };
-    let Ok(extras) = serde_json::from_str::<serde_json::Value>(extras.get()) else { return Ok(None) };
-    match extras.get(FIELD_KEY) {
-        None => Ok(None),
-        Some(serde_json::Value::String(text)) => Ok(Some(text.clone())),
-        Some(_) => {
-            let name = node.name.clone().unwrap_or_else(|| format!("node_{index}"));
-            Err(Error::failed(format!("`{FIELD_KEY}` should be one string; docs/layout.md says what is in it"))
-                .at(format!("field node `{name}`")))
-        }
-    }
-}
-
 fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
     primitive
         .attributes
@@ -193,15 +60,8 @@ fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
     attribute(primitive, &Semantic::Extras(name.to_owned()))
 }
 
-fn is_taxels(primitive: &Primitive) -> bool {
+pub(super) fn is_taxels(primitive: &Primitive) -> bool {
     matches!(primitive.mode, Checked::Valid(Mode::Points)) && custom(primitive, TAXEL_ID).is_some()
-}
-
-fn holds_taxels(document: &Document, node: &json::Node) -> bool {
-    node.mesh.is_some_and(|mesh| {
-        let primitives = &document.root.meshes[mesh.value()].primitives;
-        !primitives.is_empty() && primitives.iter().all(is_taxels)
-    })
 }
 
 /// How the joints of a skinned node carry its points: per joint its link, and link_from_mesh.

@@ -2,6 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// A field of more members than this is taken by a whole workgroup, as `WIDE` in `shaders/shared/layout.wgsl` says.
+pub(crate) const WIDE: usize = 4096;
+
 /// What changes from batch to batch.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -12,8 +15,8 @@ pub(crate) struct Batch {
     pub(crate) slots: u32,
     /// Fields.
     pub(crate) fields: u32,
-    /// A uniform block's size is a multiple of 16 bytes.
-    pub(crate) unused: u32,
+    /// Fields of more than [`WIDE`] members.
+    pub(crate) wide: u32,
 }
 
 /// A taxel's calibration.

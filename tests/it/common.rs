@@ -1,7 +1,8 @@
 //! Bodies and backends that several tests share.
-#![allow(dead_code)]
+#![allow(dead_code)] // Each test binary uses its own part of this.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
@@ -18,7 +19,8 @@ pub fn backends() -> Vec<BackendKind> {
 
 /// Whether there is an adapter. With `SOMATIC_REQUIRE_GPU=1` its absence fails the test.
 pub fn has_gpu() -> bool {
-    let found = !somatic::backend::gpu::adapters().is_empty();
+    static FOUND: OnceLock<bool> = OnceLock::new();
+    let found = *FOUND.get_or_init(|| !somatic::backend::gpu::adapters().is_empty());
     if !found {
         assert!(
             std::env::var("SOMATIC_REQUIRE_GPU").as_deref() != Ok("1"),
@@ -29,14 +31,15 @@ pub fn has_gpu() -> bool {
     found
 }
 
-/// The folder of real recordings and meshes, if this machine has it.
-pub fn data() -> Option<PathBuf> {
-    let folder = PathBuf::from(std::env::var("SOMATIC_DATA").unwrap_or_else(|_| "../shared/data".into()));
-    if !folder.is_dir() {
-        eprintln!("SKIPPED: no real data at {}; set SOMATIC_DATA", folder.display());
-        return None;
+/// `part` of the folder of real recordings and meshes, or `None`, said aloud, where it is not there.
+pub fn data(part: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("SOMATIC_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
+    let path = root.join(part);
+    if path.exists() {
+        return Some(path);
     }
-    Some(folder)
+    eprintln!("SKIPPED: {} is not there; set SOMATIC_DATA to the folder that has it", path.display());
+    None
 }
 
 /// A flat skin of taxels at `uv`, looking along +y, in a body of one link; ids count up from 0.

@@ -1,2 +1,14 @@
+//! Everything that is tested from outside, in one binary, so that all tests share one device.
+
+mod batches;
+mod bodies;
 mod common;
-mod smoke;
+mod draft;
+mod extremes;
+mod house;
+mod legal;
+mod meshes;
+mod properties;
+mod real;
+mod recordings;
+mod touch;

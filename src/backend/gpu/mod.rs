@@ -24,7 +24,7 @@ use crate::percept::{CellsMut, Outputs, Percepts};
 use crate::scene::Plan;
 use crate::stage::layout;
 
-/// Invocations a group; any power of two up to 256 is valid, this one did best on lavapipe.
+/// Invocations a group, as `shaders/shared/layout.wgsl` has it.
 const GROUP: u32 = 64;
 /// Bytes before the raw values in the upload buffer: the batch's uniform block.
 const HEADER: u64 = size_of::<layout::Batch>() as u64;
@@ -39,6 +39,8 @@ pub(crate) struct Gpu {
     batch: wgpu::Buffer,
     raw: wgpu::Buffer,
     stages: Vec<Stage>,
+    /// Number of wide fields.
+    wide: u32,
     results: Vec<Column>,
     readback: wgpu::Buffer,
 }
@@ -48,14 +50,18 @@ struct Stage {
     name: &'static str,
     pipeline: wgpu::ComputePipeline,
     bound: wgpu::BindGroup,
-    /// One invocation a taxel and frame, or one a field and frame.
     over: Over,
 }
 
+/// What a dispatch counts up to, times the frames.
 #[derive(Clone, Copy, PartialEq)]
 enum Over {
+    /// One invocation a taxel.
     Taxels,
+    /// One invocation a field; wide ones return at once.
     Fields,
+    /// One group a wide field.
+    WideFields,
 }
 
 /// A result that is read back.
@@ -133,27 +139,32 @@ impl Gpu {
         let orientations = working("orientations", frames * fields * 4);
         let axes = working("axes", frames * fields * 8);
 
+        let wide: Vec<u32> =
+            (0..).zip(&plan.fields).filter(|(_, field)| field.count > layout::WIDE).map(|(index, _)| index).collect();
+        let wide_fields = table(&device, "wide fields", &wide);
+
         let wanted = plan.stages();
-        let stage = |shader: &StageShader, over, buffers: &[&wgpu::Buffer]| Stage::new(&device, shader, over, buffers);
-        let mut stages = vec![
-            stage(&shaders::CALIBRATE, Over::Taxels, &[&batch, &taxels, &raw, &pressures, &statuses]),
-            stage(
-                &shaders::CONTACT,
-                Over::Fields,
-                &[&batch, &taxels, &field_table, &members, &pressures, &statuses, &cells, &contacts],
-            ),
-        ];
+        let buffers = [&batch, &taxels, &raw, &pressures, &statuses];
+        let mut stages = vec![Stage::new(&device, &shaders::CALIBRATE, "main", Over::Taxels, &buffers)];
+        let mut over_fields = |shader: &StageShader, buffers: [&wgpu::Buffer; 8]| {
+            stages.push(Stage::new(&device, shader, "main", Over::Fields, &buffers));
+            if !wide.is_empty() {
+                let buffers = [&buffers[..], &[&wide_fields]].concat();
+                stages.push(Stage::new(&device, shader, "wide", Over::WideFields, &buffers));
+            }
+        };
+        let buffers = [&batch, &taxels, &field_table, &members, &pressures, &statuses, &cells, &contacts];
+        over_fields(&shaders::CONTACT, buffers);
         if wanted.centroid {
             let buffers = [&batch, &field_table, &members, &depths, &pressures, &contacts, &cells, &centroids];
-            stages.push(stage(&shaders::CENTROID, Over::Fields, &buffers));
+            over_fields(&shaders::CENTROID, buffers);
         }
+        let line = |result| [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, result];
         if wanted.orientation {
-            let buffers = [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, &orientations];
-            stages.push(stage(&shaders::ORIENTATION, Over::Fields, &buffers));
+            over_fields(&shaders::ORIENTATION, line(&orientations));
         }
         if wanted.axis {
-            let buffers = [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, &axes];
-            stages.push(stage(&shaders::AXIS, Over::Fields, &buffers));
+            over_fields(&shaders::AXIS, line(&axes));
         }
 
         let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
@@ -172,13 +183,14 @@ impl Gpu {
         let bytes_back = results.iter().map(|column| column.stride).sum::<u64>() * frames * fields;
         let readback =
             buffer("readback", bytes_back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false);
-        Ok(Self { plan: plan.clone(), device, capacity, upload, batch, raw, stages, results, readback })
+        let wide = wide.len() as u32;
+        Ok(Self { plan: plan.clone(), device, capacity, upload, batch, raw, stages, wide, results, readback })
     }
 
     /// One submission: `raw.frames` is at most the capacity.
     fn submit(&self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
         let (frames, slots, fields) = (raw.frames as u32, self.plan.slots() as u32, self.plan.fields.len() as u32);
-        let header = layout::Batch { frames, slots, fields, unused: 0 };
+        let header = layout::Batch { frames, slots, fields, wide: self.wide };
         let values: &[u8] = cast_slice(raw.values);
         let lost =
             |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
@@ -197,8 +209,12 @@ impl Gpu {
         for stage in &self.stages {
             let mut pass = encoder
                 .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
-            let invocations = frames * if stage.over == Over::Taxels { slots } else { fields };
-            let (wide, tall) = groups(invocations.div_ceil(GROUP));
+            let count = match stage.over {
+                Over::Taxels => (frames * slots).div_ceil(GROUP),
+                Over::Fields => (frames * fields).div_ceil(GROUP),
+                Over::WideFields => frames * self.wide,
+            };
+            let (wide, tall) = groups(count);
             pass.set_pipeline(&stage.pipeline);
             pass.set_bind_group(0, &stage.bound, &[]);
             pass.dispatch_workgroups(wide, tall, 1);
@@ -298,8 +314,8 @@ impl Gpu {
 const PRESENT: u32 = 16;
 
 impl Stage {
-    fn new(device: &Device, shader: &StageShader, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
-        let pipeline = pipeline(device, shader);
+    fn new(device: &Device, shader: &StageShader, entry: &str, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
+        let pipeline = pipeline(device, shader, entry);
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
             .enumerate()
@@ -317,8 +333,8 @@ impl Stage {
     }
 }
 
-/// The compute pipeline of one stage.
-pub(crate) fn pipeline(device: &Device, shader: &StageShader) -> wgpu::ComputePipeline {
+/// The compute pipeline of one stage's entry point.
+pub(crate) fn pipeline(device: &Device, shader: &StageShader, entry: &str) -> wgpu::ComputePipeline {
     let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(shader.name),
         source: wgpu::ShaderSource::Wgsl(shader.source.into()),
@@ -327,11 +343,8 @@ pub(crate) fn pipeline(device: &Device, shader: &StageShader) -> wgpu::ComputePi
         label: Some(shader.name),
         layout: None,
         module: &module,
-        entry_point: Some("main"),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &[("GROUP", f64::from(GROUP))],
-            ..wgpu::PipelineCompilationOptions::default()
-        },
+        entry_point: Some(entry),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     })
 }

@@ -24,8 +24,8 @@ macro_rules! stage {
 pub(crate) const CALIBRATE: StageShader = stage!("calibrate");
 pub(crate) const CONTACT: StageShader = stage!("contact");
 pub(crate) const CENTROID: StageShader = stage!("centroid");
-pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle");
-pub(crate) const AXIS: StageShader = stage!("axis", "angle");
+pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line");
+pub(crate) const AXIS: StageShader = stage!("axis", "angle", "line");
 
 /// All of them, in the order they run.
 #[cfg(test)]

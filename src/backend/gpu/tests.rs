@@ -6,7 +6,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
 use super::shaders::{ALL, StageShader};
-use super::{PRESENT, adapter, groups, pipeline};
+use super::{GROUP, PRESENT, adapter, groups, pipeline};
 use crate::percept::{Flags, Outputs};
 use crate::stage::{calibrate, layout};
 
@@ -34,7 +34,7 @@ macro_rules! same_layout {
 #[test]
 fn structs_lie_as_naga_lays_them() {
     let module = parse(&ALL[1]);
-    same_layout!(&module, Batch { frames, slots, fields, unused });
+    same_layout!(&module, Batch { frames, slots, fields, wide });
     same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, masked });
     same_layout!(&module, Field { first, count, charted, area_known });
     same_layout!(&module, Member { slot, weight, u, v });
@@ -66,6 +66,8 @@ fn bits_have_one_meaning() {
     }
     assert_eq!(constant(&module, "FLAGS"), Some(Flags::all().bits()));
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
+    assert_eq!(constant(&module, "GROUP"), Some(GROUP));
+    assert_eq!(constant(&module, "WIDE"), Some(layout::WIDE as u32));
     assert_eq!(constant(&module, "UNUSABLE"), Some(calibrate::UNUSABLE));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
@@ -79,7 +81,7 @@ fn every_shader_validates_with_no_optional_capability() {
         let module = parse(shader);
         let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
         assert!(validated.is_ok(), "{}: {:?}", shader.name, validated.err());
-        assert_eq!(module.entry_points.len(), 1, "{}", shader.name);
+        assert_eq!(module.entry_points[0].name, "main", "{}", shader.name);
         let storage =
             module.global_variables.iter().filter(|(_, v)| matches!(v.space, naga::AddressSpace::Storage { .. }));
         assert!(storage.count() <= 8, "{} binds more than every device can", shader.name);
@@ -107,14 +109,17 @@ fn every_shader_is_the_file_of_its_stage() {
 fn pipelines_build_without_any_driver() {
     let device = adapter::open(wgpu::Backends::NOOP).expect("noop is always there");
     for shader in &ALL {
-        let built = pipeline(&device, shader);
-        assert!(format!("{built:?}").contains("ComputePipeline"));
+        for entry in parse(shader).entry_points {
+            let built = pipeline(&device, shader, &entry.name);
+            assert!(format!("{built:?}").contains("ComputePipeline"));
+        }
     }
 }
 
 #[test]
 fn a_shader_that_is_wrong_is_caught() {
-    let broken = ALL[1].source.replace("total += member.weight * pressure;", "total += member.weight * status;");
+    let broken =
+        ALL[1].source.replace("sums.total += member.weight * pressure;", "sums.total += member.weight * status;");
     assert!(
         naga::front::wgsl::parse_str(&broken).is_err() || {
             let module = naga::front::wgsl::parse_str(&broken).unwrap();

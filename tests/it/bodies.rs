@@ -1,7 +1,7 @@
 //! The bundled bodies are what their recipes make, and what `bodies/README.md` says they are.
 
 #[allow(dead_code)]
-#[path = "../bodies/recipes/main.rs"]
+#[path = "../../bodies/recipes/main.rs"]
 mod recipes;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -1,8 +1,6 @@
 //! Real meshes, where they are at hand: what Blender and a WebXR project exported is read as they meant it.
 
-mod common;
-
-use common::data;
+use crate::common::data;
 use glam::DVec3;
 use somatic::Body;
 use somatic::body::{Home, Surface};

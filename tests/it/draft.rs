@@ -1,7 +1,5 @@
-//! What tests of bodies share: glTF put together by hand, and the files that are not part of the project.
+//! glTF put together by hand, for bodies that no tool would write.
 #![allow(dead_code, unreachable_pub)] // Each test uses its own part of this.
-
-use std::path::PathBuf;
 
 use base64::Engine as _;
 use serde_json::{Value, json};
@@ -9,17 +7,6 @@ use somatic::{Body, Result};
 
 pub const FLOAT: u32 = 5126;
 pub const U16: u32 = 5123;
-
-/// The folder of real meshes and recordings, or `None`, said aloud, where it is not there.
-pub fn data(part: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("SOMATIC_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
-    let path = root.join(part);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is not there; set SOMATIC_DATA to the folder that has it", path.display());
-    None
-}
 
 /// A `.gltf` put together by hand; its numbers go into one buffer that the JSON carries along.
 pub struct Draft {

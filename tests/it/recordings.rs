@@ -1,8 +1,6 @@
 //! Real recordings, where they are at hand: every value comes out as it stands in the file.
 
-mod common;
-
-use common::data;
+use crate::common::data;
 use somatic::signal::Frame;
 use somatic::source::{CsvSource, Source as _};
 

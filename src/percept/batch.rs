@@ -1,0 +1,284 @@
+//! A batch of percepts, in columns.
+
+use super::{Flags, Outputs, Percept, Precision};
+
+/// One precision's columns, a value per cell; a cell is `frame · fields + field`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Columns<T> {
+    pub(crate) total: Vec<T>,
+    pub(crate) peak: Vec<T>,
+    pub(crate) area: Vec<T>,
+    /// (u, v, depth) in the chart; of a field without one, along its anchor's axes from the field's origin.
+    pub(crate) centroid: Vec<[T; 3]>,
+    pub(crate) orientation: Vec<T>,
+    pub(crate) axis: Vec<T>,
+    pub(crate) anisotropy: Vec<T>,
+}
+
+impl<T: Clone + Default> Columns<T> {
+    fn resize(&mut self, wanted: Outputs, cells: usize) {
+        fn column<V: Clone + Default>(column: &mut Vec<V>, wanted: bool, cells: usize) {
+            column.clear();
+            column.resize(if wanted { cells } else { 0 }, V::default());
+        }
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        column(&mut self.total, wanted.contains(Outputs::TOTAL), cells);
+        column(&mut self.peak, wanted.contains(Outputs::PEAK), cells);
+        column(&mut self.area, wanted.contains(Outputs::AREA), cells);
+        column(&mut self.centroid, wanted.intersects(place), cells);
+        column(&mut self.orientation, wanted.contains(Outputs::ORIENTATION), cells);
+        column(&mut self.axis, wanted.contains(Outputs::AXIS), cells);
+        column(&mut self.anisotropy, wanted.contains(Outputs::ANISOTROPY), cells);
+    }
+}
+
+/// The columns in the precision of the backend that made them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    F32(Columns<f32>),
+    F64(Columns<f64>),
+}
+
+/// The percepts of a batch: `frames × fields` cells, only the outputs that were asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Percepts {
+    outputs: Outputs,
+    fields: usize,
+    pub(crate) first_frame: u64,
+    pub(crate) t_s: Vec<f64>,
+    pub(crate) in_world: Vec<bool>,
+    pub(crate) flags: Vec<Flags>,
+    pub(crate) present: Vec<Outputs>,
+    pub(crate) active: Vec<u32>,
+    pub(crate) values: Values,
+    pub(crate) position: Vec<[f64; 3]>,
+    pub(crate) normal: Vec<[f64; 3]>,
+}
+
+impl Percepts {
+    /// An empty batch for `fields` fields that holds `outputs`.
+    #[must_use]
+    pub fn new(outputs: Outputs, fields: usize, precision: Precision) -> Self {
+        Self {
+            outputs,
+            fields,
+            first_frame: 0,
+            t_s: Vec::new(),
+            in_world: Vec::new(),
+            flags: Vec::new(),
+            present: Vec::new(),
+            active: Vec::new(),
+            values: match precision {
+                Precision::F32 => Values::F32(Columns::default()),
+                Precision::F64 => Values::F64(Columns::default()),
+            },
+            position: Vec::new(),
+            normal: Vec::new(),
+        }
+    }
+
+    /// Makes room for `frames` frames, every cell empty. Allocates only when a batch is larger than all before it.
+    pub(crate) fn reset(&mut self, frames: usize) {
+        fn refill<V: Clone>(column: &mut Vec<V>, length: usize, value: V) {
+            column.clear();
+            column.resize(length, value);
+        }
+        let cells = frames * self.fields;
+        let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
+        refill(&mut self.t_s, frames, 0.0);
+        refill(&mut self.in_world, cells, false);
+        refill(&mut self.flags, cells, Flags::empty());
+        refill(&mut self.present, cells, Outputs::empty());
+        refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
+        refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
+        refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        match &mut self.values {
+            Values::F32(columns) => columns.resize(self.outputs, cells),
+            Values::F64(columns) => columns.resize(self.outputs, cells),
+        }
+    }
+
+    /// The outputs that were asked for.
+    #[must_use]
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// The arithmetic the numbers were made with.
+    #[must_use]
+    pub fn precision(&self) -> Precision {
+        match self.values {
+            Values::F32(_) => Precision::F32,
+            Values::F64(_) => Precision::F64,
+        }
+    }
+
+    /// Number of frames in the batch.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Number of fields in every frame.
+    #[must_use]
+    pub fn fields(&self) -> usize {
+        self.fields
+    }
+
+    /// Number of the batch's frame `frame` since the engine started.
+    #[must_use]
+    pub fn frame_number(&self, frame: usize) -> u64 {
+        self.first_frame + frame as u64
+    }
+
+    /// Time of the batch's frame `frame`, s.
+    #[must_use]
+    pub fn t_s(&self, frame: usize) -> f64 {
+        self.t_s[frame]
+    }
+
+    /// The percept of field `field` in the batch's frame `frame`.
+    #[must_use]
+    pub fn get(&self, frame: usize, field: usize) -> Percept {
+        let cell = frame * self.fields + field;
+        let flags = self.flags[cell];
+        let present = self.present[cell];
+        let has = |output| present.contains(output);
+        let mut percept = Percept {
+            field,
+            contact: !flags.contains(Flags::NO_CONTACT),
+            flags,
+            total: None,
+            peak: None,
+            active: has(Outputs::ACTIVE).then(|| self.active[cell]),
+            area: None,
+            centroid: None,
+            position: has(Outputs::POSITION).then(|| self.position[cell]),
+            normal: has(Outputs::NORMAL).then(|| self.normal[cell]),
+            orientation: None,
+            axis: None,
+            anisotropy: None,
+            in_world: self.in_world[cell],
+        };
+        match &self.values {
+            Values::F32(columns) => columns.fill(&mut percept, present, cell),
+            Values::F64(columns) => columns.fill(&mut percept, present, cell),
+        }
+        percept
+    }
+
+    /// All percepts of the batch's frame `frame`, in field order.
+    pub fn frame(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
+        (0..self.fields).map(move |field| self.get(frame, field))
+    }
+
+    /// The percepts of the fields in contact in the batch's frame `frame`.
+    pub fn touched(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
+        self.frame(frame).filter(|percept| percept.contact)
+    }
+}
+
+impl<T: Copy + Into<f64>> Columns<T> {
+    fn fill(&self, percept: &mut Percept, present: Outputs, cell: usize) {
+        let scalar = |output, column: &[T]| present.contains(output).then(|| column[cell].into());
+        percept.total = scalar(Outputs::TOTAL, &self.total);
+        percept.peak = scalar(Outputs::PEAK, &self.peak);
+        percept.area = scalar(Outputs::AREA, &self.area);
+        percept.orientation = scalar(Outputs::ORIENTATION, &self.orientation);
+        percept.axis = scalar(Outputs::AXIS, &self.axis);
+        percept.anisotropy = scalar(Outputs::ANISOTROPY, &self.anisotropy);
+        percept.centroid = present.contains(Outputs::CENTROID).then(|| {
+            let [u, v, _] = self.centroid[cell];
+            [u.into(), v.into()]
+        });
+    }
+}
+
+/// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
+pub(crate) struct CellsMut<'a> {
+    fields: usize,
+    flags: &'a mut [Flags],
+    present: &'a mut [Outputs],
+    pub(crate) active: &'a mut [u32],
+    pub(crate) total: &'a mut [f32],
+    pub(crate) peak: &'a mut [f32],
+    pub(crate) area: &'a mut [f32],
+    pub(crate) centroid: &'a mut [[f32; 3]],
+    pub(crate) orientation: &'a mut [f32],
+    pub(crate) axis: &'a mut [f32],
+    pub(crate) anisotropy: &'a mut [f32],
+}
+
+impl Percepts {
+    /// All cells of single-precision percepts; `None` for double precision.
+    pub(crate) fn cells_f32(&mut self) -> Option<CellsMut<'_>> {
+        let Values::F32(columns) = &mut self.values else { return None };
+        Some(CellsMut {
+            fields: self.fields,
+            flags: &mut self.flags,
+            present: &mut self.present,
+            active: &mut self.active,
+            total: &mut columns.total,
+            peak: &mut columns.peak,
+            area: &mut columns.area,
+            centroid: &mut columns.centroid,
+            orientation: &mut columns.orientation,
+            axis: &mut columns.axis,
+            anisotropy: &mut columns.anisotropy,
+        })
+    }
+}
+
+impl CellsMut<'_> {
+    /// The first `frames` frames, and the rest.
+    pub(crate) fn split_at(self, frames: usize) -> (Self, Self) {
+        fn split<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
+            column.split_at_mut(cells.min(column.len()))
+        }
+        let cells = frames * self.fields;
+        let (flags, later_flags) = split(self.flags, cells);
+        let (present, later_present) = split(self.present, cells);
+        let (active, later_active) = split(self.active, cells);
+        let (total, later_total) = split(self.total, cells);
+        let (peak, later_peak) = split(self.peak, cells);
+        let (area, later_area) = split(self.area, cells);
+        let (centroid, later_centroid) = split(self.centroid, cells);
+        let (orientation, later_orientation) = split(self.orientation, cells);
+        let (axis, later_axis) = split(self.axis, cells);
+        let (anisotropy, later_anisotropy) = split(self.anisotropy, cells);
+        (
+            Self {
+                fields: self.fields,
+                flags,
+                present,
+                active,
+                total,
+                peak,
+                area,
+                centroid,
+                orientation,
+                axis,
+                anisotropy,
+            },
+            Self {
+                fields: self.fields,
+                flags: later_flags,
+                present: later_present,
+                active: later_active,
+                total: later_total,
+                peak: later_peak,
+                area: later_area,
+                centroid: later_centroid,
+                orientation: later_orientation,
+                axis: later_axis,
+                anisotropy: later_anisotropy,
+            },
+        )
+    }
+
+    /// Sets a cell's flags and the quantities it holds, by their bits.
+    pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
+        self.flags[cell] = Flags::from_bits_truncate(flags);
+        self.present[cell] = Outputs::from_bits_truncate(present);
+    }
+}

@@ -1,0 +1,89 @@
+//! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
+
+use somatic::{BackendKind, Body, Engine, Frame, Options, Percepts, RawValue};
+
+use crate::common::{backends, frame};
+
+/// Everything a frame's percepts say, with numbers as bits.
+fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
+    // f64's `{:?}` prints the shortest number that reads back to the same bits.
+    percepts.frame(frame).map(|p| format!("{} {p:?}", percepts.t_s(frame))).collect()
+}
+
+fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option<&[u32]>) -> Vec<Vec<String>> {
+    let calibration = "[checks]\nsettle_frames = 2\nisolated_ratio = 3\nisolated_above = 500\n[all]\np_max = 900";
+    let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
+    let scene = somatic::Scene { max_age_s: 0.1, ..somatic::Scene::default() };
+    let mut engine = Engine::new(body, Options { backend: kind, batch: 100, calibration, scene }).unwrap();
+    if let Some(ids) = ids {
+        engine.listen(ids).unwrap();
+    }
+    let mut seen = Vec::new();
+    for part in frames.chunks(cut) {
+        let percepts = engine.process(part).unwrap();
+        assert_eq!(percepts.frame_number(0), seen.len() as u64);
+        seen.extend((0..part.len()).map(|frame| bits(percepts, frame)));
+    }
+    seen
+}
+
+/// A recording with a bit of everything: touches that move, gaps, faults.
+fn recording(body: &Body, frames: usize) -> Vec<Frame> {
+    let mut seed = 12_345_u32;
+    let mut random = move || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1 << 24)
+    };
+    (0..frames)
+        .map(|number| {
+            let centre = random() * body.taxels.len() as f64;
+            let mut frame = frame(number as f64 * 0.02, &[]);
+            frame.values = (0..body.taxels.len())
+                .map(|taxel| match random() {
+                    x if x < 0.02 => RawValue::MISSING,
+                    x if x < 0.03 => RawValue::FAULTY,
+                    x if (taxel as f64 - centre).abs() < 40.0 => RawValue::new((x * 1023.0).round()),
+                    _ => RawValue::new(0.0),
+                })
+                .collect();
+            frame
+        })
+        .collect()
+}
+
+#[test]
+fn percepts_do_not_depend_on_the_cut() {
+    let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
+    let frames = recording(&body, 203);
+    for kind in backends() {
+        let whole = run(&body, kind, &frames, frames.len(), None);
+        for cut in [1, 7, 64] {
+            let parts = run(&body, kind, &frames, cut, None);
+            let differs = whole.iter().zip(&parts).position(|(a, b)| a != b);
+            assert_eq!(differs, None, "{kind:?} cut by {cut}");
+        }
+        // The comparison itself can fail: another frame in one place is seen.
+        let mut other = frames.clone();
+        other.swap(100, 101);
+        assert_ne!(run(&body, kind, &other, 64, None), whole);
+    }
+}
+
+#[test]
+fn percepts_do_not_depend_on_the_order_of_channels() {
+    let body = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
+    let frames = recording(&body, 50);
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let order: Vec<usize> = (0..ids.len()).map(|i| (i * 7 + 3) % ids.len()).collect();
+    let mixed_ids: Vec<u32> = order.iter().map(|&i| ids[i]).collect();
+    let mixed: Vec<Frame> = frames
+        .iter()
+        .map(|f| Frame { t_s: f.t_s, values: order.iter().map(|&i| f.values[i]).collect(), pose: Vec::new() })
+        .collect();
+    for kind in backends() {
+        let straight = run(&body, kind, &frames, 10, None);
+        assert_eq!(run(&body, kind, &mixed, 10, Some(&mixed_ids)), straight, "{kind:?}");
+        assert_ne!(run(&body, kind, &mixed, 10, None), straight, "{kind:?}: the order should matter if it is not told");
+    }
+}

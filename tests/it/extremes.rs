@@ -1,0 +1,361 @@
+//! The edges of the input, on every backend: an expected answer or an expected flag, and nothing that is not finite.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::{DQuat, DVec3};
+use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::{Body, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue};
+
+use crate::common::{Flat, backends, engine, frame};
+
+/// The percept of field 0 for one frame of `values`, on every backend; each is also held to the reference.
+fn percepts(body: &Body, values: &[f64]) -> Vec<Percept> {
+    let frame = frame(0.0, values);
+    on_every_backend(body, &frame)
+}
+
+fn on_every_backend(body: &Body, frame: &Frame) -> Vec<Percept> {
+    backends()
+        .into_iter()
+        .map(|kind| {
+            let mut engine = engine(body, kind);
+            let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(frame)).unwrap();
+            assert!(agreement.holds(), "{kind:?}: {agreement}");
+            let percept = percepts.get(0, 0);
+            assert_finite(&percept);
+            percept
+        })
+        .collect()
+}
+
+fn assert_finite(percept: &Percept) {
+    let scalars = [percept.total, percept.peak, percept.area, percept.orientation, percept.axis, percept.anisotropy];
+    let vectors = [percept.position, percept.normal];
+    let centroid = percept.centroid.unwrap_or_default();
+    let all = scalars.into_iter().flatten().chain(vectors.into_iter().flatten().flatten()).chain(centroid);
+    assert!(all.into_iter().all(f64::is_finite), "{percept:?}");
+    for angle in [percept.orientation, percept.axis].into_iter().flatten() {
+        assert!((0.0..PI).contains(&angle) && angle.is_sign_positive(), "{percept:?}");
+    }
+}
+
+fn field(uv: &[[f64; 2]]) -> Body {
+    Flat::new(uv).field("field", None, 0..uv.len() as u32).surface(4.0).body()
+}
+
+const SQUARE: [[f64; 2]; 4] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+
+fn near(a: Option<f64>, b: f64, within: f64) -> bool {
+    a.is_some_and(|a| (a - b).abs() <= within)
+}
+
+#[test]
+fn no_pressure_is_no_contact() {
+    for values in [[0.0; 4], [-0.0; 4], [-5.0; 4]] {
+        for p in percepts(&field(&SQUARE), &values) {
+            assert_eq!((p.contact, p.flags), (false, Flags::NO_CONTACT));
+            assert_eq!((p.total, p.peak, p.active, p.area), (Some(0.0), Some(0.0), Some(0), Some(0.0)));
+            assert_eq!((p.centroid, p.position, p.orientation, p.axis), (None, None, None, None));
+        }
+    }
+}
+
+#[test]
+fn one_live_taxel_has_a_place_and_no_direction() {
+    for p in percepts(&field(&SQUARE), &[0.0, 0.0, 7.0, 0.0]) {
+        assert_eq!(p.flags, Flags::ONE_TAXEL);
+        assert_eq!((p.centroid, p.active), (Some([0.5, 0.5]), Some(1)));
+        assert_eq!((p.orientation, p.axis, p.anisotropy), (None, None, None));
+        assert_eq!(p.position, Some([0.5, 0.0, -0.5]));
+        assert_eq!(p.normal, Some([0.0, 1.0, 0.0]));
+    }
+    // A field that has no more than one.
+    for p in percepts(&field(&[[0.25, 0.0]]), &[3.0]) {
+        assert_eq!((p.flags, p.centroid, p.total), (Flags::ONE_TAXEL, Some([0.25, 0.0]), Some(3.0)));
+    }
+}
+
+#[test]
+fn all_equal_is_a_tie_and_isotropic() {
+    for p in percepts(&field(&SQUARE), &[3.0; 4]) {
+        assert_eq!(p.flags, Flags::TIE | Flags::ISOTROPIC);
+        assert_eq!((p.centroid, p.total), (Some([0.0, 0.0]), Some(12.0)));
+        // The lowest two ids, 0 and 1, lie along u.
+        assert_eq!((p.orientation, p.axis), (Some(0.0), None));
+        assert!(near(p.anisotropy, 0.0, 1e-6));
+    }
+}
+
+#[test]
+fn an_exact_tie_goes_to_the_lowest_ids() {
+    // Three corners as far as each other: ids 1 and 2 win over 3, whatever the order they are read in.
+    let uv = [[0.0, 0.0], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]];
+    for p in percepts(&field(&uv), &[1.0, 4.0, 4.0, 4.0, 4.0]) {
+        assert!(p.flags.contains(Flags::TIE));
+        assert_eq!(p.orientation, Some(0.0));
+    }
+}
+
+#[test]
+fn all_saturated_still_answers() {
+    let body = field(&[[-0.5, 0.0], [0.0, 0.0], [0.5, 0.0]]);
+    let calibration = somatic::Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
+    for kind in backends() {
+        let options = Options { backend: kind, calibration: Some(calibration.clone()), ..Options::default() };
+        let mut engine = Engine::new(&body, options).unwrap();
+        let p = engine.process(&[frame(0.0, &[1023.0; 3])]).unwrap().get(0, 0);
+        assert_eq!(p.flags, Flags::SATURATED);
+        assert_eq!((p.orientation, p.total), (Some(0.0), Some(3069.0)));
+        let at_the_edge = engine.process(&[frame(0.0, &[100.0; 3])]).unwrap().get(0, 0);
+        assert_eq!(at_the_edge.flags, Flags::empty());
+    }
+}
+
+#[test]
+fn collinear_taxels_have_their_line() {
+    for degrees in [0.0, 1e-4, 30.0, 89.9999, 90.0, 90.0001, 135.0, 179.9999_f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let uv: Vec<[f64; 2]> = [-1.0, -0.4, 0.1, 0.7].iter().map(|r| [r * cos, r * sin]).collect();
+        for p in percepts(&field(&uv), &[5.0, 9.0, 2.0, 6.0]) {
+            let apart = |angle: Option<f64>| {
+                let d = (angle.unwrap() - degrees.to_radians()).abs();
+                d.min(PI - d)
+            };
+            // Positions are stored in single precision.
+            assert!(apart(p.orientation) < 1e-5 && apart(p.axis) < 1e-5, "{degrees} {p:?}");
+            assert!(near(p.anisotropy, 1.0, 1e-5));
+        }
+    }
+}
+
+#[test]
+fn vertical_is_no_special_case() {
+    for p in percepts(&field(&[[0.25, -0.5], [0.25, 0.5]]), &[2.0, 2.0]) {
+        assert!(near(p.orientation, FRAC_PI_2, 1e-6) && near(p.axis, FRAC_PI_2, 1e-6), "{p:?}");
+    }
+}
+
+#[test]
+fn the_seam_is_crossed_without_reaching_pi() {
+    for v in [0.0, -0.0, 1e-8, -1e-8, 1e-30, -1e-30, 3e-7, -3e-7] {
+        for [a, b] in [[[-1.0, -v], [1.0, v]], [[1.0, v], [-1.0, -v]]] {
+            for p in percepts(&field(&[a, b]), &[2.0, 2.0]) {
+                let angle = p.orientation.unwrap();
+                assert!(angle.min(PI - angle) < 1e-6, "{v} {angle}");
+            }
+        }
+    }
+}
+
+#[test]
+fn coincident_taxels_have_no_line() {
+    for p in percepts(&field(&[[0.5, 0.25]; 3]), &[1.0, 2.0, 3.0]) {
+        assert_eq!(p.flags, Flags::COINCIDENT);
+        assert_eq!((p.centroid, p.active), (Some([0.5, 0.25]), Some(3)));
+        assert_eq!((p.orientation, p.axis, p.anisotropy), (None, None, None));
+    }
+    // Two on one point and one elsewhere: the two farthest points may coincide while the spread has an axis.
+    for p in percepts(&field(&[[0.5, 0.0], [0.5, 0.0], [-0.5, 0.0]]), &[1.0, 1.0, 2.0]) {
+        assert!(near(p.axis, 0.0, 1e-6), "{p:?}");
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_left_out_and_told() {
+    let body = field(&SQUARE);
+    for bad in [f64::NAN, -f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1.2e18, -1.2e18] {
+        for p in percepts(&body, &[2.0, bad, 0.0, 2.0]) {
+            assert!(p.flags.contains(Flags::FAULTY_INPUT), "{bad}");
+            assert_eq!((p.total, p.active, p.centroid), (Some(4.0), Some(2), Some([-0.5, 0.0])), "{bad}");
+        }
+        for p in percepts(&body, &[bad; 4]) {
+            assert_eq!(p.flags, Flags::FAULTY_INPUT | Flags::NO_CONTACT, "{bad}");
+            // Nothing was measured: no total, rather than a total of nothing.
+            assert_eq!((p.total, p.peak, p.active, p.area), (None, None, None, None), "{bad}");
+        }
+    }
+    // Every quiet and signalling NaN there is a bit for, as a device or a driver may deliver it.
+    for bits in (0..23).map(|bit| 0x7F80_0001_u32 | 1 << bit).chain([0xFF80_0001, 0xFFC0_0000]) {
+        let mut frame = frame(0.0, &[2.0, 0.0, 0.0, 2.0]);
+        frame.values[1] = RawValue::new(f64::from(f32::from_bits(bits)));
+        for p in on_every_backend(&body, &frame) {
+            assert_eq!((p.total, p.flags), (Some(4.0), Flags::FAULTY_INPUT), "{bits:08x}");
+        }
+    }
+}
+
+#[test]
+fn what_is_too_small_counts_as_nothing_and_is_told() {
+    for tiny in [1e-300, 1e-45, 1e-40, 1e-38, 8.6e-19, -1e-20] {
+        for p in percepts(&field(&SQUARE), &[2.0, tiny, 0.0, 2.0]) {
+            assert_eq!((p.total, p.active, p.flags), (Some(4.0), Some(2), Flags::FAULTY_INPUT), "{tiny}");
+        }
+    }
+}
+
+#[test]
+fn pressures_answer_alike_over_all_their_range() {
+    // 2⁻⁶⁰ to 2⁶⁰, in powers of two: the same answers to the bit, the total scaled.
+    let body = field(&[[-0.5, -0.3], [0.4, -0.5], [0.5, 0.5], [-0.2, 0.1]]);
+    let values = [3.0, 1.0, 2.0, 1.5];
+    let plain = percepts(&body, &values);
+    for exponent in [-60, -30, -3, 17, 58] {
+        let scale = 2.0_f64.powi(exponent);
+        for (p, plain) in percepts(&body, &values.map(|v| v * scale)).iter().zip(&plain) {
+            let expected =
+                Percept { total: plain.total.map(|t| t * scale), peak: plain.peak.map(|t| t * scale), ..*plain };
+            assert_eq!(*p, expected, "2^{exponent}");
+        }
+    }
+}
+
+#[test]
+fn a_faint_neighbour_of_a_huge_value_does_no_harm() {
+    for p in percepts(&field(&SQUARE), &[1.0e18, 1.0e-18, 0.0, 1.0]) {
+        assert!(near(p.total, 1.0e18, 1e12) && p.active == Some(3));
+        let [u, v] = p.centroid.unwrap();
+        assert!((u + 0.5).abs() < 1e-6 && (v + 0.5).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_missing_value_is_left_out_and_told() {
+    let body = field(&SQUARE);
+    let mut some = frame(0.0, &[2.0, 9.0, 0.0, 2.0]);
+    some.values[1] = RawValue::MISSING;
+    for p in on_every_backend(&body, &some) {
+        assert_eq!((p.total, p.flags & Flags::INCOMPLETE), (Some(4.0), Flags::INCOMPLETE));
+        assert!(!p.flags.contains(Flags::FAULTY_INPUT));
+    }
+    for p in on_every_backend(&body, &Frame::missing(0.0, 4)) {
+        assert_eq!((p.total, p.flags), (None, Flags::INCOMPLETE | Flags::NO_CONTACT));
+    }
+}
+
+#[test]
+fn the_extreme_weights_hold() {
+    let mut glb = Glb::new();
+    let link = glb.node("skin", None, DVec3::ZERO);
+    let taxel = |id: u32, u: f64| Taxel {
+        id,
+        link: 0,
+        position_in_link: DVec3::new(u, 0.0, 0.0),
+        normal_in_link: DVec3::Y,
+        area: 0.0,
+        modality: Modality::Pressure,
+    };
+    glb.taxels("taxels", Some(link), &[taxel(0, -1.0), taxel(1, 1.0)], None);
+    let weights = [1.0 / 1_048_576.0, 1_048_576.0];
+    let members = (0..2).map(|id| (id, MemberSpec { weight: weights[id as usize], uv: None })).collect();
+    glb.field(&FieldSpec { name: "field".into(), members, ..FieldSpec::default() }, Some(link), DVec3::ZERO);
+    let body = Body::from_bytes("weights", &glb.to_bytes().unwrap()).unwrap();
+    for values in [[1.15e18, 1.15e18], [1e-18, 1e-18], [1.15e18, 1e-18], [1e-18, 1.15e18]] {
+        for p in percepts(&body, &values) {
+            assert!(p.contact && p.area.is_none(), "{p:?}");
+        }
+    }
+}
+
+#[test]
+fn a_body_in_millimetres_or_kilometres_keeps_its_accuracy() {
+    for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
+        let uv: Vec<[f64; 2]> = [[-0.5, 0.0], [0.25, 0.5], [0.5, -0.25]].map(|[u, v]| [u * scale, v * scale]).into();
+        for p in percepts(&field(&uv), &[1.0, 2.0, 3.0]) {
+            let [u, v] = p.centroid.unwrap();
+            assert!((u / scale - 0.25).abs() < 1e-6 && (v / scale - 0.25 / 6.0).abs() < 1e-6, "{scale}");
+        }
+    }
+}
+
+#[test]
+fn ten_kilometres_from_the_origin_nothing_is_lost() {
+    // Places that single precision holds exactly at this distance; without local charts their mean would be off by up
+    // to a millimetre.
+    let step = 1.0 / 128.0;
+    let uv: Vec<[f64; 2]> = (0..25).map(|i| [f64::from(i % 5) * step, f64::from(i / 5) * step]).collect();
+    let values: Vec<f64> = (0..25).map(|i| f64::from((i * 7) % 11)).collect();
+    let far = DVec3::new(8192.0, 4096.0, -8192.0);
+    let spec = |origin| {
+        let flat = Flat::at(&uv, origin);
+        let mut flat = flat;
+        let members = (0..25).map(|id| (id, MemberSpec::default())).collect();
+        let field = FieldSpec { name: "field".into(), members, ..FieldSpec::default() };
+        flat.glb.field(&field, Some(0), DVec3::ZERO);
+        flat.body()
+    };
+    let here = percepts(&spec(DVec3::ZERO), &values);
+    for (p, here) in percepts(&spec(far), &values).iter().zip(&here) {
+        let shifted = DVec3::from_array(p.position.unwrap()) - far;
+        assert!(shifted.distance(DVec3::from_array(here.position.unwrap())) < 1e-8, "{p:?} {here:?}");
+        assert!(near(p.orientation, here.orientation.unwrap(), 1e-5));
+    }
+}
+
+#[test]
+fn a_pose_puts_the_answer_in_the_world() {
+    let body = field(&SQUARE);
+    let mut posed = frame(0.0, &[0.0, 0.0, 7.0, 0.0]);
+    let pose = Pose { translation: DVec3::new(1e4, 2e4, -3e4), rotation: DQuat::from_rotation_z(FRAC_PI_2) };
+    posed.pose.push(("skin".into(), pose));
+    for p in on_every_backend(&body, &posed) {
+        let right = DVec3::new(1e4, 2e4 + 0.5, -3e4 - 0.5);
+        assert!(p.in_world && DVec3::from_array(p.position.unwrap()).distance(right) < 1e-9);
+        assert!(DVec3::from_array(p.normal.unwrap()).distance(DVec3::NEG_X) < 1e-12);
+        // The chart is the field's own and does not turn with the robot.
+        assert_eq!(p.centroid, Some([0.5, 0.5]));
+    }
+}
+
+#[test]
+fn a_field_around_a_limb_has_no_chart_and_says_where_it_is() {
+    let mut glb = Glb::new();
+    let link = glb.node("forearm", None, DVec3::ZERO);
+    let taxels: Vec<Taxel> = (0..12)
+        .map(|id| {
+            let (sin, cos) = (f64::from(id) / 12.0 * 2.0 * PI).sin_cos();
+            Taxel {
+                id: id as u32,
+                link: 0,
+                position_in_link: DVec3::new(0.04 * cos, 0.1, 0.04 * sin),
+                normal_in_link: DVec3::new(cos, 0.0, sin),
+                area: 1e-4,
+                modality: Modality::Pressure,
+            }
+        })
+        .collect();
+    glb.taxels("taxels", Some(link), &taxels, None);
+    let members = (0..12).map(|id| (id, MemberSpec::default())).collect();
+    glb.field(&FieldSpec { name: "forearm".into(), members, ..FieldSpec::default() }, Some(link), DVec3::ZERO);
+    let body = Body::from_bytes("forearm", &glb.to_bytes().unwrap()).unwrap();
+    let mut values = [0.0; 12];
+    (values[0], values[3]) = (3.0, 1.0);
+    for p in percepts(&body, &values) {
+        assert_eq!(p.flags, Flags::NO_CHART);
+        assert_eq!((p.centroid, p.normal, p.orientation, p.axis), (None, None, None, None));
+        assert_eq!((p.total, p.active), (Some(4.0), Some(2)));
+        let mean = DVec3::new(0.03, 0.1, 0.01);
+        assert!(DVec3::from_array(p.position.unwrap()).distance(mean) < 1e-8, "{p:?}");
+    }
+    for p in percepts(&body, &[0.0; 12]) {
+        assert_eq!((p.flags, p.position), (Flags::NO_CHART | Flags::NO_CONTACT, None));
+    }
+}
+
+#[test]
+fn a_field_of_a_million_taxels_answers() {
+    let side = 1000_u32;
+    let uv: Vec<[f64; 2]> =
+        (0..side * side).map(|i| [f64::from(i % side) * 1e-3, f64::from(i / side) * 1e-3]).collect();
+    let body = Flat::new(&uv).field("field", None, 0..side * side).body();
+    let values: Vec<f64> = (0..side * side).map(|i| f64::from((i % 4096 * 7919) % 1024)).collect();
+    let frame = frame(0.0, &values);
+    for kind in backends() {
+        // Without position, which would lay a grid over the surface.
+        let outputs = Outputs::all() - Outputs::POSITION - Outputs::NORMAL;
+        let scene = somatic::Scene { outputs, ..somatic::Scene::default() };
+        let mut engine = Engine::new(&body, Options { backend: kind, scene, ..Options::default() }).unwrap();
+        let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(&frame)).unwrap();
+        assert!(agreement.holds(), "{kind:?}: {agreement}");
+        assert_eq!(percepts.get(0, 0).active, Some(values.iter().filter(|&&v| v > 0.0).count() as u32));
+    }
+}

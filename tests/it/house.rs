@@ -1,0 +1,116 @@
+//! The house stays in order: who may use whom, and each heavy dependency behind its one door.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What each module of the crate may use of the others.
+fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
+    let below_backend = ["error", "percept", "signal", "body", "field", "stage", "scene"];
+    BTreeMap::from([
+        ("error", vec![]),
+        ("percept", vec![]),
+        ("bundled", vec![]),
+        ("signal", vec!["error"]),
+        ("body", vec!["error", "write_whole"]),
+        ("field", vec!["error", "body"]),
+        ("author", vec!["error", "body", "field"]),
+        ("stage", vec!["percept", "signal", "field"]),
+        ("scene", vec!["error", "percept", "signal", "body", "field", "stage"]),
+        ("backend", below_backend.to_vec()),
+        ("engine", [&below_backend[..], &["backend"]].concat()),
+        ("source", vec!["error", "signal"]),
+        ("sink", vec!["error", "percept"]),
+    ])
+}
+
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Every file under `src/`, as (top module, path, text without its tests).
+fn sources() -> Vec<(String, PathBuf, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&root, &mut files);
+    files
+        .into_iter()
+        .map(|path| {
+            let within = path.strip_prefix(&root).unwrap().to_path_buf();
+            let module = within.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs").to_owned();
+            let text = std::fs::read_to_string(&path).unwrap();
+            let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap().to_owned();
+            (module, within, text)
+        })
+        .collect()
+}
+
+/// The crate's own modules that `text` names.
+fn used(text: &str) -> Vec<String> {
+    let code = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n");
+    code.split("crate::")
+        .skip(1)
+        .map(|rest| rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap().to_owned())
+        .collect()
+}
+
+#[test]
+fn arrows_point_one_way() {
+    let allowed = allowed();
+    for (module, path, text) in sources() {
+        if ["lib", "main", "cli", "tradeoff"].contains(&module.as_str()) {
+            continue;
+        }
+        let may = allowed.get(module.as_str()).unwrap_or_else(|| panic!("say in this test what `{module}` may use"));
+        for name in used(&text) {
+            let own = name == module || name.is_empty();
+            assert!(
+                own || may.contains(&name.as_str()),
+                "{} uses crate::{name}; see the arrows in this test",
+                path.display()
+            );
+        }
+    }
+    assert_eq!(used("use crate::error::Error; // crate::engine\nlet x = crate::body::load();"), ["error", "body"]);
+}
+
+#[test]
+fn each_heavy_dependency_has_one_door() {
+    let doors = [
+        ("wgpu", "backend/gpu"),
+        ("pollster", "backend/gpu"),
+        ("gltf", "body"),
+        ("csv", "source"),
+        ("clap", "cli"),
+        ("indicatif", "cli"),
+        ("toml", "signal"),
+        ("rayon", "backend/cpu"),
+        ("globset", "scene"),
+    ];
+    for (dependency, door) in doors {
+        let mut seen = false;
+        for (_, path, text) in sources() {
+            let code: String =
+                text.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n");
+            let uses = code.contains(&format!("{dependency}::")) && !code.contains(&format!("_{dependency}::"));
+            let door_open = path.starts_with(door) || path == Path::new("main.rs");
+            assert!(!uses || door_open, "{} uses {dependency}, whose door is src/{door}", path.display());
+            seen |= uses;
+        }
+        assert!(seen || dependency == "clap" || dependency == "indicatif", "{dependency} is used nowhere");
+    }
+}
+
+#[test]
+fn no_file_is_too_long_for_one_sitting() {
+    for (_, path, text) in sources() {
+        let lines = text.lines().count();
+        assert!(lines <= 450, "{} has {lines} lines", path.display());
+    }
+}
