@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 /// A field of more members than this is taken by a whole workgroup, as `WIDE` in `shaders/shared/layout.wgsl` says.
+#[cfg(feature = "gpu")]
 pub(crate) const WIDE: usize = 4096;
 
 /// What changes from batch to batch.
