@@ -6,6 +6,7 @@
 pub mod author;
 pub mod backend;
 pub mod body;
+pub mod bundled;
 mod engine;
 pub mod error;
 pub mod field;
