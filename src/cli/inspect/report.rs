@@ -1,6 +1,6 @@
 //! A body in words and tables.
 
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
+use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Table};
 use console::{Term, style};
 use rstar::RTree;
 use somatic::body::{Body, ChartKind};
@@ -76,6 +76,9 @@ fn links(body: &Body) -> Table {
 
 fn tree(body: &Body, fields: &[Field]) -> Table {
     let mut table = plain(["field", "taxels", "radius mm", "anchor", "distortion", "chart"]);
+    // Where it is narrow, reasons are wrapped and names are not.
+    let whole = (0..5).map(|_| ColumnConstraint::ContentWidth);
+    table.set_constraints(whole);
     for column in [1, 2, 4] {
         right(&mut table, column);
     }
