@@ -84,6 +84,7 @@ impl View {
         if let Some(table) = &mut self.table {
             table.lines(&mut lines, &self.pace, rows.saturating_sub(bar.is_some().into()), columns);
         }
+        lines.truncate(rows.saturating_sub(bar.is_some().into()));
         lines.extend(bar);
         screen.draw(&lines);
     }
@@ -167,6 +168,9 @@ impl Pace {
             format!("{:>3.0} %  {left}", 100.0 * progress)
         };
         let width = columns.saturating_sub(text.len() + 6).min(40);
+        if width < 8 {
+            return Some(clipped(&format!("  {text}"), columns));
+        }
         let full = (progress * width as f64).round() as usize;
         let paint = |text: String| if self.on_stderr { style(text).for_stderr() } else { style(text) };
         let (done, rest) = (paint("━".repeat(full)).cyan(), paint("─".repeat(width - full)).dim());
