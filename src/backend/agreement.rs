@@ -212,7 +212,7 @@ mod tests {
         (columns.total[0], columns.peak[0], columns.area[0]) = (10.0, 5.0, 1.0);
         columns.centroid[0] = [0.1, 0.2, 0.0];
         (columns.orientation[0], columns.axis[0], columns.anisotropy[0]) = (0.001, 1.0, 0.5);
-        columns.direction[0] = 3.141;
+        columns.direction[0] = 3.139;
         change(&mut percepts, &mut columns);
         percepts.values = Values::F64(columns);
         percepts
@@ -250,7 +250,7 @@ mod tests {
         assert!(against(bound(), |_, c| c.total[0] += 0.009).holds());
         // Either side of the seam is near.
         assert!(against(bound(), |_, c| c.orientation[0] = std::f64::consts::PI - 0.001).holds());
-        assert!(against(bound(), |_, c| c.direction[0] = -3.141).holds());
+        assert!(against(bound(), |_, c| c.direction[0] = -3.139).holds());
     }
 
     #[test]

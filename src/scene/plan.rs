@@ -145,6 +145,12 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The quantities that are computed.
+    #[must_use]
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
     /// Number of taxels that are read.
     #[must_use]
     pub fn slots(&self) -> usize {
