@@ -85,6 +85,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     max_age: f64,
 
+    /// The longest time between two frames over which motion is measured, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    max_gap: f64,
+
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
     verify: bool,
@@ -157,12 +161,15 @@ impl Arguments {
         if !(self.max_age.is_finite() && self.max_age >= 0.0) {
             return Err(Error::usage(format!("--max-age {} is no time span; give seconds from 0", self.max_age)));
         }
+        if self.max_gap.is_nan() || self.max_gap <= 0.0 {
+            return Err(Error::usage(format!("--max-gap {} is no time span; give seconds over 0", self.max_gap)));
+        }
         Ok(())
     }
 
     fn options(&self, ids: &[u32], batch: usize) -> Result<Options> {
         let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::all());
-        let scene = Scene { outputs, fields: self.fields.clone(), max_age_s: self.max_age };
+        let scene = Scene { outputs, fields: self.fields.clone(), max_age_s: self.max_age, max_gap_s: self.max_gap };
         let calibration = self.calibration.as_ref().map(|path| Calibration::load(path, ids)).transpose()?;
         Ok(Options { scene, calibration, backend: self.backend, batch })
     }
