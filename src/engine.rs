@@ -10,10 +10,10 @@ use crate::backend::{self, Backend, BackendKind, RawBatch, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
-use crate::percept::{Flags, Outputs, Percepts, Precision, Values};
-use crate::scene::{Plan, Scene};
+use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
+use crate::scene::{Plan, PlanField, Scene};
 use crate::signal::{Calibration, Frame, Intake, RawValue};
-use crate::stage::position;
+use crate::stage::{position, touches};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -59,7 +59,9 @@ pub struct Engine {
     max_gap_s: f64,
     percepts: Percepts,
     /// Made by the first comparison, and kept, as it has a memory too.
-    reference: Option<Reference>,
+    reference: Option<(Reference, Vec<touches::Memory>)>,
+    /// Per field, the touches of the frame before.
+    memories: Vec<touches::Memory>,
     frames_done: u64,
     ids: Vec<u32>,
     links: Links,
@@ -96,8 +98,10 @@ impl Engine {
             steps: Vec::new(),
             last_t_s: None,
             max_gap_s: scene.max_gap_s,
-            percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision()).with_columns(plan.columns),
+            percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
+                .with_columns(plan.columns, plan.kept_pressures()),
             reference: None,
+            memories: vec![touches::Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
@@ -169,7 +173,8 @@ impl Engine {
         self.gather(frames)?;
         let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
         self.percepts.first_frame = self.frames_done;
-        run(&mut *self.backend, &self.plan, &self.links, frames, &raw, &mut self.percepts)?;
+        let host = Host { plan: &self.plan, links: &self.links };
+        host.run(&mut *self.backend, frames, &raw, &mut self.percepts, &mut self.memories)?;
         self.frames_done += frames.len() as u64;
         Ok(&self.percepts)
     }
@@ -183,13 +188,15 @@ impl Engine {
             return Err(Error::usage("frames were processed without a comparison; compare from the first on"));
         }
         self.process(frames)?;
-        let reference = self.reference.get_or_insert_with(|| Reference::new(&self.plan));
+        let start = || (Reference::new(&self.plan), vec![touches::Memory::default(); self.plan.fields.len()]);
+        let (reference, memories) = self.reference.get_or_insert_with(start);
         let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
         let bounds = reference.bounds(&raw);
-        let mut right =
-            Percepts::new(self.plan.outputs, self.plan.fields.len(), Precision::F64).with_columns(self.plan.columns);
+        let mut right = Percepts::new(self.plan.outputs, self.plan.fields.len(), Precision::F64)
+            .with_columns(self.plan.columns, self.plan.kept_pressures());
         right.first_frame = self.percepts.first_frame;
-        run(reference, &self.plan, &self.links, frames, &raw, &mut right)?;
+        let host = Host { plan: &self.plan, links: &self.links };
+        host.run(reference, frames, &raw, &mut right, memories)?;
         let names: Vec<&str> = self.plan.fields.iter().map(|field| field.name.as_str()).collect();
         let agreement = compare(&right, &bounds, &self.percepts, &names);
         Ok((&self.percepts, agreement))
@@ -233,53 +240,110 @@ fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
 /// Speeds over shorter steps could pass what single precision holds.
 const SHORTEST_STEP_S: f64 = 1e-12;
 
-/// The part of a call that does not change the engine: a backend, then what the host adds.
-fn run(
-    backend: &mut dyn Backend,
-    plan: &Plan,
-    links: &Links,
-    frames: &[Frame],
-    raw: &RawBatch<'_>,
-    percepts: &mut Percepts,
-) -> Result<()> {
-    percepts.reset(frames.len());
-    backend.run(raw, percepts)?;
-    for (index, frame) in frames.iter().enumerate() {
-        percepts.t_s[index] = frame.t_s;
-    }
-    if plan.stages().position {
-        for (index, frame) in frames.iter().enumerate() {
-            place(plan, links, frame, index, percepts);
-        }
-    }
-    Ok(())
+/// What the host does for every backend alike.
+struct Host<'a> {
+    plan: &'a Plan,
+    links: &'a Links,
 }
 
-/// Puts the centroids of one frame on the surface, and into the world where the frame says where that is.
-fn place(plan: &Plan, links: &Links, frame: &Frame, index: usize, percepts: &mut Percepts) {
-    for (number, field) in plan.fields.iter().enumerate() {
-        let cell = index * plan.fields.len() + number;
-        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
-            continue;
+impl Host<'_> {
+    /// A backend's part of a call, then the host's.
+    fn run(
+        &self,
+        backend: &mut dyn Backend,
+        frames: &[Frame],
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        memories: &mut [touches::Memory],
+    ) -> Result<()> {
+        percepts.reset(frames.len());
+        backend.run(raw, percepts)?;
+        let stages = self.plan.stages();
+        for (index, frame) in frames.iter().enumerate() {
+            percepts.t_s[index] = frame.t_s;
+            if !stages.position {
+                continue;
+            }
+            for (number, field) in self.plan.fields.iter().enumerate() {
+                let cell = index * self.plan.fields.len() + number;
+                let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
+                let world =
+                    if contact { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
+                if contact {
+                    self.place(field, world.as_ref(), cell, percepts);
+                }
+                if stages.touches {
+                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number]);
+                }
+            }
         }
+        Ok(())
+    }
+
+    /// The point of the skin at `place` (m, in the field's chart or from its origin), and the normal there.
+    fn on_skin(field: &PlanField, world: Option<&DAffine3>, place: DVec3) -> (DVec3, DVec3) {
+        let (position, normal) = match (&field.chart, &field.lift) {
+            (Some(chart), Some(lift)) => position::on_surface(chart, lift, field.origin_in_anchor, place.truncate()),
+            _ => (field.origin_in_anchor + place, DVec3::ZERO),
+        };
+        match world {
+            Some(world) => (world.transform_point3(position), world.transform_vector3(normal)),
+            None => (position, normal),
+        }
+    }
+
+    /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
+    fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
         let place = match &percepts.values {
             Values::F32(columns) => DVec3::from_array(columns.centroid[cell].map(f64::from)),
             Values::F64(columns) => DVec3::from_array(columns.centroid[cell]),
         };
-        let (mut position, mut normal) = match (&field.chart, &field.lift) {
-            (Some(chart), Some(lift)) => position::on_surface(chart, lift, field.origin_in_anchor, place.truncate()),
-            _ => (field.origin_in_anchor + place, DVec3::ZERO),
-        };
-        if let Some(world_from_anchor) = field.anchor.and_then(|anchor| links.world_from(anchor, frame)) {
-            position = world_from_anchor.transform_point3(position);
-            normal = world_from_anchor.transform_vector3(normal);
-            percepts.in_world[cell] = true;
-        }
-        if plan.outputs.contains(Outputs::POSITION) {
+        let (position, normal) = Self::on_skin(field, world, place);
+        percepts.in_world[cell] = world.is_some();
+        if self.plan.outputs.contains(Outputs::POSITION) {
             percepts.position[cell] = position.to_array();
         }
-        if plan.outputs.contains(Outputs::NORMAL) {
+        if self.plan.outputs.contains(Outputs::NORMAL) {
             percepts.normal[cell] = normal.to_array();
+        }
+    }
+
+    /// Tells a cell's separate touches.
+    fn touches(
+        &self,
+        field: &PlanField,
+        world: Option<&DAffine3>,
+        frame: usize,
+        cell: usize,
+        percepts: &mut Percepts,
+        memory: &mut touches::Memory,
+    ) {
+        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
+            memory.release();
+            percepts.push_touches([]);
+            return;
+        }
+        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
+        let members = self.plan.members_of(field);
+        let pulls: Vec<f64> =
+            members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
+        let skin = touches::Skin { places: &field.places, beside: &field.beside, spacing: field.spacing };
+        let unit_m = f64::from(field.unit_m);
+        let found = memory.follow(&skin, &pulls);
+        let several = found.len() > 1;
+        percepts.push_touches(found.iter().map(|touch| {
+            let place = touch.place * unit_m;
+            Touch {
+                id: touch.id,
+                total: touch.total,
+                active: touch.active,
+                centroid: field.charted.then(|| place.truncate().to_array()),
+                position: Self::on_skin(field, world, place).0.to_array(),
+            }
+        }));
+        percepts.present[cell] |= Outputs::TOUCHES;
+        if several {
+            percepts.flags[cell] |= Flags::SEVERAL;
         }
     }
 }

@@ -22,7 +22,7 @@ pub use backend::agreement::{Agreement, Comparison};
 pub use body::Body;
 pub use engine::{Engine, Options};
 pub use error::{Error, Result};
-pub use percept::{Flags, Outputs, Percept, Percepts, Precision};
+pub use percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Pose, RawValue};
 

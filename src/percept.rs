@@ -91,10 +91,15 @@ bitflags! {
         const SPEED = 1 << 14;
         /// Radial distance over time, m/s (eq. 8).
         const RADIAL_SPEED = 1 << 15;
+        /// The separate touches of the field, each with an identity; only on request.
+        const TOUCHES = 1 << 16;
     }
 }
 
 impl Outputs {
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`].
+    pub const USUAL: Self = Self::all().difference(Self::TOUCHES);
+
     /// What the stage *motion* gives.
     pub(crate) const MOTION: Self = Self::DISPLACEMENT
         .union(Self::DIRECTION)
@@ -122,6 +127,21 @@ pub enum Precision {
     F32,
     /// IEEE 754 binary64: backend `reference`.
     F64,
+}
+
+/// One of a field's separate touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Lasts from onset to release, and is never used again for the field.
+    pub id: u64,
+    /// Σ wᵢPᵢ over its taxels.
+    pub total: f64,
+    /// Number of its taxels.
+    pub active: u32,
+    /// Its centroid (u, v), m; absent where the field has no chart.
+    pub centroid: Option<[f64; 2]>,
+    /// The same point on the surface, as [`Percept::position`] and in the same frame, m.
+    pub position: [f64; 3],
 }
 
 /// One field's percept for one frame. Lengths in metres, angles in radians.

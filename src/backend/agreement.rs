@@ -6,8 +6,9 @@ use std::fmt;
 use glam::DVec2;
 
 use super::reference::CellBound;
-use crate::percept::{Flags, Outputs, Percept, Percepts};
+use crate::percept::{Flags, Outputs, Percept, Percepts, Touch};
 use crate::stage::angle::{between_directions, between_lines};
+use crate::stage::touches;
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,6 +90,7 @@ pub(crate) fn compare(reference: &Percepts, bounds: &[CellBound], candidate: &Pe
             let bound = &bounds[frame * names.len() + field];
             let mut cell = Cell { agreement: &mut agreement, failure: None };
             cell.compare(&reference.get(frame, field), bound, &candidate.get(frame, field));
+            cell.compare_touches(reference.touches(frame, field), bound, candidate.touches(frame, field));
             let failure = cell.failure;
             agreement.cells += 1;
             if let Some(what) = failure {
@@ -155,6 +157,29 @@ impl Cell<'_> {
         self.quantity(Outputs::RADIAL_DISTANCE, right_radial, got_radial, limit, distance);
         self.quantity(Outputs::SPEED, right.speed, got.speed, bound.speed, distance);
         self.quantity(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed, distance);
+    }
+
+    fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
+        let Some(limit) = bound.touch else { return };
+        if right.len() != got.len() {
+            self.fail(format!("touches are {}, not {}", got.len(), right.len()));
+            return;
+        }
+        for (right, got) in right.iter().zip(got) {
+            if (right.id, right.active) != (got.id, got.active) {
+                self.fail(format!(
+                    "touch {} of {} taxels is touch {} of {}",
+                    right.id, right.active, got.id, got.active
+                ));
+            }
+            let distance = |a: &f64, b: &f64| (a - b).abs();
+            let total = Some(touches::BOUND * right.total);
+            self.quantity(Outputs::TOUCHES, Some(right.total), Some(got.total), total, distance);
+            let part = |touch: &Touch, axis: usize| touch.centroid.map(|c| c[axis]);
+            for axis in 0..2 {
+                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit), distance);
+            }
+        }
     }
 
     fn quantity<T: fmt::Debug>(
@@ -237,6 +262,7 @@ mod tests {
             radial_distance: near,
             speed: near,
             radial_speed: near,
+            touch: None,
         }
     }
 
@@ -283,6 +309,23 @@ mod tests {
             assert!(!agreement.holds(), "{name}");
             assert!(agreement.failures[0].contains(name), "{name}: {}", agreement.failures[0]);
         }
+    }
+
+    #[test]
+    fn a_touch_that_differs_fails() {
+        let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
+        let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
+        let right = touched(&[touch]);
+        let limit = CellBound { touch: Some(1e-6), ..bound() };
+        assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
+        let moved = |by: f64| Touch { centroid: Some([0.1, 0.2 + by]), ..touch };
+        assert!(compare(&right, &[limit], &touched(&[moved(0.9e-6)]), &NAMES).holds());
+        let others =
+            [moved(1.1e-6), Touch { id: 2, ..touch }, Touch { active: 2, ..touch }, Touch { total: 10.1, ..touch }];
+        for other in others {
+            assert!(!compare(&right, &[limit], &touched(&[other]), &NAMES).holds(), "{other:?}");
+        }
+        assert!(!compare(&right, &[limit], &touched(&[touch, touch]), &NAMES).holds());
     }
 
     #[test]

@@ -127,7 +127,8 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
     let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
     let raw = RawBatch { frames: batch, values: &values, steps: &steps };
-    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns);
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
+        .with_columns(plan.columns, plan.kept_pressures());
     let mut times = Vec::with_capacity(CALLS);
     percepts.reset(batch);
     backend.run(&raw, &mut percepts)?;

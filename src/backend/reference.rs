@@ -8,7 +8,9 @@ use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::{Pressure, UNUSABLE};
 use crate::stage::hysteresis::ContactState;
-use crate::stage::{Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position};
+use crate::stage::{
+    Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position, touches,
+};
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
 /// the bound, so that the quantity is not compared.
@@ -34,6 +36,8 @@ pub(crate) struct CellBound {
     pub(crate) radial_distance: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) radial_speed: Option<f64>,
+    /// A touch's centroid, per coordinate, m; `None` from the first doubt on, as identities remember.
+    pub(crate) touch: Option<f64>,
 }
 
 /// The backend.
@@ -59,6 +63,8 @@ struct BoundBefore {
     state: ContactState,
     /// The centroid, and its bound as a distance.
     centroid: Option<(DVec2, f64)>,
+    /// Whether touches have been in doubt since the start.
+    touches_in_doubt: bool,
 }
 
 impl Reference {
@@ -109,7 +115,8 @@ impl Reference {
 
     fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
         let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
-        let unknown = BoundBefore { state: ContactState { contact: false, in_doubt: true }, centroid: None };
+        let state = ContactState { contact: false, in_doubt: true };
+        let unknown = BoundBefore { state, centroid: None, touches_in_doubt: true };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
@@ -122,10 +129,11 @@ impl Reference {
         if state.in_doubt {
             // Whether there is a touch at all is in doubt, and with it all that a touch has; the sums are not.
             bound.in_doubt = Flags::all() - INPUT;
-            return (bound, BoundBefore { state, centroid: None });
+            return (bound, BoundBefore { state, ..unknown });
         }
+        let touches_in_doubt = before.touches_in_doubt;
         if !state.contact {
-            return (bound, BoundBefore { state, centroid: None });
+            return (bound, BoundBefore { state, centroid: None, touches_in_doubt });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -155,7 +163,8 @@ impl Reference {
         if let Some(now) = kept {
             moved(&mut bound, field, now, before, step);
         }
-        (bound, BoundBefore { state, centroid: kept })
+        bound.touch = (!touches_in_doubt).then_some(touches::BOUND * unit);
+        (bound, BoundBefore { state, centroid: kept, touches_in_doubt })
     }
 
     fn cell(
@@ -317,6 +326,11 @@ impl Backend for Reference {
         let fields = self.plan.fields.len();
         for frame in 0..raw.frames {
             let pressures = self.pressures(raw, frame);
+            if !percepts.pressures.is_empty() {
+                let slots = self.plan.slots();
+                let kept = &mut percepts.pressures[frame * slots..][..slots];
+                kept.iter_mut().zip(&pressures).for_each(|(kept, pressure)| *kept = pressure.value);
+            }
             for index in 0..fields {
                 let cell = frame * fields + index;
                 let Values::F64(columns) = &mut percepts.values else {

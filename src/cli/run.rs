@@ -100,7 +100,7 @@ pub(super) struct Arguments {
 
 fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
-    format!("Only these quantities: {} [default: all]", names.join(", "))
+    format!("Only these quantities: {} [default: all but touches]", names.join(", "))
 }
 
 fn output(name: &str) -> Result<Outputs> {
@@ -168,7 +168,7 @@ impl Arguments {
     }
 
     fn options(&self, ids: &[u32], batch: usize) -> Result<Options> {
-        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::all());
+        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL);
         let scene = Scene { outputs, fields: self.fields.clone(), max_age_s: self.max_age, max_gap_s: self.max_gap };
         let calibration = self.calibration.as_ref().map(|path| Calibration::load(path, ids)).transpose()?;
         Ok(Options { scene, calibration, backend: self.backend, batch })

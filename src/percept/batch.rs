@@ -1,6 +1,6 @@
 //! A batch of percepts, in columns.
 
-use super::{Flags, Outputs, Percept, Precision};
+use super::{Flags, Outputs, Percept, Precision, Touch};
 
 /// One precision's columns, a value per cell; a cell is `frame · fields + field`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,6 +59,8 @@ pub struct Percepts {
     /// The outputs, and what stages work on.
     columns: Outputs,
     fields: usize,
+    /// Taxels whose pressures are kept, 0 unless a stage works on them.
+    slots: usize,
     pub(crate) first_frame: u64,
     pub(crate) t_s: Vec<f64>,
     pub(crate) in_world: Vec<bool>,
@@ -68,6 +70,11 @@ pub struct Percepts {
     pub(crate) values: Values,
     pub(crate) position: Vec<[f64; 3]>,
     pub(crate) normal: Vec<[f64; 3]>,
+    /// P, frame by frame, each taxel by taxel.
+    pub(crate) pressures: Vec<f64>,
+    touches: Vec<Touch>,
+    /// Per cell, the end of its touches.
+    touch_ends: Vec<u32>,
 }
 
 impl Percepts {
@@ -78,6 +85,7 @@ impl Percepts {
             outputs,
             columns: outputs,
             fields,
+            slots: 0,
             first_frame: 0,
             t_s: Vec::new(),
             in_world: Vec::new(),
@@ -90,12 +98,16 @@ impl Percepts {
             },
             position: Vec::new(),
             normal: Vec::new(),
+            pressures: Vec::new(),
+            touches: Vec::new(),
+            touch_ends: Vec::new(),
         }
     }
 
-    /// The same, with room for `columns` beside the outputs.
-    pub(crate) fn with_columns(mut self, columns: Outputs) -> Self {
+    /// The same, with room for `columns` beside the outputs, and for the pressures of `slots` taxels.
+    pub(crate) fn with_columns(mut self, columns: Outputs, slots: usize) -> Self {
         self.columns |= columns;
+        self.slots = slots;
         self
     }
 
@@ -114,6 +126,9 @@ impl Percepts {
         refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        refill(&mut self.pressures, frames * self.slots, 0.0);
+        self.touches.clear();
+        self.touch_ends.clear();
         match &mut self.values {
             Values::F32(columns) => columns.resize(self.columns, cells),
             Values::F64(columns) => columns.resize(self.columns, cells),
@@ -195,6 +210,22 @@ impl Percepts {
         percept
     }
 
+    /// The separate touches of field `field` in the batch's frame `frame`, the oldest first; none unless
+    /// [`Outputs::TOUCHES`] was asked for.
+    #[must_use]
+    pub fn touches(&self, frame: usize, field: usize) -> &[Touch] {
+        let cell = frame * self.fields + field;
+        let Some(&end) = self.touch_ends.get(cell) else { return &[] };
+        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
+        &self.touches[start as usize..end as usize]
+    }
+
+    /// Adds the touches of the next cell; cells are filled in their order.
+    pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = Touch>) {
+        self.touches.extend(touches);
+        self.touch_ends.push(self.touches.len() as u32);
+    }
+
     /// All percepts of the batch's frame `frame`, in field order.
     pub fn frame(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
         (0..self.fields).map(move |field| self.get(frame, field))
@@ -231,6 +262,9 @@ impl<T: Copy + Into<f64>> Columns<T> {
 /// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
 pub(crate) struct CellsMut<'a> {
     fields: usize,
+    slots: usize,
+    /// Per frame and taxel, not per cell.
+    pub(crate) pressures: &'a mut [f64],
     pub(crate) flags: &'a mut [Flags],
     pub(crate) present: &'a mut [Outputs],
     pub(crate) active: &'a mut [u32],
@@ -255,6 +289,8 @@ impl Percepts {
         let Values::F32(columns) = &mut self.values else { return None };
         Some(CellsMut {
             fields: self.fields,
+            slots: self.slots,
+            pressures: &mut self.pressures,
             flags: &mut self.flags,
             present: &mut self.present,
             active: &mut self.active,
@@ -282,10 +318,14 @@ impl CellsMut<'_> {
             column.split_at_mut(cells.min(column.len()))
         }
         let cells = frames * self.fields;
+        let (pressures, later_pressures) = split(self.pressures, frames * self.slots);
         macro_rules! split_all {
             ($($column:ident => $later:ident),* $(,)?) => {{
                 $(let ($column, $later) = split(self.$column, cells);)*
-                (Self { fields: self.fields, $($column),* }, Self { fields: self.fields, $($column: $later),* })
+                (
+                    Self { fields: self.fields, slots: self.slots, pressures, $($column),* },
+                    Self { fields: self.fields, slots: self.slots, pressures: later_pressures, $($column: $later),* },
+                )
             }};
         }
         split_all! {
@@ -312,6 +352,8 @@ impl CellsMut<'_> {
     pub(crate) fn reborrow(&mut self) -> CellsMut<'_> {
         CellsMut {
             fields: self.fields,
+            slots: self.slots,
+            pressures: self.pressures,
             flags: self.flags,
             present: self.present,
             active: self.active,

@@ -22,6 +22,6 @@ pub struct Scene {
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::all(), fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0 }
+        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0 }
     }
 }

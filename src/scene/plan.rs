@@ -8,7 +8,7 @@ use globset::{GlobBuilder, GlobSetBuilder};
 use super::Scene;
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
-use crate::field::{Chart, FieldSet, Lift, WORLD};
+use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
@@ -23,6 +23,7 @@ pub(crate) struct Stages {
     pub(crate) hysteresis: bool,
     pub(crate) motion: bool,
     pub(crate) position: bool,
+    pub(crate) touches: bool,
 }
 
 /// What a backend runs: only the taxels, fields and stages that the scene needs.
@@ -62,6 +63,10 @@ pub(crate) struct PlanField {
     pub(crate) thresholds: Thresholds,
     /// The distance in the unit up to which its centroid counts as still.
     pub(crate) still_within: f32,
+    /// Per member, the members beside it, where separate touches are wanted.
+    pub(crate) beside: Vec<Vec<u32>>,
+    /// About how far members lie apart, in the unit.
+    pub(crate) spacing: f64,
     /// Members' places in the unit, in double precision.
     pub(crate) places: Vec<DVec3>,
     /// Members' third coordinate in the unit.
@@ -110,6 +115,7 @@ impl Plan {
             body_taxels: Vec::new(),
         };
         plan.taxels = plan.calibrations.iter().zip(&plan.areas).map(|(c, &area)| taxel(c, area)).collect();
+        let around = plan.stages().touches.then(|| neighbours(body));
         for field in chosen.into_iter().map(|index| &fields.fields[index]) {
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
@@ -128,6 +134,8 @@ impl Plan {
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
                 lift: plan.stages().position.then(|| Lift::new(body, field)).flatten(),
+                beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
+                spacing: field.spacing_m() / f64::from(unit_m),
                 places,
             });
             let places = &plan.fields[plan.fields.len() - 1].places;
@@ -141,6 +149,9 @@ impl Plan {
         plan.body_taxels = body_taxels;
         if plan.stages().hysteresis {
             plan.columns |= Outputs::TOTAL;
+        }
+        if plan.stages().position {
+            plan.columns |= Outputs::CENTROID;
         }
         Ok(plan)
     }
@@ -172,15 +183,21 @@ impl Plan {
         &self.members[field.first..field.first + field.count]
     }
 
+    /// How many taxels' pressures percepts keep.
+    pub(crate) fn kept_pressures(&self) -> usize {
+        if self.stages().touches { self.slots() } else { 0 }
+    }
+
     pub(crate) fn stages(&self) -> Stages {
         let wants = |outputs| self.outputs.intersects(outputs);
-        let position = wants(Outputs::POSITION | Outputs::NORMAL);
+        let touches = wants(Outputs::TOUCHES);
+        let position = wants(Outputs::POSITION | Outputs::NORMAL) || touches;
         let orientation = wants(Outputs::ORIENTATION);
         let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
         let motion = wants(Outputs::MOTION);
         let hysteresis = self.fields.iter().any(|field| field.thresholds != Thresholds::default());
         let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
-        Stages { centroid, orientation, axis, hysteresis, motion, position }
+        Stages { centroid, orientation, axis, hysteresis, motion, position, touches }
     }
 }
 
@@ -211,6 +228,13 @@ fn choose(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> {
         return Err(Error::usage(format!("no field matches `{glob}`: {hint}")));
     }
     Ok(chosen)
+}
+
+/// Per member of `field`, the members beside it; `around` has each taxel's neighbours.
+fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let member_of = |taxel: u32| field.members.binary_search_by_key(&(taxel as usize), |member| member.taxel).ok();
+    let beside = |taxel: usize| around[taxel].iter().filter_map(|&n| member_of(n)).map(|m| m as u32).collect();
+    field.members.iter().map(|member| beside(member.taxel)).collect()
 }
 
 fn thresholds(calibration: &Calibration, field: &str) -> Thresholds {

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::{FieldNames, Flow, Sink};
 use crate::error::{Error, Result};
-use crate::percept::{Flags, Percept, Percepts, Precision};
+use crate::percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
 
 /// Writes percepts as NDJSON.
 pub struct NdjsonSink {
@@ -114,6 +114,9 @@ impl NdjsonSink {
             line.extend_from_slice(head.as_bytes());
             print(line, &percept.contact);
             print_quantities(line, &percept, percepts.precision());
+            if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
+                print_touches(line, percepts.touches(frame, percept.field));
+            }
             line.extend_from_slice(b",\"flags\":[");
             let mut first = true;
             for (_, name) in flags.iter().filter(|(flag, _)| percept.flags.contains(*flag)) {
@@ -255,6 +258,27 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
     named(line, "radial_speed", percept.radial_speed);
 }
 
+fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
+    key(line, "touches");
+    line.push(b'[');
+    for (index, touch) in touches.iter().enumerate() {
+        line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+        print(line, &touch.id);
+        key(line, "total");
+        print(line, &touch.total);
+        key(line, "active");
+        print(line, &touch.active);
+        if let Some(centroid) = touch.centroid {
+            key(line, "centroid");
+            print(line, &centroid);
+        }
+        key(line, "position");
+        print(line, &touch.position);
+        line.push(b'}');
+    }
+    line.push(b']');
+}
+
 fn key(line: &mut Vec<u8>, name: &str) {
     line.extend_from_slice(b",\"");
     line.extend_from_slice(name.as_bytes());
@@ -280,7 +304,7 @@ mod tests {
 
     /// Two frames of two fields; the first field is touched, in the second frame in the world.
     fn percepts(precision: Precision) -> Percepts {
-        let mut percepts = Percepts::new(Outputs::all(), 2, precision);
+        let mut percepts = Percepts::new(Outputs::USUAL, 2, precision);
         percepts.reset(2);
         percepts.first_frame = 7;
         percepts.t_s = vec![0.05, 0.1];

@@ -19,6 +19,7 @@ pub(crate) mod layout;
 pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
+pub(crate) mod touches;
 
 use glam::DVec3;
 

@@ -36,7 +36,7 @@ fn at_rest(backend: BackendKind) -> Options {
         | Outputs::RADIAL_DISTANCE
         | Outputs::SPEED
         | Outputs::RADIAL_SPEED;
-    let scene = Scene { outputs: Outputs::all() - moving, ..Scene::default() };
+    let scene = Scene { outputs: Outputs::USUAL - moving, ..Scene::default() };
     Options { backend, scene, ..Options::default() }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use somatic::{Body, Calibration, Engine, Flags, Frame, Options, Percept, Scene};
+use somatic::{Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Scene, Touch};
 
 use crate::common::{Flat, backends, frame};
 
@@ -142,4 +142,42 @@ fn thresholds_for_a_field_that_is_not_there_are_refused() {
     let calibration = Some(Calibration::parse("[contact.field.feild]\non = 3", &ids).unwrap());
     let refused = Engine::new(&cross(), Options { calibration, ..Options::default() }).err().unwrap().to_string();
     assert!(refused.contains("`feild`") && refused.contains("did you mean `field`"), "{refused}");
+}
+
+#[test]
+fn two_fingers_are_two_touches_only_when_asked_for() {
+    let frames = [
+        press(0.0, &[(0, 2.0), (1, 2.0), (8, 6.0)]),
+        press(0.1, &[(1, 4.0), (7, 6.0)]),
+        press(0.2, &[(7, 6.0)]),
+        press(0.3, &[]),
+        press(0.4, &[(7, 6.0)]),
+    ];
+    for backend in backends() {
+        for cut in [1, frames.len()] {
+            let scene = Scene { outputs: Outputs::TOUCHES | Outputs::CENTROID, ..Scene::default() };
+            let mut engine = Engine::new(&cross(), Options { backend, scene, ..Options::default() }).unwrap();
+            let mut seen: Vec<Vec<Touch>> = Vec::new();
+            let mut several = Vec::new();
+            for part in frames.chunks(cut) {
+                let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+                assert!(agreement.holds(), "{backend:?}: {agreement}");
+                seen.extend((0..part.len()).map(|frame| percepts.touches(frame, 0).to_vec()));
+                several.extend((0..part.len()).map(|frame| percepts.get(frame, 0).flags.contains(Flags::SEVERAL)));
+            }
+            let told = |touches: &[Touch]| -> Vec<(u64, f64, u32, f64)> {
+                touches.iter().map(|t| (t.id, t.total, t.active, t.centroid.unwrap()[0])).collect()
+            };
+            assert_eq!(told(&seen[0]), [(1, 4.0, 2, -3.5), (2, 6.0, 1, 4.0)]);
+            assert_eq!(told(&seen[1]), [(1, 4.0, 1, -3.0), (2, 6.0, 1, 3.0)]);
+            assert_eq!(told(&seen[2]), [(2, 6.0, 1, 3.0)]);
+            assert!(seen[3].is_empty());
+            assert_eq!(told(&seen[4]), [(3, 6.0, 1, 3.0)]);
+            assert_eq!(several, [true, true, false, false, false]);
+            assert_eq!(seen[0][1].position, [4.0, 0.0, 0.0]);
+        }
+        let mut usual = Engine::new(&cross(), Options { backend, ..Options::default() }).unwrap();
+        let percepts = usual.process(&frames).unwrap();
+        assert!(percepts.touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
+    }
 }

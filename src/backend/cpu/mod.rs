@@ -131,6 +131,13 @@ impl<const L: usize> Scratch<L> {
     /// All stages for `count ≤ L` frames of `raw`, frame by frame as recordings have them.
     fn block(&mut self, plan: &Plan, raw: &[RawValue], count: usize, cells: &mut CellsMut<'_>) {
         calibrate::lanes(&plan.taxels, raw, count, &mut self.pressures, &mut self.statuses);
+        if !cells.pressures.is_empty() {
+            for (slot, lanes) in self.pressures.iter().enumerate() {
+                for lane in 0..count {
+                    cells.pressures[lane * plan.slots() + slot] = lanes[lane].into();
+                }
+            }
+        }
         let stages = plan.stages();
         for (index, field) in plan.fields.iter().enumerate() {
             let members = plan.members_of(field);

@@ -59,8 +59,14 @@ pub(crate) struct Gpu {
 struct Column {
     what: What,
     buffer: wgpu::Buffer,
-    /// Bytes a cell.
+    /// Bytes a cell, or a taxel.
     stride: u64,
+}
+
+impl Column {
+    fn bytes_a_frame(&self, slots: u64, fields: u64) -> u64 {
+        self.stride * if self.what == What::Pressures { slots } else { fields }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -71,6 +77,8 @@ enum What {
     Orientations,
     Axes,
     Motions,
+    /// Per taxel and frame, where every other is per field and frame.
+    Pressures,
 }
 
 impl Gpu {
@@ -185,12 +193,13 @@ impl Gpu {
             (wanted.orientation, What::Orientations, orientations, 4),
             (wanted.axis, What::Axes, axes, 8),
             (wanted.motion, What::Motions, motions, size_of::<layout::Motion>() as u64),
+            (wanted.touches, What::Pressures, pressures, 4),
         ]
         .into_iter()
         .filter(|(read, ..)| *read)
         .map(|(_, what, buffer, stride)| Column { what, buffer, stride })
         .collect();
-        let bytes_back = results.iter().map(|column| column.stride).sum::<u64>() * frames * fields;
+        let bytes_back = frames * results.iter().map(|column| column.bytes_a_frame(slots, fields)).sum::<u64>();
         let readback =
             buffer("readback", bytes_back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false);
         Ok(Self {
@@ -249,11 +258,11 @@ impl Gpu {
             pass.set_bind_group(0, &stage.bound, &[]);
             pass.dispatch_workgroups(wide, tall, 1);
         }
-        let count = u64::from(frames) * u64::from(fields);
+        let length = |column: &Column| u64::from(frames) * column.bytes_a_frame(u64::from(slots), u64::from(fields));
         let mut end = 0;
         for column in &self.results {
-            encoder.copy_buffer_to_buffer(&column.buffer, 0, &self.readback, end, count * column.stride);
-            end += count * column.stride;
+            encoder.copy_buffer_to_buffer(&column.buffer, 0, &self.readback, end, length(column));
+            end += length(column);
         }
         self.device.queue.submit([encoder.finish()]);
 
@@ -273,7 +282,7 @@ impl Gpu {
             let mapped = self.readback.get_mapped_range(0..end).map_err(|e| lost(&e))?;
             let mut start = 0;
             for column in &self.results {
-                let length = (count * column.stride) as usize;
+                let length = length(column) as usize;
                 self.unpack(column.what, &mapped[start..start + length], raw.frames, cells);
                 start += length;
             }

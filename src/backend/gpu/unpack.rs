@@ -76,6 +76,15 @@ impl Gpu {
                     }
                 });
             }
+            What::Pressures => {
+                let pressures: &[f32] = cast_slice(bytes);
+                let slots = self.plan.slots();
+                for slot in 0..slots {
+                    for frame in 0..frames {
+                        cells.pressures[frame * slots + slot] = pressures[slot * frames + frame].into();
+                    }
+                }
+            }
             What::Axes => {
                 let axes: &[[f32; 2]] = cast_slice(bytes);
                 if wants(Outputs::AXIS) {
