@@ -15,11 +15,17 @@ const TOGETHER = 9.313225746154785e-10f;
 const ISOTROPIC_UNDER = 1e-3f;
 
 // a, b and d of the moments (a b; b d).
-fn add(so_far: vec3<f32>, m: u32, frame: u32, scale: f32, centroid: vec2<f32>) -> vec3<f32> {
+alias Part = vec3<f32>;
+
+fn nothing() -> vec3<f32> {
+    return vec3<f32>();
+}
+
+fn add(so_far: vec3<f32>, m: u32, frame: u32, context: Context) -> vec3<f32> {
     let member = members[m];
-    let q = (member.weight * pressures[member.slot * batch.frames + frame]) * scale;
-    let x = member.u - centroid.x;
-    let y = member.v - centroid.y;
+    let q = (member.weight * pressures[member.slot * batch.frames + frame]) * context.scale;
+    let x = member.u - context.centroid.x;
+    let y = member.v - context.centroid.y;
     let qx = q * x;
     return so_far + vec3<f32>(qx * x, qx * y, (q * y) * y);
 }
@@ -52,64 +58,4 @@ fn finish(cell: u32, field: Field, moments: vec3<f32>) {
     let axis = select(line_angle(y, h - x), line_angle(h + x, y), x >= 0.0);
     axes[cell] = vec2<f32>(axis, anisotropy);
     cells[cell] |= (AXIS | ANISOTROPY) << PRESENT;
-}
-
-// One invocation a field and frame.
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = invocation(group, groups, local);
-    if cell >= batch.frames * batch.fields {
-        return;
-    }
-    let field = fields[cell / batch.frames];
-    if field.count > WIDE {
-        return;
-    }
-    let contact = contacts[cell];
-    let scale = scale_of(contact.x);
-    let centroid = centroids[cell].xy;
-    var sum = vec3<f32>();
-    for (var m = field.first; m < field.first + field.count; m++) {
-        sum = add(sum, m, cell % batch.frames, scale, centroid);
-    }
-    finish(cell, field, sum);
-}
-
-var<workgroup> parts: array<vec3<f32>, GROUP>;
-
-// One group a wide field and frame.
-@compute @workgroup_size(GROUP)
-fn wide(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = group_number(group, groups);
-    if number >= batch.frames * batch.wide {
-        return;
-    }
-    let index = wide_fields[number / batch.frames];
-    let cell = index * batch.frames + number % batch.frames;
-    let field = fields[index];
-    let contact = contacts[cell];
-    let scale = scale_of(contact.x);
-    let centroid = centroids[cell].xy;
-    var sum = vec3<f32>();
-    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
-        sum = add(sum, m, cell % batch.frames, scale, centroid);
-    }
-    parts[local] = sum;
-    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-        workgroupBarrier();
-        if local < half {
-            parts[local] = join(parts[local], parts[local + half]);
-        }
-    }
-    if local == 0u {
-        finish(cell, field, parts[0]);
-    }
 }

@@ -21,7 +21,20 @@ struct Sums {
     unusable: u32,
 }
 
-fn add(so_far: Sums, m: u32, frame: u32) -> Sums {
+alias Part = Sums;
+
+// Nothing is needed beside the members.
+alias Context = bool;
+
+fn context_of(cell: u32, field: Field) -> Context {
+    return true;
+}
+
+fn nothing() -> Sums {
+    return Sums(0.0, 0.0, 0.0, 0u, 0u, UNUSABLE);
+}
+
+fn add(so_far: Sums, m: u32, frame: u32, context: Context) -> Sums {
     var sums = so_far;
     let member = members[m];
     let at = member.slot * batch.frames + frame;
@@ -59,58 +72,4 @@ fn finish(cell: u32, field: Field, sums: Sums) {
     }
     cells[cell] = flags | (present << PRESENT);
     contacts[cell] = vec4<f32>(sums.total, sums.peak, sums.area, bitcast<f32>(sums.pressed));
-}
-
-// One invocation a field and frame.
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = invocation(group, groups, local);
-    if cell >= batch.frames * batch.fields {
-        return;
-    }
-    let field = fields[cell / batch.frames];
-    if field.count > WIDE {
-        return;
-    }
-    var sum = Sums(0.0, 0.0, 0.0, 0u, 0u, UNUSABLE);
-    for (var m = field.first; m < field.first + field.count; m++) {
-        sum = add(sum, m, cell % batch.frames);
-    }
-    finish(cell, field, sum);
-}
-
-var<workgroup> parts: array<Sums, GROUP>;
-
-// One group a wide field and frame.
-@compute @workgroup_size(GROUP)
-fn wide(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = group_number(group, groups);
-    if number >= batch.frames * batch.wide {
-        return;
-    }
-    let index = wide_fields[number / batch.frames];
-    let cell = index * batch.frames + number % batch.frames;
-    let field = fields[index];
-    var sum = Sums(0.0, 0.0, 0.0, 0u, 0u, UNUSABLE);
-    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
-        sum = add(sum, m, cell % batch.frames);
-    }
-    parts[local] = sum;
-    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-        workgroupBarrier();
-        if local < half {
-            parts[local] = join(parts[local], parts[local + half]);
-        }
-    }
-    if local == 0u {
-        finish(cell, field, parts[0]);
-    }
 }

@@ -25,6 +25,12 @@ struct Farthest {
     e2: vec2<f32>,
 }
 
+alias Part = Farthest;
+
+fn nothing() -> Farthest {
+    return Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
+}
+
 fn put(so_far: Farthest, r: f32, m: u32, e: vec2<f32>) -> Farthest {
     var far = so_far;
     if r > far.r1 || (r == far.r1 && m < far.m1) {
@@ -46,14 +52,14 @@ fn put(so_far: Farthest, r: f32, m: u32, e: vec2<f32>) -> Farthest {
     return far;
 }
 
-fn add(so_far: Farthest, m: u32, frame: u32, scale: f32, centroid: vec2<f32>) -> Farthest {
+fn add(so_far: Farthest, m: u32, frame: u32, context: Context) -> Farthest {
     let member = members[m];
     let pressure = pressures[member.slot * batch.frames + frame];
     if pressure <= 0.0 {
         return so_far;
     }
-    let q = (member.weight * pressure) * scale;
-    let e = (vec2<f32>(member.u, member.v) - centroid) * q;
+    let q = (member.weight * pressure) * context.scale;
+    let e = (vec2<f32>(member.u, member.v) - context.centroid) * q;
     return put(so_far, e.x * e.x + e.y * e.y, m, e);
 }
 
@@ -77,64 +83,4 @@ fn finish(cell: u32, field: Field, far: Farthest) {
     let tie = far.r3 >= 0.0 && sqrt(far.r2) - sqrt(max(far.r3, 0.0)) <= near;
     orientations[cell] = line_angle(along.x, along.y);
     cells[cell] |= select(0u, TIE, tie) | (ORIENTATION << PRESENT);
-}
-
-// One invocation a field and frame.
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = invocation(group, groups, local);
-    if cell >= batch.frames * batch.fields {
-        return;
-    }
-    let field = fields[cell / batch.frames];
-    if field.count > WIDE {
-        return;
-    }
-    let contact = contacts[cell];
-    let scale = scale_of(contact.x);
-    let centroid = centroids[cell].xy;
-    var sum = Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
-    for (var m = field.first; m < field.first + field.count; m++) {
-        sum = add(sum, m, cell % batch.frames, scale, centroid);
-    }
-    finish(cell, field, sum);
-}
-
-var<workgroup> parts: array<Farthest, GROUP>;
-
-// One group a wide field and frame.
-@compute @workgroup_size(GROUP)
-fn wide(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = group_number(group, groups);
-    if number >= batch.frames * batch.wide {
-        return;
-    }
-    let index = wide_fields[number / batch.frames];
-    let cell = index * batch.frames + number % batch.frames;
-    let field = fields[index];
-    let contact = contacts[cell];
-    let scale = scale_of(contact.x);
-    let centroid = centroids[cell].xy;
-    var sum = Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
-    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
-        sum = add(sum, m, cell % batch.frames, scale, centroid);
-    }
-    parts[local] = sum;
-    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-        workgroupBarrier();
-        if local < half {
-            parts[local] = join(parts[local], parts[local + half]);
-        }
-    }
-    if local == 0u {
-        finish(cell, field, parts[0]);
-    }
 }

@@ -93,7 +93,9 @@ impl Gpu {
     pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
         let limit = device.device.limits().max_storage_buffer_binding_size;
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
+        // The widest buffer that shaders bind, and the one that all results come back in.
         let widest = (slots * 4).max(fields * size_of::<layout::Motion>() as u64);
+        let back = slots * 4 + fields * (4 + 16 + 16 + 4 + 8 + size_of::<layout::Motion>() as u64);
         let tables = (plan.members.len() * size_of::<layout::Member>()) as u64;
         if tables > limit || widest > limit {
             return Err(Error::failed(format!(
@@ -101,7 +103,8 @@ impl Gpu {
                 plan.members.len()
             )));
         }
-        let capacity = batch.clamp(1, (limit / widest) as usize);
+        let most = (limit / widest).min(device.device.limits().max_buffer_size / back).max(1);
+        let capacity = batch.clamp(1, most as usize);
         let frames = capacity as u64;
 
         let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages, mapped: bool| {

@@ -22,10 +22,10 @@ macro_rules! stage {
 }
 
 pub(crate) const CALIBRATE: StageShader = stage!("calibrate");
-pub(crate) const CONTACT: StageShader = stage!("contact");
-pub(crate) const CENTROID: StageShader = stage!("centroid");
-pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line");
-pub(crate) const AXIS: StageShader = stage!("axis", "angle", "line");
+pub(crate) const CONTACT: StageShader = stage!("contact", "over_fields");
+pub(crate) const CENTROID: StageShader = stage!("centroid", "over_fields");
+pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line", "over_fields");
+pub(crate) const AXIS: StageShader = stage!("axis", "angle", "line", "over_fields");
 pub(crate) const HYSTERESIS: StageShader = stage!("hysteresis");
 pub(crate) const MOTION: StageShader = stage!("motion", "angle");
 
