@@ -11,4 +11,5 @@ mod meshes;
 mod properties;
 mod real;
 mod recordings;
+mod simulated;
 mod touch;
