@@ -429,6 +429,19 @@ fn a_body_named_in_the_file_is_found_from_the_files_folder() {
 }
 
 #[test]
+fn the_documentations_own_file_is_sound() {
+    let text = include_str!("../../docs/simulation.md");
+    let example = text.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let mut simulation = SimulatedSource::from_text("docs", example, Path::new("")).unwrap();
+    assert_eq!(simulation.frames(), 200);
+    simulation.seek(75);
+    first(&mut simulation);
+    let touches: Vec<&str> = simulation.truth().iter().map(|truth| truth.name.as_str()).collect();
+    assert_eq!(touches, ["rod", "touch 2"]);
+    assert!((simulation.truth()[1].speed.unwrap() - 0.02).abs() < 1e-6);
+}
+
+#[test]
 fn the_bytes_are_the_same_on_every_machine() {
     let (frames, truth) = written(&mut SimulatedSource::open(example("rod.toml")).unwrap());
     let found = [fingerprint(&frames), fingerprint(&truth)];
