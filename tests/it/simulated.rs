@@ -298,6 +298,38 @@ fn only_what_faces_the_touch_feels_it() {
     assert!(felt(20) > felt(16));
 }
 
+#[test]
+fn a_fingertip_on_a_skinned_body_is_found_where_it_is() {
+    let humanoid = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
+    let mut engine = engine(&humanoid, BackendKind::Reference);
+    let mut tried = 0;
+    // Some of each limb's patches: opening each takes its time.
+    for (index, spec) in humanoid.fields.iter().enumerate().step_by(8) {
+        let text = format!(
+            "rate_hz = 1\nduration_s = 1\n[skin]\nthickness_m = 0.02\n[[touch]]\non = \"{}\"\nindenter = \"fingertip\"\n\
+             path = [[0, 0]]\nhold = {{ newton = 3 }}\n",
+            spec.name
+        );
+        let mut simulation = match SimulatedSource::on_body("humanoid", &text, humanoid.clone()) {
+            Ok(simulation) => simulation,
+            Err(e) => {
+                assert!(e.to_string().contains("has no chart"), "{e}");
+                continue;
+            }
+        };
+        let frame = first(&mut simulation);
+        let truth = &simulation.truth()[0];
+        let percept = engine.process(&[frame]).unwrap().get(0, index);
+        let [u, v] = percept.centroid.unwrap();
+        let [true_u, true_v] = truth.uv.unwrap();
+        // Patches end around the touch and taxels lie 20 mm apart: half of that is what one can ask for.
+        let off = (u - true_u).hypot(v - true_v);
+        assert!(off < 0.01, "{}: off by {off} m", spec.name);
+        tried += 1;
+    }
+    assert!(tried > 8, "{tried} patches");
+}
+
 /// A sound simulation, for tests to break.
 const SOUND: &str = r#"body = "hand"
 rate_hz = 50

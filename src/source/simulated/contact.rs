@@ -235,6 +235,37 @@ mod tests {
     }
 
     #[test]
+    fn footprints_are_as_wide_as_the_model_says() {
+        let sigma = SKIN.sigma_m();
+        let (force, pitch) = (5.0_f64, 1e-3);
+        // Of Hertz's patches by their textbook formulas; an even line has a variance of L²/12, an even disc of R²/4.
+        let rod = force / 0.05 * 0.0127 / (PI * 400e3);
+        let ball = (0.75 * force * 0.01 / 400e3).powf(2.0 / 3.0) / 5.0;
+        let finger = (0.75 * force * 0.008 * (1.0 / 400e3 + 1.0 / 50e3)).powf(2.0 / 3.0).min(0.008 * 0.008) / 5.0;
+        let right = [
+            (rod, 0.05 * 0.05 / 12.0),
+            (ball, ball),
+            (finger, finger),
+            (0.02 * 0.02 / 4.0, 0.02 * 0.02 / 4.0),
+            (0.0, 0.03 * 0.03 / 12.0),
+        ];
+        for (indenter, (across, along)) in ALL.iter().zip(right) {
+            let footprint = Footprint::new(indenter, &SKIN, force);
+            let (mut got_across, mut got_along) = (0.0, 0.0);
+            for (i, j) in (-70..=70).flat_map(|i| (-70..=70).map(move |j| (f64::from(i) * pitch, f64::from(j) * pitch)))
+            {
+                let part = footprint.part_on(i, j, pitch);
+                got_across += part * i * i;
+                got_along += part * j * j;
+            }
+            // Tiles add the variance of an even square; σ over four pitches leaves nothing else.
+            let tile = sigma * sigma + pitch * pitch / 12.0;
+            assert!((got_across / (across + tile) - 1.0).abs() < 1e-7, "{indenter:?}: {got_across} {across}");
+            assert!((got_along / (along + tile) - 1.0).abs() < 1e-7, "{indenter:?}: {got_along} {along}");
+        }
+    }
+
+    #[test]
     fn a_larger_force_presses_a_larger_patch_up_to_the_indenters_size() {
         for indenter in &ALL[..3] {
             let peak = |force: f64| Footprint::new(indenter, &SKIN, force).part_on(0.0, 0.0, 1e-3);

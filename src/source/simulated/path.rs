@@ -107,3 +107,53 @@ impl Path {
         between.chain(self.times_s.last().copied())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::ChartKind;
+
+    fn path(ground: Ground) -> Path {
+        let flat = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let surface = Arc::new(SurfaceIndex::of_triangles([flat]));
+        Path { ground, surface, waypoints: vec![DVec3::ZERO, DVec3::X], times_s: vec![1.0, 2.0] }
+    }
+
+    #[test]
+    fn a_direction_on_a_slope_is_seen_at_its_angle_in_the_chart() {
+        let chart = Chart {
+            kind: ChartKind::Plane,
+            u_in_anchor: DVec3::Y,
+            v_in_anchor: DVec3::NEG_X,
+            normal_in_anchor: DVec3::Z,
+            distortion: 0.0,
+        };
+        let on_chart = path(Ground::of_field(chart.clone(), DVec3::ZERO, 0.0));
+        let normal_in_link = DVec3::new(0.5, -0.3, 0.7).normalize();
+        let slope = Place { position_in_link: DVec3::ZERO, normal_in_link, uv: None };
+        for degrees in [0.0_f64, 30.0, 90.0, 135.0, 179.0] {
+            let direction = on_chart.direction(&slope, degrees.to_radians());
+            assert!(direction.dot(normal_in_link).abs() < 1e-15 && (direction.length() - 1.0).abs() < 1e-15);
+            let seen = chart.project(direction);
+            assert!((seen.y.atan2(seen.x).to_degrees() - degrees).abs() < 1e-12);
+        }
+        let on_link = path(Ground::Link);
+        let along = |normal: DVec3, degrees: f64| {
+            let place = Place { position_in_link: DVec3::ZERO, normal_in_link: normal, uv: None };
+            on_link.direction(&place, degrees.to_radians())
+        };
+        assert!(along(DVec3::Y, 0.0).distance(DVec3::X) < 1e-15);
+        assert!(along(DVec3::Y, 90.0).distance(DVec3::NEG_Z) < 1e-15);
+        assert!(along(DVec3::X, 0.0).distance(DVec3::Z) < 1e-15);
+    }
+
+    #[test]
+    fn it_rests_before_and_after_and_moves_evenly_between() {
+        let path = path(Ground::Link);
+        let x = |t_s: f64| path.waypoint(t_s).x;
+        assert_eq!([0.0, 1.0, 1.25, 2.0, 9.0].map(x), [0.0, 0.0, 0.25, 1.0, 1.0]);
+        let tried: Vec<f64> = path.times_to_try().collect();
+        assert!(tried.windows(2).all(|pair| pair[1] > pair[0] && x(pair[1]) - x(pair[0]) <= STEP_M));
+        assert_eq!((tried[0], tried[tried.len() - 1]), (1.0, 2.0));
+    }
+}
