@@ -1,13 +1,49 @@
-//! The bodies and the touch that come with the crate; `bodies/README.md` says what they are and how they were made.
+//! Bodies that come with the library, and a touch, so that everything can be tried without a robot.
+//!
+//! What each of them is, and the recipe that makes it, is in `bodies/README.md`.
 
-/// The hand of the paper: 40 taxels on four boards and four digits.
+/// A right hand of four digits with 40 taxels, after the paper's.
 pub const HAND: &[u8] = include_bytes!("../bodies/hand.glb");
 
-/// A pressure mat of 64 × 32 taxels.
+/// A pressure mat for a bed: 64 × 32 taxels.
 pub const MAT: &[u8] = include_bytes!("../bodies/mat.glb");
 
-/// A humanoid of 0.75 m.
+/// A humanoid of a small child's shape with 960 taxels, skinned to 17 links.
 pub const HUMANOID: &[u8] = include_bytes!("../bodies/humanoid.glb");
 
-/// A touch of the hand, as CSV: taps, a rod rolled over the back, a stroke across the palm.
+/// Some seconds of touch on [`HAND`], as CSV. It is computed, not measured.
 pub const TOUCH: &[u8] = include_bytes!("../bodies/touch.csv");
+
+/// What the bundled bodies are called.
+pub const BODIES: [&str; 3] = ["hand", "mat", "humanoid"];
+
+/// The bundled body called `name`, one of [`BODIES`].
+#[must_use]
+pub fn body(name: &str) -> Option<&'static [u8]> {
+    match name {
+        "hand" => Some(HAND),
+        "mat" => Some(MAT),
+        "humanoid" => Some(HUMANOID),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::{CsvSource, Source};
+    use crate::{Body, Engine, Options};
+
+    #[test]
+    fn every_bundled_body_can_feel_and_the_hand_hears_its_touch() {
+        for name in BODIES {
+            let body = Body::from_bytes(name, body(name).unwrap()).unwrap();
+            let mut engine = Engine::new(&body, Options::default()).unwrap();
+            if name == "hand" {
+                let touch = CsvSource::from_reader("touch", TOUCH, None, None).unwrap();
+                engine.listen(touch.taxels()).unwrap();
+            }
+        }
+        assert!(body("foot").is_none());
+    }
+}

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::Reference;
-use crate::backend::{self, Backend, BackendKind, RawBatch};
+use crate::backend::{self, Backend, BackendKind, RawBatch, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
@@ -54,7 +54,12 @@ pub struct Engine {
     why: String,
     intake: Intake,
     raw: Vec<RawValue>,
+    steps: Vec<Step>,
+    last_t_s: Option<f64>,
+    max_gap_s: f64,
     percepts: Percepts,
+    /// Made by the first comparison, and kept, as it has a memory too.
+    reference: Option<Reference>,
     frames_done: u64,
     ids: Vec<u32>,
     links: Links,
@@ -88,7 +93,11 @@ impl Engine {
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         Ok(Self {
-            percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision()),
+            steps: Vec::new(),
+            last_t_s: None,
+            max_gap_s: scene.max_gap_s,
+            percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision()).with_columns(plan.columns),
+            reference: None,
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
@@ -158,7 +167,9 @@ impl Engine {
     /// the device was lost.
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
         self.gather(frames)?;
-        run(&mut *self.backend, &self.plan, &self.links, frames, &self.raw, self.frames_done, &mut self.percepts)?;
+        let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
+        self.percepts.first_frame = self.frames_done;
+        run(&mut *self.backend, &self.plan, &self.links, frames, &raw, &mut self.percepts)?;
         self.frames_done += frames.len() as u64;
         Ok(&self.percepts)
     }
@@ -166,15 +177,19 @@ impl Engine {
     /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds.
     ///
     /// # Errors
-    /// As [`Engine::process`].
+    /// As [`Engine::process`]; also after frames that were not compared, as the reference has not seen them.
     pub fn process_and_compare(&mut self, frames: &[Frame]) -> Result<(&Percepts, Agreement)> {
+        if self.reference.is_none() && self.frames_done > 0 {
+            return Err(Error::usage("frames were processed without a comparison; compare from the first on"));
+        }
         self.process(frames)?;
-        let mut reference = Reference::new(&self.plan);
-        let raw = RawBatch { frames: frames.len(), values: &self.raw };
+        let reference = self.reference.get_or_insert_with(|| Reference::new(&self.plan));
+        let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
         let bounds = reference.bounds(&raw);
-        let mut right = Percepts::new(self.plan.outputs, self.plan.fields.len(), Precision::F64);
-        let first = self.frames_done - frames.len() as u64;
-        run(&mut reference, &self.plan, &self.links, frames, &self.raw, first, &mut right)?;
+        let mut right =
+            Percepts::new(self.plan.outputs, self.plan.fields.len(), Precision::F64).with_columns(self.plan.columns);
+        right.first_frame = self.percepts.first_frame;
+        run(reference, &self.plan, &self.links, frames, &raw, &mut right)?;
         let names: Vec<&str> = self.plan.fields.iter().map(|field| field.name.as_str()).collect();
         let agreement = compare(&right, &bounds, &self.percepts, &names);
         Ok((&self.percepts, agreement))
@@ -197,9 +212,26 @@ impl Engine {
         for frame in frames {
             self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
         }
+        self.steps.clear();
+        for frame in frames {
+            self.steps.push(step(self.last_t_s, frame.t_s, self.max_gap_s));
+            self.last_t_s = Some(frame.t_s);
+        }
         Ok(())
     }
 }
+
+/// The time from the frame at `last_t_s` to the one at `t_s`, and whether motion can be measured over it.
+fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
+    let Some(last_t_s) = last_t_s else { return Step { dt_s: 0.0, flags: Flags::NO_PREVIOUS } };
+    let dt_s = t_s - last_t_s;
+    // A step too short for single precision is none.
+    let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
+    Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }
+}
+
+/// Speeds over shorter steps could pass what single precision holds.
+const SHORTEST_STEP_S: f64 = 1e-12;
 
 /// The part of a call that does not change the engine: a backend, then what the host adds.
 fn run(
@@ -207,13 +239,11 @@ fn run(
     plan: &Plan,
     links: &Links,
     frames: &[Frame],
-    raw: &[RawValue],
-    first_frame: u64,
+    raw: &RawBatch<'_>,
     percepts: &mut Percepts,
 ) -> Result<()> {
     percepts.reset(frames.len());
-    percepts.first_frame = first_frame;
-    backend.run(&RawBatch { frames: frames.len(), values: raw }, percepts)?;
+    backend.run(raw, percepts)?;
     for (index, frame) in frames.iter().enumerate() {
         percepts.t_s[index] = frame.t_s;
     }

@@ -116,31 +116,15 @@ impl std::error::Error for Error {}
 
 /// The name among `known` that is nearest to `asked`, if one is near enough to be a slip of the hand.
 ///
-/// Near is an edit distance of at most a third of the longer word.
+/// Near is an edit distance, swaps of neighbours counting once, of at most a third of the longer word.
 #[must_use]
 pub fn nearest<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
-        .map(|name| (edit_distance(asked, name), name))
+        .map(|name| (strsim::osa_distance(asked, name), name))
         .filter(|&(distance, name)| 3 * distance <= asked.chars().count().max(name.chars().count()))
         .min()
         .map(|(_, name)| name)
-}
-
-/// Levenshtein's distance between `a` and `b`, in characters.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &cb) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

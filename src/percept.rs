@@ -79,10 +79,30 @@ bitflags! {
         const AXIS = 1 << 8;
         /// (λ₁ − λ₂)/(λ₁ + λ₂) of those moments, in [0, 1].
         const ANISOTROPY = 1 << 9;
+        /// (Δu, Δv) of the centroid since the frame before, m (eq. 3–4).
+        const DISPLACEMENT = 1 << 10;
+        /// Its direction, rad in (−π, π] (eq. 5).
+        const DIRECTION = 1 << 11;
+        /// Its length, m.
+        const DISTANCE = 1 << 12;
+        /// The change of the centroid's distance from the chart's origin, m (eq. 6–7): blind to motion around it.
+        const RADIAL_DISTANCE = 1 << 13;
+        /// Distance over time, m/s.
+        const SPEED = 1 << 14;
+        /// Radial distance over time, m/s (eq. 8).
+        const RADIAL_SPEED = 1 << 15;
     }
 }
 
 impl Outputs {
+    /// What the stage *motion* gives.
+    pub(crate) const MOTION: Self = Self::DISPLACEMENT
+        .union(Self::DIRECTION)
+        .union(Self::DISTANCE)
+        .union(Self::RADIAL_DISTANCE)
+        .union(Self::SPEED)
+        .union(Self::RADIAL_SPEED);
+
     /// The outputs' names as the command line and NDJSON spell them, in order.
     pub fn names(self) -> impl Iterator<Item = String> {
         self.iter_names().map(|(name, _)| name.to_lowercase())
@@ -133,6 +153,18 @@ pub struct Percept {
     pub axis: Option<f64>,
     /// Anisotropy, in [0, 1].
     pub anisotropy: Option<f64>,
+    /// Displacement (Δu, Δv) since the frame before, m.
+    pub displacement: Option<[f64; 2]>,
+    /// Direction of motion, rad in (−π, π].
+    pub direction: Option<f64>,
+    /// Distance moved, m.
+    pub distance: Option<f64>,
+    /// Change of the distance from the chart's origin, m.
+    pub radial_distance: Option<f64>,
+    /// Distance over time, m/s.
+    pub speed: Option<f64>,
+    /// Radial distance over time, m/s.
+    pub radial_speed: Option<f64>,
     /// Whether position and normal are in the world, because the frame carried a pose, or in the field's anchor.
     pub in_world: bool,
 }

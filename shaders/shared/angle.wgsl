@@ -27,6 +27,12 @@ fn atan2_upper(y: f32, x: f32) -> f32 {
     return select(quadrant, PI - quadrant, x < 0.0);
 }
 
+// atan2(y, x) in (-pi, pi]; the largest single-precision number in there is a little under this pi.
+fn full_angle(x: f32, y: f32) -> f32 {
+    let size = min(atan2_upper(abs(y), x), 3.1415925f);
+    return select(size, -size, y < 0.0);
+}
+
 // The angle of the line along (x, y), in [0, pi).
 fn line_angle(x: f32, y: f32) -> f32 {
     let flip = y < 0.0 || (y == 0.0 && x < 0.0);

@@ -32,16 +32,36 @@ struct Member {
     v: f32,
 }
 
+// The time since the frame before, and why it cannot be used (flags), or 0.
+struct Step {
+    dt_s: f32,
+    flags: u32,
+}
+
+struct Motion {
+    displacement: vec2<f32>,
+    direction: f32,
+    distance: f32,
+    radial_distance: f32,
+    speed: f32,
+    radial_speed: f32,
+    // Flags below and quantities present above, for the host to add to the cell's: its neighbours read that meanwhile.
+    status: u32,
+}
+
 const NO_CONTACT = 1u << 0u;
 const ONE_TAXEL = 1u << 1u;
 const TIE = 1u << 2u;
 const COINCIDENT = 1u << 3u;
 const ISOTROPIC = 1u << 4u;
+const STILL = 1u << 5u;
 const SATURATED = 1u << 6u;
 const FAULTY_INPUT = 1u << 7u;
 const OUT_OF_RANGE = 1u << 8u;
 const INCOMPLETE = 1u << 9u;
 const NO_CHART = 1u << 10u;
+const NO_PREVIOUS = 1u << 11u;
+const BAD_DT = 1u << 12u;
 const FLAGS = 0x7fffu;
 
 // A cell's status holds its flags below and, from this bit on, which quantities are present.
@@ -56,6 +76,8 @@ const NORMAL = 1u << 6u;
 const ORIENTATION = 1u << 7u;
 const AXIS = 1u << 8u;
 const ANISOTROPY = 1u << 9u;
+const DISPLACEMENT = 1u << 10u;
+const DIRECTION = 1u << 11u;
 
 // Bit of a taxel's status that leaves it out of every sum.
 const UNUSABLE = 1u << 31u;

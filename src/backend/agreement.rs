@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use glam::DVec2;
+
 use super::reference::CellBound;
 use crate::percept::{Flags, Outputs, Percept, Percepts};
-use crate::stage::angle::between_lines;
+use crate::stage::angle::{between_directions, between_lines};
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -144,6 +146,15 @@ impl Cell<'_> {
         self.quantity(Outputs::ORIENTATION, right.orientation, got.orientation, bound.orientation, between);
         self.quantity(Outputs::ANISOTROPY, right.anisotropy, got.anisotropy, bound.anisotropy, distance);
         self.quantity(Outputs::AXIS, right.axis, got.axis, bound.axis, between);
+        let apart = |a: &[f64; 2], b: &[f64; 2]| DVec2::from_array(*a).distance(DVec2::from_array(*b));
+        self.quantity(Outputs::DISPLACEMENT, right.displacement, got.displacement, bound.displacement, apart);
+        let between = |a: &f64, b: &f64| between_directions(*a, *b);
+        self.quantity(Outputs::DIRECTION, right.direction, got.direction, bound.direction, between);
+        self.quantity(Outputs::DISTANCE, right.distance, got.distance, bound.distance, distance);
+        let (limit, right_radial, got_radial) = (bound.radial_distance, right.radial_distance, got.radial_distance);
+        self.quantity(Outputs::RADIAL_DISTANCE, right_radial, got_radial, limit, distance);
+        self.quantity(Outputs::SPEED, right.speed, got.speed, bound.speed, distance);
+        self.quantity(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed, distance);
     }
 
     fn quantity<T: fmt::Debug>(
@@ -201,6 +212,7 @@ mod tests {
         (columns.total[0], columns.peak[0], columns.area[0]) = (10.0, 5.0, 1.0);
         columns.centroid[0] = [0.1, 0.2, 0.0];
         (columns.orientation[0], columns.axis[0], columns.anisotropy[0]) = (0.001, 1.0, 0.5);
+        columns.direction[0] = 3.139;
         change(&mut percepts, &mut columns);
         percepts.values = Values::F64(columns);
         percepts
@@ -219,6 +231,12 @@ mod tests {
             orientation: near,
             axis: near,
             anisotropy: near,
+            displacement: near,
+            direction: near,
+            distance: near,
+            radial_distance: near,
+            speed: near,
+            radial_speed: near,
         }
     }
 
@@ -232,12 +250,13 @@ mod tests {
         assert!(against(bound(), |_, c| c.total[0] += 0.009).holds());
         // Either side of the seam is near.
         assert!(against(bound(), |_, c| c.orientation[0] = std::f64::consts::PI - 0.001).holds());
+        assert!(against(bound(), |_, c| c.direction[0] = -3.139).holds());
     }
 
     #[test]
     fn every_quantity_beyond_its_bound_fails() {
         type Change = fn(&mut Percepts, &mut crate::percept::Columns<f64>);
-        let changes: [(&str, Change); 13] = [
+        let changes: [(&str, Change); 20] = [
             ("total", |_, c| c.total[0] += 0.011),
             ("peak", |_, c| c.peak[0] -= 0.011),
             ("area", |_, c| c.area[0] = f64::NAN),
@@ -248,6 +267,13 @@ mod tests {
             ("orientation", |_, c| c.orientation[0] += 0.011),
             ("axis", |_, c| c.axis[0] += 1.5),
             ("anisotropy", |_, c| c.anisotropy[0] = 0.6),
+            ("displacement", |_, c| c.displacement[0] = [0.008, 0.008]),
+            ("direction", |_, c| c.direction[0] = -3.12),
+            ("distance", |_, c| c.distance[0] = 0.011),
+            ("radial_distance", |_, c| c.radial_distance[0] = -0.011),
+            ("speed", |_, c| c.speed[0] = f64::INFINITY),
+            ("radial_speed", |_, c| c.radial_speed[0] = 0.011),
+            ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
             ("active", |p, _| p.active[0] = 2),
             ("flags", |p, _| p.flags[0] |= Flags::TIE),
             ("axis", |p, _| p.present[0] -= Outputs::AXIS),

@@ -10,7 +10,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::percept::{Percepts, Precision};
+use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::RawValue;
 
@@ -55,6 +55,17 @@ impl FromStr for BackendKind {
 pub(crate) struct RawBatch<'a> {
     pub(crate) frames: usize,
     pub(crate) values: &'a [RawValue],
+    /// Per frame, the time since the one before.
+    pub(crate) steps: &'a [Step],
+}
+
+/// The time since the frame before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Step {
+    /// s; formed in double precision from the frames' times.
+    pub(crate) dt_s: f64,
+    /// Why it cannot be used; empty when it can.
+    pub(crate) flags: Flags,
 }
 
 /// Something that runs a plan.
@@ -64,6 +75,9 @@ pub(crate) trait Backend: Send {
 
     /// What it runs on, for people.
     fn describe(&self) -> String;
+
+    /// Forgets all frames so far.
+    fn restart(&mut self);
 
     /// Turns `raw` into `percepts`, which have been reset to as many frames and hold this backend's precision.
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()>;
@@ -111,8 +125,9 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
     const CALLS: usize = 15;
     const ENOUGH: Duration = Duration::from_millis(60);
     let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
-    let raw = RawBatch { frames: batch, values: &values };
-    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32);
+    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
+    let raw = RawBatch { frames: batch, values: &values, steps: &steps };
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns);
     let mut times = Vec::with_capacity(CALLS);
     percepts.reset(batch);
     backend.run(&raw, &mut percepts)?;
@@ -123,6 +138,7 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
         backend.run(&raw, &mut percepts)?;
         times.push(call.elapsed());
     }
+    backend.restart();
     times.sort();
     Ok(times[times.len() / 2])
 }

@@ -1,11 +1,14 @@
 //! Backend `reference`: the stages' own f64, one cell after the other, and the bounds that the others are held to.
 
-use super::{Backend, RawBatch};
+use glam::DVec2;
+
+use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::{Pressure, UNUSABLE};
-use crate::stage::{Pressed, U, axis, calibrate, centroid, contact, orientation, position};
+use crate::stage::hysteresis::ContactState;
+use crate::stage::{Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position};
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
 /// the bound, so that the quantity is not compared.
@@ -24,16 +27,48 @@ pub(crate) struct CellBound {
     pub(crate) orientation: Option<f64>,
     pub(crate) axis: Option<f64>,
     pub(crate) anisotropy: Option<f64>,
+    /// As a distance, m.
+    pub(crate) displacement: Option<f64>,
+    pub(crate) direction: Option<f64>,
+    pub(crate) distance: Option<f64>,
+    pub(crate) radial_distance: Option<f64>,
+    pub(crate) speed: Option<f64>,
+    pub(crate) radial_speed: Option<f64>,
 }
 
 /// The backend.
 pub(crate) struct Reference {
     plan: Plan,
+    /// Per field, what the frame before left.
+    before: Vec<Before>,
+    /// The same for the bounds, which are worked out apart.
+    bound_before: Vec<BoundBefore>,
+}
+
+/// What a field's next percept hangs on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Before {
+    contact: bool,
+    /// The centroid in the field's unit, if it was in contact and has a chart.
+    centroid: Option<DVec2>,
+}
+
+/// What a field's next bound hangs on.
+#[derive(Clone, Copy, Debug, Default)]
+struct BoundBefore {
+    state: ContactState,
+    /// The centroid, and its bound as a distance.
+    centroid: Option<(DVec2, f64)>,
 }
 
 impl Reference {
     pub(crate) fn new(plan: &Plan) -> Self {
-        Self { plan: plan.clone() }
+        let fields = plan.fields.len();
+        Self {
+            plan: plan.clone(),
+            before: vec![Before::default(); fields],
+            bound_before: vec![BoundBefore::default(); fields],
+        }
     }
 
     /// One frame's pressures, taxel by taxel.
@@ -59,27 +94,38 @@ impl Reference {
     }
 
     /// How far single precision may be off in every cell of `raw`, frame by frame.
-    pub(crate) fn bounds(&self, raw: &RawBatch<'_>) -> Vec<CellBound> {
+    pub(crate) fn bounds(&mut self, raw: &RawBatch<'_>) -> Vec<CellBound> {
         let mut bounds = Vec::with_capacity(raw.frames * self.plan.fields.len());
         for frame in 0..raw.frames {
             let pressures = self.pressures(raw, frame);
-            for field in &self.plan.fields {
-                bounds.push(self.bound(field, &pressures));
+            for index in 0..self.plan.fields.len() {
+                let (bound, before) = self.bound(index, &pressures, &raw.steps[frame]);
+                self.bound_before[index] = before;
+                bounds.push(bound);
             }
         }
         bounds
     }
 
-    fn bound(&self, field: &PlanField, pressures: &[Pressure]) -> CellBound {
+    fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
+        let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
+        let unknown = BoundBefore { state: ContactState { contact: false, in_doubt: true }, centroid: None };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
-            return CellBound { in_doubt: Flags::all(), ..CellBound::default() };
+            return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
         let pressed = self.pressed(field, pressures);
         let sums = contact::bound(&pressed);
         let mut bound =
             CellBound { total: Some(sums.total), peak: Some(sums.peak), area: Some(sums.area), ..CellBound::default() };
-        if pressed.is_empty() {
-            return bound;
+        let total = contact::reference(&pressed).total;
+        let state = hysteresis::doubt(total, sums.total, field.thresholds, before.state);
+        if state.in_doubt {
+            // Whether there is a touch at all is in doubt, and with it all that a touch has; the sums are not.
+            bound.in_doubt = Flags::all() - INPUT;
+            return (bound, BoundBefore { state, centroid: None });
+        }
+        if !state.contact {
+            return (bound, BoundBefore { state, centroid: None });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -105,10 +151,22 @@ impl Reference {
                 bound.in_doubt |= axis.line.in_doubt;
             }
         }
-        bound
+        let kept = (field.charted && self.plan.stages().motion).then(|| (c.truncate(), c_bound.truncate().length()));
+        if let Some(now) = kept {
+            moved(&mut bound, field, now, before, step);
+        }
+        (bound, BoundBefore { state, centroid: kept })
     }
 
-    fn cell(&self, field: &PlanField, pressures: &[Pressure], columns: &mut Columns<f64>, cell: usize) -> Cell {
+    fn cell(
+        &self,
+        index: usize,
+        pressures: &[Pressure],
+        step: &Step,
+        columns: &mut Columns<f64>,
+        cell: usize,
+    ) -> (Cell, Before) {
+        let (field, before) = (&self.plan.fields[index], self.before[index]);
         let statuses = self.plan.members_of(field).iter().map(|member| pressures[member.slot as usize].status);
         let (any, all) = statuses.fold((0, u32::MAX), |(any, all), status| (any | status, all & status));
         let mut flags = Flags::from_bits_truncate(any & !UNUSABLE);
@@ -118,7 +176,7 @@ impl Reference {
         }
         let pressed = self.pressed(field, pressures);
         let sums = contact::reference(&pressed);
-        let outputs = self.plan.outputs;
+        let outputs = self.plan.columns;
         let write = |output, column: &mut Vec<f64>, value| {
             if outputs.contains(output) {
                 column[cell] = value;
@@ -133,9 +191,11 @@ impl Reference {
             write(Outputs::PEAK, &mut columns.peak, sums.peak);
             write(Outputs::AREA, &mut columns.area, sums.area);
         }
-        if pressed.is_empty() {
+        let contact = hysteresis::reference(sums.total, field.thresholds, before.contact);
+        let mut after = Before { contact, centroid: None };
+        if !contact {
             flags |= Flags::NO_CONTACT;
-            return Cell { flags, present, active: 0 };
+            return (Cell { flags, present, active: sums.active }, after);
         }
         let stages = self.plan.stages();
         let c = centroid::reference(&pressed);
@@ -167,7 +227,68 @@ impl Reference {
                 present |= Outputs::AXIS;
             }
         }
-        Cell { flags, present, active: sums.active }
+        if field.charted && stages.motion {
+            let now = c.truncate();
+            after.centroid = Some(now);
+            match before.centroid {
+                None => flags |= Flags::NO_PREVIOUS,
+                Some(_) if !step.flags.is_empty() => flags |= step.flags,
+                Some(then) => {
+                    let still_within = f64::from(field.still_within);
+                    let moved = motion::reference(now, then, still_within);
+                    present |= Outputs::MOTION;
+                    let unit = f64::from(field.unit_m);
+                    write(Outputs::DISTANCE, &mut columns.distance, moved.distance * unit);
+                    write(Outputs::RADIAL_DISTANCE, &mut columns.radial_distance, moved.radial_distance * unit);
+                    write(Outputs::SPEED, &mut columns.speed, moved.distance * unit / step.dt_s);
+                    write(Outputs::RADIAL_SPEED, &mut columns.radial_speed, moved.radial_distance * unit / step.dt_s);
+                    if let Some(displacement) = columns.displacement.get_mut(cell) {
+                        *displacement = (moved.displacement * unit).to_array();
+                    }
+                    match moved.direction {
+                        Some(direction) => write(Outputs::DIRECTION, &mut columns.direction, direction),
+                        None => {
+                            flags |= Flags::STILL;
+                            present -= Outputs::DIRECTION;
+                        }
+                    }
+                }
+            }
+        }
+        (Cell { flags, present, active: sums.active }, after)
+    }
+}
+
+/// Flags that tell of the input and of the field, not of a touch.
+const INPUT: Flags = Flags::SATURATED
+    .union(Flags::FAULTY_INPUT)
+    .union(Flags::OUT_OF_RANGE)
+    .union(Flags::INCOMPLETE)
+    .union(Flags::NO_CHART);
+
+/// Adds the bounds of motion from `before` to `now`, a centroid with its bound.
+fn moved(bound: &mut CellBound, field: &PlanField, now: (DVec2, f64), before: BoundBefore, step: &Step) {
+    let Some(then) = before.centroid else {
+        if before.state.in_doubt {
+            bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT | Flags::STILL;
+        }
+        return;
+    };
+    if !step.flags.is_empty() {
+        return;
+    }
+    let unit = f64::from(field.unit_m);
+    let still_within = f64::from(field.still_within);
+    let right = motion::reference(now.0, then.0, still_within);
+    let limit = motion::bound(now.0, then.0, still_within, now.1, then.1);
+    bound.displacement = Some(limit.displacement * unit);
+    bound.direction = limit.direction;
+    bound.distance = Some(limit.distance * unit);
+    bound.radial_distance = Some(limit.radial_distance * unit);
+    bound.speed = Some(motion::rate_bound(right.distance, limit.distance, step.dt_s) * unit);
+    bound.radial_speed = Some(motion::rate_bound(right.radial_distance, limit.radial_distance, step.dt_s) * unit);
+    if limit.still_in_doubt {
+        bound.in_doubt |= Flags::STILL;
     }
 }
 
@@ -187,16 +308,22 @@ impl Backend for Reference {
         "double precision, as the equations read, one thread".to_owned()
     }
 
+    fn restart(&mut self) {
+        self.before.fill(Before::default());
+        self.bound_before.fill(BoundBefore::default());
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let fields = self.plan.fields.len();
         for frame in 0..raw.frames {
             let pressures = self.pressures(raw, frame);
-            for (index, field) in self.plan.fields.iter().enumerate() {
+            for index in 0..fields {
                 let cell = frame * fields + index;
                 let Values::F64(columns) = &mut percepts.values else {
                     unreachable!("the engine made percepts of this precision")
                 };
-                let done = self.cell(field, &pressures, columns, cell);
+                let (done, after) = self.cell(index, &pressures, &raw.steps[frame], columns, cell);
+                self.before[index] = after;
                 percepts.flags[cell] = done.flags;
                 percepts.present[cell] = done.present & self.plan.outputs;
                 if let Some(active) = percepts.active.get_mut(cell) {

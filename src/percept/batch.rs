@@ -13,6 +13,12 @@ pub(crate) struct Columns<T> {
     pub(crate) orientation: Vec<T>,
     pub(crate) axis: Vec<T>,
     pub(crate) anisotropy: Vec<T>,
+    pub(crate) displacement: Vec<[T; 2]>,
+    pub(crate) direction: Vec<T>,
+    pub(crate) distance: Vec<T>,
+    pub(crate) radial_distance: Vec<T>,
+    pub(crate) speed: Vec<T>,
+    pub(crate) radial_speed: Vec<T>,
 }
 
 impl<T: Clone + Default> Columns<T> {
@@ -21,7 +27,8 @@ impl<T: Clone + Default> Columns<T> {
             column.clear();
             column.resize(if wanted { cells } else { 0 }, V::default());
         }
-        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        // Motion is made from the centroids' column.
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::MOTION;
         column(&mut self.total, wanted.contains(Outputs::TOTAL), cells);
         column(&mut self.peak, wanted.contains(Outputs::PEAK), cells);
         column(&mut self.area, wanted.contains(Outputs::AREA), cells);
@@ -29,6 +36,12 @@ impl<T: Clone + Default> Columns<T> {
         column(&mut self.orientation, wanted.contains(Outputs::ORIENTATION), cells);
         column(&mut self.axis, wanted.contains(Outputs::AXIS), cells);
         column(&mut self.anisotropy, wanted.contains(Outputs::ANISOTROPY), cells);
+        column(&mut self.displacement, wanted.contains(Outputs::DISPLACEMENT), cells);
+        column(&mut self.direction, wanted.contains(Outputs::DIRECTION), cells);
+        column(&mut self.distance, wanted.contains(Outputs::DISTANCE), cells);
+        column(&mut self.radial_distance, wanted.contains(Outputs::RADIAL_DISTANCE), cells);
+        column(&mut self.speed, wanted.contains(Outputs::SPEED), cells);
+        column(&mut self.radial_speed, wanted.contains(Outputs::RADIAL_SPEED), cells);
     }
 }
 
@@ -43,6 +56,8 @@ pub(crate) enum Values {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Percepts {
     outputs: Outputs,
+    /// The outputs, and what stages work on.
+    columns: Outputs,
     fields: usize,
     pub(crate) first_frame: u64,
     pub(crate) t_s: Vec<f64>,
@@ -61,6 +76,7 @@ impl Percepts {
     pub fn new(outputs: Outputs, fields: usize, precision: Precision) -> Self {
         Self {
             outputs,
+            columns: outputs,
             fields,
             first_frame: 0,
             t_s: Vec::new(),
@@ -75,6 +91,12 @@ impl Percepts {
             position: Vec::new(),
             normal: Vec::new(),
         }
+    }
+
+    /// The same, with room for `columns` beside the outputs.
+    pub(crate) fn with_columns(mut self, columns: Outputs) -> Self {
+        self.columns |= columns;
+        self
     }
 
     /// Makes room for `frames` frames, every cell empty. Allocates only when a batch is larger than all before it.
@@ -93,8 +115,8 @@ impl Percepts {
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
         match &mut self.values {
-            Values::F32(columns) => columns.resize(self.outputs, cells),
-            Values::F64(columns) => columns.resize(self.outputs, cells),
+            Values::F32(columns) => columns.resize(self.columns, cells),
+            Values::F64(columns) => columns.resize(self.columns, cells),
         }
     }
 
@@ -158,6 +180,12 @@ impl Percepts {
             orientation: None,
             axis: None,
             anisotropy: None,
+            displacement: None,
+            direction: None,
+            distance: None,
+            radial_distance: None,
+            speed: None,
+            radial_speed: None,
             in_world: self.in_world[cell],
         };
         match &self.values {
@@ -187,6 +215,12 @@ impl<T: Copy + Into<f64>> Columns<T> {
         percept.orientation = scalar(Outputs::ORIENTATION, &self.orientation);
         percept.axis = scalar(Outputs::AXIS, &self.axis);
         percept.anisotropy = scalar(Outputs::ANISOTROPY, &self.anisotropy);
+        percept.direction = scalar(Outputs::DIRECTION, &self.direction);
+        percept.distance = scalar(Outputs::DISTANCE, &self.distance);
+        percept.radial_distance = scalar(Outputs::RADIAL_DISTANCE, &self.radial_distance);
+        percept.speed = scalar(Outputs::SPEED, &self.speed);
+        percept.radial_speed = scalar(Outputs::RADIAL_SPEED, &self.radial_speed);
+        percept.displacement = present.contains(Outputs::DISPLACEMENT).then(|| self.displacement[cell].map(Into::into));
         percept.centroid = present.contains(Outputs::CENTROID).then(|| {
             let [u, v, _] = self.centroid[cell];
             [u.into(), v.into()]
@@ -197,8 +231,8 @@ impl<T: Copy + Into<f64>> Columns<T> {
 /// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
 pub(crate) struct CellsMut<'a> {
     fields: usize,
-    flags: &'a mut [Flags],
-    present: &'a mut [Outputs],
+    pub(crate) flags: &'a mut [Flags],
+    pub(crate) present: &'a mut [Outputs],
     pub(crate) active: &'a mut [u32],
     pub(crate) total: &'a mut [f32],
     pub(crate) peak: &'a mut [f32],
@@ -207,6 +241,12 @@ pub(crate) struct CellsMut<'a> {
     pub(crate) orientation: &'a mut [f32],
     pub(crate) axis: &'a mut [f32],
     pub(crate) anisotropy: &'a mut [f32],
+    pub(crate) displacement: &'a mut [[f32; 2]],
+    pub(crate) direction: &'a mut [f32],
+    pub(crate) distance: &'a mut [f32],
+    pub(crate) radial_distance: &'a mut [f32],
+    pub(crate) speed: &'a mut [f32],
+    pub(crate) radial_speed: &'a mut [f32],
 }
 
 impl Percepts {
@@ -225,6 +265,12 @@ impl Percepts {
             orientation: &mut columns.orientation,
             axis: &mut columns.axis,
             anisotropy: &mut columns.anisotropy,
+            displacement: &mut columns.displacement,
+            direction: &mut columns.direction,
+            distance: &mut columns.distance,
+            radial_distance: &mut columns.radial_distance,
+            speed: &mut columns.speed,
+            radial_speed: &mut columns.radial_speed,
         })
     }
 }
@@ -236,44 +282,53 @@ impl CellsMut<'_> {
             column.split_at_mut(cells.min(column.len()))
         }
         let cells = frames * self.fields;
-        let (flags, later_flags) = split(self.flags, cells);
-        let (present, later_present) = split(self.present, cells);
-        let (active, later_active) = split(self.active, cells);
-        let (total, later_total) = split(self.total, cells);
-        let (peak, later_peak) = split(self.peak, cells);
-        let (area, later_area) = split(self.area, cells);
-        let (centroid, later_centroid) = split(self.centroid, cells);
-        let (orientation, later_orientation) = split(self.orientation, cells);
-        let (axis, later_axis) = split(self.axis, cells);
-        let (anisotropy, later_anisotropy) = split(self.anisotropy, cells);
-        (
-            Self {
-                fields: self.fields,
-                flags,
-                present,
-                active,
-                total,
-                peak,
-                area,
-                centroid,
-                orientation,
-                axis,
-                anisotropy,
-            },
-            Self {
-                fields: self.fields,
-                flags: later_flags,
-                present: later_present,
-                active: later_active,
-                total: later_total,
-                peak: later_peak,
-                area: later_area,
-                centroid: later_centroid,
-                orientation: later_orientation,
-                axis: later_axis,
-                anisotropy: later_anisotropy,
-            },
-        )
+        macro_rules! split_all {
+            ($($column:ident => $later:ident),* $(,)?) => {{
+                $(let ($column, $later) = split(self.$column, cells);)*
+                (Self { fields: self.fields, $($column),* }, Self { fields: self.fields, $($column: $later),* })
+            }};
+        }
+        split_all! {
+            flags => later_flags,
+            present => later_present,
+            active => later_active,
+            total => later_total,
+            peak => later_peak,
+            area => later_area,
+            centroid => later_centroid,
+            orientation => later_orientation,
+            axis => later_axis,
+            anisotropy => later_anisotropy,
+            displacement => later_displacement,
+            direction => later_direction,
+            distance => later_distance,
+            radial_distance => later_radial_distance,
+            speed => later_speed,
+            radial_speed => later_radial_speed,
+        }
+    }
+
+    /// The same cells again, for a shorter while.
+    pub(crate) fn reborrow(&mut self) -> CellsMut<'_> {
+        CellsMut {
+            fields: self.fields,
+            flags: self.flags,
+            present: self.present,
+            active: self.active,
+            total: self.total,
+            peak: self.peak,
+            area: self.area,
+            centroid: self.centroid,
+            orientation: self.orientation,
+            axis: self.axis,
+            anisotropy: self.anisotropy,
+            displacement: self.displacement,
+            direction: self.direction,
+            distance: self.distance,
+            radial_distance: self.radial_distance,
+            speed: self.speed,
+            radial_speed: self.radial_speed,
+        }
     }
 
     /// Sets a cell's flags and the quantities it holds, by their bits.

@@ -16,10 +16,12 @@ pub struct Scene {
     pub fields: Vec<String>,
     /// How long a channel that is absent from a frame keeps its last value, s. Recordings say 0.
     pub max_age_s: f64,
+    /// The longest step between frames over which motion is measured, s.
+    pub max_gap_s: f64,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::all(), fields: Vec::new(), max_age_s: 0.0 }
+        Self { outputs: Outputs::all(), fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0 }
     }
 }

@@ -11,7 +11,8 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, Lift, WORLD};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, TaxelCalibration};
-use crate::stage::layout;
+use crate::stage::hysteresis::Thresholds;
+use crate::stage::{layout, motion};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub(crate) struct Stages {
     pub(crate) centroid: bool,
     pub(crate) orientation: bool,
     pub(crate) axis: bool,
+    pub(crate) hysteresis: bool,
+    pub(crate) motion: bool,
     pub(crate) position: bool,
 }
 
@@ -26,6 +29,8 @@ pub(crate) struct Stages {
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(crate) outputs: Outputs,
+    /// What percepts have columns for: the outputs, and what stages work on.
+    pub(crate) columns: Outputs,
     /// The body's taxels that are read, by ascending id; a *slot* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per slot.
@@ -53,6 +58,10 @@ pub(crate) struct PlanField {
     pub(crate) area_known: bool,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
+    /// When it counts as touched.
+    pub(crate) thresholds: Thresholds,
+    /// The distance in the unit up to which its centroid counts as still.
+    pub(crate) still_within: f32,
     /// Members' places in the unit, in double precision.
     pub(crate) places: Vec<DVec3>,
     /// Members' third coordinate in the unit.
@@ -76,6 +85,15 @@ impl Plan {
         if fields.fields.is_empty() {
             return Err(Error::failed("the body has no fields: add some, see docs/layout.md").at(&body.name));
         }
+        if let Some(name) = calibration.fields.keys().find(|name| !fields.fields.iter().any(|f| f.name == **name)) {
+            let near = nearest(name, fields.fields.iter().map(|field| field.name.as_str()));
+            let hint =
+                near.map_or("`somatic inspect` lists the fields".into(), |near| format!("did you mean `{near}`?"));
+            return Err(Error::failed(format!(
+                "the calibration has thresholds for field `{name}`, which is not there: {hint}"
+            ))
+            .at(&body.name));
+        }
         let chosen = choose(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let read: BTreeSet<usize> =
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
@@ -83,6 +101,7 @@ impl Plan {
         let slot_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let mut plan = Self {
             outputs: scene.outputs,
+            columns: scene.outputs,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             taxels: Vec::new(),
@@ -103,6 +122,8 @@ impl Plan {
                 charted: field.chart.is_ok(),
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unit_m,
+                thresholds: thresholds(calibration, &field.name),
+                still_within: motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32,
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
@@ -118,7 +139,16 @@ impl Plan {
             }));
         }
         plan.body_taxels = body_taxels;
+        if plan.stages().hysteresis {
+            plan.columns |= Outputs::TOTAL;
+        }
         Ok(plan)
+    }
+
+    /// The quantities that are computed.
+    #[must_use]
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
     }
 
     /// Number of taxels that are read.
@@ -147,7 +177,10 @@ impl Plan {
         let position = wants(Outputs::POSITION | Outputs::NORMAL);
         let orientation = wants(Outputs::ORIENTATION);
         let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
-        Stages { centroid: wants(Outputs::CENTROID) || position || orientation || axis, orientation, axis, position }
+        let motion = wants(Outputs::MOTION);
+        let hysteresis = self.fields.iter().any(|field| field.thresholds != Thresholds::default());
+        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
+        Stages { centroid, orientation, axis, hysteresis, motion, position }
     }
 }
 
@@ -178,6 +211,11 @@ fn choose(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> {
         return Err(Error::usage(format!("no field matches `{glob}`: {hint}")));
     }
     Ok(chosen)
+}
+
+fn thresholds(calibration: &Calibration, field: &str) -> Thresholds {
+    let contact = calibration.fields.get(field).copied().unwrap_or(calibration.contact);
+    Thresholds { on: contact.on, off: contact.off }
 }
 
 fn taxel(calibration: &TaxelCalibration, area: f64) -> layout::Taxel {

@@ -2,7 +2,7 @@
 //!
 //! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -64,8 +64,21 @@ pub struct Checks {
 pub struct Calibration {
     /// One entry a taxel, in the body's order.
     pub taxels: Vec<TaxelCalibration>,
+    /// When a field counts as touched, unless `fields` says otherwise.
+    pub contact: ContactThresholds,
+    /// The same for single fields, by name.
+    pub fields: BTreeMap<String, ContactThresholds>,
     /// Which input is not to be believed.
     pub checks: Checks,
+}
+
+/// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactThresholds {
+    /// Contact begins over this.
+    pub on: f32,
+    /// Contact ends at this or below; at most `on`.
+    pub off: f32,
 }
 
 #[derive(Deserialize)]
@@ -76,7 +89,25 @@ struct File {
     #[serde(default)]
     taxel: HashMap<Spanned<String>, Keys>,
     #[serde(default)]
+    contact: ContactKeys,
+    #[serde(default)]
     checks: Checks,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ContactKeys {
+    on: Option<Spanned<f64>>,
+    off: Option<Spanned<f64>>,
+    #[serde(default)]
+    field: BTreeMap<String, FieldContactKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FieldContactKeys {
+    on: Spanned<f64>,
+    off: Option<Spanned<f64>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -95,7 +126,12 @@ impl Calibration {
     /// The calibration of a robot without a file: P is the raw value.
     #[must_use]
     pub fn identity(taxels: usize) -> Self {
-        Self { taxels: vec![TaxelCalibration::default(); taxels], checks: Checks::default() }
+        Self {
+            taxels: vec![TaxelCalibration::default(); taxels],
+            contact: ContactThresholds::default(),
+            fields: BTreeMap::new(),
+            checks: Checks::default(),
+        }
     }
 
     /// Reads the file at `path` for a body whose taxels have the ids `ids`, ascending.
@@ -134,7 +170,12 @@ impl Calibration {
             keys.apply(&mut taxels[index], text)?;
         }
         check_checks(&file.checks)?;
-        Ok(Self { taxels, checks: file.checks })
+        let contact = thresholds(file.contact.on.as_ref(), file.contact.off.as_ref(), text)?;
+        let mut fields = BTreeMap::new();
+        for (name, keys) in file.contact.field {
+            fields.insert(name, thresholds(Some(&keys.on), keys.off.as_ref(), text)?);
+        }
+        Ok(Self { taxels, contact, fields, checks: file.checks })
     }
 }
 
@@ -190,6 +231,21 @@ impl Keys {
     }
 }
 
+/// Thresholds of contact; `off` is `on` where it is not given.
+fn thresholds(on: Option<&Spanned<f64>>, off: Option<&Spanned<f64>>, text: &str) -> Result<ContactThresholds> {
+    let wrong = |key: &str, value: &Spanned<f64>, must: &str| {
+        let line = line_of(text, value.span().start);
+        Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref())).at(format!("line {line}")))
+    };
+    let on_value = on.map_or(0.0, |on| *on.get_ref());
+    let off_value = off.map_or(on_value, |off| *off.get_ref());
+    match (on, off) {
+        (Some(on), _) if !(0.0..=MOST).contains(&on_value) => wrong("on", on, "0 or more, in the unit of S"),
+        (_, Some(off)) if !(0.0..=on_value).contains(&off_value) => wrong("off", off, "between 0 and `on`"),
+        _ => Ok(ContactThresholds { on: on_value as f32, off: off_value as f32 }),
+    }
+}
+
 fn check_checks(checks: &Checks) -> Result<()> {
     let wrong = |key: &str, must: &str| Err(Error::failed(format!("[checks] `{key}` must be {must}")));
     if checks.broken_frame_share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
@@ -225,6 +281,10 @@ fn explain(message: &str) -> String {
         "broken_frame_share",
         "isolated_ratio",
         "isolated_above",
+        "contact",
+        "on",
+        "off",
+        "field",
     ];
     let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
     match unknown.and_then(|word| Some((word, nearest(word, known)?))) {
@@ -261,5 +321,7 @@ mod tests {
         assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
         assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
         assert!(why("all = 3").contains("line 1"));
+        assert_eq!(why("[contact]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert!(why("[contact]\non = -3").contains("line 2"));
     }
 }

@@ -227,14 +227,17 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         print(line, &active);
     }
     named(line, "area", percept.area);
-    if let Some([u, v]) = percept.centroid {
-        key(line, "centroid");
-        line.push(b'[');
-        scalar(line, u);
-        line.push(b',');
-        scalar(line, v);
-        line.push(b']');
-    }
+    let pair = |line: &mut Vec<u8>, name: &str, value: Option<[f64; 2]>| {
+        if let Some([u, v]) = value {
+            key(line, name);
+            line.push(b'[');
+            scalar(line, u);
+            line.push(b',');
+            scalar(line, v);
+            line.push(b']');
+        }
+    };
+    pair(line, "centroid", percept.centroid);
     for (name, vector) in [("position", percept.position), ("normal", percept.normal)] {
         if let Some(vector) = vector {
             key(line, name);
@@ -244,6 +247,12 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
     named(line, "orientation", percept.orientation);
     named(line, "axis", percept.axis);
     named(line, "anisotropy", percept.anisotropy);
+    pair(line, "displacement", percept.displacement);
+    named(line, "direction", percept.direction);
+    named(line, "distance", percept.distance);
+    named(line, "radial_distance", percept.radial_distance);
+    named(line, "speed", percept.speed);
+    named(line, "radial_speed", percept.radial_speed);
 }
 
 fn key(line: &mut Vec<u8>, name: &str) {
@@ -277,7 +286,12 @@ mod tests {
         percepts.t_s = vec![0.05, 0.1];
         percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
-        percepts.present = vec![Outputs::all(), Outputs::TOTAL, Outputs::TOTAL | Outputs::POSITION, Outputs::empty()];
+        percepts.present = vec![
+            (Outputs::all() - Outputs::MOTION) | Outputs::DISPLACEMENT,
+            Outputs::TOTAL,
+            Outputs::TOTAL | Outputs::POSITION,
+            Outputs::empty(),
+        ];
         percepts.active[0] = 3;
         percepts.position = vec![[0.1, -0.2, 1e-9]; 4];
         percepts.normal = vec![[0.0, 0.0, 1.0]; 4];
@@ -290,6 +304,7 @@ mod tests {
                 $columns.orientation[0] = 1.5;
                 $columns.axis[0] = 0.0;
                 $columns.anisotropy[0] = 1.0;
+                $columns.displacement[0] = [-0.5, 0.1];
             }};
         }
         match &mut percepts.values {
@@ -325,7 +340,7 @@ mod tests {
         let wanted = concat!(
             r#"{"t":0.05,"frame":7,"fields":[{"field":"hand/palm","link":"hand","contact":true,"total":0.1,"#,
             r#""peak":1e-30,"active":3,"area":0.000025,"centroid":[0.3,-0.7],"position":[0.1,-0.2,1e-9],"#,
-            r#""normal":[0.0,0.0,1.0],"orientation":1.5,"axis":0.0,"anisotropy":1.0,"flags":["tie","saturated"]}]}"#,
+            r#""normal":[0.0,0.0,1.0],"orientation":1.5,"axis":0.0,"anisotropy":1.0,"displacement":[-0.5,0.1],"flags":["tie","saturated"]}]}"#,
             "\n",
             r#"{"t":0.1,"frame":8,"fields":[{"field":"hand/palm","link":"world","contact":true,"total":12.0,"#,
             r#""position":[0.1,-0.2,1e-9],"flags":[]}]}"#,

@@ -13,6 +13,12 @@ pub(crate) fn of_line(x: f64, y: f64) -> f64 {
     if turned >= PI { 0.0 } else { turned }
 }
 
+/// The distance between two directions, in [0, π].
+pub(crate) fn between_directions(a: f64, b: f64) -> f64 {
+    let d = (a - b).abs() % (2.0 * PI);
+    d.min(2.0 * PI - d)
+}
+
 /// The distance between two angles of lines, in [0, π/2].
 pub(crate) fn between_lines(a: f64, b: f64) -> f64 {
     let d = (a - b).abs() % PI;
@@ -48,6 +54,13 @@ pub(crate) fn atan2_f32(y: f32, x: f32) -> f32 {
     let octant = a + (a * z) * q;
     let quadrant = if tall > wide { std::f32::consts::FRAC_PI_2 - octant } else { octant };
     if x < 0.0 { std::f32::consts::PI - quadrant } else { quadrant }
+}
+
+/// atan2(y, x), in (−π, π].
+pub(crate) fn full_f32(x: f32, y: f32) -> f32 {
+    // The largest single-precision number under π: f32's own π is above it.
+    let size = atan2_f32(y.abs(), x).min(3.141_592_5);
+    if y < 0.0 { -size } else { size }
 }
 
 /// The angle of the line along (x, y), in [0, π): [`of_line`] in f32.

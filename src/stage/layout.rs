@@ -36,6 +36,29 @@ pub(crate) struct Taxel {
     pub(crate) masked: u32,
 }
 
+/// The time since the frame before.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Step {
+    pub(crate) dt_s: f32,
+    /// Why it cannot be used, as [`crate::percept::Flags`], or 0.
+    pub(crate) flags: u32,
+}
+
+/// How a field's centroid moved, in its unit.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Motion {
+    pub(crate) displacement: [f32; 2],
+    pub(crate) direction: f32,
+    pub(crate) distance: f32,
+    pub(crate) radial_distance: f32,
+    pub(crate) speed: f32,
+    pub(crate) radial_speed: f32,
+    /// Flags and quantities present, to be added to the cell's.
+    pub(crate) status: u32,
+}
+
 /// Where a field's members stand, and what it can answer.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]

@@ -14,7 +14,9 @@ pub(crate) mod axis;
 pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod contact;
+pub(crate) mod hysteresis;
 pub(crate) mod layout;
+pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
 

@@ -4,9 +4,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DQuat, DVec3};
 use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
-use somatic::{Body, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue};
+use somatic::{BackendKind, Body, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene};
 
-use crate::common::{Flat, backends, engine, frame};
+use crate::common::{Flat, backends, frame};
 
 /// The percept of field 0 for one frame of `values`, on every backend; each is also held to the reference.
 fn percepts(body: &Body, values: &[f64]) -> Vec<Percept> {
@@ -18,7 +18,7 @@ fn on_every_backend(body: &Body, frame: &Frame) -> Vec<Percept> {
     backends()
         .into_iter()
         .map(|kind| {
-            let mut engine = engine(body, kind);
+            let mut engine = Engine::new(body, at_rest(kind)).unwrap();
             let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(frame)).unwrap();
             assert!(agreement.holds(), "{kind:?}: {agreement}");
             let percept = percepts.get(0, 0);
@@ -26,6 +26,18 @@ fn on_every_backend(body: &Body, frame: &Frame) -> Vec<Percept> {
             percept
         })
         .collect()
+}
+
+/// Everything but motion, which a single frame has none of.
+fn at_rest(backend: BackendKind) -> Options {
+    let moving = Outputs::DISPLACEMENT
+        | Outputs::DIRECTION
+        | Outputs::DISTANCE
+        | Outputs::RADIAL_DISTANCE
+        | Outputs::SPEED
+        | Outputs::RADIAL_SPEED;
+    let scene = Scene { outputs: Outputs::all() - moving, ..Scene::default() };
+    Options { backend, scene, ..Options::default() }
 }
 
 fn assert_finite(percept: &Percept) {
@@ -101,7 +113,7 @@ fn all_saturated_still_answers() {
     let body = field(&[[-0.5, 0.0], [0.0, 0.0], [0.5, 0.0]]);
     let calibration = somatic::Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
     for kind in backends() {
-        let options = Options { backend: kind, calibration: Some(calibration.clone()), ..Options::default() };
+        let options = Options { calibration: Some(calibration.clone()), ..at_rest(kind) };
         let mut engine = Engine::new(&body, options).unwrap();
         let p = engine.process(&[frame(0.0, &[1023.0; 3])]).unwrap().get(0, 0);
         assert_eq!(p.flags, Flags::SATURATED);
@@ -351,9 +363,9 @@ fn a_field_of_a_million_taxels_answers() {
     let frame = frame(0.0, &values);
     for kind in backends() {
         // Without position, which would lay a grid over the surface.
-        let outputs = Outputs::all() - Outputs::POSITION - Outputs::NORMAL;
-        let scene = somatic::Scene { outputs, ..somatic::Scene::default() };
-        let mut engine = Engine::new(&body, Options { backend: kind, scene, ..Options::default() }).unwrap();
+        let mut options = at_rest(kind);
+        options.scene.outputs -= Outputs::POSITION | Outputs::NORMAL;
+        let mut engine = Engine::new(&body, options).unwrap();
         let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(&frame)).unwrap();
         assert!(agreement.holds(), "{kind:?}: {agreement}");
         assert_eq!(percepts.get(0, 0).active, Some(values.iter().filter(|&&v| v > 0.0).count() as u32));

@@ -8,6 +8,7 @@ mod extremes;
 mod house;
 mod legal;
 mod meshes;
+mod motion;
 mod properties;
 mod real;
 mod recordings;

@@ -7,6 +7,8 @@ mod axis;
 mod calibrate;
 mod centroid;
 mod contact;
+mod hysteresis;
+mod motion;
 mod orientation;
 
 use super::{Backend, RawBatch};
@@ -24,11 +26,20 @@ const TASK: usize = 8 * LANES;
 pub(crate) struct Cpu {
     plan: Plan,
     single: Scratch<1>,
+    /// Per field, whether the frame before was in contact.
+    touched: Vec<bool>,
+    /// Per field, its centroid in the frame before, in its unit, if that was in contact.
+    last: Vec<Option<[f32; 2]>>,
 }
 
 impl Cpu {
     pub(crate) fn new(plan: &Plan) -> Self {
-        Self { plan: plan.clone(), single: Scratch::new(plan.slots()) }
+        Self {
+            plan: plan.clone(),
+            single: Scratch::new(plan.slots()),
+            touched: vec![false; plan.fields.len()],
+            last: vec![None; plan.fields.len()],
+        }
     }
 }
 
@@ -41,16 +52,30 @@ impl Backend for Cpu {
         format!("single precision, {} threads", rayon::current_num_threads())
     }
 
+    fn restart(&mut self) {
+        self.touched.fill(false);
+        self.last.fill(None);
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let Some(mut cells) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
         if raw.frames < LANES {
+            let mut rest = cells.reborrow();
             for frame in raw.values.chunks_exact(self.plan.slots().max(1)) {
-                let (mut first, rest) = cells.split_at(1);
+                let (mut first, later) = rest.split_at(1);
                 self.single.block(&self.plan, frame, 1, &mut first);
-                cells = rest;
+                rest = later;
             }
         } else {
-            batch(&self.plan, raw.values, raw.frames, cells);
+            batch(&self.plan, raw.values, raw.frames, cells.reborrow());
+        }
+        // What hangs on the frame before goes through the frames in order.
+        let stages = self.plan.stages();
+        if stages.hysteresis {
+            hysteresis::scan(&self.plan, raw.frames, &mut cells, &mut self.touched);
+        }
+        if stages.motion {
+            motion::scan(&self.plan, raw.steps, &mut cells, &mut self.last);
         }
         Ok(())
     }
@@ -136,8 +161,8 @@ fn store<const L: usize>(
     cells: &mut CellsMut<'_>,
     cell: usize,
 ) {
-    let outputs = plan.outputs;
-    cells.set_status(cell, lanes.flags[lane], lanes.present[lane] & outputs.bits());
+    let outputs = plan.columns;
+    cells.set_status(cell, lanes.flags[lane], lanes.present[lane] & plan.outputs.bits());
     let write = |output, column: &mut [f32], value: f32| {
         if outputs.contains(output) {
             column[cell] = value;

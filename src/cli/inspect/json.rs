@@ -1,0 +1,58 @@
+//! A body as JSON.
+
+use serde_json::{Map, Value, json};
+use somatic::body::Body;
+use somatic::field::{Field, WORLD};
+
+/// One object and a newline.
+pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String {
+    let link = |index: usize| body.links[index].name.as_str();
+    let taxel = |index: usize| {
+        let taxel = &body.taxels[index];
+        json!({
+            "id": taxel.id,
+            "link": link(taxel.link),
+            "position": taxel.position_in_link.to_array(),
+            "normal": taxel.normal_in_link.to_array(),
+            "area": taxel.area,
+            "modality": taxel.modality.name(),
+        })
+    };
+    let whole = json!({
+        "links": body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(),
+        "taxels": (0..body.taxels.len()).map(taxel).collect::<Vec<_>>(),
+        "fields": fields.iter().map(|f| field(body, fields, f)).collect::<Vec<_>>(),
+        "findings": findings,
+    });
+    format!("{whole}\n")
+}
+
+fn field(body: &Body, fields: &[Field], field: &Field) -> Value {
+    let member = |member: &somatic::field::Member| {
+        let mut object = Map::new();
+        object.insert("taxel".into(), body.taxels[member.taxel].id.into());
+        object.insert("weight".into(), member.weight.into());
+        if field.chart.is_ok() {
+            object.insert("uv".into(), json!([member.place.x, member.place.y]));
+        }
+        Value::Object(object)
+    };
+    let mut object = json!({
+        "name": field.name,
+        "parent": field.parent.map(|parent| fields[parent].name.as_str()),
+        "anchor": field.anchor.map_or(WORLD, |anchor| body.links[anchor].name.as_str()),
+        "members": field.members.iter().map(member).collect::<Vec<_>>(),
+        "chart": field.chart.as_ref().ok().map(|chart| json!({
+            "kind": chart.kind,
+            "origin": field.origin_in_anchor.to_array(),
+            "u": chart.u_in_anchor.to_array(),
+            "v": chart.v_in_anchor.to_array(),
+            "normal": chart.normal_in_anchor.to_array(),
+            "distortion": chart.distortion,
+        })),
+    });
+    if let Err(reason) = &field.chart {
+        object["no_chart"] = reason.to_string().into();
+    }
+    object
+}

@@ -1,0 +1,176 @@
+//! A body in words and tables.
+
+use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Table};
+use console::{Term, style};
+use rstar::RTree;
+use somatic::body::{Body, ChartKind};
+use somatic::field::{Field, WORLD};
+
+use crate::cli::words::{count, millimetres};
+
+/// All there is to say, the oddest last, where it is read.
+pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String {
+    let mut text = format!("{}\n", style(&body.name).bold());
+    let mut line = |what: &str, value: String| text += &format!("  {what:<10}{value}\n");
+    let triangles: usize = body.surfaces.iter().map(|surface| surface.triangles.len()).sum();
+    line("links", body.links.len().to_string());
+    let surfaces = count(triangles as u64, "triangle");
+    line("surfaces", format!("{} with {surfaces}", body.surfaces.len()));
+    line("taxels", taxels(body));
+    let charts = fields.iter().filter(|field| field.chart.is_ok()).count();
+    line("fields", format!("{}, {charts} with a chart", fields.len()));
+    if !body.links.is_empty() {
+        text += &format!("\n{}", shown(&links(body)));
+    }
+    if !fields.is_empty() {
+        text += &format!("\n{}", shown(&tree(body, fields)));
+    }
+    text += "\n";
+    if findings.is_empty() {
+        return text + "nothing odd was found\n";
+    }
+    text += &format!("{}\n", style(count(findings.len() as u64, "finding")).bold());
+    for finding in findings {
+        text += &format!("  {} {finding}\n", style("•").yellow());
+    }
+    text
+}
+
+/// Number of taxels, how far they lie apart, and the area they stand for.
+fn taxels(body: &Body) -> String {
+    let mut text = body.taxels.len().to_string();
+    let places: Vec<[f64; 3]> = body
+        .taxels
+        .iter()
+        .map(|taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link).to_array())
+        .collect();
+    let tree = RTree::bulk_load(places.clone());
+    let nearest = |place: &[f64; 3]| tree.nearest_neighbor_iter_with_distance_2(*place).nth(1).map(|(_, d2)| d2.sqrt());
+    let mut gaps: Vec<f64> = places.iter().filter_map(nearest).collect();
+    gaps.sort_by(f64::total_cmp);
+    if let (Some(least), Some(most)) = (gaps.first(), gaps.last()) {
+        let [least, middle, most] = [*least, gaps[gaps.len() / 2], *most].map(millimetres);
+        text += &format!(", {middle} mm apart ({least} to {most})");
+    }
+    let area: f64 = body.taxels.iter().map(|taxel| taxel.area).sum();
+    if area > 0.0 {
+        text += &format!(", {:.1} cm² of skin", area * 1e4);
+    }
+    let unknown = body.taxels.iter().filter(|taxel| taxel.area == 0.0).count();
+    if unknown > 0 {
+        text += &format!(", {unknown} without an area");
+    }
+    text
+}
+
+fn links(body: &Body) -> Table {
+    let mut table = plain(["link", "taxels"]);
+    right(&mut table, 1);
+    let parents: Vec<Option<usize>> = body.links.iter().map(|link| link.parent).collect();
+    for (link, branch) in branches(&parents) {
+        let taxels = body.taxels.iter().filter(|taxel| taxel.link == link).count();
+        table.add_row([format!("{branch}{}", body.links[link].name), some(taxels)]);
+    }
+    table
+}
+
+fn tree(body: &Body, fields: &[Field]) -> Table {
+    let mut table = plain(["field", "taxels", "radius mm", "anchor", "distortion", "chart"]);
+    // Where it is narrow, reasons are wrapped and names are not.
+    let whole = (0..5).map(|_| ColumnConstraint::ContentWidth);
+    table.set_constraints(whole);
+    for column in [1, 2, 4] {
+        right(&mut table, column);
+    }
+    let parents: Vec<Option<usize>> = fields.iter().map(|field| field.parent).collect();
+    for (index, branch) in branches(&parents) {
+        let field = &fields[index];
+        let (chart, distortion) = match &field.chart {
+            Ok(chart) => (kind(chart.kind).to_owned(), format!("{:.1} %", 100.0 * chart.distortion)),
+            Err(reason) => (format!("none: {reason}"), String::new()),
+        };
+        table.add_row([
+            format!("{branch}{}", field.name),
+            field.members.len().to_string(),
+            millimetres(field.radius_m()),
+            field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
+            distortion,
+            chart,
+        ]);
+    }
+    table
+}
+
+fn kind(kind: ChartKind) -> &'static str {
+    match kind {
+        ChartKind::Plane => "plane",
+        ChartKind::None => "none",
+    }
+}
+
+/// Nothing is easier to see than a zero.
+fn some(count: usize) -> String {
+    if count == 0 { String::new() } else { count.to_string() }
+}
+
+/// Indices depth first, each with the lines that lead to it.
+fn branches(parents: &[Option<usize>]) -> Vec<(usize, String)> {
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); parents.len()];
+    let mut waiting: Vec<(usize, String, &str, &str)> = Vec::new();
+    for (index, parent) in parents.iter().enumerate() {
+        match parent {
+            Some(parent) => children[*parent].push(index),
+            None => waiting.push((index, String::new(), "", "")),
+        }
+    }
+    waiting.reverse();
+    let mut order = Vec::with_capacity(parents.len());
+    while let Some((index, above, own, below)) = waiting.pop() {
+        for (place, &child) in children[index].iter().enumerate().rev() {
+            let last = place + 1 == children[index].len();
+            let (own, next) = if last { ("└ ", "  ") } else { ("├ ", "│ ") };
+            waiting.push((child, format!("{above}{below}"), own, next));
+        }
+        order.push((index, format!("{above}{own}")));
+    }
+    order
+}
+
+fn plain<const N: usize>(headings: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_header(headings.map(Cell::new));
+    let term = Term::stdout();
+    if term.is_term() {
+        table.set_width(term.size().1);
+    }
+    table
+}
+
+fn right(table: &mut Table, column: usize) {
+    if let Some(column) = table.column_mut(column) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+}
+
+fn shown(table: &Table) -> String {
+    let mut text = String::new();
+    for (index, line) in table.lines().enumerate() {
+        let line = line.trim_end();
+        text += &if index == 0 { style(line).dim().to_string() } else { line.to_owned() };
+        text += "\n";
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tree_is_drawn_depth_first() {
+        let parents = [None, Some(0), Some(0), Some(1), None];
+        let drawn: Vec<String> = branches(&parents).iter().map(|(index, branch)| format!("{branch}{index}")).collect();
+        assert_eq!(drawn, ["0", "├ 1", "│ └ 3", "└ 2", "4"]);
+    }
+}

@@ -1,0 +1,328 @@
+//! What a person sees while `run` runs: the touched fields, how far a recording is, and in the end a summary.
+
+use std::time::{Duration, Instant};
+
+use console::{Term, style};
+use somatic::{Engine, Outputs, Percept, Percepts};
+
+use super::screen::Screen;
+use super::words::{clipped, count, fitted, number, span};
+
+mod columns;
+
+use columns::Scale;
+
+/// Between two drawings: as fast as reading needs, slow enough not to flicker.
+const REDRAW: Duration = Duration::from_millis(66);
+/// How long a field that is no longer touched stays readable.
+const FADE: Duration = Duration::from_millis(700);
+/// Fields that a summary lists.
+const MOST_IN_SUMMARY: usize = 40;
+
+/// Which view a run gets.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Choice {
+    Table,
+    Bar,
+    Nothing,
+}
+
+/// What a view says about a run.
+pub(super) struct About<'a> {
+    pub(super) engine: &'a Engine,
+    pub(super) body: &'a str,
+    pub(super) source: &'a str,
+    pub(super) all_fields: bool,
+}
+
+/// What is shown while frames come.
+pub(super) struct View {
+    screen: Option<Screen>,
+    table: Option<Table>,
+    pace: Pace,
+    drawn: Option<Instant>,
+}
+
+impl View {
+    /// A table where standard output is a terminal and free, a bar where only standard error is one, for recordings.
+    pub(super) fn choose(quiet: bool, stdout_taken: bool, recording: bool) -> Choice {
+        let (out, err) = (Term::stdout(), Term::stderr());
+        if quiet || console::is_dumb() {
+            Choice::Nothing
+        } else if out.is_term() {
+            if stdout_taken { Choice::Nothing } else { Choice::Table }
+        } else if err.is_term() && recording {
+            Choice::Bar
+        } else {
+            Choice::Nothing
+        }
+    }
+
+    pub(super) fn is_table(&self) -> bool {
+        self.table.is_some()
+    }
+
+    /// Adds what `percepts` say.
+    pub(super) fn see(&mut self, percepts: &Percepts, progress: Option<f64>) {
+        self.pace.see(percepts, progress);
+        if let Some(table) = &mut self.table {
+            table.see(percepts);
+        }
+    }
+
+    /// Draws, if it is time to.
+    pub(super) fn draw(&mut self) {
+        let Some(screen) = &mut self.screen else { return };
+        if self.drawn.is_some_and(|drawn| drawn.elapsed() < REDRAW) {
+            return;
+        }
+        self.drawn = Some(Instant::now());
+        self.pace.tick();
+        let (rows, columns) = screen.room();
+        let bar = self.pace.bar(columns);
+        let mut lines = Vec::new();
+        if let Some(table) = &mut self.table {
+            table.lines(&mut lines, &self.pace, rows.saturating_sub(bar.is_some().into()), columns);
+        }
+        lines.truncate(rows.saturating_sub(bar.is_some().into()));
+        lines.extend(bar);
+        screen.draw(&lines);
+    }
+
+    /// Takes the lines away and leaves a summary of the table.
+    pub(super) fn finish(self) {
+        drop(self.screen);
+        if let Some(table) = self.table {
+            // A terminal that has gone needs no summary.
+            let _ = super::print(&table.summary(&self.pace));
+        }
+    }
+}
+
+impl Choice {
+    pub(super) fn is_table(self) -> bool {
+        self == Self::Table
+    }
+
+    pub(super) fn open(self, about: &About<'_>) -> View {
+        let term = match self {
+            Self::Table => Some(Term::stdout()),
+            Self::Bar => Some(Term::stderr()),
+            Self::Nothing => None,
+        };
+        View {
+            screen: term.map(Screen::new),
+            table: self.is_table().then(|| Table::new(about)),
+            pace: Pace::new(self == Self::Bar),
+            drawn: None,
+        }
+    }
+}
+
+/// How far it is and how fast it goes.
+struct Pace {
+    on_stderr: bool,
+    started: Instant,
+    frames: u64,
+    first_s: Option<f64>,
+    last_s: f64,
+    progress: Option<f64>,
+    mark: (Instant, u64),
+    rate: Option<f64>,
+}
+
+impl Pace {
+    fn new(on_stderr: bool) -> Self {
+        let now = Instant::now();
+        let (frames, first_s, last_s, progress, rate) = (0, None, 0.0, None, None);
+        Self { on_stderr, started: now, frames, first_s, last_s, progress, mark: (now, 0), rate }
+    }
+
+    fn see(&mut self, percepts: &Percepts, progress: Option<f64>) {
+        if percepts.frames() > 0 {
+            self.first_s.get_or_insert(percepts.t_s(0));
+            self.last_s = percepts.t_s(percepts.frames() - 1);
+            self.frames += percepts.frames() as u64;
+        }
+        self.progress = progress;
+    }
+
+    /// Measures the rate over a second or so, so that its digits can be read.
+    fn tick(&mut self) {
+        let (since, frames) = self.mark;
+        let wait = if self.rate.is_some() { 1.0 } else { 0.3 };
+        if since.elapsed().as_secs_f64() > wait {
+            self.rate = Some((self.frames - frames) as f64 / since.elapsed().as_secs_f64());
+            self.mark = (Instant::now(), self.frames);
+        }
+    }
+
+    fn bar(&self, columns: usize) -> Option<String> {
+        let progress = self.progress?;
+        let elapsed = self.started.elapsed().as_secs_f64();
+        let left = elapsed * (1.0 - progress) / progress.max(1e-9);
+        let left = if elapsed > 0.4 { format!("{} left", span(left)) } else { String::new() };
+        let text = if self.on_stderr {
+            format!("{:>3.0} %  {}  {left}", 100.0 * progress, count(self.frames, "frame"))
+        } else {
+            format!("{:>3.0} %  {left}", 100.0 * progress)
+        };
+        let width = columns.saturating_sub(text.len() + 6).min(40);
+        if width < 8 {
+            return Some(clipped(&format!("  {text}"), columns));
+        }
+        let full = (progress * width as f64).round() as usize;
+        let paint = |text: String| if self.on_stderr { style(text).for_stderr() } else { style(text) };
+        let (done, rest) = (paint("━".repeat(full)).cyan(), paint("─".repeat(width - full)).dim());
+        Some(format!("  {done}{rest}  {text}"))
+    }
+}
+
+/// A field, as far as it was seen.
+struct Row {
+    name: String,
+    latest: Option<Percept>,
+    touched_at: Option<Instant>,
+    frames_touched: u64,
+    largest: Option<(f64, f64)>,
+}
+
+struct Table {
+    title: String,
+    backend: String,
+    outputs: Outputs,
+    all_fields: bool,
+    rows: Vec<Row>,
+    largest_total: f64,
+    in_world: bool,
+    /// Rows shown at most so far: the table grows and does not shrink, or what is below would jump.
+    tallest: usize,
+}
+
+impl Table {
+    fn new(about: &About<'_>) -> Self {
+        let (name, what, _) = about.engine.backend();
+        let row = |(field, _): (&str, &str)| Row {
+            name: field.to_owned(),
+            latest: None,
+            touched_at: None,
+            frames_touched: 0,
+            largest: None,
+        };
+        Self {
+            title: format!("{} ← {}", about.body, about.source),
+            backend: format!("{name}, {what}"),
+            outputs: about.engine.plan().outputs(),
+            all_fields: about.all_fields,
+            rows: about.engine.plan().fields().map(row).collect(),
+            largest_total: 0.0,
+            in_world: false,
+            tallest: 0,
+        }
+    }
+
+    fn see(&mut self, percepts: &Percepts) {
+        let now = Instant::now();
+        for frame in 0..percepts.frames() {
+            for percept in percepts.touched(frame) {
+                let row = &mut self.rows[percept.field];
+                row.frames_touched += 1;
+                row.touched_at = Some(now);
+                row.latest = Some(percept);
+                self.in_world |= percept.in_world;
+                if let Some(total) = percept.total {
+                    self.largest_total = self.largest_total.max(total);
+                    if row.largest.is_none_or(|(largest, _)| total > largest) {
+                        row.largest = Some((total, percepts.t_s(frame)));
+                    }
+                }
+            }
+        }
+        if let Some(last) = percepts.frames().checked_sub(1) {
+            for percept in percepts.frame(last).filter(|percept| !percept.contact) {
+                let row = &mut self.rows[percept.field];
+                // What is shown while it fades is the last touch, marked as over.
+                if let Some(latest) = &mut row.latest {
+                    latest.contact = false;
+                }
+            }
+        }
+    }
+
+    fn lines(&mut self, lines: &mut Vec<String>, pace: &Pace, rows: usize, columns: usize) {
+        let rate = pace.rate.map_or(String::new(), |rate| format!("   {} frames/s", number_of_frames(rate)));
+        let head = format!("t {:.2} s   {}{rate}", pace.last_s, count(pace.frames, "frame"));
+        let wide = |text: &str| console::measure_text_width(text);
+        if wide(&head) + wide(&self.backend) + 5 <= columns {
+            lines.push(format!("  {head}   {}", style(&self.backend).dim()));
+        } else {
+            lines.push(clipped(&format!("  {head}"), columns));
+        }
+        if rows >= 8 && wide(&self.title) + 2 <= columns {
+            lines.insert(0, format!("  {}", style(&self.title).bold()));
+        }
+        let shown = |row: &&Row| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE);
+        let visible: Vec<&Row> = self.rows.iter().filter(shown).collect();
+        let longest = self.rows.iter().map(|row| wide(&row.name)).max().unwrap_or(0);
+        let layout = columns::Layout::new(longest, self.outputs, self.in_world, columns.saturating_sub(2));
+        lines.push(format!("  {}", style(layout.headings()).dim()));
+
+        let room = rows.saturating_sub(lines.len());
+        let fits = if visible.len() > room { room.saturating_sub(1) } else { visible.len() };
+        let scale = Scale { largest_total: self.largest_total };
+        lines.extend(
+            visible.iter().take(fits).map(|row| format!("  {}", layout.row(&row.name, row.latest.as_ref(), scale))),
+        );
+        if fits < visible.len() {
+            lines.push(format!("  {}", style(format!("… and {} more", visible.len() - fits)).dim()));
+        }
+        if visible.is_empty() && room > 0 {
+            lines.push(format!("  {}", style("nothing is touched").dim()));
+        }
+        self.tallest = self.tallest.max(lines.len()).min(rows);
+        lines.resize(self.tallest.max(lines.len()), String::new());
+    }
+
+    fn summary(&self, pace: &Pace) -> String {
+        let seconds = pace.started.elapsed().as_secs_f64();
+        let length = pace.first_s.map_or(0.0, |first| pace.last_s - first);
+        let mut text = format!(
+            "{}\n{} over {length:.2} s, in {} ({} frames/s); backend {}\n",
+            style(&self.title).bold(),
+            count(pace.frames, "frame"),
+            span(seconds),
+            number_of_frames(pace.frames as f64 / seconds.max(1e-9)),
+            self.backend
+        );
+        let touched: Vec<&Row> = self.rows.iter().filter(|row| row.frames_touched > 0).collect();
+        if touched.is_empty() {
+            return text + &format!("none of {} was touched\n", count(self.rows.len() as u64, "field"));
+        }
+        let columns = usize::from(Term::stdout().size().1).saturating_sub(1);
+        let longest = touched.iter().map(|row| console::measure_text_width(&row.name)).max().unwrap_or(0);
+        let width = longest.max(5).min(columns.saturating_sub(42)).max(8);
+        let head = format!("{}  frames touched  largest total      at", fitted("field", width, false));
+        text += &format!("\n{}\n", style(clipped(&head, columns)).dim());
+        for row in touched.iter().take(MOST_IN_SUMMARY) {
+            let share = 100.0 * row.frames_touched as f64 / pace.frames as f64;
+            text += &format!("{}  {:>8} {share:>3.0} %", fitted(&row.name, width, false), row.frames_touched);
+            if let Some((total, at)) = row.largest {
+                text += &format!("  {:>13}  {:>6}", number(total), format!("{at:.2} s"));
+            }
+            text += "\n";
+        }
+        let more = touched.len().saturating_sub(MOST_IN_SUMMARY);
+        if more > 0 {
+            text += &format!("… and {more} more\n");
+        }
+        let never = self.rows.len() - touched.len();
+        if never > 0 {
+            text += &format!("{} never touched\n", count(never as u64, "field"));
+        }
+        text
+    }
+}
+
+fn number_of_frames(rate: f64) -> String {
+    if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
+}

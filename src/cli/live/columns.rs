@@ -1,0 +1,208 @@
+//! The columns of the live table: which of them fit, and what stands in them.
+
+use std::f64::consts::PI;
+
+use console::style;
+use somatic::{Outputs, Percept};
+
+use crate::cli::words::{clipped, fitted, millimetres, number};
+
+/// Blank between columns.
+const GAP: usize = 2;
+/// What a field's name gets at least, and what flags get.
+const LEAST_NAME: usize = 14;
+const LEAST_FLAGS: usize = 9;
+const BAR: usize = 8;
+
+/// What totals and peaks are measured by: the largest total seen.
+#[derive(Clone, Copy)]
+pub(super) struct Scale {
+    pub(super) largest_total: f64,
+}
+
+impl Scale {
+    /// `value` with as many decimals as give the largest five digits, so that points stand below each other.
+    fn number(self, value: f64) -> String {
+        if !(1e-3..1e7).contains(&self.largest_total) {
+            return number(value);
+        }
+        let decimals = (4 - self.largest_total.log10().floor() as i32).clamp(0, 6) as usize;
+        format!("{value:.decimals$}")
+    }
+}
+
+struct Column {
+    heading: &'static str,
+    width: usize,
+    /// Shown where one of these is asked for.
+    outputs: Outputs,
+    /// The column with the largest number gives way first.
+    gives_way: u8,
+    text: fn(&Percept, Scale) -> Option<String>,
+}
+
+const COLUMNS: [Column; 8] = [
+    Column {
+        heading: "total",
+        width: 8,
+        outputs: Outputs::TOTAL,
+        gives_way: 0,
+        text: |p, scale| p.total.map(|total| scale.number(total)),
+    },
+    Column { heading: "", width: BAR, outputs: Outputs::TOTAL, gives_way: 3, text: bar },
+    Column {
+        heading: "peak",
+        width: 8,
+        outputs: Outputs::PEAK,
+        gives_way: 6,
+        text: |p, scale| p.peak.map(|peak| scale.number(peak)),
+    },
+    Column {
+        heading: "active",
+        width: 6,
+        outputs: Outputs::ACTIVE,
+        gives_way: 4,
+        text: |p, _| p.active.map(|active| active.to_string()),
+    },
+    Column {
+        heading: "u    v mm",
+        width: 13,
+        outputs: Outputs::CENTROID,
+        gives_way: 1,
+        text: |p, _| p.centroid.map(|c| places(&c)),
+    },
+    Column {
+        heading: "x      y      z mm",
+        width: 20,
+        outputs: Outputs::POSITION,
+        gives_way: 7,
+        text: |p, _| p.position.map(|place| places(&place)),
+    },
+    Column {
+        heading: "angle",
+        width: 6,
+        outputs: Outputs::ORIENTATION,
+        gives_way: 2,
+        text: |p, _| p.orientation.map(line),
+    },
+    Column {
+        heading: "aniso",
+        width: 5,
+        outputs: Outputs::ANISOTROPY,
+        gives_way: 5,
+        text: |p, _| p.anisotropy.map(|share| format!("{share:.2}")),
+    },
+];
+
+/// What of a table fits into a terminal.
+pub(super) struct Layout {
+    name: usize,
+    columns: Vec<&'static Column>,
+    flags: usize,
+    in_world: bool,
+}
+
+impl Layout {
+    /// For names up to `longest` and the quantities `outputs`, in `width` columns.
+    pub(super) fn new(longest: usize, outputs: Outputs, in_world: bool, width: usize) -> Self {
+        let mut columns: Vec<&Column> = COLUMNS.iter().filter(|column| outputs.intersects(column.outputs)).collect();
+        let taken = |columns: &[&Column]| columns.iter().map(|column| column.width + GAP).sum::<usize>();
+        let least_name = longest.clamp(5, LEAST_NAME);
+        let mut flags = LEAST_FLAGS;
+        while least_name + taken(&columns) + GAP + flags > width {
+            match columns.iter().enumerate().max_by_key(|(_, column)| column.gives_way) {
+                Some((index, column)) if column.gives_way > 2 => drop(columns.remove(index)),
+                _ if flags > 0 => flags = 0,
+                Some((index, _)) => drop(columns.remove(index)),
+                None => break,
+            }
+        }
+        let gap = if flags > 0 { GAP } else { 0 };
+        let name = longest.max(5).min(width.saturating_sub(taken(&columns) + gap + flags));
+        let flags = if flags > 0 { width.saturating_sub(name + taken(&columns) + gap) } else { 0 };
+        Self { name, columns, flags, in_world }
+    }
+
+    pub(super) fn headings(&self) -> String {
+        let mut text = fitted("field", self.name, false);
+        for column in &self.columns {
+            text += &" ".repeat(GAP);
+            let world = self.in_world && column.outputs == Outputs::POSITION;
+            text += &fitted(if world { "x    y    z mm world" } else { column.heading }, column.width, true);
+        }
+        if self.flags > 0 { text + "  flags" } else { text }
+    }
+
+    /// A row; dim when the touch is over.
+    pub(super) fn row(&self, name: &str, percept: Option<&Percept>, scale: Scale) -> String {
+        let touched = percept.is_some_and(|percept| percept.contact);
+        let mut text = fitted(name, self.name, false);
+        for column in &self.columns {
+            text += &" ".repeat(GAP);
+            let cell = percept.map_or(Some("·".to_owned()), |percept| (column.text)(percept, scale));
+            // What is absent leaves a mark, so that columns can be followed.
+            let cell = fitted(cell.as_deref().unwrap_or("–"), column.width, !column.heading.is_empty());
+            let is_bar = column.heading.is_empty() && touched;
+            text += &if is_bar { style(cell).cyan().to_string() } else { cell };
+        }
+        if let Some(percept) = percept.filter(|_| self.flags > 0) {
+            let flags = percept.flags.names().collect::<Vec<_>>().join(" ");
+            let flags = clipped(&flags, self.flags);
+            text += &format!("  {}", if touched { style(flags).yellow().to_string() } else { flags });
+        }
+        if touched { text } else { style(text).dim().to_string() }
+    }
+}
+
+fn places(metres: &[f64]) -> String {
+    let texts: Vec<String> = metres.iter().map(|&m| format!("{:>6}", millimetres(m))).collect();
+    texts.join(" ")
+}
+
+/// Degrees, and which way a line at `angle` runs where +u points right and +v up.
+fn line(angle: f64) -> String {
+    const LINES: [&str; 4] = ["─", "╱", "│", "╲"];
+    let eighth = (angle / (PI / 4.0)).round() as usize % LINES.len();
+    format!("{:.0}° {}", angle.to_degrees(), LINES[eighth])
+}
+
+/// A bar of the total as a share of the largest seen.
+fn bar(percept: &Percept, scale: Scale) -> Option<String> {
+    const EIGHTHS: [&str; 8] = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
+    let total = percept.total?;
+    let share = if scale.largest_total > 0.0 { (total / scale.largest_total).clamp(0.0, 1.0) } else { 0.0 };
+    // Whatever is touched is seen.
+    let eighths = ((share * (8 * BAR) as f64).round() as usize).max(1);
+    Some("█".repeat(eighths / 8) + EIGHTHS[eighths % 8])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_looks_the_way_it_runs() {
+        let texts = [0.0, PI / 4.0, PI / 2.0, 3.0 * PI / 4.0, PI - 0.01].map(line);
+        assert_eq!(texts, ["0° ─", "45° ╱", "90° │", "135° ╲", "179° ─"]);
+    }
+
+    #[test]
+    fn every_row_fits_whatever_the_width() {
+        for width in 0..200 {
+            for longest in [1, 8, 30] {
+                let layout = Layout::new(longest, Outputs::all(), true, width);
+                let headings = console::measure_text_width(&layout.headings());
+                assert!(headings <= width.max(5) || layout.columns.is_empty(), "{width}: {headings}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_not_asked_for_has_no_column_and_a_wide_terminal_has_all() {
+        let headings = |outputs, width| Layout::new(10, outputs, false, width).headings();
+        assert!(!headings(Outputs::TOTAL, 200).contains("angle"));
+        assert!(headings(Outputs::all(), 200).contains("peak"));
+        let narrow = headings(Outputs::all(), 58);
+        assert!(narrow.contains("total") && narrow.contains("angle") && !narrow.contains("peak"), "{narrow}");
+    }
+}

@@ -1,0 +1,89 @@
+//! The command line: one file per subcommand, and what they share.
+
+mod completions;
+mod feed;
+mod inspect;
+mod live;
+mod run;
+mod screen;
+mod words;
+
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use clap::{Parser, Subcommand};
+use somatic::error::nearest;
+use somatic::{Body, Error, Result, bundled};
+
+/// Exit code: everything was done.
+const DONE: u8 = 0;
+/// Exit code: what was asked for does not hold.
+const FAILED: u8 = 1;
+/// Exit code: done, but some input was never processed.
+const LOST: u8 = 3;
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic run                                   watch a recorded touch on the bundled hand
+  somatic run | jq -c '.fields[] | [.field, .total]'
+  somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
+  robot-driver | somatic run --body robot.glb --source - | controller
+  somatic inspect robot.glb                     what taxels and fields a body has
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
+
+/// A sense of touch for whole robots: touch frames in, percepts out.
+///
+/// It reads where the sensors sit from a glTF body, groups them into receptive fields, and says for every field and
+/// frame where the touch is, how strong, and how it is oriented.
+#[derive(Parser)]
+#[command(name = "somatic", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::Arguments),
+    Inspect(inspect::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// Does what was asked for and gives the exit code.
+pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
+    match &arguments.command {
+        Command::Run(arguments) => run::run(arguments),
+        Command::Inspect(arguments) => inspect::inspect(arguments),
+        Command::Completions(arguments) => completions::completions(arguments),
+    }
+}
+
+/// Tells the user `line` on standard error. That nobody may listen there is no reason to stop.
+pub(crate) fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "somatic: {line}");
+}
+
+/// Writes `text` to standard output. A reader that has gone is a normal end.
+fn print(text: &str) -> Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Error::failed(format!("cannot write: {e}")).at("standard output"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The body in the file `name`, or the bundled one of that name where there is no such file.
+fn load_body(name: &str) -> Result<Body> {
+    if !Path::new(name).exists() {
+        if let Some(bytes) = bundled::body(name) {
+            return Body::from_bytes(name, bytes);
+        }
+        if let Some(near) = nearest(name, bundled::BODIES) {
+            return Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name));
+        }
+    }
+    Body::load(name)
+}

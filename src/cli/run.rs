@@ -1,0 +1,311 @@
+//! `somatic run`: from a source through an engine to sinks.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use console::Term;
+use somatic::error::nearest;
+use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
+use somatic::source::{CsvSource, Source, SourceSpec};
+use somatic::{Agreement, BackendKind, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
+
+use super::feed::{Arrival, Feed, Manner};
+use super::live::{About, View};
+use super::{DONE, FAILED, LOST, load_body, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic run                                            the bundled touch on the bundled hand
+  somatic run --source touch.csv --sink percepts.ndjson  a recording, as fast as possible
+  somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
+  somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
+  robot-driver | somatic run --body robot.glb --source - | controller
+  somatic run --body mat --source night.csv --backend gpu --verify
+
+A frame on standard input is a line such as {\"t\":0.5,\"values\":{\"7\":12.0}}.
+At a terminal the touched fields are shown; into a pipe goes a line of JSON a frame.";
+
+/// Frames a call for recordings, unless told otherwise.
+const RECORDED_BATCH: usize = 256;
+
+/// Turn touch frames into percepts, live or from a recording.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand].
+    #[arg(long, value_name = "BODY")]
+    body: Option<String>,
+
+    /// Where frames come from: csv:FILE, or - for NDJSON on standard input [default: the bundled touch].
+    #[arg(long = "source", value_name = "SOURCE")]
+    sources: Vec<String>,
+
+    /// Where percepts go: ndjson:FILE, or - for NDJSON on standard output; may be given several times.
+    #[arg(long = "sink", value_name = "SINK")]
+    sinks: Vec<String>,
+
+    /// What computes: double precision, single precision on the CPU, shaders, or the faster of the last two by a
+    /// measurement.
+    #[arg(long, default_value = "auto", value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
+        .try_map(|name| name.parse::<BackendKind>()))]
+    backend: BackendKind,
+
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
+    outputs: Vec<Outputs>,
+
+    /// Only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be given several times.
+    #[arg(long, value_name = "GLOB")]
+    fields: Vec<String>,
+
+    /// List fields without contact too.
+    #[arg(long)]
+    all_fields: bool,
+
+    /// The robot's calibration, a TOML file; without one, pressures are the raw values.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Frames a call, at most: more is faster, fewer is sooner [default: 256 for recordings, 1 live].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    batch: Option<u32>,
+
+    /// Play a recording at this many times the speed it was made at [default: as fast as possible].
+    #[arg(long, value_name = "X")]
+    speed: Option<f64>,
+
+    /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    max_age: f64,
+
+    /// The longest time between two frames over which motion is measured, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    max_gap: f64,
+
+    /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
+    #[arg(long)]
+    verify: bool,
+
+    /// Show no table, progress or remarks.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+fn outputs_help() -> String {
+    let names: Vec<String> = Outputs::all().names().collect();
+    format!("Only these quantities: {} [default: all]", names.join(", "))
+}
+
+fn output(name: &str) -> Result<Outputs> {
+    Outputs::named(name).ok_or_else(|| {
+        let names: Vec<String> = Outputs::all().names().collect();
+        let hint = match nearest(name, names.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are {}", names.join(", ")),
+        };
+        Error::usage(format!("there is no output `{name}`; {hint}"))
+    })
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    arguments.check()?;
+    let sinks = arguments.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
+    let input = Input::named(arguments)?;
+    let body = load_body(arguments.body.as_deref().unwrap_or("hand"))?;
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let source = input.open(&ids, arguments.rate)?;
+
+    let view = View::choose(arguments.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
+    let at_terminal = view.is_table();
+    let speed = arguments.speed.or((input.is_bundled() && at_terminal).then_some(1.0));
+    let gather = input.is_recording() && speed.is_none();
+    let batch = arguments.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
+    let mut engine = Engine::new(&body, arguments.options(&ids, batch)?)?;
+    engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+    if arguments.backend == BackendKind::Auto && !arguments.quiet {
+        let (name, what, why) = engine.backend();
+        say(&format!("backend {name} ({what}): {why}"));
+    }
+
+    // From here on there is something to bring to a clean end.
+    let stop = stop_on_signal()?;
+    let sinks = if sinks.is_empty() && !at_terminal { vec![SinkSpec::Stdout] } else { sinks };
+    let names: Vec<FieldNames> =
+        engine.plan().fields().map(|(field, link)| FieldNames { field: field.into(), link: link.into() }).collect();
+    let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: arguments.all_fields };
+    let view = view.open(&about);
+    let sinks = sinks.iter().map(|sink| sink.open(&names, arguments.all_fields)).collect::<Result<_>>()?;
+    let feed = Feed::start(source, Manner { most: batch, gather, speed });
+    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement: arguments.verify.then(Agreement::default) };
+    let losses = pump.run(feed, &stop)?;
+    pump.finish(&losses)
+}
+
+impl Arguments {
+    fn check(&self) -> Result<()> {
+        if self.sources.len() > 1 {
+            return Err(Error::usage("this version reads one --source at a time; merge them, or run once for each"));
+        }
+        if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
+            return Err(Error::usage(format!(
+                "--speed {speed} is no speed; give a positive number, 1 for as recorded"
+            )));
+        }
+        if !(self.max_age.is_finite() && self.max_age >= 0.0) {
+            return Err(Error::usage(format!("--max-age {} is no time span; give seconds from 0", self.max_age)));
+        }
+        if self.max_gap.is_nan() || self.max_gap <= 0.0 {
+            return Err(Error::usage(format!("--max-gap {} is no time span; give seconds over 0", self.max_gap)));
+        }
+        Ok(())
+    }
+
+    fn options(&self, ids: &[u32], batch: usize) -> Result<Options> {
+        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::all());
+        let scene = Scene { outputs, fields: self.fields.clone(), max_age_s: self.max_age, max_gap_s: self.max_gap };
+        let calibration = self.calibration.as_ref().map(|path| Calibration::load(path, ids)).transpose()?;
+        Ok(Options { scene, calibration, backend: self.backend, batch })
+    }
+}
+
+/// What frames are read from.
+struct Input {
+    /// As messages call it.
+    name: String,
+    /// `None` is the bundled touch.
+    spec: Option<SourceSpec>,
+}
+
+impl Input {
+    fn named(arguments: &Arguments) -> Result<Self> {
+        let Some(text) = arguments.sources.first() else {
+            return match arguments.body.as_deref() {
+                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None }),
+                Some(body) => Err(Error::usage(format!(
+                    "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
+                ))),
+            };
+        };
+        let spec: SourceSpec = text.parse()?;
+        let name = match &spec {
+            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
+            SourceSpec::Stdin => "stdin".to_owned(),
+            _ => text.clone(),
+        };
+        let input = Self { name, spec: Some(spec) };
+        if arguments.speed.is_some() && !input.is_recording() {
+            return Err(Error::usage("--speed is for recordings; live frames come when they come"));
+        }
+        Ok(input)
+    }
+
+    fn is_bundled(&self) -> bool {
+        self.spec.is_none()
+    }
+
+    fn is_recording(&self) -> bool {
+        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
+    }
+
+    fn open(&self, ids: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
+        match &self.spec {
+            Some(spec) => spec.open(ids, rate_hz),
+            None => {
+                let length = Some(bundled::TOUCH.len() as u64);
+                Ok(Box::new(CsvSource::from_reader(&self.name, bundled::TOUCH, length, rate_hz)?))
+            }
+        }
+    }
+}
+
+/// Takes frames from a feed through the engine to whoever is to have the percepts.
+struct Pump {
+    engine: Engine,
+    sinks: Vec<Box<dyn Sink + Send>>,
+    view: View,
+    /// Whether somebody waits for every frame.
+    flush: bool,
+    agreement: Option<Agreement>,
+}
+
+impl Pump {
+    /// Runs until the source ends, the last reader has gone, or `stop` is set; gives what the source lost.
+    fn run(&mut self, mut feed: Feed, stop: &AtomicBool) -> Result<Vec<String>> {
+        let watched = self.view.is_table() || self.sinks.is_empty();
+        while !stop.load(Ordering::Relaxed) {
+            match feed.next(Duration::from_millis(40)) {
+                Some(Arrival::Frames(frames, progress)) => {
+                    let percepts = match &mut self.agreement {
+                        None => self.engine.process(&frames)?,
+                        Some(sum) => {
+                            let (percepts, agreement) = self.engine.process_and_compare(&frames)?;
+                            sum.merge(agreement);
+                            percepts
+                        }
+                    };
+                    self.view.see(percepts, progress);
+                    let mut open = Vec::with_capacity(self.sinks.len());
+                    for mut sink in self.sinks.drain(..) {
+                        let flow = sink.write(percepts)?;
+                        let flow = if flow == Flow::Open && self.flush { sink.flush()? } else { flow };
+                        match flow {
+                            Flow::Open => open.push(sink),
+                            Flow::Closed => sink.finish()?,
+                        }
+                    }
+                    self.sinks = open;
+                    if self.sinks.is_empty() && !watched {
+                        break;
+                    }
+                    feed.give_back(frames);
+                }
+                Some(Arrival::End(losses)) => return Ok(losses),
+                Some(Arrival::Failed(error)) => return Err(error),
+                None => {}
+            }
+            self.view.draw();
+        }
+        Ok(Vec::new())
+    }
+
+    /// Makes all outputs whole, says what is to be said, and gives the exit code.
+    fn finish(self, losses: &[String]) -> Result<u8> {
+        for sink in self.sinks {
+            sink.finish()?;
+        }
+        self.view.finish();
+        for loss in losses {
+            say(&format!("never processed: {loss}"));
+        }
+        if let Some(agreement) = self.agreement {
+            say(&format!("backend {} {agreement}", self.engine.backend().0));
+            if !agreement.holds() {
+                return Ok(FAILED);
+            }
+        }
+        Ok(if losses.is_empty() { DONE } else { LOST })
+    }
+}
+
+/// A flag that the first Ctrl-C or termination signal sets; the second ends the process at once.
+fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            for term in [Term::stdout(), Term::stderr()].into_iter().filter(Term::is_term) {
+                let _ = term.show_cursor();
+            }
+            std::process::exit(130);
+        }
+    })
+    .map_err(|e| Error::failed(format!("cannot listen for Ctrl-C: {e}")))?;
+    Ok(stop)
+}

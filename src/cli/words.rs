@@ -1,0 +1,109 @@
+//! Numbers as people read them.
+
+/// `value` with four significant digits, in at most nine characters.
+pub(super) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e6).contains(&size) {
+        return format!("{value:.1e}");
+    }
+    let decimals = (3 - size.log10().floor() as i32).clamp(0, 5) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// `metres` in millimetres, in at most six characters while that is under a kilometre.
+pub(super) fn millimetres(metres: f64) -> String {
+    let mm = metres * 1e3;
+    let text = match mm.abs() {
+        size if size < 999.95 => format!("{mm:.1}"),
+        size if size < 99999.5 => format!("{mm:.0}"),
+        _ => format!("{mm:.0e}"),
+    };
+    // Minus nothing is nothing.
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+/// `count` things: `1 frame`, `2 frames`.
+pub(super) fn count(count: u64, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}
+
+/// A time span as short as it can be understood.
+pub(super) fn span(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+/// `text` in exactly `width` columns. What does not fit loses its start, as the end of a name tells most.
+pub(super) fn fitted(text: &str, width: usize, right: bool) -> String {
+    let have = console::measure_text_width(text);
+    if have <= width {
+        let blank = " ".repeat(width - have);
+        return if right { blank + text } else { format!("{text}{blank}") };
+    }
+    let mut kept = String::new();
+    let mut used = 1;
+    for letter in text.chars().rev() {
+        used += console::measure_text_width(letter.encode_utf8(&mut [0; 4]));
+        if used > width {
+            break;
+        }
+        kept.insert(0, letter);
+    }
+    let short = if width == 0 { String::new() } else { format!("…{kept}") };
+    let blank = width.saturating_sub(console::measure_text_width(&short));
+    short + &" ".repeat(blank)
+}
+
+/// As much of the start of `text` as `width` columns show.
+pub(super) fn clipped(text: &str, width: usize) -> String {
+    if console::measure_text_width(text) <= width {
+        return text.to_owned();
+    }
+    let mut kept = String::new();
+    for letter in text.chars() {
+        if console::measure_text_width(&kept) + console::measure_text_width(letter.encode_utf8(&mut [0; 4])) >= width {
+            break;
+        }
+        kept.push(letter);
+    }
+    if width == 0 { kept } else { kept + "…" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_keep_four_digits() {
+        let texts = [0.0, 1.0, 0.0123456, -12.345, 123456.0, 999_999.9, 1e9, -1e-30].map(number);
+        assert_eq!(texts, ["0", "1.000", "0.01235", "-12.35", "123456", "1000000", "1.0e9", "-1.0e-30"]);
+        assert_eq!(
+            [0.0123, -0.00001, -0.9999, 12.0, -99.0].map(millimetres),
+            ["12.3", "0.0", "-999.9", "12000", "-99000"]
+        );
+    }
+
+    #[test]
+    fn text_is_fitted_by_what_a_terminal_shows() {
+        assert_eq!(fitted("palm", 6, false), "palm  ");
+        assert_eq!(fitted("12", 4, true), "  12");
+        assert_eq!(fitted("hand/palm", 6, false), "…/palm");
+        assert_eq!(fitted("掌掌掌", 4, false), "…掌 ");
+        assert_eq!(fitted("palm", 0, false), "");
+        assert_eq!(["palm", "fingers"].map(|text| clipped(text, 5)), ["palm", "fing…"]);
+        assert_eq!((clipped("掌掌掌", 4), clipped("palm", 0)), ("掌…".into(), String::new()));
+    }
+
+    #[test]
+    fn spans_and_counts_read_well() {
+        assert_eq!([0.04, 59.6, 130.0, 9000.0].map(span), ["0.0 s", "60 s", "2 min", "2.5 h"]);
+        assert_eq!((count(1, "frame"), count(0, "frame")), ("1 frame".into(), "0 frames".into()));
+    }
+}

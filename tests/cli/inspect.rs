@@ -1,0 +1,75 @@
+//! `somatic inspect`.
+
+use serde_json::{Value, json};
+
+use super::{done, fails, file, output, text_of};
+
+/// A body without taxels and fields.
+const BARE: &str = r#"{"asset":{"version":"2.0"},"nodes":[{"name":"arm"}],"scenes":[{"nodes":[0]}]}"#;
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn json_has_the_keys_that_others_lean_on() {
+    let body: Value = serde_json::from_str(&done(&["inspect", "hand", "--json"])).unwrap();
+    assert_eq!(keys(&body)[..3], ["links", "taxels", "fields"]);
+    assert_eq!(body["links"], json!(["hand", "thumb", "index", "middle", "ring"]));
+    let taxels = body["taxels"].as_array().unwrap();
+    assert_eq!(taxels.len(), 40);
+    for taxel in taxels {
+        assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality"]);
+        assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
+    }
+    let (mut charted, mut chartless) = (0, 0);
+    for field in body["fields"].as_array().unwrap() {
+        assert_eq!(keys(field)[..5], ["name", "parent", "anchor", "members", "chart"]);
+        let has_chart = !field["chart"].is_null();
+        if has_chart {
+            charted += 1;
+            assert_eq!(keys(&field["chart"]), ["kind", "origin", "u", "v", "normal", "distortion"]);
+            assert_eq!(field["chart"]["kind"], "plane");
+        } else {
+            chartless += 1;
+            assert!(field["no_chart"].as_str().unwrap().contains("links"));
+        }
+        for member in field["members"].as_array().unwrap() {
+            assert_eq!(keys(member), if has_chart { vec!["taxel", "weight", "uv"] } else { vec!["taxel", "weight"] });
+        }
+    }
+    assert_eq!((charted, chartless), (11, 2));
+}
+
+#[test]
+fn a_report_names_links_fields_and_why_a_chart_is_missing() {
+    let text = done(&["inspect", "humanoid"]);
+    for words in ["960", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert!(!text.contains('\x1b'));
+}
+
+#[test]
+fn findings_are_told_and_count_only_where_that_is_asked_for() {
+    let (_folder, path) = file("bare.gltf", BARE);
+    let text = done(&["inspect", text_of(&path)]);
+    assert!(text.contains("no taxels") && text.contains("no fields"), "{text}");
+    let strict = output(&["inspect", text_of(&path), "--strict", "--json"]);
+    assert_eq!(strict.status.code(), Some(1));
+    let body: Value = serde_json::from_slice(&strict.stdout).unwrap();
+    assert!(!body["findings"].as_array().unwrap().is_empty());
+    assert_eq!((&body["taxels"], &body["fields"]), (&json!([]), &json!([])));
+    assert!(fails(1, &["run", "--body", text_of(&path), "--source", "-"]).contains("no taxels"));
+
+    assert_eq!(output(&["inspect", "mat", "--strict"]).status.code(), Some(0), "nothing is odd about the mat");
+    assert!(done(&["inspect", "hand"]).contains("under 3 taxels, too few for orientation: hand/side"));
+}
+
+#[test]
+fn a_file_goes_before_a_bundled_body_of_its_name() {
+    let (folder, _) = file("hand", BARE);
+    let output = super::somatic(&["inspect", "hand", "--json"]).current_dir(folder.path()).output().unwrap();
+    let body: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(body["links"], json!(["arm"]));
+}

@@ -1,0 +1,84 @@
+//! `somatic run` at a terminal: a pseudo-terminal that `script` of util-linux makes.
+#![cfg(unix)]
+
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::{file, text_of};
+
+const BINARY: &str = env!("CARGO_BIN_EXE_somatic");
+
+/// What a terminal gets to see of `command`, and its exit code; `typed` is typed after a second.
+fn seen(command: &str, typed: &str) -> Option<(String, Option<i32>)> {
+    let there = Command::new("script").arg("--version").output().is_ok_and(|o| o.stdout.starts_with(b"script"));
+    if !there {
+        eprintln!("SKIPPED: there is no `script` of util-linux to make a terminal");
+        return None;
+    }
+    let mut child = Command::new("script")
+        .args(["-qec", &format!("stty cols 100 rows 30; {command}"), "/dev/null"])
+        .env("TERM", "xterm-256color")
+        .env_remove("NO_COLOR")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    if !typed.is_empty() {
+        std::thread::sleep(Duration::from_secs(1));
+        stdin.write_all(typed.as_bytes()).unwrap();
+    }
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    Some((String::from_utf8_lossy(&output.stdout).into_owned(), output.status.code()))
+}
+
+#[test]
+fn a_table_is_drawn_and_a_summary_stays() {
+    let Some((text, code)) = seen(&format!("{BINARY} run --backend cpu --speed 8"), "") else { return };
+    assert_eq!(code, Some(0), "{text}");
+    for part in ["\x1b[?25l", "hand ← bundled touch", "━", " left", "hand/back", "█", "aniso"] {
+        assert!(text.contains(part), "{part:?}: {text}");
+    }
+    let (_, after) = text.rsplit_once("\x1b[?25h").expect("the cursor comes back");
+    assert!(after.contains("280 frames over 5.58 s") && after.contains("1 field never touched"), "{after}");
+    assert!(!text.contains(r#"{"t""#), "no JSON into a table");
+}
+
+#[test]
+fn without_colours_there_are_none() {
+    let Some((text, _)) = seen(&format!("NO_COLOR=1 {BINARY} run --backend cpu --speed 20"), "") else { return };
+    assert!(text.contains("hand/back") && !text.contains("\x1b[36m") && !text.contains("\x1b[2m"), "{text}");
+}
+
+#[test]
+fn ctrl_c_ends_a_table_with_its_summary_and_a_cursor() {
+    let Some((text, code)) = seen(&format!("{BINARY} run --backend cpu --speed 0.2"), "\x03") else { return };
+    assert_eq!(code, Some(0), "{text}");
+    let (_, after) = text.rsplit_once("\x1b[?25h").expect("the cursor comes back");
+    assert!(after.contains("frames over") && !after.contains("280 frames"), "{after}");
+}
+
+#[test]
+fn an_error_takes_the_table_away_first() {
+    let (_folder, path) = file("touch.csv", "t,4\n0,1\n0.3,oops\n");
+    let command = format!("{BINARY} run --backend cpu --speed 1 --source {}", text_of(&path));
+    let Some((text, code)) = seen(&command, "") else { return };
+    assert_eq!(code, Some(1), "{text}");
+    let (_, after) = text.rsplit_once("\x1b[?25h").expect("the cursor comes back");
+    assert!(after.contains("error") && after.contains("line 3") && after.contains("\x1b[31m"), "{after}");
+}
+
+#[test]
+fn with_its_output_elsewhere_a_recording_shows_a_bar_unless_quiet() {
+    let (folder, _) = file("x", "");
+    let out = folder.path().join("out");
+    let command = |more| format!("{BINARY} run --backend cpu --speed 8 {more} > {}", text_of(&out));
+    let Some((text, code)) = seen(&command(""), "") else { return };
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains(" %") && text.contains("━") && !text.contains("hand/back"), "{text}");
+    assert_eq!(std::fs::read_to_string(&out).unwrap().lines().count(), 280);
+    let Some((text, _)) = seen(&command("--quiet"), "") else { return };
+    assert_eq!(text, "");
+}

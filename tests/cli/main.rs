@@ -1,0 +1,107 @@
+//! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
+
+mod inspect;
+mod live;
+mod run;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// The command, with nothing around it that colours its output.
+fn somatic(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_somatic"));
+    command.args(arguments).stdin(Stdio::null());
+    for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
+        command.env_remove(name);
+    }
+    command
+}
+
+fn output(arguments: &[&str]) -> Output {
+    somatic(arguments).output().unwrap()
+}
+
+/// Standard output of a run that must succeed.
+fn done(arguments: &[&str]) -> String {
+    let output = output(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Standard error of a run that must end with `code`.
+fn fails(code: i32, arguments: &[&str]) -> String {
+    let output = output(arguments);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", stderr(&output));
+    stderr(&output)
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Lines of JSON.
+fn frames(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"))).collect()
+}
+
+/// Waits for `child`, which must end soon, and gives its exit code.
+fn code_of(child: &mut Child) -> Option<i32> {
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if start.elapsed() > Duration::from_secs(20) {
+            child.kill().unwrap();
+            panic!("the command does not end");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A folder with a file `name` that holds `text`, and the file's path.
+fn file(name: &str, text: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::File::create(&path).unwrap().write_all(text.as_bytes()).unwrap();
+    (folder, path)
+}
+
+fn text_of(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// The names of the files in `folder`.
+fn files_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_teaches_and_names_everything() {
+    let help = done(&["--help"]);
+    for word in ["run", "inspect", "completions", "Examples:", "Exit codes"] {
+        assert!(help.contains(word), "{word}: {help}");
+    }
+    let help = done(&["run", "--help"]);
+    for word in ["--source", "--verify", "Examples:", "centroid", "anisotropy", "Hz", "seconds"] {
+        assert!(help.contains(word), "{word}: {help}");
+    }
+    assert_eq!(done(&["--version"]), format!("somatic {}\n", env!("CARGO_PKG_VERSION")));
+    assert!(fails(2, &[]).contains("Usage"));
+}
+
+#[test]
+fn completions_are_printed_for_shells() {
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(done(&["completions", shell]).contains("all-fields"), "{shell}");
+    }
+    fails(2, &["completions", "fsh"]);
+}

@@ -1,0 +1,360 @@
+//! `somatic run` without a terminal.
+
+use std::collections::BTreeSet;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::{code_of, done, fails, file, files_in, frames, output, somatic, stderr, text_of};
+
+/// One taxel of the bundled hand's palm, pressed in two of three frames.
+const PRESSED: &str = "t,4\n0,0\n0.1,5\n0.2,7\n";
+
+fn has_adapters() -> bool {
+    #[cfg(feature = "gpu")]
+    let there = !somatic::backend::gpu::adapters().is_empty();
+    #[cfg(not(feature = "gpu"))]
+    let there = false;
+    if !there {
+        eprintln!("SKIPPED: the gpu backend, as no driver answers");
+    }
+    there
+}
+
+fn fields(frame: &Value) -> &Vec<Value> {
+    frame["fields"].as_array().unwrap()
+}
+
+#[test]
+fn without_arguments_the_bundled_touch_comes_out_as_lines_of_json() {
+    let output = output(&["run"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(stderr(&output).matches("somatic: backend ").count(), 1, "{}", stderr(&output));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(!text.contains('\x1b'));
+    let frames = frames(&text);
+    assert_eq!(frames.len(), somatic::bundled::TOUCH.iter().filter(|&&byte| byte == b'\n').count() - 1);
+    let mut keys = BTreeSet::new();
+    for (number, frame) in frames.iter().enumerate() {
+        assert_eq!(frame["frame"], number);
+        assert!(frame["t"].is_number());
+        for field in fields(frame) {
+            assert_eq!(field["contact"], true);
+            keys.extend(field.as_object().unwrap().keys().cloned());
+        }
+    }
+    for key in [
+        "field",
+        "link",
+        "total",
+        "peak",
+        "active",
+        "area",
+        "centroid",
+        "position",
+        "normal",
+        "orientation",
+        "axis",
+        "anisotropy",
+        "flags",
+    ] {
+        assert!(keys.contains(key), "{key} in {keys:?}");
+    }
+}
+
+#[test]
+fn fields_and_outputs_are_those_asked_for() {
+    let run = ["run", "--backend", "cpu"];
+    let all = done(&[&run[..], &["--all-fields"]].concat());
+    assert!(frames(&all).iter().all(|frame| fields(frame).len() == 13));
+    assert!(all.contains(r#""contact":false"#));
+
+    let some = done(&[&run[..], &["--all-fields", "--fields", "hand/palm", "--fields", "hand/palm/ulnar*"]].concat());
+    let some = frames(&some);
+    let named: Vec<&Value> = fields(&some[0]).iter().map(|field| &field["field"]).collect();
+    assert_eq!(named, ["hand/palm", "hand/palm/ulnar_distal", "hand/palm/ulnar_proximal"]);
+    assert!(fails(2, &[&run[..], &["--fields", "hand/plam"]].concat()).contains("did you mean `hand/palm`?"));
+
+    let one = done(&[&run[..], &["--outputs", "centroid"]].concat());
+    assert!(one.contains("centroid") && !one.contains("total") && !one.contains("position"));
+    let two = done(&[&run[..], &["--outputs", "total,axis"]].concat());
+    assert!(two.contains("total") && two.contains("axis") && !two.contains("centroid"));
+}
+
+#[test]
+fn backends_give_the_same_percepts() {
+    let run = |backend| frames(&done(&["run", "--backend", backend, "--all-fields"]));
+    let right = run("reference");
+    let mut others = vec![("cpu", run("cpu"))];
+    if has_adapters() {
+        others.push(("gpu", run("gpu")));
+    }
+    for (name, got) in others {
+        assert_eq!(right.len(), got.len());
+        let mut compared = 0;
+        for (a, b) in right.iter().zip(&got) {
+            for (a, b) in fields(a).iter().zip(fields(b)) {
+                assert_eq!((&a["field"], &a["contact"], &a["active"]), (&b["field"], &b["contact"], &b["active"]));
+                for key in ["total", "peak"] {
+                    if let (Some(a), Some(b)) = (a[key].as_f64(), b[key].as_f64()) {
+                        assert!((a - b).abs() <= 1e-5 * a.abs(), "{name}: {key} {a} {b}");
+                        compared += 1;
+                    }
+                }
+                if let (Some(a), Some(b)) = (a["centroid"].as_array(), b["centroid"].as_array()) {
+                    for (a, b) in a.iter().zip(b) {
+                        assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-7, "{name}: centroid {a} {b}");
+                        compared += 1;
+                    }
+                }
+            }
+        }
+        assert!(compared > 1000, "{name}: {compared}");
+    }
+}
+
+#[test]
+fn verify_reports_how_the_backend_compares() {
+    let output = output(&["run", "--backend", "cpu", "--verify"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let report = stderr(&output);
+    assert!(report.contains("backend cpu agrees with the reference in 3640 of 3640 percepts"), "{report}");
+    assert!(report.contains("orientation"), "{report}");
+    assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 280);
+}
+
+#[test]
+fn the_cut_into_batches_changes_nothing() {
+    let run = |batch| done(&["run", "--backend", "cpu", "--batch", batch]);
+    let whole = run("1000");
+    assert!(run("1") == whole && run("7") == whole);
+}
+
+#[test]
+fn what_makes_no_sense_is_wrong_usage() {
+    assert!(fails(2, &["run", "--outputs", "centriod"]).contains("did you mean `centroid`?"));
+    assert!(fails(2, &["run", "--outputs", "banana"]).contains("total, peak"));
+    assert!(fails(2, &["run", "--nonsense"]).contains("--nonsense"));
+    assert!(fails(2, &["run", "--backend", "gpo"]).contains("'gpu'"));
+    assert!(fails(2, &["run", "--body", "mat"]).contains("needs a --source"));
+    assert!(fails(2, &["run", "--source", "a.csv", "--source", "b.csv"]).contains("one --source"));
+    assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
+    assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
+    assert!(fails(2, &["run", "--max-age", "nan"]).contains("--max-age"));
+    assert!(fails(2, &["run", "--rate", "9"]).contains("--rate"));
+    assert!(fails(2, &["run", "--batch", "0"]).contains("--batch"));
+    assert!(fails(2, &["run", "--sink", "json:x"]).contains("did you mean `ndjson:`?"));
+}
+
+#[test]
+fn what_is_not_there_is_named_in_one_line() {
+    for arguments in [
+        ["run", "--body", "no/such.glb", "--source", "-"],
+        ["run", "--source", "no/such.csv", "--backend", "cpu"],
+        ["run", "--calibration", "no/such.toml", "--backend", "cpu"],
+        ["run", "--sink", "no/such.ndjson", "--backend", "cpu"],
+    ] {
+        let error = fails(1, &arguments);
+        assert!(error.starts_with("somatic: error: no/such."), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+    assert!(fails(1, &["inspect", "humanoit"]).contains("did you mean the bundled body `humanoid`?"));
+}
+
+#[test]
+fn ids_that_the_body_does_not_have_are_told_with_the_file() {
+    let (_folder, path) = file("touch.csv", "t,4,77\n0,1,2\n");
+    let error = fails(1, &["run", "--backend", "cpu", "--source", text_of(&path)]);
+    let start = format!("somatic: error: {}: header: there is a taxel id 77, which", path.display());
+    assert!(error.starts_with(&start), "{error}");
+    let (_folder, path) = file("touch.csv", "t,4,4\n0,1,2\n");
+    assert!(fails(1, &["run", "--source", text_of(&path)]).contains("touch.csv: taxel 4 heads columns 2 and 3"));
+}
+
+#[test]
+fn an_error_midway_leaves_no_output_behind() {
+    let (folder, path) = file("touch.csv", "t,4\n0,1\n0.1,2\n0.2\n0.3,4\n");
+    let out = folder.path().join("out.ndjson");
+    let error = fails(1, &["run", "--backend", "cpu", "--source", text_of(&path), "--sink", text_of(&out)]);
+    assert!(error.contains("touch.csv: line 4: 1 values where the header has 2"), "{error}");
+    assert_eq!(files_in(folder.path()), ["touch.csv"]);
+}
+
+#[test]
+fn a_ragged_end_is_a_loss_and_the_rest_is_done() {
+    let (folder, path) = file("touch.csv", "t,4,5\n0,1,0\n0.1,2,0\n0.2,3");
+    let out = folder.path().join("out.ndjson");
+    let lost = fails(3, &["run", "--backend", "cpu", "--source", text_of(&path), "--sink", text_of(&out)]);
+    assert!(lost.contains("never processed") && lost.contains("touch.csv: line 4: last row truncated"), "{lost}");
+    assert_eq!(frames(&std::fs::read_to_string(&out).unwrap()).len(), 2);
+    assert_eq!(files_in(folder.path()), ["out.ndjson", "touch.csv"]);
+}
+
+#[test]
+fn several_sinks_get_the_same_and_a_rate_stands_in_for_times() {
+    let (folder, path) = file("touch.csv", "4\n1\n2\n");
+    let out = folder.path().join("out.ndjson");
+    let text = done(&[
+        "run",
+        "--backend",
+        "cpu",
+        "--source",
+        text_of(&path),
+        "--rate",
+        "10",
+        "--sink",
+        "-",
+        "--sink",
+        text_of(&out),
+    ]);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), text);
+    assert_eq!(frames(&text)[1]["t"], 0.1);
+    assert!(fails(2, &["run", "--source", text_of(&path)]).contains("--rate"));
+}
+
+#[test]
+fn calibration_and_age_reach_the_percepts() {
+    let (_folder, calibration) = file("robot.toml", "[all]\nbaseline = 1\ngain = 10\n");
+    let (_other, path) = file("touch.csv", "t,4\n0,3\n0.1,\n0.9,\n");
+    let run = ["run", "--backend", "cpu", "--all-fields", "--fields", "hand/palm", "--source", text_of(&path)];
+    let totals = |more: &[&str]| -> Vec<f64> {
+        let frames = frames(&done(&[&run[..], more].concat()));
+        frames.iter().map(|frame| frame["fields"][0]["total"].as_f64().unwrap_or(0.0)).collect()
+    };
+    assert_eq!(totals(&["--calibration", text_of(&calibration)]), [20.0, 0.0, 0.0]);
+    assert_eq!(totals(&["--max-age", "0.5"]), [3.0, 3.0, 0.0]);
+}
+
+#[test]
+fn speed_is_kept() {
+    let (_folder, path) = file("touch.csv", PRESSED);
+    let start = std::time::Instant::now();
+    done(&["run", "--backend", "cpu", "--source", text_of(&path), "--speed", "0.4"]);
+    let seconds = start.elapsed().as_secs_f64();
+    assert!((0.5..5.0).contains(&seconds), "{seconds}");
+}
+
+#[test]
+fn a_reader_that_goes_ends_the_run_in_silence() {
+    for arguments in [&["run", "--backend", "cpu", "--all-fields"][..], &["inspect", "humanoid", "--json"]] {
+        let mut child = somatic(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut reader = BufReader::new(child.stdout.take().unwrap());
+        reader.fill_buf().unwrap();
+        drop(reader);
+        assert_eq!(code_of(&mut child), Some(0));
+        assert_eq!(stderr(&child.wait_with_output().unwrap()), "");
+    }
+}
+
+/// A run that reads from a pipe, and the lines it has written.
+struct Piped {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Piped {
+    fn start(arguments: &[&str]) -> Self {
+        let mut command = somatic(&["run", "--backend", "cpu", "--source", "-"]);
+        let mut child = command
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (sender, lines) = channel();
+        let stdout: ChildStdout = child.stdout.take().unwrap();
+        std::thread::spawn(move || {
+            BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
+        });
+        Self { child, lines }
+    }
+
+    fn send(&mut self, line: &str) {
+        writeln!(self.child.stdin.as_mut().unwrap(), "{line}").unwrap();
+    }
+
+    /// The next line, which must come while the pipe stays open.
+    fn line(&self) -> Value {
+        let line = self.lines.recv_timeout(Duration::from_secs(20)).expect("a line at once");
+        serde_json::from_str(&line).unwrap()
+    }
+}
+
+#[test]
+fn every_live_frame_is_answered_at_once() {
+    let mut run = Piped::start(&[]);
+    for number in 0..5 {
+        run.send(&format!(r#"{{"t":{number},"values":{{"4":{}}}}}"#, number + 1));
+        let answer = run.line();
+        assert_eq!(answer["frame"], number);
+        assert_eq!(answer["fields"][0]["total"].as_f64(), Some(f64::from(number + 1)));
+    }
+    drop(run.child.stdin.take());
+    assert_eq!(code_of(&mut run.child), Some(0));
+}
+
+#[test]
+fn a_pose_puts_positions_into_the_world() {
+    let mut run = Piped::start(&["--fields", "hand/palm"]);
+    run.send(r#"{"t":0,"values":{"4":1}}"#);
+    run.send(r#"{"t":1,"values":{"4":1},"pose":{"hand":[10,20,30,0,0,0,1]}}"#);
+    let (still, posed) = (run.line(), run.line());
+    let place = |line: &Value| -> Vec<f64> {
+        line["fields"][0]["position"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    assert_eq!((&still["fields"][0]["link"], &posed["fields"][0]["link"]), (&"hand".into(), &"world".into()));
+    for (axis, offset) in [10.0, 20.0, 30.0].into_iter().enumerate() {
+        assert!((place(&posed)[axis] - place(&still)[axis] - offset).abs() < 1e-9);
+    }
+    drop(run.child.stdin.take());
+    assert_eq!(code_of(&mut run.child), Some(0));
+}
+
+#[test]
+fn a_bad_live_frame_names_its_line_and_keeps_what_was_answered() {
+    let mut run = Piped::start(&[]);
+    run.send(r#"{"t":0,"values":{"4":1}}"#);
+    run.line();
+    run.send(r#"{"t":0,"values":{"5":oops}}"#);
+    assert_eq!(code_of(&mut run.child), Some(1));
+    let error = stderr(&run.child.wait_with_output().unwrap());
+    assert!(error.starts_with("somatic: error: stdin: line 2"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_brings_a_run_that_waits_for_input_to_a_clean_end() {
+    for signal in ["-INT", "-TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out.ndjson");
+        let mut run = Piped::start(&["--sink", "-", "--sink", text_of(&out)]);
+        for t in 0..2 {
+            run.send(&format!(r#"{{"t":{t},"values":{{"4":1}}}}"#));
+            run.line();
+        }
+        assert_eq!(files_in(folder.path()), ["out.ndjson.part"]);
+        assert!(Command::new("kill").args([signal, &run.child.id().to_string()]).status().unwrap().success());
+        // Its standard input is still open.
+        assert_eq!(code_of(&mut run.child), Some(0), "{signal}");
+        assert_eq!(files_in(folder.path()), ["out.ndjson"]);
+        assert_eq!(frames(&std::fs::read_to_string(&out).unwrap()).len(), 2);
+        assert_eq!(stderr(&run.child.wait_with_output().unwrap()), "");
+    }
+}
+
+#[test]
+fn auto_says_once_what_it_chose_and_quiet_says_nothing() {
+    let output = output(&["run"]);
+    let said: Vec<String> =
+        stderr(&output).lines().filter(|line| line.starts_with("somatic:")).map(str::to_owned).collect();
+    assert_eq!(said.len(), 1, "{said:?}");
+    let why = if has_adapters() { "measured on this plan, 256 frames a call: cpu " } else { "no GPU" };
+    assert!(said[0].starts_with("somatic: backend ") && said[0].contains(why), "{said:?}");
+    let quiet = super::output(&["run", "--quiet"]);
+    assert!(!stderr(&quiet).contains("somatic:"));
+    assert_eq!(quiet.stdout.iter().filter(|&&byte| byte == b'\n').count(), 280);
+}

@@ -1,0 +1,135 @@
+//! Every command that the documentation shows is run, as written, in a folder with what a reader would have there.
+#![cfg(feature = "cli")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
+const RUN_ELSEWHERE: [&str; 8] = [
+    "cargo run --release -- run",
+    "cargo run --release --example embed",
+    "cargo run --example bodies",
+    "cargo run --example bodies -- --check",
+    "cargo install --path .",
+    "tests/run",
+    "tests/run [arguments for cargo test]",
+    ".ci/run",
+];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The lines of all `sh` blocks of a page, comments cut off.
+fn commands(page: &str) -> Vec<String> {
+    let mut inside = false;
+    let mut commands = Vec::new();
+    for line in page.lines() {
+        match line.trim() {
+            "```sh" => inside = true,
+            "```" => inside = false,
+            command if inside && !command.is_empty() && !command.starts_with('#') => {
+                commands.push(command.split("  #").next().unwrap().trim().to_owned());
+            }
+            _ => {}
+        }
+    }
+    commands
+}
+
+fn pages() -> Vec<PathBuf> {
+    let mut pages = vec![root().join("README.md"), root().join("CONTRIBUTING.md"), root().join("bodies/README.md")];
+    for entry in std::fs::read_dir(root().join("docs")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "md") {
+            pages.push(path);
+        }
+    }
+    pages
+}
+
+/// A folder such as a reader works in: the project's bodies and docs, and a recording of their own for the mat.
+fn workplace() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["bodies", "docs", "examples"] {
+        let (from, to) = (root().join(name), folder.path().join(name));
+        std::fs::create_dir(&to).unwrap();
+        copy(&from, &to);
+    }
+    let ids: Vec<String> = (0..2048).map(|id| id.to_string()).collect();
+    let mut recording = format!("t,{}\n", ids.join(","));
+    for frame in 0..5 {
+        let row: Vec<String> = (0..2048).map(|id| ((id * 31 + frame * 17) % 300).to_string()).collect();
+        recording += &format!("{frame},{}\n", row.join(","));
+    }
+    std::fs::write(folder.path().join("recording.csv"), recording).unwrap();
+    folder
+}
+
+fn copy(from: &Path, to: &Path) {
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let to = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            std::fs::create_dir(&to).unwrap();
+            copy(&entry.path(), &to);
+        } else {
+            std::fs::copy(entry.path(), to).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_command_that_is_shown_runs() {
+    let program = Path::new(env!("CARGO_BIN_EXE_somatic"));
+    let paths = std::env::join_paths(
+        std::iter::once(program.parent().unwrap().to_path_buf())
+            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
+    )
+    .unwrap();
+    let mut run = 0;
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        let folder = workplace();
+        for command in commands(&text) {
+            if RUN_ELSEWHERE.contains(&command.as_str()) {
+                continue;
+            }
+            let output = Command::new("sh")
+                .args(["-ec", &command])
+                .current_dir(folder.path())
+                .env("PATH", &paths)
+                .output()
+                .unwrap();
+            assert!(
+                output.status.success(),
+                "{}: `{command}` ended with {}\n{}",
+                page.display(),
+                output.status,
+                String::from_utf8_lossy(&output.stderr)
+            );
+            run += 1;
+        }
+    }
+    assert!(run >= 6, "only {run} commands were found in the documentation");
+}
+
+#[test]
+fn commands_are_found_where_they_stand() {
+    let page = "text\n```sh\nsomatic run   # why\n\n# no\nls\n```\nsomatic no\n```json\n{}\n```\n";
+    assert_eq!(commands(page), ["somatic run", "ls"]);
+}
+
+#[test]
+fn every_link_within_the_project_leads_somewhere() {
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            if link.contains("://") || link.starts_with('#') {
+                continue;
+            }
+            let target = page.parent().unwrap().join(link.split('#').next().unwrap());
+            assert!(target.exists(), "{}: [{link}] leads nowhere", page.display());
+        }
+    }
+}
