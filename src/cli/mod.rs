@@ -6,6 +6,7 @@ mod inspect;
 mod live;
 mod run;
 mod screen;
+mod simulate;
 mod words;
 
 use std::io::{self, Write as _};
@@ -29,6 +30,7 @@ Examples:
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic inspect robot.glb                     what taxels and fields a body has
+  somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
 
@@ -47,6 +49,7 @@ pub(crate) struct Arguments {
 enum Command {
     Run(run::Arguments),
     Inspect(inspect::Arguments),
+    Simulate(simulate::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -55,6 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     match &arguments.command {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
+        Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }
 }

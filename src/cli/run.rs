@@ -10,7 +10,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use console::Term;
 use somatic::error::nearest;
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
-use somatic::source::{CsvSource, Source, SourceSpec};
+use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
 use somatic::{Agreement, BackendKind, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
 
 use super::feed::{Arrival, Feed, Manner};
@@ -36,11 +36,12 @@ const RECORDED_BATCH: usize = 256;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand].
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand, or a
+    /// simulation's own].
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
 
-    /// Where frames come from: csv:FILE, or - for NDJSON on standard input [default: the bundled touch].
+    /// Where frames come from: csv:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     sources: Vec<String>,
 
@@ -118,7 +119,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     arguments.check()?;
     let sinks = arguments.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(arguments)?;
-    let body = load_body(arguments.body.as_deref().unwrap_or("hand"))?;
+    let body = match (&arguments.body, &input.spec) {
+        (Some(body), _) => load_body(body)?,
+        // A simulation says what body it is on.
+        (None, Some(SourceSpec::Sim(path))) => SimulatedSource::open(path)?.body().clone(),
+        (None, _) => load_body("hand")?,
+    };
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let source = input.open(&ids, arguments.rate)?;
 

@@ -3,6 +3,7 @@
 mod inspect;
 mod live;
 mod run;
+mod simulate;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

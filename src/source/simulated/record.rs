@@ -64,9 +64,11 @@ fn write(
         row.clear();
         row.push(frame.t_s.to_string());
         // The shortest words that read back as the same single-precision value.
-        row.extend(
-            frame.values.iter().map(|value| value.number().map_or("nan".to_owned(), |v| (v as f32).to_string())),
-        );
+        row.extend(frame.values.iter().map(|value| match value.number() {
+            Some(value) => (value as f32).to_string(),
+            None if value.is_missing() => String::new(),
+            None => "nan".to_owned(),
+        }));
         frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
         for touch in simulation.truth() {
             truth.write_record(truth_row(frame.t_s, number, touch)).map_err(|e| failed(truth_path, e))?;
