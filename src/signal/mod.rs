@@ -2,8 +2,10 @@
 
 mod calibration;
 mod frame;
+mod fsr;
 mod intake;
 
 pub use calibration::{Calibration, Checks, TaxelCalibration};
 pub use frame::{Frame, Pose, RawValue};
+pub use fsr::FsrCircuit;
 pub(crate) use intake::Intake;

@@ -1,13 +1,15 @@
 //! Sources: where frames come from.
 //!
-//! A source knows the taxel ids it delivers and nothing of bodies or engines.
+//! A source knows the taxel ids it delivers and nothing of engines; of bodies only the simulated one does.
 
 mod csv;
 mod ndjson;
+mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
 pub use ndjson::NdjsonSource;
+pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 
 use crate::error::Result;

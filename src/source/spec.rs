@@ -4,7 +4,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{CsvSource, NdjsonSource, Source};
+use super::{CsvSource, NdjsonSource, SimulatedSource, Source};
 use crate::error::{Error, Result, nearest};
 
 const FORMS: &str = "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, or - for NDJSON on standard input";
@@ -84,7 +84,7 @@ impl SourceSpec {
                 Ok(Box::new(NdjsonSource::new("stdin", reader, taxels.to_vec())))
             }
             Self::Mcap(path) => not_yet("MCAP", path.display().to_string()),
-            Self::Sim(path) => not_yet("simulated touches", path.display().to_string()),
+            Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
             Self::Serial { port, .. } => not_yet(&format!("serial lines ({})", ports()), port.clone()),
         }
     }
@@ -139,7 +139,7 @@ mod tests {
         let why = |text: &str| text.parse::<SourceSpec>().unwrap().open(&[1], None).err().unwrap().to_string();
         assert!(why("serial:/dev/ttyX").starts_with("/dev/ttyX: this version does not read serial lines"));
         assert!(why("mcap:a.mcap").contains("does not read MCAP yet"));
-        assert!(why("sim:a.toml").contains("does not read simulated touches yet"));
+        assert!(SourceSpec::Sim("no/such.toml".into()).open(&[1], None).err().unwrap().is_not_found());
         assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());
         assert!(SourceSpec::Csv("no/such.csv".into()).open(&[1], None).err().unwrap().is_not_found());
     }

@@ -12,4 +12,5 @@ mod motion;
 mod properties;
 mod real;
 mod recordings;
+mod simulated;
 mod touch;

@@ -1,0 +1,310 @@
+//! Simulated touches: indenters moved over a body's surface, the frames its sensors then deliver, and the truth.
+//!
+//! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine: nothing
+//! depends on the clock, on the order in which frames are asked for, or on a machine's own arithmetic.
+
+mod contact;
+mod file;
+mod noise;
+mod path;
+mod profile;
+mod record;
+mod sensor;
+mod sensors;
+mod setup;
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::path::Path;
+
+use glam::DVec3;
+
+pub use record::write_recording;
+
+use self::contact::{Footprint, Skin};
+use self::file::{File, Text};
+use self::sensor::{Reading, Sensor};
+use self::setup::{Setup, Touch};
+use super::Source;
+use crate::body::{Body, Modality, Taxel};
+use crate::bundled;
+use crate::error::{Error, Result};
+use crate::field::FieldSet;
+use crate::signal::{Frame, RawValue};
+
+/// What is true of one touch in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Index of the touch in the file.
+    pub touch: usize,
+    /// Its name; `touch 1` and so on where the file gives none.
+    pub name: String,
+    /// The link whose frame positions are in: the one that the file names, or the field's anchor.
+    pub link: String,
+    /// The field whose chart (u, v) and the angle are in, where the file names one.
+    pub field: Option<String>,
+    /// Middle of the contact on the body's surface, m.
+    pub position_in_link: DVec3,
+    /// Outward unit normal there.
+    pub normal_in_link: DVec3,
+    /// The same point in the field's chart, m.
+    pub uv: Option<[f64; 2]>,
+    /// Direction of a rod or an edge, rad in [0, π): in the chart, or from the link's +x in the tangent plane.
+    pub angle: Option<f64>,
+    /// Mean velocity since the frame before, m/s; absent in a touch's first frame.
+    pub velocity_in_link: Option<DVec3>,
+    /// The same in the field's chart, m/s.
+    pub velocity_uv: Option<[f64; 2]>,
+    /// Length of `velocity_in_link`, m/s.
+    pub speed: Option<f64>,
+    /// Force along the normal, N.
+    pub force_newton: f64,
+}
+
+/// Frames made by simulated touches.
+pub struct SimulatedSource {
+    name: String,
+    body: Body,
+    rate_hz: f64,
+    frames: u64,
+    skin: Skin,
+    sensor: Sensor,
+    /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
+    ids: Vec<u32>,
+    taxels: Vec<(usize, f64)>,
+    touches: Vec<Scenario>,
+    next: u64,
+    truth: Vec<Truth>,
+    forces_newton: Vec<f64>,
+}
+
+/// A touch and the taxels, (position, normal) in its link's frame.
+struct Scenario {
+    touch: Touch,
+    link: String,
+    taxels: Vec<(DVec3, DVec3)>,
+}
+
+impl SimulatedSource {
+    /// Opens the simulation in the TOML file at `path`.
+    ///
+    /// # Errors
+    /// The file or its body cannot be read, or something in it makes no sense; the message has line and key.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_text(&path.display().to_string(), &text, folder)
+    }
+
+    /// The simulation in `text`, called `name` in messages, whose body is bundled or a file named as from `folder`.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`].
+    pub fn from_text(name: &str, text: &str, folder: &Path) -> Result<Self> {
+        let text = Text(text);
+        let opened = text.parse().and_then(|file| {
+            let body = load_body(text, &file, folder)?;
+            Self::new(name, text, &file, body)
+        });
+        opened.map_err(|e| e.at(name))
+    }
+
+    /// The simulation in `text`, called `name` in messages, on `body`, whatever body the text names.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`].
+    pub fn on_body(name: &str, text: &str, body: Body) -> Result<Self> {
+        let text = Text(text);
+        text.parse().and_then(|file| Self::new(name, text, &file, body)).map_err(|e| e.at(name))
+    }
+
+    fn new(name: &str, text: Text<'_>, file: &File, body: Body) -> Result<Self> {
+        let rate_hz = text.positive("rate_hz", &file.rate_hz)?;
+        let duration_s = text.positive("duration_s", &file.duration_s)?;
+        // 0.3 s at 10 Hz are three frames, although 0.3 · 10 is a little over 3.
+        let frames = (duration_s * rate_hz - 1e-6).ceil().max(1.0);
+        if frames > f64::from(u32::MAX) {
+            let what = format!("`duration_s` and `rate_hz` make {frames:e} frames; that is too many");
+            return Err(text.wrong(file.duration_s.span(), what));
+        }
+        let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Pressure);
+        let ids: Vec<u32> = pressure().map(|(_, taxel)| taxel.id).collect();
+        if ids.is_empty() {
+            return Err(Error::failed(format!("the body `{}` has no pressure taxels", body.name)));
+        }
+        let area = file.sensor.area_m2.as_ref().map(|area| text.positive("area_m2", area)).transpose()?;
+        let side = |taxel: &Taxel| match area.unwrap_or(taxel.area) {
+            area if area > 0.0 => Ok(area.sqrt()),
+            _ => Err(Error::failed(format!(
+                "taxel {} has no area in the layout; give all one as [sensor] `area_m2`",
+                taxel.id
+            ))),
+        };
+        let taxels = pressure().map(|(index, taxel)| Ok((index, side(taxel)?))).collect::<Result<Vec<_>>>()?;
+        let fields = FieldSet::new(&body)?;
+        let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
+        let skin = setup.skin(file.skin.as_ref())?;
+        let sensor = sensors::sensors(text, &file.sensor, file.seed, &ids)?;
+        let mut touches = Vec::with_capacity(file.touch.len());
+        for (index, keys) in file.touch.iter().enumerate() {
+            let touch = setup.touch(index, keys.get_ref())?;
+            let places = taxels.iter().map(|&(taxel, _)| {
+                let taxel = &body.taxels[taxel];
+                let link_from_taxel = body.rest_transform(touch.link, taxel.link);
+                let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
+                (link_from_taxel.transform_point3(taxel.position_in_link), normal)
+            });
+            let places = places.collect();
+            touches.push(Scenario { link: body.links[touch.link].name.clone(), touch, taxels: places });
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            rate_hz,
+            frames: frames as u64,
+            skin,
+            sensor,
+            forces_newton: vec![0.0; ids.len()],
+            ids,
+            taxels,
+            touches,
+            next: 0,
+            truth: Vec::new(),
+            body,
+        })
+    }
+
+    /// The body that is touched.
+    #[must_use]
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// Frames a second.
+    #[must_use]
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Number of frames from beginning to end.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// What is true in the frame read last: one entry a touch that presses, in the file's order.
+    #[must_use]
+    pub fn truth(&self) -> &[Truth] {
+        &self.truth
+    }
+
+    /// The force on each taxel in the frame read last, N, in the order of [`Source::taxels`], before any sensor.
+    #[must_use]
+    pub fn forces_newton(&self) -> &[f64] {
+        &self.forces_newton
+    }
+
+    /// Makes `frame` (counted from 0) the one that is read next.
+    pub fn seek(&mut self, frame: u64) {
+        self.next = frame.min(self.frames);
+    }
+
+    fn time(&self, frame: u64) -> f64 {
+        frame as f64 / self.rate_hz
+    }
+
+    /// Adds a touch's part to the forces, and says what is true of it.
+    fn press(&mut self, index: usize, frame: u64) -> Result<()> {
+        let t_s = self.time(frame);
+        let Scenario { touch, link, taxels } = &self.touches[index];
+        let Some(force_newton) = touch.force(t_s) else { return Ok(()) };
+        let Some(place) = touch.path.place(t_s) else { return Err(Error::failed(touch.leaves_surface(t_s))) };
+        let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
+        let along = touch.path.direction(&place, angle.unwrap_or(0.0));
+        let across = along.cross(place.normal_in_link);
+        let footprint = Footprint::new(&touch.indenter, &self.skin, force_newton);
+        for ((force, (position, normal)), (_, side_m)) in self.forces_newton.iter_mut().zip(taxels).zip(&self.taxels) {
+            let offset = *position - place.position_in_link;
+            if normal.dot(place.normal_in_link) > 0.0 && offset.dot(place.normal_in_link).abs() <= footprint.depth_m() {
+                *force += force_newton * footprint.part_on(offset.dot(across), offset.dot(along), *side_m);
+            }
+        }
+        let before = frame.checked_sub(1).map(|frame| self.time(frame)).filter(|&t_s| touch.force(t_s).is_some());
+        let before = before.and_then(|before_s| Some((touch.path.place(before_s)?, t_s - before_s)));
+        let velocity_in_link = before.map(|(before, dt_s)| (place.position_in_link - before.position_in_link) / dt_s);
+        let velocity_uv = before.and_then(|(before, dt_s)| {
+            let (now, before) = (place.uv?, before.uv?);
+            Some([(now[0] - before[0]) / dt_s, (now[1] - before[1]) / dt_s])
+        });
+        self.truth.push(Truth {
+            touch: index,
+            name: touch.name.clone(),
+            link: link.clone(),
+            field: touch.field.clone(),
+            position_in_link: place.position_in_link,
+            normal_in_link: place.normal_in_link,
+            uv: place.uv,
+            angle: angle.map(of_line),
+            velocity_in_link,
+            velocity_uv,
+            speed: velocity_in_link.map(DVec3::length),
+            force_newton,
+        });
+        Ok(())
+    }
+}
+
+impl Source for SimulatedSource {
+    fn taxels(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        if self.next >= self.frames {
+            return Ok(false);
+        }
+        let number = self.next;
+        self.next += 1;
+        self.truth.clear();
+        self.forces_newton.fill(0.0);
+        for touch in 0..self.touches.len() {
+            self.press(touch, number).map_err(|e| e.at(&self.name))?;
+        }
+        frame.clear();
+        frame.t_s = self.time(number);
+        frame.values.clear();
+        let readings = self.ids.iter().zip(&self.forces_newton).enumerate().map(|(index, (&id, &force_newton))| {
+            let reading = Reading { index, id, frame: number, t_s: frame.t_s, force_newton };
+            RawValue::new(self.sensor.read(&reading))
+        });
+        frame.values.extend(readings);
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(self.next as f64 / self.frames as f64)
+    }
+}
+
+/// An angle as a line's: in [0, π).
+fn of_line(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(PI);
+    if turned < PI { turned } else { 0.0 }
+}
+
+fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
+    let Some(body) = &file.body else {
+        return Err(text.wrong(0..0, "`body` is missing; give a file, or hand, mat or humanoid"));
+    };
+    let bundled = [("hand", bundled::HAND), ("mat", bundled::MAT), ("humanoid", bundled::HUMANOID)];
+    if let Some((name, bytes)) = bundled.iter().find(|(name, _)| name == body.get_ref()) {
+        return Body::from_bytes(name, bytes);
+    }
+    Body::load(folder.join(body.get_ref())).map_err(|e| {
+        if e.is_not_found() {
+            text.unknown(body, "there is no body", bundled.map(|(name, _)| name))
+        } else {
+            text.wrong(body.span(), e.to_string())
+        }
+    })
+}

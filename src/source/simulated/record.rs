@@ -1,0 +1,95 @@
+//! A simulation written down: its frames as a recording, and the truth beside them.
+
+use std::path::Path;
+
+use glam::DVec3;
+use tempfile::NamedTempFile;
+
+use super::{SimulatedSource, Truth};
+use crate::error::{Error, Result};
+use crate::signal::Frame;
+use crate::source::Source as _;
+
+/// The truth's columns.
+const COLUMNS: [&str; 22] = [
+    "t", "frame", "touch", "name", "link", "field", "x", "y", "z", "nx", "ny", "nz", "u", "v", "angle", "vx", "vy",
+    "vz", "vu", "vv", "speed", "force",
+];
+
+/// Writes all frames of `simulation`, from its first, as CSV at `csv_path`, and what is true in them at `truth_path`:
+/// both files complete, or neither. Returns the number of frames.
+///
+/// The truth has a row for each frame and touch that presses; `docs/simulation.md` lists its columns.
+///
+/// # Errors
+/// A path leaves the surface, a file cannot be written, or both are one; the files are then not there.
+pub fn write_recording(simulation: &mut SimulatedSource, csv_path: &Path, truth_path: &Path) -> Result<u64> {
+    if csv_path == truth_path {
+        return Err(Error::usage("the frames and the truth need a file each").at(csv_path.display()));
+    }
+    let mut frames_file = beside(csv_path)?;
+    let mut truth_file = beside(truth_path)?;
+    simulation.seek(0);
+    write(simulation, &mut frames_file, &mut truth_file, [csv_path, truth_path])?;
+    let place = |file: NamedTempFile, path: &Path| file.persist(path).map_err(|e| Error::io(path, &e.error));
+    place(frames_file, csv_path)?;
+    place(truth_file, truth_path).inspect_err(|_| {
+        // Frames without their truth would look like a recording of their own.
+        let _ = std::fs::remove_file(csv_path);
+    })?;
+    Ok(simulation.frames())
+}
+
+fn beside(path: &Path) -> Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))
+}
+
+fn write(
+    simulation: &mut SimulatedSource,
+    frames_file: &mut NamedTempFile,
+    truth_file: &mut NamedTempFile,
+    [frames_path, truth_path]: [&Path; 2],
+) -> Result<()> {
+    let writer = |file| csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file));
+    let (mut frames, mut truth) = (writer(frames_file), writer(truth_file));
+    let failed = |path: &Path, e: csv::Error| Error::failed(e.to_string()).at(path.display());
+    let mut row: Vec<String> = std::iter::once("t".to_owned()).collect();
+    row.extend(simulation.taxels().iter().map(ToString::to_string));
+    frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
+    truth.write_record(COLUMNS).map_err(|e| failed(truth_path, e))?;
+    let mut frame = Frame::missing(0.0, simulation.taxels().len());
+    let mut number = 0_u64;
+    while simulation.next_frame(&mut frame)? {
+        row.clear();
+        row.push(frame.t_s.to_string());
+        // The shortest words that read back as the same single-precision value.
+        row.extend(
+            frame.values.iter().map(|value| value.number().map_or("nan".to_owned(), |v| (v as f32).to_string())),
+        );
+        frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
+        for touch in simulation.truth() {
+            truth.write_record(truth_row(frame.t_s, number, touch)).map_err(|e| failed(truth_path, e))?;
+        }
+        number += 1;
+    }
+    frames.flush().map_err(|e| Error::io(frames_path, &e))?;
+    truth.flush().map_err(|e| Error::io(truth_path, &e))
+}
+
+/// The cells under [`COLUMNS`]; what is absent is blank.
+fn truth_row(t_s: f64, frame: u64, truth: &Truth) -> [String; COLUMNS.len()] {
+    let cell = |number: Option<f64>| number.map(|x| x.to_string()).unwrap_or_default();
+    let of = |vector: Option<DVec3>| vector.map_or([None; 3], |v| v.to_array().map(Some)).map(cell);
+    let two = |pair: Option<[f64; 2]>| pair.map_or([None; 2], |p| p.map(Some)).map(cell);
+    let [x, y, z] = of(Some(truth.position_in_link));
+    let [nx, ny, nz] = of(Some(truth.normal_in_link));
+    let [u, v] = two(truth.uv);
+    let [vx, vy, vz] = of(truth.velocity_in_link);
+    let [vu, vv] = two(truth.velocity_uv);
+    let field = truth.field.clone().unwrap_or_default();
+    let (speed, force) = (cell(truth.speed), cell(Some(truth.force_newton)));
+    let (t, frame, touch) = (t_s.to_string(), frame.to_string(), truth.touch.to_string());
+    let (name, link, angle) = (truth.name.clone(), truth.link.clone(), cell(truth.angle));
+    [t, frame, touch, name, link, field, x, y, z, nx, ny, nz, u, v, angle, vx, vy, vz, vu, vv, speed, force]
+}

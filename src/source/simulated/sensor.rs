@@ -1,0 +1,150 @@
+//! From the force on a taxel to the raw value it delivers: circuit, noise, drift, and what is broken.
+
+use super::noise;
+use crate::signal::FsrCircuit;
+
+/// What an `fsr` sensor delivers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum FsrOutput {
+    /// The converter's reading, which falls when pressed.
+    Counts,
+    /// The paper's logarithmic raw signal, 0 to 1000.
+    Logarithmic,
+    /// The paper's linearised signal, 0 to 1000 at this force.
+    Linearised { full_scale_newton: f64 },
+}
+
+/// How a force becomes a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// Newton, as they are.
+    Ideal,
+    /// The paper's circuit.
+    Fsr { circuit: FsrCircuit, output: FsrOutput },
+    /// offset + gain · force, rounded and cut to whole counts where it has `bits`.
+    Linear { offset: f64, gain: f64, bits: Option<u32> },
+}
+
+/// What is wrong with a taxel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Fault {
+    /// It always reads what an untouched one does.
+    Dead,
+    /// It always reads this.
+    Stuck(f64),
+    /// Its noise has this standard deviation.
+    Noisy(f64),
+}
+
+/// All sensors of a simulation, alike but for their faults.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sensor {
+    pub(super) kind: Kind,
+    pub(super) seed: u64,
+    /// Standard deviation before rounding, in counts (an ideal sensor's: N).
+    pub(super) noise_sigma: f64,
+    /// What all readings gain in a minute, in the same unit.
+    pub(super) drift_per_minute: f64,
+    /// One a taxel.
+    pub(super) faults: Vec<Option<Fault>>,
+}
+
+/// A taxel in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reading {
+    /// Index in the order of the source.
+    pub(super) index: usize,
+    pub(super) id: u32,
+    pub(super) frame: u64,
+    pub(super) t_s: f64,
+    pub(super) force_newton: f64,
+}
+
+impl Sensor {
+    /// The raw value.
+    pub(super) fn read(&self, reading: &Reading) -> f64 {
+        let sigma = match self.faults[reading.index] {
+            Some(Fault::Dead) => return self.kind.value(0.0, 0.0),
+            Some(Fault::Stuck(value)) => return value,
+            Some(Fault::Noisy(sigma)) => sigma,
+            None => self.noise_sigma,
+        };
+        let noise = if sigma > 0.0 { sigma * noise::normal(self.seed, reading.frame, reading.id) } else { 0.0 };
+        self.kind.value(reading.force_newton, noise + self.drift_per_minute * (reading.t_s / 60.0))
+    }
+}
+
+impl Kind {
+    /// The raw value at `force_newton`, `disturbed` in counts on the way to the converter.
+    fn value(&self, force_newton: f64, disturbed: f64) -> f64 {
+        match *self {
+            Self::Ideal => force_newton + disturbed,
+            Self::Fsr { circuit, output } => {
+                let counts = FsrCircuit::convert(circuit.level(force_newton) + disturbed);
+                match output {
+                    FsrOutput::Counts => counts.into(),
+                    FsrOutput::Logarithmic => circuit.logarithmic(counts),
+                    FsrOutput::Linearised { full_scale_newton } => circuit.linearised(counts, full_scale_newton),
+                }
+            }
+            Self::Linear { offset, gain, bits } => {
+                let level = offset + gain * force_newton + disturbed;
+                match bits {
+                    // Halves go up, whatever the sign.
+                    Some(bits) => (level + 0.5).floor().clamp(0.0, f64::from((1_u32 << bits) - 1)),
+                    None => level,
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor(kind: Kind, faults: Vec<Option<Fault>>) -> Sensor {
+        Sensor { kind, seed: 1, noise_sigma: 0.0, drift_per_minute: 0.0, faults }
+    }
+
+    fn reading(index: usize, force_newton: f64) -> Reading {
+        Reading { index, id: 7, frame: 3, t_s: 30.0, force_newton }
+    }
+
+    #[test]
+    fn a_linear_sensor_rounds_and_stays_in_range() {
+        let inverted = Kind::Linear { offset: 240.0, gain: -20.0, bits: Some(8) };
+        let sensor = sensor(inverted, vec![None]);
+        assert_eq!([0.0, 1.02, 1.03, 100.0].map(|f| sensor.read(&reading(0, f))), [240.0, 220.0, 219.0, 0.0]);
+        let drifting = Sensor { drift_per_minute: 60.0, ..sensor };
+        assert_eq!([0.0, 1.0].map(|f| drifting.read(&reading(0, f))), [255.0, 250.0]);
+    }
+
+    #[test]
+    fn broken_taxels_read_what_they_must() {
+        let faults = vec![Some(Fault::Dead), Some(Fault::Stuck(700.0)), Some(Fault::Noisy(50.0)), None];
+        let fsr = Kind::Fsr { circuit: FsrCircuit::default(), output: FsrOutput::Counts };
+        let sensor = Sensor { noise_sigma: 3.0, ..sensor(fsr, faults) };
+        let spread = |index: usize| {
+            let values = (0..200).map(|frame| sensor.read(&Reading { frame, ..reading(index, 1.0) }));
+            let (low, high) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+            (low, high)
+        };
+        assert_eq!(spread(0), (1023.0, 1023.0));
+        assert_eq!(spread(1), (700.0, 700.0));
+        let width = |(low, high): (f64, f64)| high - low;
+        assert!(width(spread(2)) > 10.0 * width(spread(3)) && width(spread(3)) > 3.0);
+    }
+
+    #[test]
+    fn the_papers_signals_come_from_the_whole_count() {
+        let circuit = FsrCircuit::default();
+        let counts = circuit.counts(2.0);
+        let signals = [FsrOutput::Counts, FsrOutput::Logarithmic, FsrOutput::Linearised { full_scale_newton: 5.0 }]
+            .map(|output| {
+                let sensor = sensor(Kind::Fsr { circuit, output }, vec![None]);
+                sensor.read(&reading(0, 2.0))
+            });
+        assert_eq!(signals, [counts.into(), circuit.logarithmic(counts), circuit.linearised(counts, 5.0)]);
+    }
+}

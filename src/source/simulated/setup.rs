@@ -1,0 +1,279 @@
+//! From the file's keys to touches on a body's surface and sensors over it, everything checked.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+use toml::Spanned;
+
+use super::contact::{Indenter, Skin};
+use super::file::{AngleKeys, IndenterName, SkinKeys, Text, TouchKeys};
+use super::path::{Ground, Path};
+use super::profile::Profile;
+use crate::body::{Body, SurfaceIndex};
+use crate::error::Result;
+use crate::field::FieldSet;
+
+/// One touch, ready to be asked where it is and how hard it presses.
+pub(super) struct Touch {
+    pub(super) name: String,
+    pub(super) link: usize,
+    pub(super) field: Option<String>,
+    pub(super) indenter: Indenter,
+    /// rad
+    pub(super) angle: Option<Profile>,
+    pub(super) path: Path,
+    pub(super) force_newton: Profile,
+}
+
+impl Touch {
+    /// The force at `t_s` where the touch presses.
+    pub(super) fn force(&self, t_s: f64) -> Option<f64> {
+        self.force_newton.within(t_s).filter(|&force| force > 0.0)
+    }
+
+    /// That there is no surface at `t_s`.
+    pub(super) fn leaves_surface(&self, t_s: f64) -> String {
+        let place = self.path.waypoint(t_s);
+        let at = match self.path.ground {
+            Ground::Chart { .. } => format!("(u, v) = ({:.4}, {:.4}) m", place.x, place.y),
+            Ground::Link => format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z),
+        };
+        format!("`path` leaves the surface at {t_s:.3} s, at {at}; keep it on the body, or the force at 0 there")
+    }
+}
+
+/// Looks things up in a body for a file.
+pub(super) struct Setup<'a> {
+    pub(super) text: Text<'a>,
+    pub(super) body: &'a Body,
+    pub(super) fields: &'a FieldSet,
+    pub(super) surfaces: BTreeMap<usize, Arc<SurfaceIndex>>,
+    pub(super) duration_s: f64,
+}
+
+impl Setup<'_> {
+    pub(super) fn skin(&self, keys: Option<&SkinKeys>) -> Result<Skin> {
+        let Some(keys) = keys else { return Ok(Skin::NONE) };
+        let or = |key: &str, value: &Option<Spanned<f64>>, default: f64| {
+            value.as_ref().map_or(Ok(default), |value| self.text.positive(key, value))
+        };
+        Ok(Skin {
+            thickness_m: self.text.not_negative("thickness_m", &keys.thickness_m)?,
+            spread: or("spread", &keys.spread, Skin::SPREAD)?,
+            stiffness_pa: or("stiffness_pa", &keys.stiffness_pa, Skin::STIFFNESS_PA)?,
+        })
+    }
+
+    pub(super) fn touch(&mut self, index: usize, keys: &TouchKeys) -> Result<Touch> {
+        let indenter = self.indenter(keys)?;
+        let (in_chart, waypoints) = self.waypoints(keys)?;
+        let (link, field, ground) = if in_chart { self.on_field(keys)? } else { self.on_link(keys)? };
+        let surface = self.surfaces.entry(link).or_insert_with(|| Arc::new(self.body.surface_in_link(link, None)));
+        let surface = Arc::clone(surface);
+        if surface.is_empty() {
+            return Err(self.text.wrong(keys.on.span(), "the body has no surface that could be touched"));
+        }
+        let times_s = self.times(keys, &waypoints)?;
+        let touch = Touch {
+            name: keys.name.clone().unwrap_or_else(|| format!("touch {}", index + 1)),
+            link,
+            field,
+            indenter,
+            angle: self.angle(keys, &indenter)?,
+            path: Path { ground, surface, waypoints, times_s },
+            force_newton: self.force(keys)?,
+        };
+        let times = touch.path.times_to_try().chain(touch.force_newton.times());
+        let mut pressed = times.filter(|&t_s| t_s <= self.duration_s && touch.force(t_s).is_some());
+        let off_surface = pressed.find(|&t_s| touch.path.place(t_s).is_none());
+        drop(pressed);
+        match off_surface {
+            Some(t_s) => Err(self.text.wrong(keys.path.span(), touch.leaves_surface(t_s))),
+            None => Ok(touch),
+        }
+    }
+
+    fn indenter(&self, keys: &TouchKeys) -> Result<Indenter> {
+        let (text, indenter) = (self.text, &keys.indenter);
+        let size = |key: &str, value: &Option<Spanned<f64>>, default: Option<f64>| match (value, default) {
+            (Some(value), _) => text.positive(key, value),
+            (None, Some(default)) => Ok(default),
+            (None, None) => Err(text.wrong(indenter.span(), format!("this indenter needs its `{key}`"))),
+        };
+        let refuse = |key: &str, value: &Option<Spanned<f64>>| text.refuse(key, value.as_ref(), "for this indenter");
+        let radius = |default| size("radius_m", &keys.radius_m, default);
+        let length = || size("length_m", &keys.length_m, None);
+        match indenter.get_ref() {
+            IndenterName::Rod => Ok(Indenter::Rod { radius_m: radius(None)?, length_m: length()? }),
+            IndenterName::Edge => {
+                refuse("radius_m", &keys.radius_m)?;
+                Ok(Indenter::Edge { length_m: length()? })
+            }
+            round => {
+                refuse("length_m", &keys.length_m)?;
+                Ok(match round {
+                    IndenterName::Ball => Indenter::Ball { radius_m: radius(None)? },
+                    IndenterName::Flat => Indenter::Flat { radius_m: radius(None)? },
+                    _ => Indenter::Fingertip { radius_m: radius(Some(Indenter::FINGERTIP_RADIUS_M))? },
+                })
+            }
+        }
+    }
+
+    /// Whether the places are (u, v) rather than (x, y, z), and the places.
+    fn waypoints(&self, keys: &TouchKeys) -> Result<(bool, Vec<DVec3>)> {
+        let path = keys.path.get_ref();
+        let wanted = path.first().map_or(0, |first| first.get_ref().len());
+        if path.is_empty() {
+            return Err(self.text.wrong(keys.path.span(), "`path` is empty; give at least one place"));
+        }
+        let points = path.iter().map(|waypoint| {
+            let numbers = waypoint.get_ref();
+            let wrong = |what: String| Err(self.text.wrong(waypoint.span(), what));
+            if numbers.len() != wanted || !(2..=3).contains(&wanted) {
+                return wrong("`path` is all [u, v] on a field, or all [x, y, z] on a link".to_owned());
+            }
+            if let Some(bad) = numbers.iter().find(|x| x.is_nan() || x.abs() > 1e6) {
+                return wrong(format!("`path` has the coordinate {bad}; give metres"));
+            }
+            Ok(DVec3::new(numbers[0], numbers[1], numbers.get(2).copied().unwrap_or(0.0)))
+        });
+        Ok((wanted == 2, points.collect::<Result<_>>()?))
+    }
+
+    fn on_field(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, Ground)> {
+        let on = keys.on.get_ref();
+        let Some(field) = self.fields.fields.iter().find(|field| field.name == *on) else {
+            if self.body.link_index(on).is_some() {
+                let what = format!("`{on}` is a link, not a field; give its `path` as [x, y, z]");
+                return Err(self.text.wrong(keys.on.span(), what));
+            }
+            return Err(self.text.unknown(&keys.on, "there is no field", self.names()));
+        };
+        match (&field.chart, field.anchor) {
+            (Ok(chart), Some(link)) => {
+                let deepest_m = field.members.iter().map(|member| member.place.z.abs()).fold(0.0, f64::max);
+                let ground = Ground::of_field(chart.clone(), field.origin_in_anchor, deepest_m);
+                Ok((link, Some(on.clone()), ground))
+            }
+            (chart, _) => {
+                let why = chart.as_ref().err().map(ToString::to_string).unwrap_or_default();
+                let what = format!("field `{on}` has no chart for [u, v]: {why}; name a field below it, or a link");
+                Err(self.text.wrong(keys.on.span(), what))
+            }
+        }
+    }
+
+    fn on_link(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, Ground)> {
+        let on = keys.on.get_ref();
+        match self.body.link_index(on) {
+            Some(link) => Ok((link, None, Ground::Link)),
+            None if self.fields.fields.iter().any(|field| field.name == *on) => {
+                let what = format!("`{on}` is a field, not a link; give its `path` as [u, v]");
+                Err(self.text.wrong(keys.on.span(), what))
+            }
+            None => Err(self.text.unknown(&keys.on, "there is no link", self.names())),
+        }
+    }
+
+    /// What can be touched.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let fields = self.fields.fields.iter().map(|field| field.name.as_str());
+        fields.chain(self.body.links.iter().map(|link| link.name.as_str()))
+    }
+
+    fn times(&self, keys: &TouchKeys, waypoints: &[DVec3]) -> Result<Vec<f64>> {
+        let text = self.text;
+        if let Some(times) = &keys.times_s {
+            text.refuse("start_s", keys.start_s.as_ref(), "beside `times_s`")?;
+            text.refuse("speed_m_s", keys.speed_m_s.as_ref(), "beside `times_s`")?;
+            text.check_times("times_s", times.span(), times.get_ref().iter().copied())?;
+            let (found, wanted) = (times.get_ref().len(), waypoints.len());
+            if found != wanted {
+                let what = format!("`times_s` has {found} times for {wanted} places in `path`; give each one");
+                return Err(text.wrong(times.span(), what));
+            }
+            return Ok(times.get_ref().clone());
+        }
+        let mut t_s = keys.start_s.as_ref().map_or(Ok(0.0), |start| text.not_negative("start_s", start))?;
+        let mut times = vec![t_s];
+        if waypoints.len() > 1 {
+            let Some(speed) = &keys.speed_m_s else {
+                return Err(text.wrong(keys.path.span(), "`path` has several places; give `times_s` or `speed_m_s`"));
+            };
+            let speed = text.positive("speed_m_s", speed)?;
+            for (pair, place) in waypoints.windows(2).zip(&keys.path.get_ref()[1..]) {
+                let later = t_s + pair[0].distance(pair[1]) / speed;
+                if later <= t_s {
+                    let what = "`path` has the same place twice in a row; to rest there, give `times_s`";
+                    return Err(text.wrong(place.span(), what));
+                }
+                t_s = later;
+                times.push(t_s);
+            }
+        } else {
+            text.refuse("speed_m_s", keys.speed_m_s.as_ref(), "where `path` is one place")?;
+        }
+        Ok(times)
+    }
+
+    fn angle(&self, keys: &TouchKeys, indenter: &Indenter) -> Result<Option<Profile>> {
+        let text = self.text;
+        if !indenter.is_long() {
+            text.refuse("angle_deg", keys.angle_deg.as_ref(), "for a round indenter")?;
+            return Ok(None);
+        }
+        let Some(angle) = &keys.angle_deg else { return Ok(Some(Profile::constant(0.0))) };
+        let points = match angle.get_ref() {
+            AngleKeys::Fixed(degrees) => vec![[0.0, *degrees]],
+            AngleKeys::Turning(points) => points.clone(),
+        };
+        text.check_times("angle_deg", angle.span(), points.iter().map(|point| point[0]))?;
+        if let Some([_, bad]) = points.iter().find(|point| point[1].is_nan() || point[1].abs() > 1e6) {
+            return Err(text.wrong(angle.span(), format!("`angle_deg` is {bad}; give degrees")));
+        }
+        Ok(Some(Profile::new(points.into_iter().map(|[t_s, degrees]| (t_s, degrees.to_radians())).collect())))
+    }
+
+    fn force(&self, keys: &TouchKeys) -> Result<Profile> {
+        let text = self.text;
+        let given = [keys.force_newton.is_some(), keys.tap.is_some(), keys.press.is_some(), keys.hold.is_some()];
+        if given.into_iter().filter(|&is| is).count() != 1 {
+            let what = "a touch needs one of `force_newton`, `tap`, `press` and `hold`";
+            return Err(text.wrong(keys.indenter.span(), what));
+        }
+        if let Some(list) = &keys.force_newton {
+            let points: Vec<(f64, f64)> = list.get_ref().iter().map(|&[t_s, newton]| (t_s, newton)).collect();
+            text.check_times("force_newton", list.span(), points.iter().map(|point| point.0))?;
+            if let Some((t_s, bad)) = points.iter().find(|point| !(0.0..=1e9).contains(&point.1)) {
+                let what = format!("`force_newton` is {bad} at {t_s} s; it must be 0 or more, and no more than 1e9");
+                return Err(text.wrong(list.span(), what));
+            }
+            return Ok(Profile::new(points));
+        }
+        if let Some(tap) = keys.tap.as_ref().map(Spanned::get_ref) {
+            let lasts_s = text.positive("lasts_s", &tap.lasts_s)?;
+            let starts = tap.at_s.get_ref();
+            text.check_times("at_s", tap.at_s.span(), starts.iter().copied())?;
+            if starts.windows(2).any(|pair| pair[1] - pair[0] < lasts_s) {
+                return Err(text.wrong(tap.at_s.span(), "`at_s` has taps that overlap; give them a touch each"));
+            }
+            return Ok(Profile::bells(starts, text.not_negative("newton", &tap.newton)?, lasts_s));
+        }
+        if let Some(press) = keys.press.as_ref().map(Spanned::get_ref) {
+            let (from, to) = (text.not_negative("from_s", &press.from_s)?, text.not_negative("to_s", &press.to_s)?);
+            let ramp = text.positive("ramp_s", &press.ramp_s)?;
+            if to - from < 2.0 * ramp {
+                let what = "`to_s` comes before the force has risen and fallen; it is at least `from_s` + 2 · `ramp_s`";
+                return Err(text.wrong(press.to_s.span(), what));
+            }
+            let newton = text.not_negative("newton", &press.newton)?;
+            let mut points = vec![(from, 0.0), (from + ramp, newton), (to - ramp, newton), (to, 0.0)];
+            points.dedup_by_key(|point| point.0);
+            return Ok(Profile::new(points));
+        }
+        let newton = keys.hold.as_ref().map_or(Ok(0.0), |hold| text.not_negative("newton", &hold.get_ref().newton))?;
+        Ok(Profile::new(vec![(0.0, newton), (f64::MAX, newton)]))
+    }
+}
