@@ -7,6 +7,8 @@
 // As the fields read it: a taxel's frames side by side.
 @group(0) @binding(3) var<storage, read_write> pressures: array<f32>;
 @group(0) @binding(4) var<storage, read_write> statuses: array<u32>;
+@group(0) @binding(5) var<storage, read> curves: array<Curve>;
+@group(0) @binding(6) var<storage, read> knots: array<Knot>;
 
 const MISSING = 0xffffffffu;
 const SIZE_BITS = 0x7fffffffu;
@@ -15,6 +17,29 @@ const TINY_BITS = 0x21800000u;
 
 fn is_tiny(size: u32) -> bool {
     return size != 0u && size < TINY_BITS;
+}
+
+fn on_curve(curve: Curve, x: f32) -> f32 {
+    let first = knots[curve.first];
+    let last = knots[curve.first + curve.count - 1u];
+    if x <= first.raw {
+        return first.p;
+    }
+    if x >= last.raw {
+        return last.p;
+    }
+    // The knot below x is `low` or one of the `count - 1` after it.
+    var low = curve.first;
+    var count = curve.count - 1u;
+    while count > 1u {
+        let half = count / 2u;
+        let above = knots[low + half].raw <= x;
+        low = select(low, low + half, above);
+        count = select(half, count - half, above);
+    }
+    let from = knots[low];
+    let to = knots[low + 1u];
+    return clamp(from.p + (x - from.raw) * from.slope, min(from.p, to.p), max(from.p, to.p));
 }
 
 @compute @workgroup_size(GROUP)
@@ -37,7 +62,7 @@ fn main(
     var status = 0u;
     if bits == MISSING {
         status = INCOMPLETE | UNUSABLE;
-    } else if size > HUGE_BITS || taxel.masked != 0u {
+    } else if size > HUGE_BITS || taxel.response == MASKED {
         // Infinity and NaN have larger bits than any number.
         status = FAULTY_INPUT | UNUSABLE;
     } else {
@@ -46,7 +71,11 @@ fn main(
         let low = value < taxel.raw_low || (is_tiny(size) && taxel.raw_low == 0.0 && bits != size);
         let high = value > taxel.raw_high || (is_tiny(size) && taxel.raw_high == 0.0 && bits == size);
         status |= select(0u, OUT_OF_RANGE, low || high);
-        let p = (value - taxel.baseline) * taxel.gain;
+        let above = value - taxel.baseline;
+        var p = above * taxel.gain;
+        if taxel.response >= FIRST_CURVE {
+            p = on_curve(curves[taxel.response - FIRST_CURVE], above);
+        }
         let p_size = bitcast<u32>(p) & SIZE_BITS;
         if p_size > HUGE_BITS {
             status = FAULTY_INPUT | UNUSABLE;

@@ -15,7 +15,19 @@ struct Taxel {
     raw_low: f32,
     raw_high: f32,
     area: f32,
-    masked: u32,
+    // STRAIGHT, MASKED, or FIRST_CURVE and up.
+    response: u32,
+}
+
+struct Curve {
+    first: u32,
+    count: u32,
+}
+
+struct Knot {
+    raw: f32,
+    p: f32,
+    slope: f32,
 }
 
 struct Field {
@@ -78,6 +90,10 @@ const AXIS = 1u << 8u;
 const ANISOTROPY = 1u << 9u;
 const DISPLACEMENT = 1u << 10u;
 const DIRECTION = 1u << 11u;
+
+const STRAIGHT = 0u;
+const MASKED = 1u;
+const FIRST_CURVE = 2u;
 
 // Bit of a taxel's status that leaves it out of every sum.
 const UNUSABLE = 1u << 31u;

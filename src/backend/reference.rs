@@ -80,7 +80,8 @@ impl Reference {
     /// One frame's pressures, taxel by taxel.
     fn pressures(&self, raw: &RawBatch<'_>, frame: usize) -> Vec<Pressure> {
         let values = &raw.values[frame * self.plan.slots()..][..self.plan.slots()];
-        values.iter().zip(&self.plan.calibrations).map(|(&raw, taxel)| calibrate::reference(raw, taxel)).collect()
+        let taxels = values.iter().zip(&self.plan.calibrations).enumerate();
+        taxels.map(|(slot, (&raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
     }
 
     /// A field's pressed taxels, by ascending id.

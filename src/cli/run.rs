@@ -9,9 +9,10 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use console::Term;
 use somatic::error::nearest;
+use somatic::signal::FsrSignal;
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
 use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
-use somatic::{Agreement, BackendKind, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
+use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
 
 use super::feed::{Arrival, Feed, Manner};
 use super::live::{About, View};
@@ -69,6 +70,11 @@ pub(super) struct Arguments {
     /// The robot's calibration, a TOML file; without one, pressures are the raw values.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+
+    /// Which signal force-sensing resistors deliver, raw or linear, instead of what the calibration says.
+    #[arg(long, value_name = "SIGNAL", value_parser = PossibleValuesParser::new(["raw", "linear"])
+        .try_map(|name| name.parse::<FsrSignal>()))]
+    signal: Option<FsrSignal>,
 
     /// Frames per second of a CSV recording that has no column t, in Hz.
     #[arg(long, value_name = "HZ")]
@@ -133,7 +139,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let speed = arguments.speed.or((input.is_bundled() && at_terminal).then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     let batch = arguments.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
-    let mut engine = Engine::new(&body, arguments.options(&ids, batch)?)?;
+    let mut engine = Engine::new(&body, arguments.options(&body, &ids, batch)?)?;
     engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if arguments.backend == BackendKind::Auto && !arguments.quiet {
         let (name, what, why) = engine.backend();
@@ -173,10 +179,21 @@ impl Arguments {
         Ok(())
     }
 
-    fn options(&self, ids: &[u32], batch: usize) -> Result<Options> {
+    fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
         let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL);
-        let scene = Scene { outputs, fields: self.fields.clone(), max_age_s: self.max_age, max_gap_s: self.max_gap };
-        let calibration = self.calibration.as_ref().map(|path| Calibration::load(path, ids)).transpose()?;
+        let scene = Scene {
+            outputs,
+            fields: self.fields.clone(),
+            max_age_s: self.max_age,
+            max_gap_s: self.max_gap,
+            signal: self.signal,
+        };
+        let load = |path: &PathBuf| {
+            let calibration = Calibration::load(path, ids)?;
+            calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
+            Ok(calibration)
+        };
+        let calibration = self.calibration.as_ref().map(load).transpose()?;
         Ok(Options { scene, calibration, backend: self.backend, batch })
     }
 }

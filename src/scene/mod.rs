@@ -1,11 +1,13 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
+mod curves;
 mod plan;
 
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
 
 use crate::percept::Outputs;
+use crate::signal::FsrSignal;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,10 +20,12 @@ pub struct Scene {
     pub max_age_s: f64,
     /// The longest step between frames over which motion is measured, s.
     pub max_gap_s: f64,
+    /// Which signal the sensors of the paper's circuit deliver, instead of what the calibration says.
+    pub signal: Option<FsrSignal>,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0 }
+        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0, signal: None }
     }
 }

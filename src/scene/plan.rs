@@ -6,11 +6,12 @@ use glam::DVec3;
 use globset::{GlobBuilder, GlobSetBuilder};
 
 use super::Scene;
+use super::curves::Curves;
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
-use crate::signal::{Calibration, TaxelCalibration};
+use crate::signal::{Calibration, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::{layout, motion};
 
@@ -40,6 +41,8 @@ pub struct Plan {
     pub(crate) areas: Vec<f64>,
     /// Per slot, as the f32 backends read them.
     pub(crate) taxels: Vec<layout::Taxel>,
+    /// What their responses refer to.
+    pub(crate) curves: Curves,
     pub(crate) fields: Vec<PlanField>,
     /// All fields' members, one field after the other, each by ascending id.
     pub(crate) members: Vec<layout::Member>,
@@ -81,7 +84,8 @@ impl Plan {
     /// The plan for `scene` on `body`, whose fields are `fields`, with one robot's `calibration`.
     ///
     /// # Errors
-    /// The body has no taxels or no fields; a glob is malformed or matches nothing.
+    /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
+    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
             let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
@@ -89,6 +93,13 @@ impl Plan {
         }
         if fields.fields.is_empty() {
             return Err(Error::failed("the body has no fields: add some, see docs/layout.md").at(&body.name));
+        }
+        calibration.check_body(&body.name)?;
+        let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
+        if let Some(signal) = scene.signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
+            return Err(Error::usage(format!(
+                "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; see docs/calibration.md"
+            )));
         }
         if let Some(name) = calibration.fields.keys().find(|name| !fields.fields.iter().any(|f| f.name == **name)) {
             let near = nearest(name, fields.fields.iter().map(|field| field.name.as_str()));
@@ -110,11 +121,15 @@ impl Plan {
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             taxels: Vec::new(),
+            curves: Curves::default(),
             fields: Vec::with_capacity(chosen.len()),
             members: Vec::new(),
             body_taxels: Vec::new(),
         };
-        plan.taxels = plan.calibrations.iter().zip(&plan.areas).map(|(c, &area)| taxel(c, area)).collect();
+        for (of_taxel, &area) in plan.calibrations.iter().zip(&plan.areas) {
+            let response = plan.curves.response_of(calibration, of_taxel, scene.signal)?;
+            plan.taxels.push(taxel(of_taxel, area, response));
+        }
         let around = plan.stages().touches.then(|| neighbours(body));
         for field in chosen.into_iter().map(|index| &fields.fields[index]) {
             let unit_m = unit_of(field.radius_m());
@@ -177,6 +192,11 @@ impl Plan {
     /// Names of the fields, in the order of the percepts, each with the link it answers in.
     pub fn fields(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
         self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
+    }
+
+    /// Per slot.
+    pub(crate) fn knots_of(&self, slot: usize) -> &[layout::Knot] {
+        self.curves.of(self.taxels[slot].response)
     }
 
     pub(crate) fn members_of(&self, field: &PlanField) -> &[layout::Member] {
@@ -242,7 +262,7 @@ fn thresholds(calibration: &Calibration, field: &str) -> Thresholds {
     Thresholds { on: contact.on, off: contact.off }
 }
 
-fn taxel(calibration: &TaxelCalibration, area: f64) -> layout::Taxel {
+fn taxel(calibration: &TaxelCalibration, area: f64, response: u32) -> layout::Taxel {
     layout::Taxel {
         baseline: calibration.baseline,
         gain: calibration.gain,
@@ -251,7 +271,7 @@ fn taxel(calibration: &TaxelCalibration, area: f64) -> layout::Taxel {
         raw_low: calibration.raw_range[0],
         raw_high: calibration.raw_range[1],
         area: area as f32,
-        masked: calibration.mask.into(),
+        response,
     }
 }
 

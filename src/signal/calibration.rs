@@ -2,20 +2,26 @@
 //!
 //! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
 
+mod response;
+
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use self::response::{CurveKeys, Draft, only_for_fsr};
+pub use self::response::{FsrResponse, FsrSignal, Response};
+use super::FsrCircuit;
+use super::curve::Curve;
 use crate::error::{Error, Result, nearest};
 
 /// Gains beyond these would take products out of single precision.
-const GAINS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+pub(super) const GAINS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 /// Baselines and dead bands beyond this are beyond belief, as values are.
-const MOST: f64 = 1.15e18;
+pub(super) const MOST: f64 = 1.15e18;
 
-/// How one taxel's raw value becomes a pressure: P = gain · (raw − baseline), then 0 unless over the dead band.
+/// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 unless over the dead band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaxelCalibration {
     /// Raw value at rest.
@@ -30,6 +36,8 @@ pub struct TaxelCalibration {
     pub raw_range: [f32; 2],
     /// Never believe this taxel.
     pub mask: bool,
+    /// What stands between raw value and pressure.
+    pub response: Response,
 }
 
 impl Default for TaxelCalibration {
@@ -41,6 +49,7 @@ impl Default for TaxelCalibration {
             p_max: f32::MAX,
             raw_range: [-f32::MAX, f32::MAX],
             mask: false,
+            response: Response::Linear,
         }
     }
 }
@@ -62,8 +71,12 @@ pub struct Checks {
 /// A robot's calibration, for the taxels of one body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
+    /// The body it is for, if it says so: its file's name, with or without folder and ending.
+    pub body: Option<String>,
     /// One entry a taxel, in the body's order.
     pub taxels: Vec<TaxelCalibration>,
+    /// What [`Response::Curve`] counts in.
+    pub curves: Vec<Curve>,
     /// When a field counts as touched, unless `fields` says otherwise.
     pub contact: ContactThresholds,
     /// The same for single fields, by name.
@@ -84,6 +97,9 @@ pub struct ContactThresholds {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    body: Option<String>,
+    #[serde(default)]
+    curve: HashMap<Spanned<String>, CurveKeys>,
     #[serde(default)]
     all: Keys,
     #[serde(default)]
@@ -120,6 +136,11 @@ struct Keys {
     p_max: Option<Spanned<f64>>,
     raw_range: Option<Spanned<[f64; 2]>>,
     mask: Option<bool>,
+    curve: Option<Spanned<String>>,
+    sensor: Option<Spanned<String>>,
+    tap: Option<Spanned<i64>>,
+    signal: Option<Spanned<String>>,
+    full_scale_newton: Option<Spanned<f64>>,
 }
 
 impl Calibration {
@@ -127,7 +148,9 @@ impl Calibration {
     #[must_use]
     pub fn identity(taxels: usize) -> Self {
         Self {
+            body: None,
             taxels: vec![TaxelCalibration::default(); taxels],
+            curves: Vec::new(),
             contact: ContactThresholds::default(),
             fields: BTreeMap::new(),
             checks: Checks::default(),
@@ -154,33 +177,86 @@ impl Calibration {
             let line = e.span().map_or(1, |span| line_of(text, span.start));
             Error::failed(explain(e.message())).at(format!("line {line}"))
         })?;
-        let mut all = TaxelCalibration::default();
-        file.all.apply(&mut all, text)?;
-        let mut taxels = vec![all; ids.len()];
+        let mut named: Vec<_> = file.curve.into_iter().collect();
+        named.sort_by_key(|(name, _)| name.span().start);
+        let names: Vec<&str> = named.iter().map(|(name, _)| name.get_ref().as_str()).collect();
+        let curves = named.iter().map(|(name, keys)| keys.read(name.get_ref(), text)).collect::<Result<Vec<_>>>()?;
+
+        let mut all = Draft::default();
+        file.all.apply(&mut all, &names, text)?;
+        let mut drafts = vec![all; ids.len()];
         let mut named: Vec<_> = file.taxel.into_iter().collect();
         named.sort_by_key(|(id, _)| id.span().start);
         for (id, keys) in named {
             let at = |e: Error| e.at(format!("line {}", line_of(text, id.span().start)));
             let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
+                let made_for = file.body.as_ref().map_or(String::new(), |body| format!(" (the file is for `{body}`)"));
                 at(Error::failed(format!(
-                    "[taxel.{}] names a taxel that the body does not have; remove it",
+                    "[taxel.{}] names a taxel that the body does not have; remove it{made_for}",
                     id.get_ref()
                 )))
             })?;
-            keys.apply(&mut taxels[index], text)?;
+            keys.apply(&mut drafts[index], &names, text)?;
+            only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
         }
+        only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
+        let taxels = drafts.into_iter().map(|draft| draft.finish(&curves)).collect::<Result<_>>()?;
         check_checks(&file.checks)?;
         let contact = thresholds(file.contact.on.as_ref(), file.contact.off.as_ref(), text)?;
         let mut fields = BTreeMap::new();
         for (name, keys) in file.contact.field {
             fields.insert(name, thresholds(Some(&keys.on), keys.off.as_ref(), text)?);
         }
-        Ok(Self { taxels, contact, fields, checks: file.checks })
+        Ok(Self { body: file.body, taxels, curves, contact, fields, checks: file.checks })
+    }
+
+    /// Refuses a body that the calibration says it is not for.
+    ///
+    /// # Errors
+    /// The names differ, folders and endings aside.
+    pub fn check_body(&self, name: &str) -> Result<()> {
+        let stem = |name: &str| Path::new(name).file_stem().map(std::ffi::OsStr::to_owned);
+        match &self.body {
+            Some(body) if stem(body) != stem(name) => Err(Error::failed(format!(
+                "the calibration is for body `{body}`, and this is `{name}`; change its key `body` if they are one"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// The curve of `taxel`, gain and sign in it, with `signal` instead of its own where it has the paper's circuit.
+    /// `None` for a straight line.
+    pub(crate) fn curve_of(&self, taxel: &TaxelCalibration, signal: Option<FsrSignal>) -> Result<Option<Curve>> {
+        let curve = match taxel.response {
+            Response::Linear => return Ok(None),
+            Response::Curve(index) => {
+                let missing = || Error::failed(format!("a taxel has curve {index} of {}", self.curves.len()));
+                self.curves.get(index).ok_or_else(missing)?.scaled(taxel.gain)
+            }
+            Response::Fsr(fsr) => {
+                Curve::fsr(&FsrResponse { signal: signal.unwrap_or(fsr.signal), ..fsr }).scaled(taxel.gain)
+            }
+        };
+        curve.map(Some)
+    }
+
+    /// How far `value` of the taxel `index` is from rest, in raw units, pressed being positive.
+    pub(crate) fn rise(&self, index: usize, value: f64) -> f64 {
+        let taxel = &self.taxels[index];
+        let above = value - f64::from(taxel.baseline);
+        let signed = above * f64::from(taxel.gain.signum());
+        match taxel.response {
+            Response::Linear => signed,
+            Response::Curve(curve) => self.curves.get(curve).map_or(0.0, |curve| curve.rise(signed)),
+            Response::Fsr(_) => f64::from(FsrCircuit::OPEN_COUNTS) - signed,
+        }
     }
 }
 
 impl Keys {
-    fn apply(&self, taxel: &mut TaxelCalibration, text: &str) -> Result<()> {
+    fn apply(&self, draft: &mut Draft, curves: &[&str], text: &str) -> Result<()> {
+        draft.take(self, curves, text)?;
+        let taxel = &mut draft.taxel;
         let number =
             |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f32>> {
                 let Some(value) = value else { return Ok(None) };
@@ -267,6 +343,8 @@ fn line_of(text: &str, offset: usize) -> usize {
 /// The parser's message, with the nearest key where it met one that it does not know.
 fn explain(message: &str) -> String {
     let known = [
+        "body",
+        "curve",
         "all",
         "taxel",
         "checks",
@@ -277,6 +355,12 @@ fn explain(message: &str) -> String {
         "p_max",
         "raw_range",
         "mask",
+        "raw",
+        "p",
+        "sensor",
+        "tap",
+        "signal",
+        "full_scale_newton",
         "settle_frames",
         "broken_frame_share",
         "isolated_ratio",

@@ -102,9 +102,10 @@ impl Intake {
 
     /// Marks values that rise far above all of their neighbours'.
     fn distrust_isolated(&mut self, ratio: f64) {
-        for ((rise, value), taxel) in self.rise.iter_mut().zip(&self.now).zip(&self.calibration.taxels) {
-            let above = value.number().map_or(0.0, |value| value - f64::from(taxel.baseline));
-            *rise = if taxel.mask { 0.0 } else { (above * f64::from(taxel.gain.signum())).max(0.0) };
+        for (index, (rise, value)) in self.rise.iter_mut().zip(&self.now).enumerate() {
+            let masked = self.calibration.taxels[index].mask;
+            let number = value.number().filter(|_| !masked);
+            *rise = number.map_or(0.0, |value| self.calibration.rise(index, value).max(0.0));
         }
         for (index, neighbours) in self.neighbours.iter().enumerate() {
             let rise = self.rise[index];

@@ -1,11 +1,14 @@
 //! Signals: what arrives from the sensors, and what a robot's calibration makes of it.
 
 mod calibration;
+mod curve;
 mod frame;
 mod fsr;
 mod intake;
 
-pub use calibration::{Calibration, Checks, TaxelCalibration};
+pub use calibration::{Calibration, Checks, FsrResponse, FsrSignal, Response, TaxelCalibration};
+pub use curve::Curve;
+pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
 pub(crate) use intake::Intake;

@@ -1,12 +1,21 @@
 //! **calibrate**: raw values to pressures.
 //!
-//! P = gain · (raw − baseline), 0 unless over the dead band. A value that is not finite, over 2⁶⁰ in size (raw or P), or
+//! P = gain · (raw − baseline), or P = c(raw − baseline) for a taxel with a curve; 0 unless over the dead band. A value that is not finite, over 2⁶⁰ in size (raw or P), or
 //! masked is left out; one under 2⁻⁶⁰ and not zero counts as 0; each puts `faulty_input` on its fields. All of these are
 //! decided by the bits, because shader compilers may assume that NaN and infinity never occur.
 //!
-//! **Bound.** Two roundings: |δP| ≤ 2u·P; none where difference and product are single-precision numbers themselves.
+//! **Curve.** Gain and sign are in the table, which is single precision's on every backend. Between two knots
+//! c(x) = p₀ + (x − x₀) · s with s = (p₁ − p₀)/(x₁ − x₀), kept within p₀ and p₁ so that it stays monotone; before the
+//! first knot and after the last it is that knot's p. The knot is found by halving.
+//!
+//! **Bound.** Two roundings on a straight line: |δP| ≤ 2u·P; none where difference and product are single-precision
+//! numbers themselves. On a curve x̂ = x(1 + δ), |δ| ≤ u, and as c is monotone it is at most
+//! max |c(x ± u|x|) − c(x)| off for that. Then s, the difference and the product round, each by u of at most
+//! |p₁ − p₀|, and the sum by u|c|: 3u|p₁ − p₀| + u|c|, over all the knots that x̂ may lie between. Nothing is lost at a
+//! knot, beyond the ends, and where each of these is a single-precision number.
 
-use super::U;
+use super::layout::Knot;
+use super::{SLACK, U};
 use crate::percept::Flags;
 use crate::signal::{RawValue, TaxelCalibration};
 
@@ -32,8 +41,8 @@ pub(crate) struct Pressure {
     pub(crate) in_doubt: bool,
 }
 
-/// What is right, in f64.
-pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration) -> Pressure {
+/// What is right, in f64; `curve` is the taxel's, empty for a straight line.
+pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: &[Knot]) -> Pressure {
     let unusable = |flag: Flags| Pressure { status: flag.bits() | UNUSABLE, ..Pressure::default() };
     if raw.is_missing() {
         return unusable(Flags::INCOMPLETE);
@@ -49,9 +58,12 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration) -> Pressure {
     let nothing = value != 0.0 && value.abs() < TINY;
     let value = if nothing { 0.0 } else { value };
     let above = value - f64::from(taxel.baseline);
-    let pressure = above * f64::from(taxel.gain);
-    let exact = [above, pressure].iter().all(|&x| f64::from(x as f32) == x);
-    let bound = if exact { 0.0 } else { 2.0 * U * pressure.abs() };
+    let (pressure, bound) = if curve.is_empty() {
+        let pressure = above * f64::from(taxel.gain);
+        (pressure, if is_single(&[above, pressure]) { 0.0 } else { 2.0 * U * pressure.abs() })
+    } else {
+        on_curve(curve, above)
+    };
     if pressure.abs() > HUGE {
         return Pressure { in_doubt: pressure.abs() - HUGE <= bound, ..unusable(Flags::FAULTY_INPUT) };
     }
@@ -72,6 +84,45 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration) -> Pressure {
     }
 }
 
+/// Whether all are single-precision numbers.
+fn is_single(numbers: &[f64]) -> bool {
+    numbers.iter().all(|&x| f64::from(x as f32) == x)
+}
+
+/// c(x), and how far single precision may be off.
+fn on_curve(knots: &[Knot], x: f64) -> (f64, f64) {
+    let (p, steps) = interpolate(knots, x);
+    let rounding = if is_single(&[x]) { 0.0 } else { U * x.abs() };
+    if rounding == 0.0 && is_single(&[steps[0], steps[1], steps[2], p]) {
+        return (p, 0.0);
+    }
+    let ends = [x - rounding, x + rounding];
+    let around = ends.map(|x| interpolate(knots, x).0);
+    let off = around.map(|c| (c - p).abs());
+    let [low, high] = ends.map(|x| knots.partition_point(|knot| f64::from(knot.raw) <= x));
+    if high == 0 || low == knots.len() {
+        return (p, 0.0);
+    }
+    let [from, to] = [low.max(1) - 1, high.min(knots.len() - 1)].map(|knot| f64::from(knots[knot].p));
+    let size = around[0].abs().max(around[1].abs());
+    (p, SLACK * (off[0].max(off[1]) + 3.0 * U * (to - from).abs() + U * size))
+}
+
+/// c(x), and on the way to it x − x₀, s and their product.
+fn interpolate(knots: &[Knot], x: f64) -> (f64, [f64; 3]) {
+    let after = knots.partition_point(|knot| f64::from(knot.raw) <= x);
+    let Some(from) = after.checked_sub(1).map(|before| knots[before]) else { return (knots[0].p.into(), [0.0; 3]) };
+    let Some(to) = knots.get(after) else { return (from.p.into(), [0.0; 3]) };
+    let [low, high] = [from.p, to.p].map(f64::from);
+    let run = x - f64::from(from.raw);
+    let slope = (high - low) / (f64::from(to.raw) - f64::from(from.raw));
+    let rise = run * slope;
+    if run == 0.0 {
+        return (low, [0.0; 3]);
+    }
+    ((low + rise).clamp(low.min(high), low.max(high)), [run, slope, rise])
+}
+
 /// 2⁶⁰.
 const HUGE: f64 = 1_152_921_504_606_846_976.0;
 /// 2⁻⁶⁰.
@@ -82,7 +133,7 @@ mod tests {
     use super::*;
 
     fn of(raw: f64) -> Pressure {
-        reference(RawValue::new(raw), &TaxelCalibration::default())
+        reference(RawValue::new(raw), &TaxelCalibration::default(), &[])
     }
 
     #[test]
@@ -107,7 +158,7 @@ mod tests {
         for raw in [1e-19, -1e-19, 1e-45, 1e-300] {
             assert_eq!((of(raw).value, of(raw).status), (0.0, faulty), "{raw}");
         }
-        let missing = reference(RawValue::MISSING, &TaxelCalibration::default());
+        let missing = reference(RawValue::MISSING, &TaxelCalibration::default(), &[]);
         assert_eq!(missing.status, Flags::INCOMPLETE.bits() | UNUSABLE);
     }
 
@@ -115,7 +166,7 @@ mod tests {
     fn an_inverted_sensor_rises_when_its_value_falls() {
         let taxel =
             TaxelCalibration { baseline: 250.0, gain: -1.0, dead_band: 5.0, p_max: 200.0, ..Default::default() };
-        let at = |raw: f64| reference(RawValue::new(raw), &taxel);
+        let at = |raw: f64| reference(RawValue::new(raw), &taxel, &[]);
         assert_eq!(at(240.0).value, 10.0);
         assert_eq!(at(246.0).value, 0.0);
         assert_eq!(at(252.0).value, 0.0);

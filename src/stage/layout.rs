@@ -32,8 +32,35 @@ pub(crate) struct Taxel {
     pub(crate) raw_high: f32,
     /// m².
     pub(crate) area: f32,
-    /// 1: never believed.
-    pub(crate) masked: u32,
+    /// [`STRAIGHT`], [`MASKED`], or [`FIRST_CURVE`] and up: which of the curves.
+    pub(crate) response: u32,
+}
+
+/// P = gain · (raw − baseline).
+pub(crate) const STRAIGHT: u32 = 0;
+/// Never believed.
+pub(crate) const MASKED: u32 = 1;
+/// The first curve; gain and sign are in the table.
+pub(crate) const FIRST_CURVE: u32 = 2;
+
+/// Where a curve's knots stand.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Curve {
+    pub(crate) first: u32,
+    /// Number of knots, at least two.
+    pub(crate) count: u32,
+}
+
+/// A knot of a curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Knot {
+    /// raw − baseline, rising from knot to knot.
+    pub(crate) raw: f32,
+    pub(crate) p: f32,
+    /// To the next knot; 0 at the last.
+    pub(crate) slope: f32,
 }
 
 /// The time since the frame before.

@@ -1,22 +1,32 @@
 //! calibrate in f32 lanes; see [`crate::stage::calibrate`].
 
 use crate::percept::Flags;
+use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
-use crate::stage::layout::Taxel;
+use crate::stage::layout::{FIRST_CURVE, Knot, MASKED, Taxel};
 
 /// Reads `count ≤ L` frames, each with its values side by side, into lanes by taxel.
 pub(super) fn lanes<const L: usize>(
-    taxels: &[Taxel],
+    plan: &Plan,
     raw: &[RawValue],
     count: usize,
     pressures: &mut [[f32; L]],
     statuses: &mut [[u32; L]],
 ) {
-    for (slot, taxel) in taxels.iter().enumerate() {
+    for (slot, taxel) in plan.taxels.iter().enumerate() {
+        let slots = plan.taxels.len();
         let (pressures, statuses) = (&mut pressures[slot], &mut statuses[slot]);
-        for lane in 0..count {
-            (pressures[lane], statuses[lane]) = one(raw[lane * taxels.len() + slot], taxel);
+        if taxel.response < FIRST_CURVE {
+            for lane in 0..count {
+                let straight = |above| above * taxel.gain;
+                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, straight);
+            }
+        } else {
+            let knots = plan.knots_of(slot);
+            for lane in 0..count {
+                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, |x| on_curve(knots, x));
+            }
         }
         // Lanes beyond the batch's end are empty frames.
         pressures[count..].fill(0.0);
@@ -24,7 +34,7 @@ pub(super) fn lanes<const L: usize>(
     }
 }
 
-fn one(raw: RawValue, taxel: &Taxel) -> (f32, u32) {
+fn one(raw: RawValue, taxel: &Taxel, response: impl Fn(f32) -> f32) -> (f32, u32) {
     let is_tiny = |size: u32| size != 0 && size < TINY_BITS;
     let bits = raw.to_bits();
     let size = bits & SIZE_BITS;
@@ -32,14 +42,14 @@ fn one(raw: RawValue, taxel: &Taxel) -> (f32, u32) {
         return (0.0, Flags::INCOMPLETE.bits() | UNUSABLE);
     }
     let faulty = Flags::FAULTY_INPUT.bits();
-    if size > HUGE_BITS || taxel.masked != 0 {
+    if size > HUGE_BITS || taxel.response == MASKED {
         return (0.0, faulty | UNUSABLE);
     }
     let value = f32::from_bits(bits);
     let beyond = value < taxel.raw_low || value > taxel.raw_high;
     let mut status = if beyond { Flags::OUT_OF_RANGE.bits() } else { 0 };
     let value = if is_tiny(size) { 0.0 } else { value };
-    let pressure = (value - taxel.baseline) * taxel.gain;
+    let pressure = response(value - taxel.baseline);
     let pressure_size = pressure.to_bits() & SIZE_BITS;
     if pressure_size > HUGE_BITS {
         return (0.0, faulty | UNUSABLE);
@@ -54,4 +64,17 @@ fn one(raw: RawValue, taxel: &Taxel) -> (f32, u32) {
         status |= Flags::SATURATED.bits();
     }
     (pressure, status)
+}
+
+fn on_curve(knots: &[Knot], x: f32) -> f32 {
+    let (first, last) = (knots[0], knots[knots.len() - 1]);
+    if x <= first.raw {
+        return first.p;
+    }
+    if x >= last.raw {
+        return last.p;
+    }
+    let after = knots.partition_point(|knot| knot.raw <= x);
+    let (from, to) = (knots[after - 1], knots[after]);
+    (from.p + (x - from.raw) * from.slope).clamp(from.p.min(to.p), from.p.max(to.p))
 }

@@ -130,7 +130,7 @@ impl<const L: usize> Scratch<L> {
 
     /// All stages for `count ≤ L` frames of `raw`, frame by frame as recordings have them.
     fn block(&mut self, plan: &Plan, raw: &[RawValue], count: usize, cells: &mut CellsMut<'_>) {
-        calibrate::lanes(&plan.taxels, raw, count, &mut self.pressures, &mut self.statuses);
+        calibrate::lanes(plan, raw, count, &mut self.pressures, &mut self.statuses);
         if !cells.pressures.is_empty() {
             for (slot, lanes) in self.pressures.iter().enumerate() {
                 for lane in 0..count {

@@ -97,7 +97,8 @@ impl Gpu {
         let widest = (slots * 4).max(fields * size_of::<layout::Motion>() as u64);
         let back = slots * 4 + fields * (4 + 16 + 16 + 4 + 8 + size_of::<layout::Motion>() as u64);
         let tables = (plan.members.len() * size_of::<layout::Member>()) as u64;
-        if tables > limit || widest > limit {
+        let knots = (plan.curves.knots.len() * size_of::<layout::Knot>()) as u64;
+        if tables > limit || widest > limit || knots > limit {
             return Err(Error::failed(format!(
                 "{} memberships and {slots} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
                 plan.members.len()
@@ -153,7 +154,9 @@ impl Gpu {
         let wide_fields = table(&device, "wide fields", &wide);
 
         let wanted = plan.stages();
-        let buffers = [&batch, &taxels, &raw, &pressures, &statuses];
+        let curves = table(&device, "curves", &plan.curves.curves);
+        let knots = table(&device, "knots", &plan.curves.knots);
+        let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
         let mut stages = vec![Stage::new(&device, &shaders::CALIBRATE, "main", Over::Taxels, &buffers)];
         let mut over_fields = |shader: &StageShader, buffers: [&wgpu::Buffer; 8]| {
             stages.push(Stage::new(&device, shader, "main", Over::Fields, &buffers));

@@ -37,7 +37,9 @@ macro_rules! same_layout {
 fn structs_lie_as_naga_lays_them() {
     let module = parse(&ALL[1]);
     same_layout!(&module, Batch { frames, slots, fields, wide });
-    same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, masked });
+    same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, response });
+    same_layout!(&module, Curve { first, count });
+    same_layout!(&module, Knot { raw, p, slope });
     same_layout!(&module, Field { first, count, charted, area_known });
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
@@ -76,6 +78,9 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
     assert_eq!(constant(&module, "WIDE"), Some(layout::WIDE as u32));
+    assert_eq!(constant(&module, "STRAIGHT"), Some(layout::STRAIGHT));
+    assert_eq!(constant(&module, "MASKED"), Some(layout::MASKED));
+    assert_eq!(constant(&module, "FIRST_CURVE"), Some(layout::FIRST_CURVE));
     assert_eq!(constant(&module, "UNUSABLE"), Some(calibrate::UNUSABLE));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));

@@ -1,0 +1,87 @@
+//! The curves that a plan's taxels need, each once, as the backends read them.
+
+use std::collections::HashMap;
+
+use crate::error::Result;
+use crate::signal::{Calibration, Curve, FsrSignal, Response, TaxelCalibration, slope};
+use crate::stage::layout;
+
+/// Curves, one after the other.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Curves {
+    pub(crate) curves: Vec<layout::Curve>,
+    pub(crate) knots: Vec<layout::Knot>,
+    /// Taxels that respond alike share a curve.
+    known: HashMap<Alike, u32>,
+}
+
+/// What makes a taxel's curve: its kind or number, then whatever else there is, as bits.
+type Alike = (usize, u8, u64, u32);
+
+impl Curves {
+    /// What [`layout::Taxel::response`] says for `taxel`.
+    pub(super) fn response_of(
+        &mut self,
+        calibration: &Calibration,
+        taxel: &TaxelCalibration,
+        signal: Option<FsrSignal>,
+    ) -> Result<u32> {
+        let gain = taxel.gain.to_bits();
+        let alike = match taxel.response {
+            _ if taxel.mask => return Ok(layout::MASKED),
+            Response::Linear => return Ok(layout::STRAIGHT),
+            Response::Fsr(fsr) => {
+                let kind = usize::from(signal.unwrap_or(fsr.signal) == FsrSignal::Linear);
+                (kind, fsr.tap, fsr.full_scale_newton.to_bits(), gain)
+            }
+            Response::Curve(index) => (2 + index, 0, 0, gain),
+        };
+        if let Some(&known) = self.known.get(&alike) {
+            return Ok(known);
+        }
+        let response = layout::FIRST_CURVE + self.curves.len() as u32;
+        if let Some(curve) = calibration.curve_of(taxel, signal)? {
+            self.add(&curve);
+        }
+        self.known.insert(alike, response);
+        Ok(response)
+    }
+
+    fn add(&mut self, curve: &Curve) {
+        let knots = curve.knots();
+        self.curves.push(layout::Curve { first: self.knots.len() as u32, count: knots.len() as u32 });
+        let slopes = knots.windows(2).map(|pair| slope(pair[0], pair[1]) as f32).chain([0.0]);
+        self.knots.extend(knots.iter().zip(slopes).map(|(&[raw, p], slope)| layout::Knot { raw, p, slope }));
+    }
+
+    /// The knots of a taxel that responds by `response`; none for a straight line.
+    pub(crate) fn of(&self, response: u32) -> &[layout::Knot] {
+        let index = response.checked_sub(layout::FIRST_CURVE).map(|index| index as usize);
+        let Some(curve) = index.map(|index| self.curves[index]) else { return &[] };
+        &self.knots[curve.first as usize..][..curve.count as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn taxels_that_respond_alike_share_a_curve() {
+        let text = "[curve.a]\nraw = [0, 2]\np = [0, 8]\n[all]\nsensor = \"fsr\"\n[taxel.1]\ntap = 7\n[taxel.2]\n\
+                    curve = \"a\"\n[taxel.3]\ncurve = \"a\"\ninvert = true\n[taxel.4]\ntap = 7\n[taxel.5]\nmask = true\n\
+                    [taxel.6]\nsensor = \"linear\"";
+        let calibration = Calibration::parse(text, &[0, 1, 2, 3, 4, 5, 6]).unwrap();
+        let mut curves = Curves::default();
+        let codes: Vec<u32> =
+            calibration.taxels.iter().map(|taxel| curves.response_of(&calibration, taxel, None).unwrap()).collect();
+        assert_eq!(codes, [2, 3, 4, 5, 3, layout::MASKED, layout::STRAIGHT]);
+        assert_eq!((curves.curves.len(), curves.knots.len()), (4, 2 * 1024 + 4));
+        assert_eq!(curves.of(4)[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
+        assert_eq!(curves.of(5).iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
+        assert!(curves.of(layout::STRAIGHT).is_empty() && curves.of(layout::MASKED).is_empty());
+        // The other signal is another curve.
+        assert_eq!(curves.response_of(&calibration, &calibration.taxels[0], Some(FsrSignal::Raw)).unwrap(), 6);
+        assert_eq!(curves.of(6)[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
+    }
+}

@@ -1,0 +1,207 @@
+//! Curves: what a sensor's raw value means where that is no straight line.
+
+use super::calibration::{GAINS, MOST};
+use super::{FsrCircuit, FsrResponse, FsrSignal};
+use crate::error::{Error, Result};
+
+/// A monotone table from raw value to pressure: straight between its knots, held beyond its ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// (raw, P); raw strictly increasing, P all the way up or all the way down.
+    knots: Vec<[f32; 2]>,
+}
+
+/// Which of a table's columns a flaw is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Column {
+    Raw,
+    P,
+}
+
+/// What is wrong with a table: where, and in words.
+#[derive(Debug)]
+pub(crate) struct Flaw {
+    pub(crate) column: Column,
+    /// The knot, from 0; beyond the last for what concerns the whole column.
+    pub(crate) knot: usize,
+    pub(crate) what: String,
+}
+
+impl Curve {
+    /// The curve through the knots (`raw[i]`, `p[i]`), in single precision.
+    ///
+    /// # Errors
+    /// Fewer than two knots, another number of raw values than of pressures, a number that is not finite or beyond
+    /// belief, raw values that do not rise, pressures that turn back or are all the same, or a slope that would leave
+    /// single precision.
+    pub fn new(raw: &[f64], p: &[f64]) -> Result<Self> {
+        Self::sound(raw, p).map_err(|flaw| Error::failed(flaw.what))
+    }
+
+    /// The same, telling where the table is wrong.
+    pub(crate) fn sound(raw: &[f64], p: &[f64]) -> std::result::Result<Self, Flaw> {
+        let whole = |column, what| Err(Flaw { column, knot: usize::MAX, what });
+        let (knots, pressures) = (raw.len(), p.len());
+        if knots != pressures {
+            let what = format!("`raw` has {knots} knots and `p` has {pressures}; give as many of one as of the other");
+            return whole(Column::P, what);
+        }
+        if knots < 2 {
+            return whole(Column::Raw, format!("`raw` has {knots} of the two knots that a curve has at least"));
+        }
+        for (column, name, values) in [(Column::Raw, "raw", raw), (Column::P, "p", p)] {
+            if let Some((knot, x)) = values.iter().enumerate().find(|(_, x)| !is_believable(**x)) {
+                let at = knot + 1;
+                let what = format!("`{name}` is {x} at knot {at}; it must be 0, or between 1e-18 and 1e18 in size");
+                return Err(Flaw { column, knot, what });
+            }
+        }
+        let curve = Self { knots: raw.iter().zip(p).map(|(&raw, &p)| [raw as f32, p as f32]).collect() };
+        let falls = curve.falls();
+        for (knot, pair) in curve.knots.windows(2).enumerate() {
+            let ([from, low], [to, high]) = (pair[0], pair[1]);
+            let (knot, at) = (knot + 1, knot + 2);
+            if to <= from {
+                let what =
+                    format!("`raw` is {} at knot {at}, after {}; it must rise from knot to knot", raw[knot], from);
+                return Err(Flaw { column: Column::Raw, knot, what });
+            }
+            if (falls && high > low) || (!falls && high < low) {
+                let what = format!(
+                    "`p` is {high} at knot {at}, after {low}: it is not monotone; it must rise all the way, or fall all \
+                     the way"
+                );
+                return Err(Flaw { column: Column::P, knot, what });
+            }
+        }
+        if curve.knots[0][1] == curve.knots[knots - 1][1] {
+            return whole(Column::P, format!("`p` is {} at every knot, so that no touch could be felt", p[0]));
+        }
+        match curve.steep() {
+            None => Ok(curve),
+            Some((knot, slope)) => {
+                let at = knot + 1;
+                let what = format!("`p` changes by {slope:e} a raw unit after knot {at}; keep it {SLOPES}");
+                Err(Flaw { column: Column::P, knot, what })
+            }
+        }
+    }
+
+    /// What a sensor of the paper's circuit delivers, with a knot at every reading.
+    pub(crate) fn fsr(sensor: &FsrResponse) -> Self {
+        let circuit = FsrCircuit { tap: sensor.tap };
+        let signal = |counts| match sensor.signal {
+            FsrSignal::Raw => circuit.logarithmic(counts),
+            FsrSignal::Linear => circuit.linearised(counts, sensor.full_scale_newton),
+        };
+        Self { knots: (0..=FsrCircuit::OPEN_COUNTS).map(|n| [f32::from(n), signal(n) as f32]).collect() }
+    }
+
+    /// The curve for P = |gain| · curve(±x), with the sign of `gain`.
+    ///
+    /// # Errors
+    /// A slope would leave single precision.
+    pub(crate) fn scaled(&self, gain: f32) -> Result<Self> {
+        let mut knots: Vec<[f32; 2]> = self.knots.iter().map(|&[raw, p]| [raw, p * gain.abs()]).collect();
+        if gain < 0.0 {
+            knots.reverse();
+            knots.iter_mut().for_each(|[raw, _]| *raw = -*raw);
+        }
+        let scaled = Self { knots };
+        match scaled.steep() {
+            None => Ok(scaled),
+            Some((_, slope)) => Err(Error::failed(format!(
+                "`gain` {} makes the curve change by {slope:e} a raw unit; keep it {SLOPES}",
+                gain.abs()
+            ))),
+        }
+    }
+
+    /// (raw, P) of every knot, raw rising.
+    #[must_use]
+    pub fn knots(&self) -> &[[f32; 2]] {
+        &self.knots
+    }
+
+    /// Whether the raw value falls when the sensor is pressed.
+    #[must_use]
+    pub fn falls(&self) -> bool {
+        self.knots[0][1] > self.knots[self.knots.len() - 1][1]
+    }
+
+    /// How far the raw value `x` is from the curve's untouched end.
+    pub(crate) fn rise(&self, x: f64) -> f64 {
+        if self.falls() { f64::from(self.knots[self.knots.len() - 1][0]) - x } else { x - f64::from(self.knots[0][0]) }
+    }
+
+    /// The first knot after which the slope is not 0 and beyond what single precision works with.
+    fn steep(&self) -> Option<(usize, f64)> {
+        let slopes = self.knots.windows(2).map(|pair| slope(pair[0], pair[1]));
+        slopes.enumerate().find(|(_, slope)| *slope != 0.0 && !GAINS.contains(&slope.abs()))
+    }
+}
+
+const SLOPES: &str = "between 1e-12 and 1e12";
+
+/// ΔP / Δraw from one knot to the next.
+pub(crate) fn slope([from, low]: [f32; 2], [to, high]: [f32; 2]) -> f64 {
+    (f64::from(high) - f64::from(low)) / (f64::from(to) - f64::from(from))
+}
+
+/// Whether a backend takes `x` for what it is: see [`crate::signal::calibration`] on what is beyond belief.
+fn is_believable(x: f64) -> bool {
+    x == 0.0 || (1.0 / MOST..=MOST).contains(&x.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::FsrSignal::{Linear, Raw};
+
+    #[test]
+    fn a_table_that_makes_no_sense_is_told_apart() {
+        let why = |raw: &[f64], p: &[f64]| Curve::new(raw, p).unwrap_err().to_string();
+        assert_eq!(
+            why(&[0.0, 1.0, 2.0], &[0.0, 9.0, 8.0]),
+            "`p` is 8 at knot 3, after 9: it is not monotone; it must rise all the way, or fall all the way"
+        );
+        assert!(why(&[0.0, 1.0, 2.0], &[9.0, 9.5, 8.0]).contains("9.5 at knot 2"));
+        assert!(why(&[0.0, 1.0], &[0.0, 9.0, 8.0]).contains("`raw` has 2 knots and `p` has 3"));
+        assert!(why(&[0.0], &[0.0]).contains("`raw` has 1 of the two knots"));
+        assert!(why(&[], &[]).contains("two knots"));
+        assert!(why(&[0.0, f64::NAN], &[0.0, 1.0]).contains("`raw` is NaN at knot 2"));
+        assert!(why(&[0.0, 1.0], &[f64::INFINITY, 1.0]).contains("`p` is inf at knot 1"));
+        assert!(why(&[0.0, 1.0], &[0.0, 1e-30]).contains("between 1e-18"));
+        assert!(why(&[0.0, 1.0, 1.0], &[0.0, 1.0, 2.0]).contains("`raw` is 1 at knot 3, after 1"));
+        // Apart in double precision only.
+        assert!(why(&[0.0, 16_777_216.0, 16_777_217.0], &[0.0, 1.0, 2.0]).contains("must rise"));
+        assert!(why(&[0.0, 1.0], &[3.0, 3.0]).contains("no touch"));
+        assert!(why(&[0.0, 1e-6], &[0.0, 1e7]).contains("1e13 a raw unit after knot 1"));
+        assert!(Curve::new(&[-5.0, 0.0, 1.0], &[3.0, 3.0, -1.0]).unwrap().falls());
+    }
+
+    #[test]
+    fn gain_and_inversion_go_into_the_table() {
+        let curve = Curve::new(&[0.0, 10.0, 30.0], &[0.0, 1.0, 8.0]).unwrap();
+        assert_eq!(curve.scaled(2.0).unwrap().knots(), [[0.0, 0.0], [10.0, 2.0], [30.0, 16.0]]);
+        let turned = curve.scaled(-1.0).unwrap();
+        assert_eq!(turned.knots(), [[-30.0, 8.0], [-10.0, 1.0], [0.0, 0.0]]);
+        assert_eq!((curve.rise(4.0), turned.rise(-4.0)), (4.0, 4.0));
+        assert!(curve.scaled(1e12).is_ok() && curve.scaled(1e13).unwrap_err().to_string().contains("`gain`"));
+    }
+
+    #[test]
+    fn the_circuits_curves_are_sound_tables_that_say_what_it_says() {
+        for tap in 0..=255 {
+            for (signal, full_scale_newton) in [(Raw, 10.0), (Linear, 10.0), (Linear, 0.1), (Linear, 1e6)] {
+                let curve = Curve::fsr(&FsrResponse { tap, signal, full_scale_newton });
+                let column = |i: usize| curve.knots.iter().map(|knot| f64::from(knot[i])).collect::<Vec<_>>();
+                assert_eq!(Curve::new(&column(0), &column(1)).unwrap(), curve);
+                assert!(curve.falls() && curve.knots[1023] == [1023.0, 0.0]);
+            }
+        }
+        let circuit = FsrCircuit { tap: 100 };
+        let curve = Curve::fsr(&FsrResponse { tap: 100, signal: Linear, full_scale_newton: 5.0 });
+        assert_eq!(f64::from(curve.knots[700][1]), f64::from(circuit.linearised(700, 5.0) as f32));
+    }
+}
