@@ -1,19 +1,20 @@
 //! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
 
-use std::collections::HashMap;
+mod host;
 
-use glam::{DAffine3, DVec3};
+use std::ops::Range;
 
+use self::host::{Host, Links};
 use crate::backend::agreement::{Agreement, compare};
-use crate::backend::reference::Reference;
+use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, RawBatch, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
-use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
-use crate::scene::{Plan, PlanField, Scene};
-use crate::signal::{Calibration, Frame, Intake, RawValue};
-use crate::stage::{position, touches};
+use crate::percept::{Flags, Percepts, Precision};
+use crate::scene::{Plan, Scene};
+use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Unfit, Upkeep};
+use crate::stage::{layout, touches};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -58,8 +59,10 @@ pub struct Engine {
     last_t_s: Option<f64>,
     max_gap_s: f64,
     percepts: Percepts,
-    /// Made by the first comparison, and kept, as it has a memory too.
-    reference: Option<(Reference, Vec<touches::Memory>)>,
+    /// Made by the first comparison, and kept, as the reference has a memory too.
+    check: Option<Box<Check>>,
+    /// What the calibration's upkeep does, if it does anything.
+    upkeep: Option<KeptUp>,
     /// Per field, the touches of the frame before.
     memories: Vec<touches::Memory>,
     frames_done: u64,
@@ -67,11 +70,44 @@ pub struct Engine {
     links: Links,
 }
 
-/// What poses are applied to: the body's links and how they hang together at rest.
-struct Links {
-    index_of: HashMap<String, usize>,
-    parent: Vec<Option<usize>>,
-    world_from_link: Vec<DAffine3>,
+/// The reference's side of a comparison.
+struct Check {
+    reference: Reference,
+    memories: Vec<touches::Memory>,
+    right: Percepts,
+    bounds: Vec<CellBound>,
+}
+
+impl Check {
+    fn new(plan: &Plan) -> Self {
+        Self {
+            reference: Reference::new(plan),
+            memories: vec![touches::Memory::default(); plan.fields.len()],
+            right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
+                .with_columns(plan.columns, plan.kept_pressures()),
+            bounds: Vec::new(),
+        }
+    }
+}
+
+/// Upkeep, and what it needs of the engine.
+struct KeptUp {
+    upkeep: Upkeep,
+    /// The taxels as the calibration has them.
+    made: Vec<layout::Taxel>,
+    /// Per field, whether it was in contact in this epoch.
+    touched: Vec<bool>,
+}
+
+impl KeptUp {
+    fn new(plan: &Plan, calibration: &Calibration) -> Option<Self> {
+        let taxels = plan.calibrations.iter().map(|c| Kept { baseline: c.baseline, raw_range: c.raw_range });
+        Some(Self {
+            upkeep: Upkeep::new(calibration.upkeep, taxels)?,
+            made: plan.taxels.clone(),
+            touched: vec![false; plan.fields.len()],
+        })
+    }
 }
 
 impl Engine {
@@ -100,7 +136,8 @@ impl Engine {
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures()),
-            reference: None,
+            check: None,
+            upkeep: KeptUp::new(&plan, &calibration),
             memories: vec![touches::Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
@@ -170,12 +207,7 @@ impl Engine {
     /// A frame has another number of values than the engine listens to, or poses a link that the body does not have; or
     /// the device was lost.
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
-        self.gather(frames)?;
-        let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
-        self.percepts.first_frame = self.frames_done;
-        let host = Host { plan: &self.plan, links: &self.links };
-        host.run(&mut *self.backend, frames, &raw, &mut self.percepts, &mut self.memories)?;
-        self.frames_done += frames.len() as u64;
+        self.advance(frames, None)?;
         Ok(&self.percepts)
     }
 
@@ -184,22 +216,97 @@ impl Engine {
     /// # Errors
     /// As [`Engine::process`]; also after frames that were not compared, as the reference has not seen them.
     pub fn process_and_compare(&mut self, frames: &[Frame]) -> Result<(&Percepts, Agreement)> {
-        if self.reference.is_none() && self.frames_done > 0 {
-            return Err(Error::usage("frames were processed without a comparison; compare from the first on"));
-        }
-        self.process(frames)?;
-        let start = || (Reference::new(&self.plan), vec![touches::Memory::default(); self.plan.fields.len()]);
-        let (reference, memories) = self.reference.get_or_insert_with(start);
-        let raw = RawBatch { frames: frames.len(), values: &self.raw, steps: &self.steps };
-        let bounds = reference.bounds(&raw);
-        let mut right = Percepts::new(self.plan.outputs, self.plan.fields.len(), Precision::F64)
-            .with_columns(self.plan.columns, self.plan.kept_pressures());
-        right.first_frame = self.percepts.first_frame;
-        let host = Host { plan: &self.plan, links: &self.links };
-        host.run(reference, frames, &raw, &mut right, memories)?;
+        let mut check = match self.check.take() {
+            Some(check) => check,
+            None if self.frames_done > 0 => {
+                return Err(Error::usage("frames were processed without a comparison; compare from the first on"));
+            }
+            None => Box::new(Check::new(&self.plan)),
+        };
+        let done = self.advance(frames, Some(&mut check));
         let names: Vec<&str> = self.plan.fields.iter().map(|field| field.name.as_str()).collect();
-        let agreement = compare(&right, &bounds, &self.percepts, &names);
-        Ok((&self.percepts, agreement))
+        let agreement = done.map(|()| compare(&check.right, &check.bounds, &self.percepts, &names));
+        self.check = Some(check);
+        Ok((&self.percepts, agreement?))
+    }
+
+    /// Taxels that are not used at present, by id, and why: those that upkeep has found unfit.
+    pub fn unfit(&self) -> impl Iterator<Item = (u32, Unfit)> + '_ {
+        let judged = self.upkeep.iter().flat_map(|kept| kept.upkeep.taxels());
+        judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
+    }
+
+    /// All of `frames`, epoch by epoch where there is upkeep, on the backend and, if asked for, on the reference.
+    fn advance(&mut self, frames: &[Frame], mut check: Option<&mut Check>) -> Result<()> {
+        self.gather(frames)?;
+        self.percepts.reset(frames.len());
+        self.percepts.first_frame = self.frames_done;
+        if let Some(check) = check.as_deref_mut() {
+            check.right.reset(frames.len());
+            check.right.first_frame = self.frames_done;
+            check.bounds.clear();
+        }
+        let mut start = 0;
+        for index in 0..frames.len() {
+            if self.upkeep.as_ref().is_some_and(|kept| kept.upkeep.is_due(frames[index].t_s)) {
+                self.segment(frames, start..index, check.as_deref_mut())?;
+                self.close_epoch(check.as_deref_mut());
+                start = index;
+            }
+            if let Some(kept) = &mut self.upkeep {
+                let slots = self.plan.slots();
+                kept.upkeep.observe(frames[index].t_s, &self.raw[index * slots..][..slots]);
+            }
+        }
+        self.segment(frames, start..frames.len(), check)?;
+        self.frames_done += frames.len() as u64;
+        Ok(())
+    }
+
+    /// A run of frames that are calibrated alike.
+    fn segment(&mut self, frames: &[Frame], range: Range<usize>, check: Option<&mut Check>) -> Result<()> {
+        if range.is_empty() {
+            return Ok(());
+        }
+        let slots = self.plan.slots();
+        let raw = RawBatch {
+            first: range.start,
+            frames: range.len(),
+            values: &self.raw[range.start * slots..range.end * slots],
+            steps: &self.steps[range.clone()],
+        };
+        let host = Host { plan: &self.plan, links: &self.links };
+        host.run(&mut *self.backend, &frames[range.clone()], &raw, &mut self.percepts, &mut self.memories)?;
+        if let Some(check) = check {
+            check.bounds.extend(check.reference.bounds(&raw));
+            host.run(&mut check.reference, &frames[range.clone()], &raw, &mut check.right, &mut check.memories)?;
+        }
+        if let Some(kept) = &mut self.upkeep {
+            let fields = self.plan.fields.len();
+            let cells = &self.percepts.flags[range.start * fields..range.end * fields];
+            for frame in cells.chunks_exact(fields) {
+                for (touched, flags) in kept.touched.iter_mut().zip(frame) {
+                    *touched |= !flags.contains(Flags::NO_CONTACT);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets upkeep judge the epoch, and calibrates from now on as it says.
+    fn close_epoch(&mut self, check: Option<&mut Check>) {
+        let Some(kept) = &mut self.upkeep else { return };
+        let changed = kept.upkeep.close(&self.plan.touched_slots(&kept.touched));
+        kept.touched.fill(false);
+        if changed {
+            for (slot, ((baseline, unfit), made)) in kept.upkeep.taxels().zip(&kept.made).enumerate() {
+                self.plan.keep_up(slot, baseline, unfit.is_some(), made);
+            }
+            self.backend.recalibrate(&self.plan);
+            if let Some(check) = check {
+                check.reference.recalibrate(&self.plan);
+            }
+        }
     }
 
     fn gather(&mut self, frames: &[Frame]) -> Result<()> {
@@ -239,135 +346,6 @@ fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
 
 /// Speeds over shorter steps could pass what single precision holds.
 const SHORTEST_STEP_S: f64 = 1e-12;
-
-/// What the host does for every backend alike.
-struct Host<'a> {
-    plan: &'a Plan,
-    links: &'a Links,
-}
-
-impl Host<'_> {
-    /// A backend's part of a call, then the host's.
-    fn run(
-        &self,
-        backend: &mut dyn Backend,
-        frames: &[Frame],
-        raw: &RawBatch<'_>,
-        percepts: &mut Percepts,
-        memories: &mut [touches::Memory],
-    ) -> Result<()> {
-        percepts.reset(frames.len());
-        backend.run(raw, percepts)?;
-        let stages = self.plan.stages();
-        for (index, frame) in frames.iter().enumerate() {
-            percepts.t_s[index] = frame.t_s;
-            if !stages.position {
-                continue;
-            }
-            for (number, field) in self.plan.fields.iter().enumerate() {
-                let cell = index * self.plan.fields.len() + number;
-                let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
-                let world =
-                    if contact { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
-                if contact {
-                    self.place(field, world.as_ref(), cell, percepts);
-                }
-                if stages.touches {
-                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number]);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// The point of the skin at `place` (m, in the field's chart or from its origin), and the normal there.
-    fn on_skin(field: &PlanField, world: Option<&DAffine3>, place: DVec3) -> (DVec3, DVec3) {
-        let (position, normal) = match (&field.chart, &field.lift) {
-            (Some(chart), Some(lift)) => position::on_surface(chart, lift, field.origin_in_anchor, place.truncate()),
-            _ => (field.origin_in_anchor + place, DVec3::ZERO),
-        };
-        match world {
-            Some(world) => (world.transform_point3(position), world.transform_vector3(normal)),
-            None => (position, normal),
-        }
-    }
-
-    /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
-    fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
-        let place = match &percepts.values {
-            Values::F32(columns) => DVec3::from_array(columns.centroid[cell].map(f64::from)),
-            Values::F64(columns) => DVec3::from_array(columns.centroid[cell]),
-        };
-        let (position, normal) = Self::on_skin(field, world, place);
-        percepts.in_world[cell] = world.is_some();
-        if self.plan.outputs.contains(Outputs::POSITION) {
-            percepts.position[cell] = position.to_array();
-        }
-        if self.plan.outputs.contains(Outputs::NORMAL) {
-            percepts.normal[cell] = normal.to_array();
-        }
-    }
-
-    /// Tells a cell's separate touches.
-    fn touches(
-        &self,
-        field: &PlanField,
-        world: Option<&DAffine3>,
-        frame: usize,
-        cell: usize,
-        percepts: &mut Percepts,
-        memory: &mut touches::Memory,
-    ) {
-        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
-            memory.release();
-            percepts.push_touches([]);
-            return;
-        }
-        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
-        let members = self.plan.members_of(field);
-        let pulls: Vec<f64> =
-            members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
-        let skin = touches::Skin { places: &field.places, beside: &field.beside, spacing: field.spacing };
-        let unit_m = f64::from(field.unit_m);
-        let found = memory.follow(&skin, &pulls);
-        let several = found.len() > 1;
-        percepts.push_touches(found.iter().map(|touch| {
-            let place = touch.place * unit_m;
-            Touch {
-                id: touch.id,
-                total: touch.total,
-                active: touch.active,
-                centroid: field.charted.then(|| place.truncate().to_array()),
-                position: Self::on_skin(field, world, place).0.to_array(),
-            }
-        }));
-        percepts.present[cell] |= Outputs::TOUCHES;
-        if several {
-            percepts.flags[cell] |= Flags::SEVERAL;
-        }
-    }
-}
-
-impl Links {
-    /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from
-    /// there on. `None` where the frame poses neither.
-    fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
-        if frame.pose.is_empty() {
-            return None;
-        }
-        let mut at = Some(link);
-        while let Some(ancestor) = at {
-            let posed = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&ancestor));
-            if let Some((_, pose)) = posed {
-                let world_from_ancestor = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
-                let ancestor_from_link = self.world_from_link[ancestor].inverse() * self.world_from_link[link];
-                return Some(world_from_ancestor * ancestor_from_link);
-            }
-            at = self.parent[ancestor];
-        }
-        None
-    }
-}
 
 /// Ascending ids in few words: `0–35, 64–103`.
 fn ranges(ids: &[u32]) -> String {

@@ -53,6 +53,8 @@ impl FromStr for BackendKind {
 /// A batch of raw values: frames one after the other, each with one value a slot.
 #[derive(Clone, Copy)]
 pub(crate) struct RawBatch<'a> {
+    /// Where its first frame stands in the percepts.
+    pub(crate) first: usize,
     pub(crate) frames: usize,
     pub(crate) values: &'a [RawValue],
     /// Per frame, the time since the one before.
@@ -79,7 +81,10 @@ pub(crate) trait Backend: Send {
     /// Forgets all frames so far.
     fn restart(&mut self);
 
-    /// Turns `raw` into `percepts`, which have been reset to as many frames and hold this backend's precision.
+    /// Calibrates from now on as `plan` does, which differs in nothing but its taxels' calibration.
+    fn recalibrate(&mut self, plan: &Plan);
+
+    /// Turns `raw` into those frames of `percepts` that stand for it; `percepts` hold this backend's precision.
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()>;
 }
 
@@ -126,7 +131,7 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
     const ENOUGH: Duration = Duration::from_millis(60);
     let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
-    let raw = RawBatch { frames: batch, values: &values, steps: &steps };
+    let raw = RawBatch { first: 0, frames: batch, values: &values, steps: &steps };
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures());
     let mut times = Vec::with_capacity(CALLS);

@@ -323,17 +323,21 @@ impl Backend for Reference {
         self.bound_before.fill(BoundBefore::default());
     }
 
+    fn recalibrate(&mut self, plan: &Plan) {
+        self.plan.recalibrate(plan);
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let fields = self.plan.fields.len();
         for frame in 0..raw.frames {
             let pressures = self.pressures(raw, frame);
             if !percepts.pressures.is_empty() {
                 let slots = self.plan.slots();
-                let kept = &mut percepts.pressures[frame * slots..][..slots];
+                let kept = &mut percepts.pressures[(raw.first + frame) * slots..][..slots];
                 kept.iter_mut().zip(&pressures).for_each(|(kept, pressure)| *kept = pressure.value);
             }
             for index in 0..fields {
-                let cell = frame * fields + index;
+                let cell = (raw.first + frame) * fields + index;
                 let Values::F64(columns) = &mut percepts.values else {
                     unreachable!("the engine made percepts of this precision")
                 };

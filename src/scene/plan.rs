@@ -59,6 +59,8 @@ pub(crate) struct PlanField {
     pub(crate) first: usize,
     pub(crate) count: usize,
     pub(crate) charted: bool,
+    /// Whether another field of the plan has it as its parent.
+    pub(crate) divided: bool,
     pub(crate) area_known: bool,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
@@ -131,7 +133,8 @@ impl Plan {
             plan.taxels.push(taxel(of_taxel, area, response));
         }
         let around = plan.stages().touches.then(|| neighbours(body));
-        for field in chosen.into_iter().map(|index| &fields.fields[index]) {
+        let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
+        for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             plan.fields.push(PlanField {
@@ -141,6 +144,7 @@ impl Plan {
                 first: plan.members.len(),
                 count: field.members.len(),
                 charted: field.chart.is_ok(),
+                divided: parents.contains(&index),
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unit_m,
                 thresholds: thresholds(calibration, &field.name),
@@ -175,6 +179,39 @@ impl Plan {
     #[must_use]
     pub fn outputs(&self) -> Outputs {
         self.outputs
+    }
+
+    /// Calibrates the taxel in `slot` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how it was
+    /// before any upkeep.
+    pub(crate) fn keep_up(&mut self, slot: usize, baseline: f32, unfit: bool, made: &layout::Taxel) {
+        let response = if unfit { layout::MASKED } else { made.response };
+        self.taxels[slot] = layout::Taxel { baseline, response, ..*made };
+        self.calibrations[slot].baseline = baseline;
+        self.calibrations[slot].mask = response == layout::MASKED;
+    }
+
+    /// Per slot, whether one of its own fields is in contact, where `touched` says it of each field. A taxel's own fields
+    /// are those that no child divides further, so that a body that is touched somewhere is not touched everywhere.
+    pub(crate) fn touched_slots(&self, touched: &[bool]) -> Vec<bool> {
+        let mut own = vec![false; self.slots()];
+        let mut finest = vec![false; self.slots()];
+        for divided in [false, true] {
+            for (field, &touched) in self.fields.iter().zip(touched).filter(|(field, _)| field.divided == divided) {
+                for slot in self.members_of(field).iter().map(|member| member.slot as usize) {
+                    if !divided || !finest[slot] {
+                        own[slot] |= touched;
+                    }
+                    finest[slot] |= !divided;
+                }
+            }
+        }
+        own
+    }
+
+    /// Takes over the taxels' calibration of `other`, which is the same plan but for that.
+    pub(crate) fn recalibrate(&mut self, other: &Self) {
+        self.calibrations.clone_from(&other.calibrations);
+        self.taxels.clone_from(&other.taxels);
     }
 
     /// Number of taxels that are read.

@@ -14,6 +14,7 @@ use self::response::{CurveKeys, Draft, only_for_fsr};
 pub use self::response::{FsrResponse, FsrSignal, Response};
 use super::FsrCircuit;
 use super::curve::Curve;
+use super::upkeep::UpkeepKeys;
 use crate::error::{Error, Result, nearest};
 
 /// Gains beyond these would take products out of single precision.
@@ -83,6 +84,8 @@ pub struct Calibration {
     pub fields: BTreeMap<String, ContactThresholds>,
     /// Which input is not to be believed.
     pub checks: Checks,
+    /// How baselines follow drift, and which taxels are found unfit.
+    pub upkeep: UpkeepKeys,
 }
 
 /// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
@@ -108,6 +111,8 @@ struct File {
     contact: ContactKeys,
     #[serde(default)]
     checks: Checks,
+    #[serde(default)]
+    upkeep: UpkeepKeys,
 }
 
 #[derive(Default, Deserialize)]
@@ -154,6 +159,7 @@ impl Calibration {
             contact: ContactThresholds::default(),
             fields: BTreeMap::new(),
             checks: Checks::default(),
+            upkeep: UpkeepKeys::default(),
         }
     }
 
@@ -202,12 +208,13 @@ impl Calibration {
         only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
         let taxels = drafts.into_iter().map(|draft| draft.finish(&curves)).collect::<Result<_>>()?;
         check_checks(&file.checks)?;
+        file.upkeep.check()?;
         let contact = thresholds(file.contact.on.as_ref(), file.contact.off.as_ref(), text)?;
         let mut fields = BTreeMap::new();
         for (name, keys) in file.contact.field {
             fields.insert(name, thresholds(Some(&keys.on), keys.off.as_ref(), text)?);
         }
-        Ok(Self { body: file.body, taxels, curves, contact, fields, checks: file.checks })
+        Ok(Self { body: file.body, taxels, curves, contact, fields, checks: file.checks, upkeep: file.upkeep })
     }
 
     /// Refuses a body that the calibration says it is not for.
@@ -366,6 +373,14 @@ fn explain(message: &str) -> String {
         "isolated_ratio",
         "isolated_above",
         "contact",
+        "upkeep",
+        "cadence_s",
+        "time_constant_s",
+        "max_drift",
+        "stuck_s",
+        "noisy",
+        "saturated_s",
+        "dead_s",
         "on",
         "off",
         "field",

@@ -5,10 +5,13 @@ mod curve;
 mod frame;
 mod fsr;
 mod intake;
+mod upkeep;
 
-pub use calibration::{Calibration, Checks, FsrResponse, FsrSignal, Response, TaxelCalibration};
+pub use calibration::{Calibration, Checks, ContactThresholds, FsrResponse, FsrSignal, Response, TaxelCalibration};
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
 pub(crate) use intake::Intake;
+pub(crate) use upkeep::{Kept, Upkeep};
+pub use upkeep::{Unfit, UpkeepKeys};

@@ -14,3 +14,4 @@ mod real;
 mod recordings;
 mod simulated;
 mod touch;
+mod upkeep;

@@ -57,8 +57,13 @@ impl Backend for Cpu {
         self.last.fill(None);
     }
 
+    fn recalibrate(&mut self, plan: &Plan) {
+        self.plan.recalibrate(plan);
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
-        let Some(mut cells) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        let mut cells = all.split_at(raw.first).1;
         if raw.frames < LANES {
             let mut rest = cells.reborrow();
             for frame in raw.values.chunks_exact(self.plan.slots().max(1)) {

@@ -44,6 +44,7 @@ pub(crate) struct Gpu {
     batch: wgpu::Buffer,
     steps: wgpu::Buffer,
     raw: wgpu::Buffer,
+    taxels: wgpu::Buffer,
     stages: Vec<Stage>,
     /// Number of wide fields.
     wide: u32,
@@ -216,6 +217,7 @@ impl Gpu {
             batch,
             steps,
             raw,
+            taxels,
             stages,
             wide: wide.len() as u32,
             results,
@@ -316,13 +318,19 @@ impl Backend for Gpu {
         self.device.queue.submit([encoder.finish()]);
     }
 
+    fn recalibrate(&mut self, plan: &Plan) {
+        self.plan.recalibrate(plan);
+        self.device.queue.write_buffer(&self.taxels, 0, cast_slice(&self.plan.taxels));
+    }
+
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
-        let Some(mut rest) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+        let mut rest = all.split_at(raw.first).1;
         let steps = raw.steps.chunks(self.capacity);
         for (values, steps) in raw.values.chunks(self.capacity * self.plan.slots()).zip(steps) {
             let frames = steps.len();
             let (mut cells, later) = rest.split_at(frames);
-            self.submit(&RawBatch { frames, values, steps }, &mut cells)?;
+            self.submit(&RawBatch { first: 0, frames, values, steps }, &mut cells)?;
             rest = later;
         }
         Ok(())

@@ -1,0 +1,147 @@
+//! What the host does for every backend alike: places on the surface and in the world, and separate touches.
+
+use std::collections::HashMap;
+
+use glam::{DAffine3, DVec3};
+
+use crate::backend::{Backend, RawBatch};
+use crate::error::Result;
+use crate::percept::{Flags, Outputs, Percepts, Touch, Values};
+use crate::scene::{Plan, PlanField};
+use crate::signal::Frame;
+use crate::stage::{position, touches};
+
+/// What poses are applied to: the body's links and how they hang together at rest.
+pub(super) struct Links {
+    pub(super) index_of: HashMap<String, usize>,
+    pub(super) parent: Vec<Option<usize>>,
+    pub(super) world_from_link: Vec<DAffine3>,
+}
+
+/// What the host does for every backend alike.
+pub(super) struct Host<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) links: &'a Links,
+}
+
+impl Host<'_> {
+    /// A backend's part of a call, then the host's.
+    pub(super) fn run(
+        &self,
+        backend: &mut dyn Backend,
+        frames: &[Frame],
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        memories: &mut [touches::Memory],
+    ) -> Result<()> {
+        backend.run(raw, percepts)?;
+        let stages = self.plan.stages();
+        for (index, frame) in (raw.first..).zip(frames) {
+            percepts.t_s[index] = frame.t_s;
+            if !stages.position {
+                continue;
+            }
+            for (number, field) in self.plan.fields.iter().enumerate() {
+                let cell = index * self.plan.fields.len() + number;
+                let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
+                let world =
+                    if contact { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
+                if contact {
+                    self.place(field, world.as_ref(), cell, percepts);
+                }
+                if stages.touches {
+                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The point of the skin at `place` (m, in the field's chart or from its origin), and the normal there.
+    fn on_skin(field: &PlanField, world: Option<&DAffine3>, place: DVec3) -> (DVec3, DVec3) {
+        let (position, normal) = match (&field.chart, &field.lift) {
+            (Some(chart), Some(lift)) => position::on_surface(chart, lift, field.origin_in_anchor, place.truncate()),
+            _ => (field.origin_in_anchor + place, DVec3::ZERO),
+        };
+        match world {
+            Some(world) => (world.transform_point3(position), world.transform_vector3(normal)),
+            None => (position, normal),
+        }
+    }
+
+    /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
+    fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
+        let place = match &percepts.values {
+            Values::F32(columns) => DVec3::from_array(columns.centroid[cell].map(f64::from)),
+            Values::F64(columns) => DVec3::from_array(columns.centroid[cell]),
+        };
+        let (position, normal) = Self::on_skin(field, world, place);
+        percepts.in_world[cell] = world.is_some();
+        if self.plan.outputs.contains(Outputs::POSITION) {
+            percepts.position[cell] = position.to_array();
+        }
+        if self.plan.outputs.contains(Outputs::NORMAL) {
+            percepts.normal[cell] = normal.to_array();
+        }
+    }
+
+    /// Tells a cell's separate touches.
+    fn touches(
+        &self,
+        field: &PlanField,
+        world: Option<&DAffine3>,
+        frame: usize,
+        cell: usize,
+        percepts: &mut Percepts,
+        memory: &mut touches::Memory,
+    ) {
+        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
+            memory.release();
+            percepts.push_touches([]);
+            return;
+        }
+        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
+        let members = self.plan.members_of(field);
+        let pulls: Vec<f64> =
+            members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
+        let skin = touches::Skin { places: &field.places, beside: &field.beside, spacing: field.spacing };
+        let unit_m = f64::from(field.unit_m);
+        let found = memory.follow(&skin, &pulls);
+        let several = found.len() > 1;
+        percepts.push_touches(found.iter().map(|touch| {
+            let place = touch.place * unit_m;
+            Touch {
+                id: touch.id,
+                total: touch.total,
+                active: touch.active,
+                centroid: field.charted.then(|| place.truncate().to_array()),
+                position: Self::on_skin(field, world, place).0.to_array(),
+            }
+        }));
+        percepts.present[cell] |= Outputs::TOUCHES;
+        if several {
+            percepts.flags[cell] |= Flags::SEVERAL;
+        }
+    }
+}
+
+impl Links {
+    /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from
+    /// there on. `None` where the frame poses neither.
+    fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
+        if frame.pose.is_empty() {
+            return None;
+        }
+        let mut at = Some(link);
+        while let Some(ancestor) = at {
+            let posed = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&ancestor));
+            if let Some((_, pose)) = posed {
+                let world_from_ancestor = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
+                let ancestor_from_link = self.world_from_link[ancestor].inverse() * self.world_from_link[link];
+                return Some(world_from_ancestor * ancestor_from_link);
+            }
+            at = self.parent[ancestor];
+        }
+        None
+    }
+}
