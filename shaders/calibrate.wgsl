@@ -37,9 +37,10 @@ fn on_curve(curve: Curve, x: f32) -> f32 {
         low = select(low, low + half, above);
         count = select(half, count - half, above);
     }
-    let from = knots[low];
-    let to = knots[low + 1u];
-    return clamp(from.p + (x - from.raw) * from.slope, min(from.p, to.p), max(from.p, to.p));
+    let before = knots[low];
+    let after = knots[low + 1u];
+    let p = before.p + (x - before.raw) * before.slope;
+    return clamp(p, min(before.p, after.p), max(before.p, after.p));
 }
 
 @compute @workgroup_size(GROUP)

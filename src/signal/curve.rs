@@ -176,7 +176,7 @@ mod tests {
         // Apart in double precision only.
         assert!(why(&[0.0, 16_777_216.0, 16_777_217.0], &[0.0, 1.0, 2.0]).contains("must rise"));
         assert!(why(&[0.0, 1.0], &[3.0, 3.0]).contains("no touch"));
-        assert!(why(&[0.0, 1e-6], &[0.0, 1e7]).contains("1e13 a raw unit after knot 1"));
+        assert!(why(&[0.0, 0.5_f64.powi(20)], &[0.0, 1e7]).contains("1.048576e13 a raw unit after knot 1"));
         assert!(Curve::new(&[-5.0, 0.0, 1.0], &[3.0, 3.0, -1.0]).unwrap().falls());
     }
 

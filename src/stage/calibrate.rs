@@ -172,4 +172,45 @@ mod tests {
         assert_eq!(at(252.0).value, 0.0);
         assert_eq!(at(30.0).status, Flags::SATURATED.bits());
     }
+
+    /// What a plan makes of `curve`.
+    fn table(curve: &[[f32; 2]]) -> Vec<Knot> {
+        let slope = |i: usize| curve.get(i + 1).map_or(0.0, |&to| crate::signal::slope(curve[i], to) as f32);
+        curve.iter().enumerate().map(|(i, &[raw, p])| Knot { raw, p, slope: slope(i) }).collect()
+    }
+
+    #[test]
+    fn a_curve_is_straight_between_knots_and_held_beyond_them() {
+        let knots = table(&[[0.0, 100.0], [16.0, 90.0], [20.0, 10.0], [255.0, 0.0]]);
+        let taxel = TaxelCalibration { dead_band: 2.0, p_max: 95.0, raw_range: [0.0, 255.0], ..Default::default() };
+        let at = |raw: f64| reference(RawValue::new(raw), &taxel, &knots);
+        for (raw, p) in [(16.0, 90.0), (18.0, 50.0), (20.0, 10.0), (17.0, 70.0), (8.0, 95.0)] {
+            assert_eq!(at(raw), Pressure { value: p, ..Pressure::default() }, "{raw}");
+        }
+        assert_eq!((at(-3.0).value, at(-3.0).bound), (100.0, 0.0));
+        assert_eq!(at(-3.0).status, (Flags::SATURATED | Flags::OUT_OF_RANGE).bits());
+        assert_eq!((at(300.0).value, at(300.0).status), (0.0, Flags::OUT_OF_RANGE.bits()));
+        assert_eq!((at(0.0).status, at(250.0).value), (Flags::SATURATED.bits(), 0.0));
+        assert_eq!(at(f64::NAN).status, Flags::FAULTY_INPUT.bits() | UNUSABLE);
+        assert_eq!(at(1e19).status, Flags::FAULTY_INPUT.bits() | UNUSABLE);
+        assert_eq!((at(1e-30).value, at(1e-30).status), (100.0, (Flags::FAULTY_INPUT | Flags::SATURATED).bits()));
+        let between = at(100.0);
+        assert!(between.bound > 0.0 && between.bound < 3.0 * 4.0 * U * 10.0, "{between:?}");
+        // 10 − (raw − 20)/23.5 is at the dead band where raw is 208.
+        assert!(at(208.0).in_doubt && !at(207.0).in_doubt);
+    }
+
+    #[test]
+    fn what_a_difference_loses_is_in_the_bound() {
+        let knots = table(&[[-1.0, 0.0], [0.0, 10.0], [1.0, 1000.0]]);
+        let taxel = TaxelCalibration { baseline: 0.1, ..Default::default() };
+        let p = reference(RawValue::new(1e-9), &taxel, &knots);
+        // x = −0.1 to u of itself; 10 a unit below 0.
+        assert!(p.bound >= 10.0 * 0.1 * U && p.bound < 10.0 * 5.0 * U, "{p:?}");
+        // Across the knot the steeper side counts.
+        let taxel = TaxelCalibration { baseline: 16_777_216.0, ..Default::default() };
+        let far = table(&[[-16_777_216.0, 0.0], [-16_777_215.0, 1.0], [0.0, 2.0]]);
+        let p = reference(RawValue::new(0.75), &taxel, &far);
+        assert!((p.value - 0.75).abs() < 1e-6 && p.bound > 0.25, "{p:?}");
+    }
 }

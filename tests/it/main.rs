@@ -7,6 +7,7 @@ mod draft;
 mod extremes;
 mod house;
 mod legal;
+mod letters;
 mod meshes;
 mod motion;
 mod properties;
