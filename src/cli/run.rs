@@ -9,7 +9,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use console::Term;
 use somatic::error::nearest;
-use somatic::signal::FsrSignal;
+use somatic::signal::{FsrSignal, Unfit};
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
 use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
 use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
@@ -155,7 +155,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let view = view.open(&about);
     let sinks = sinks.iter().map(|sink| sink.open(&names, arguments.all_fields)).collect::<Result<_>>()?;
     let feed = Feed::start(source, Manner { most: batch, gather, speed });
-    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement: arguments.verify.then(Agreement::default) };
+    let agreement = arguments.verify.then(Agreement::default);
+    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new() };
     let losses = pump.run(feed, &stop)?;
     pump.finish(&losses)
 }
@@ -256,6 +257,8 @@ struct Pump {
     /// Whether somebody waits for every frame.
     flush: bool,
     agreement: Option<Agreement>,
+    /// Taxels that have been told to be left out.
+    unfit: Vec<(u32, Unfit)>,
 }
 
 impl Pump {
@@ -288,6 +291,9 @@ impl Pump {
                         break;
                     }
                     feed.give_back(frames);
+                    if !self.view.is_table() {
+                        tell_unfit(&self.engine, &mut self.unfit);
+                    }
                 }
                 Some(Arrival::End(losses)) => return Ok(losses),
                 Some(Arrival::Failed(error)) => return Err(error),
@@ -299,11 +305,12 @@ impl Pump {
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
-    fn finish(self, losses: &[String]) -> Result<u8> {
+    fn finish(mut self, losses: &[String]) -> Result<u8> {
         for sink in self.sinks {
             sink.finish()?;
         }
         self.view.finish();
+        tell_unfit(&self.engine, &mut self.unfit);
         for loss in losses {
             say(&format!("never processed: {loss}"));
         }
@@ -315,6 +322,18 @@ impl Pump {
         }
         Ok(if losses.is_empty() { DONE } else { LOST })
     }
+}
+
+/// Says which taxels are left out from now on and which are used again, where that differs from what was `told`.
+fn tell_unfit(engine: &Engine, told: &mut Vec<(u32, Unfit)>) {
+    let now: Vec<(u32, Unfit)> = engine.unfit().collect();
+    for (id, why) in now.iter().filter(|taxel| !told.contains(taxel)) {
+        say(&format!("taxel {id} is {why} and left out"));
+    }
+    for (id, _) in told.iter().filter(|(id, _)| !now.iter().any(|(other, _)| other == id)) {
+        say(&format!("taxel {id} is used again"));
+    }
+    *told = now;
 }
 
 /// A flag that the first Ctrl-C or termination signal sets; the second ends the process at once.
