@@ -13,7 +13,7 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Unfit, Upkeep};
+use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Unfit, Upkeep, UpkeepKeys};
 use crate::stage::{layout, touches};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
@@ -25,13 +25,15 @@ pub struct Options {
     pub calibration: Option<Calibration>,
     /// What it runs on.
     pub backend: BackendKind,
+    /// Take the first frame's values as the baselines: only for a robot that nothing touches when it starts.
+    pub tare: bool,
     /// Frames a call, about: 1 for a live robot, some hundred for recordings. More are taken in turns.
     pub batch: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { scene: Scene::default(), calibration: None, backend: BackendKind::Auto, batch: 1 }
+        Self { scene: Scene::default(), calibration: None, backend: BackendKind::Auto, tare: false, batch: 1 }
     }
 }
 
@@ -65,6 +67,8 @@ pub struct Engine {
     upkeep: Option<KeptUp>,
     /// Per field, the touches of the frame before.
     memories: Vec<touches::Memory>,
+    /// Whether the first frame is still to be taken as the baselines.
+    tare: bool,
     frames_done: u64,
     ids: Vec<u32>,
     links: Links,
@@ -100,10 +104,10 @@ struct KeptUp {
 }
 
 impl KeptUp {
-    fn new(plan: &Plan, calibration: &Calibration) -> Option<Self> {
+    fn new(plan: &Plan, keys: UpkeepKeys) -> Option<Self> {
         let taxels = plan.calibrations.iter().map(|c| Kept { baseline: c.baseline, raw_range: c.raw_range });
         Some(Self {
-            upkeep: Upkeep::new(calibration.upkeep, taxels)?,
+            upkeep: Upkeep::new(keys, taxels)?,
             made: plan.taxels.clone(),
             touched: vec![false; plan.fields.len()],
         })
@@ -117,7 +121,7 @@ impl Engine {
     /// The body has no taxels or no fields, a field is empty, the scene asks for what is not there, or the backend that
     /// was asked for cannot run here ([`Error::is_no_adapter`]).
     pub fn new(body: &Body, options: Options) -> Result<Self> {
-        let Options { scene, calibration, backend: kind, batch } = options;
+        let Options { scene, calibration, backend: kind, tare, batch } = options;
         let calibration = calibration.unwrap_or_else(|| Calibration::identity(body.taxels.len()));
         if calibration.taxels.len() != body.taxels.len() {
             return Err(Error::failed(format!(
@@ -137,12 +141,13 @@ impl Engine {
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures()),
             check: None,
-            upkeep: KeptUp::new(&plan, &calibration),
+            upkeep: KeptUp::new(&plan, calibration.upkeep),
             memories: vec![touches::Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
             raw: Vec::new(),
+            tare,
             frames_done: 0,
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
             links: Links {
@@ -246,6 +251,10 @@ impl Engine {
             check.right.first_frame = self.frames_done;
             check.bounds.clear();
         }
+        if self.tare && !frames.is_empty() {
+            self.tare = false;
+            self.take_as_baselines(check.as_deref_mut());
+        }
         let mut start = 0;
         for index in 0..frames.len() {
             if self.upkeep.as_ref().is_some_and(|kept| kept.upkeep.is_due(frames[index].t_s)) {
@@ -261,6 +270,23 @@ impl Engine {
         self.segment(frames, start..frames.len(), check)?;
         self.frames_done += frames.len() as u64;
         Ok(())
+    }
+
+    /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
+    fn take_as_baselines(&mut self, check: Option<&mut Check>) {
+        for slot in 0..self.plan.slots() {
+            if let Some(value) = self.raw[slot].number() {
+                let made = self.plan.taxels[slot];
+                self.plan.keep_up(slot, value as f32, false, &made);
+            }
+        }
+        if let Some(kept) = &mut self.upkeep {
+            *kept = KeptUp::new(&self.plan, kept.upkeep.keys()).unwrap_or_else(|| unreachable!("it was on before"));
+        }
+        self.backend.recalibrate(&self.plan);
+        if let Some(check) = check {
+            check.reference.recalibrate(&self.plan);
+        }
     }
 
     /// A run of frames that are calibrated alike.

@@ -76,6 +76,10 @@ pub(super) struct Arguments {
         .try_map(|name| name.parse::<FsrSignal>()))]
     signal: Option<FsrSignal>,
 
+    /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
+    #[arg(long)]
+    tare: bool,
+
     /// Frames per second of a CSV recording that has no column t, in Hz.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -195,7 +199,7 @@ impl Arguments {
             Ok(calibration)
         };
         let calibration = self.calibration.as_ref().map(load).transpose()?;
-        Ok(Options { scene, calibration, backend: self.backend, batch })
+        Ok(Options { scene, calibration, backend: self.backend, tare: self.tare, batch })
     }
 }
 

@@ -140,6 +140,11 @@ impl Upkeep {
         (!keys.is_off()).then_some(Self { keys, taxels, epoch_start_s: None, last_t_s: 0.0 })
     }
 
+    /// What is kept up.
+    pub(crate) fn keys(&self) -> UpkeepKeys {
+        self.keys
+    }
+
     /// Whether a frame at `t_s` belongs to a new epoch, so that the one before is to be closed first.
     pub(crate) fn is_due(&self, t_s: f64) -> bool {
         let cadence_s = self.keys.cadence_s.unwrap_or(1.0);

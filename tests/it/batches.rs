@@ -15,7 +15,8 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
     let scene = somatic::Scene { max_age_s: 0.1, ..somatic::Scene::default() };
-    let mut engine = Engine::new(body, Options { backend: kind, batch: 100, calibration, scene }).unwrap();
+    let mut engine =
+        Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {
         engine.listen(ids).unwrap();
     }

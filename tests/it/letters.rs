@@ -18,7 +18,7 @@ fn parse(text: &str, count: u32) -> Calibration {
 
 fn options(kind: BackendKind, calibration: &Calibration, signal: Option<FsrSignal>) -> Options {
     let scene = Scene { outputs: Outputs::TOTAL | Outputs::ACTIVE, signal, ..Scene::default() };
-    Options { scene, calibration: Some(calibration.clone()), backend: kind, batch: 64 }
+    Options { scene, calibration: Some(calibration.clone()), backend: kind, batch: 64, ..Options::default() }
 }
 
 /// The percepts of `frames` on `kind`, frame by frame, held to the reference.

@@ -35,6 +35,7 @@ fn on_every_backend(calibration: &str, frames: &[Frame]) -> Vec<Vec<Percept>> {
             calibration: Some(calibration.clone()),
             scene: Scene { max_gap_s: 5.0, ..Scene::default() },
             batch: 64,
+            ..Options::default()
         };
         for cut in [1, frames.len()] {
             let mut engine = Engine::new(&body, options.clone()).unwrap();

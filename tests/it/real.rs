@@ -182,3 +182,34 @@ fn thirty_grasps_of_five_fingertips() {
     }
     assert!(recordings == 30 && touched > 1000, "{recordings} recordings, {touched} touches");
 }
+
+#[test]
+fn grasps_are_told_apart_by_how_much_the_total_rises() {
+    let (Some(folder), Some(layout)) = (data("recordings/icub_grasp"), data("layouts/ftx2_taxels.csv")) else { return };
+    let body = fingertips(&std::fs::read_to_string(layout).unwrap());
+    let ids: Vec<u32> = (0..60).collect();
+    let calibration = Calibration::parse("[all]\ninvert = true", &ids).unwrap();
+    for backend in backends() {
+        // The largest total over the five fingertips, above the trial's own first frame.
+        let rises = |object: &str| -> Vec<f64> {
+            (1..=5)
+                .map(|trial| {
+                    let (ids, frames) = read(&folder.join(format!("{object}_{trial}.csv")));
+                    let calibration = Some(calibration.clone());
+                    let options = Options { backend, tare: true, calibration, batch: 32, ..Options::default() };
+                    let mut engine = Engine::new(&body, options).unwrap();
+                    engine.listen(&ids).unwrap();
+                    let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
+                    assert!(agreement.holds(), "{agreement}");
+                    let total = |frame| percepts.get(frame, field(&body, "hand")).total.unwrap();
+                    (0..percepts.frames()).map(total).fold(0.0, f64::max)
+                })
+                .collect()
+        };
+        let ends =
+            |rises: &[f64]| (rises.iter().copied().fold(f64::MAX, f64::min), rises.iter().copied().fold(0.0, f64::max));
+        let (nothing, book, toy) = (ends(&rises("none")), ends(&rises("book")), ends(&rises("monkey_toy")));
+        println!("{backend:?}: nothing {nothing:?}, book {book:?}, toy {toy:?}");
+        assert!(nothing.1 < book.0 && book.1 < toy.0, "{backend:?}: {nothing:?} {book:?} {toy:?}");
+    }
+}
