@@ -91,11 +91,15 @@ impl Reference {
             .iter()
             .zip(&field.places)
             .filter(|(member, _)| pressures[member.slot as usize].value > 0.0)
-            .map(|(member, &place)| Pressed {
-                weight: member.weight.into(),
-                pressure: pressures[member.slot as usize].value,
-                place,
-                area: self.plan.areas[member.slot as usize],
+            .map(|(member, &place)| {
+                let Pressure { value, bound, .. } = pressures[member.slot as usize];
+                Pressed {
+                    weight: member.weight.into(),
+                    pressure: value,
+                    excess: (bound - 2.0 * U * value).max(0.0),
+                    place,
+                    area: self.plan.areas[member.slot as usize],
+                }
             })
             .collect()
     }

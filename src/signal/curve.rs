@@ -62,8 +62,10 @@ impl Curve {
             let ([from, low], [to, high]) = (pair[0], pair[1]);
             let (knot, at) = (knot + 1, knot + 2);
             if to <= from {
-                let what =
-                    format!("`raw` is {} at knot {at}, after {}; it must rise from knot to knot", raw[knot], from);
+                let what = format!(
+                    "`raw` is {} at knot {at}, after {from} in single precision; it must rise from knot to knot",
+                    raw[knot]
+                );
                 return Err(Flaw { column: Column::Raw, knot, what });
             }
             if (falls && high > low) || (!falls && high < low) {
@@ -172,7 +174,7 @@ mod tests {
         assert!(why(&[0.0, f64::NAN], &[0.0, 1.0]).contains("`raw` is NaN at knot 2"));
         assert!(why(&[0.0, 1.0], &[f64::INFINITY, 1.0]).contains("`p` is inf at knot 1"));
         assert!(why(&[0.0, 1.0], &[0.0, 1e-30]).contains("between 1e-18"));
-        assert!(why(&[0.0, 1.0, 1.0], &[0.0, 1.0, 2.0]).contains("`raw` is 1 at knot 3, after 1"));
+        assert!(why(&[0.0, 1.0, 1.0], &[0.0, 1.0, 2.0]).contains("`raw` is 1 at knot 3, after 1 "));
         // Apart in double precision only.
         assert!(why(&[0.0, 16_777_216.0, 16_777_217.0], &[0.0, 1.0, 2.0]).contains("must rise"));
         assert!(why(&[0.0, 1.0], &[3.0, 3.0]).contains("no touch"));

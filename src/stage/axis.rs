@@ -9,7 +9,8 @@
 //!
 //! **Bound.** About another centre the moments are M + S·δc δcᵀ, exactly: the centroid's own error counts only squared.
 //! With δ = u‖x‖ + u‖x − c‖ for coordinate and difference, every entry of M is off by at most
-//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (n + 8)u Σ wP‖x − c‖²; then |δ(a + d)| ≤ 1.5E, |δh| ≤ 2E + 12u·h (a square root
+//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (n + 8)u Σ wP‖x − c‖², and Σ wε‖x − c‖² where pressures are off by ε more than
+//! 2u, with P + ε for P; then |δ(a + d)| ≤ 1.5E, |δh| ≤ 2E + 12u·h (a square root
 //! may lose 9u), the quotient's error is (|δh| + κ|δ(a + d)|)/(a + d − |δ(a + d)|) + 8u, and the axis turns by at most
 //! ½ asin(δh/h).
 
@@ -90,13 +91,15 @@ pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2)
             let x = taxel.place.truncate();
             let r = x.distance(centroid);
             let delta = U * x.length() + U * r;
-            taxel.pull() * (2.0 * r * delta + (delta + centroid_bound.length()).powi(2) + (n + 8.0) * U * r * r)
+            let (excess, around) = (taxel.pull_excess(), (delta + centroid_bound.length()).powi(2));
+            (taxel.pull() + excess) * (2.0 * r * delta + around + (n + 8.0) * U * r * r) + excess * r * r
         })
         .sum::<f64>()
         * SLACK;
     let (trace, h) = (a + d, (a - d).hypot(2.0 * b));
     let trace_error = 1.5 * entry;
-    if (trace - TOGETHER * total).abs() <= trace_error + (n + 4.0) * U * TOGETHER * total || trace_error > 0.5 * trace {
+    let total_error = (n + 4.0) * U * total + pressed.iter().map(Pressed::pull_excess).sum::<f64>();
+    if (trace - TOGETHER * total).abs() <= trace_error + TOGETHER * total_error || trace_error > 0.5 * trace {
         return undecided(Flags::COINCIDENT | Flags::ISOTROPIC);
     }
     let h_error = 2.0 * entry + 12.0 * U * h;
@@ -116,7 +119,12 @@ mod tests {
     fn axis(taxels: &[(f64, f64, f64)]) -> Axis {
         let pressed: Vec<Pressed> = taxels
             .iter()
-            .map(|&(u, v, pressure)| Pressed { weight: 1.0, pressure, place: DVec3::new(u, v, 0.0), area: 0.0 })
+            .map(|&(u, v, pressure)| Pressed {
+                weight: 1.0,
+                pressure,
+                place: DVec3::new(u, v, 0.0),
+                ..Pressed::default()
+            })
             .collect();
         reference(&pressed, crate::stage::centroid::reference(&pressed).truncate())
     }

@@ -4,6 +4,7 @@
 //! the same on every backend.
 //!
 //! **Bound.** Each wP carries the pressure's 2u and one rounding, n − 1 sums one each: |δS| ≤ (n + 2)u·S.
+//! To this comes what the pressures are off by more than 2u, ε each: Σ wε for S, the largest ε for the peak.
 //! The peak carries its pressure's error alone; n areas, rounded to f32 and summed: |δA| ≤ n·u·A.
 
 use super::{Pressed, SLACK, U};
@@ -32,8 +33,8 @@ pub(crate) fn bound(pressed: &[Pressed]) -> Contact {
     let right = reference(pressed);
     let n = pressed.len() as f64;
     Contact {
-        total: SLACK * (n + 2.0) * U * right.total,
-        peak: SLACK * 2.0 * U * right.peak,
+        total: SLACK * ((n + 2.0) * U * right.total + pressed.iter().map(Pressed::pull_excess).sum::<f64>()),
+        peak: SLACK * (2.0 * U * right.peak + pressed.iter().map(|taxel| taxel.excess).fold(0.0, f64::max)),
         active: 0,
         area: SLACK * (n + 1.0) * U * right.area,
     }

@@ -33,12 +33,14 @@ pub(crate) const DIVISION: f64 = 5.0 * U;
 pub(crate) const SLACK: f64 = 1.1;
 
 /// One pressed taxel of a field in one frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pressed {
     /// w > 0.
     pub(crate) weight: f64,
     /// P > 0.
     pub(crate) pressure: f64,
+    /// By how much more than 2u·P single precision's P may be off, in the unit of P: what a curve loses.
+    pub(crate) excess: f64,
     /// (u, v, depth) in the field's unit.
     pub(crate) place: DVec3,
     /// m².
@@ -49,5 +51,10 @@ impl Pressed {
     /// wP.
     pub(crate) fn pull(&self) -> f64 {
         self.weight * self.pressure
+    }
+
+    /// How far that may be off for the excess.
+    pub(crate) fn pull_excess(&self) -> f64 {
+        self.weight * self.excess
     }
 }

@@ -11,7 +11,8 @@
 //!
 //! **Bound.** A point's own error is ε = q(‖δc‖ + u‖x‖ + 9u‖x − c‖) plus 2⁻⁶², where its square underflows: the
 //! centroid's error, the coordinate's rounding, then 3u in q, u each in the difference and the product, and the sum of
-//! squares. The pair is certain when R₂ − ε₂ exceeds R + ε of every other; else the choice is the reference's margin
+//! squares. Pressures that are off by ε more than 2u add q‖x − c‖(ε/P + ρ)/(1 − ρ) with ρ = Σ wε/S; from ρ = ½ on nothing
+//! is compared. The pair is certain when R₂ − ε₂ exceeds R + ε of every other; else the choice is the reference's margin
 //! below the bound, and nothing is compared. The difference then carries δ = ε₁ + ε₂ + u‖e₁ − e₂‖, the angle
 //! asin(δ/‖e₁ − e₂‖) and the arctangent's own error.
 
@@ -71,12 +72,17 @@ pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2)
         return LineBound { angle: None, in_doubt: Flags::empty() };
     }
     let total: f64 = pressed.iter().map(Pressed::pull).sum();
+    let lost = pressed.iter().map(Pressed::pull_excess).sum::<f64>() / total;
+    if lost >= 0.5 {
+        return LineBound { angle: None, in_doubt: Flags::COINCIDENT | Flags::TIE };
+    }
     let points = points(pressed, centroid);
     let error = |(index, _): &(usize, DVec2)| {
         let taxel = &pressed[*index];
         let x = taxel.place.truncate();
         let q = taxel.pull() / total;
-        SLACK * (q * (centroid_bound.length() + U * x.length() + 9.0 * U * x.distance(centroid)) + 2.2e-19)
+        let share = 9.0 * U + (taxel.excess / taxel.pressure + lost) / (1.0 - lost);
+        SLACK * (q * (centroid_bound.length() + U * x.length() + share * x.distance(centroid)) + 2.2e-19)
     };
     let far = |point: &(usize, DVec2)| point.1.length();
     let errors: Vec<f64> = points.iter().map(error).collect();
@@ -113,7 +119,12 @@ mod tests {
     fn pressed(taxels: &[(f64, f64, f64)]) -> Vec<Pressed> {
         taxels
             .iter()
-            .map(|&(u, v, pressure)| Pressed { weight: 1.0, pressure, place: DVec3::new(u, v, 0.0), area: 0.0 })
+            .map(|&(u, v, pressure)| Pressed {
+                weight: 1.0,
+                pressure,
+                place: DVec3::new(u, v, 0.0),
+                ..Pressed::default()
+            })
             .collect()
     }
 
