@@ -229,6 +229,39 @@ fn calibration_and_age_reach_the_percepts() {
 }
 
 #[test]
+fn the_circuits_signal_is_chosen_for_a_run() {
+    let text = "[all]\nsensor = \"fsr\"\nsignal = \"linear\"\ntap = 60\n";
+    let (_folder, calibration) = file("robot.toml", text);
+    let (_other, path) = file("touch.csv", "t,4\n0,1023\n0.1,600\n0.2,0\n");
+    let run = ["run", "--backend", "cpu", "--all-fields", "--fields", "hand/palm", "--source", text_of(&path)];
+    let totals = |more: &[&str]| -> Vec<f64> {
+        let arguments = [&run[..], &["--calibration", text_of(&calibration)], more].concat();
+        frames(&done(&arguments)).iter().map(|frame| frame["fields"][0]["total"].as_f64().unwrap()).collect()
+    };
+    let sensor = somatic::signal::FsrCircuit { tap: 60 };
+    let [raw, linear] = [sensor.logarithmic(600), sensor.linearised(600, 10.0)].map(|p| f64::from(p as f32));
+    let near = |totals: Vec<f64>, p: f64| {
+        assert_eq!((totals[0], totals[2]), (0.0, 1000.0));
+        assert!((totals[1] - p).abs() < 1e-3 * p, "{totals:?} {p}");
+    };
+    near(totals(&[]), linear);
+    near(totals(&["--signal", "linear"]), linear);
+    near(totals(&["--signal", "raw"]), raw);
+    assert!(raw > 2.0 * linear, "{raw} {linear}");
+    assert!(fails(2, &[&run[..], &["--signal", "raw"]].concat()).contains("signal `raw` is for sensors of kind `fsr`"));
+    assert!(fails(2, &[&run[..], &["--signal", "log"]].concat()).contains("--signal"));
+}
+
+#[test]
+fn a_calibration_for_another_body_is_refused_by_name() {
+    let (_folder, calibration) = file("robot.toml", "body = \"mat\"\n[taxel.4]\ngain = 2\n");
+    let error = fails(1, &["run", "--backend", "cpu", "--calibration", text_of(&calibration)]);
+    let start =
+        format!("somatic: error: {}: the calibration is for body `mat`, and this is `hand`", calibration.display());
+    assert!(error.starts_with(&start) && error.lines().count() == 1, "{error}");
+}
+
+#[test]
 fn speed_is_kept() {
     let (_folder, path) = file("touch.csv", PRESSED);
     let start = std::time::Instant::now();
