@@ -4,6 +4,7 @@ mod completions;
 mod feed;
 mod inspect;
 mod live;
+mod paper;
 mod run;
 mod screen;
 mod words;
@@ -47,6 +48,7 @@ pub(crate) struct Arguments {
 enum Command {
     Run(run::Arguments),
     Inspect(inspect::Arguments),
+    Paper(paper::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -55,6 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     match &arguments.command {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
+        Command::Paper(arguments) => paper::paper(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }
 }
