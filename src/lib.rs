@@ -9,6 +9,9 @@ pub mod body;
 pub mod bundled;
 mod engine;
 pub mod error;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod experiments;
 pub mod field;
 pub mod percept;
 pub mod scene;

@@ -4,6 +4,7 @@ mod completions;
 mod feed;
 mod inspect;
 mod live;
+mod paper;
 mod run;
 mod screen;
 mod simulate;
@@ -50,6 +51,7 @@ enum Command {
     Run(run::Arguments),
     Inspect(inspect::Arguments),
     Simulate(simulate::Arguments),
+    Paper(paper::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -59,6 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Paper(arguments) => paper::paper(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }
 }

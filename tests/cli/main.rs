@@ -2,6 +2,7 @@
 
 mod inspect;
 mod live;
+mod paper;
 mod run;
 mod simulate;
 
@@ -88,7 +89,7 @@ fn files_in(folder: &Path) -> Vec<String> {
 #[test]
 fn help_teaches_and_names_everything() {
     let help = done(&["--help"]);
-    for word in ["run", "inspect", "completions", "Examples:", "Exit codes"] {
+    for word in ["run", "inspect", "paper", "completions", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "{word}: {help}");
     }
     let help = done(&["run", "--help"]);

@@ -20,6 +20,22 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("engine", [&below_backend[..], &["backend"]].concat()),
         ("source", vec!["error", "signal", "body", "field", "bundled"]),
         ("sink", vec!["error", "percept"]),
+        (
+            "experiments",
+            vec![
+                "error",
+                "percept",
+                "signal",
+                "body",
+                "field",
+                "scene",
+                "backend",
+                "engine",
+                "source",
+                "bundled",
+                "write_whole",
+            ],
+        ),
     ])
 }
 
@@ -90,8 +106,10 @@ fn each_heavy_dependency_has_one_door() {
         ("clap", "cli"),
         ("comfy_table", "cli"),
         ("toml", "signal|source/simulated"),
-        ("rayon", "backend/cpu"),
+        ("rayon", "backend/cpu|experiments"),
         ("globset", "scene"),
+        ("plotters", "experiments/plot.rs"),
+        ("png", "experiments/plot.rs"),
     ];
     for (dependency, door) in doors {
         let mut seen = false;

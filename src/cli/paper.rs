@@ -1,0 +1,67 @@
+//! `somatic paper`: the paper's experiments from simulation, and their errors.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use console::Term;
+use somatic::error::Result;
+use somatic::experiments;
+
+use super::screen::Screen;
+use super::{DONE, print};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic paper --out paper                 everything: some seconds
+  somatic paper --out paper --quick         the figures, and one speed and noise of the table
+  jq '.over_all_angles[] | [.indenter, .signal, .centroid_mm]' paper/table.json
+
+docs/paper.md shows the results and says what they mean.";
+
+/// Before this long there is nothing to wait for.
+const PATIENCE: Duration = Duration::from_secs(1);
+const BETWEEN_DRAWINGS: Duration = Duration::from_millis(100);
+const BAR: usize = 40;
+
+/// Do the paper's experiments in simulation: its Figs. 3, 6 and 7, and a table of errors against the truth.
+///
+/// Writes fig3, fig6 and fig7 as .svg and .png, and the table as table.md and table.json, and prints their names.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The folder to write into; made where there is none.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+
+    /// Do one speed (20 mm/s) and one noise (1 count) of the table only.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// What is drawn while somebody waits at a terminal.
+struct Bar {
+    screen: Option<Screen>,
+    next: Instant,
+}
+
+pub(super) fn paper(arguments: &Arguments) -> Result<u8> {
+    let bar = Mutex::new(Bar { screen: None, next: Instant::now() + PATIENCE });
+    let progress = |share: f64| {
+        let Ok(mut bar) = bar.lock() else { return };
+        let term = Term::stderr();
+        if Instant::now() < bar.next || !term.is_term() {
+            return;
+        }
+        bar.next = Instant::now() + BETWEEN_DRAWINGS;
+        let full = (share * BAR as f64).round() as usize;
+        let line = format!("{:>3.0} %  {}{}  simulating", 100.0 * share, "█".repeat(full), "░".repeat(BAR - full));
+        bar.screen.get_or_insert_with(|| Screen::new(term)).draw(&[line]);
+    };
+    let written = experiments::write(&arguments.out, arguments.quick, &progress);
+    drop(bar);
+    let names: Vec<String> = written?.iter().map(|path| format!("{}\n", path.display())).collect();
+    print(&names.concat())?;
+    Ok(DONE)
+}

@@ -1,0 +1,343 @@
+//! Draws figures as SVG and PNG. The only user of plotters; no font of the system is needed.
+
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::prelude::*;
+use plotters::style::register_font;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::error::{Error, Result};
+
+/// DejaVu Sans, cut down to the letters that figures use; its licence lies beside it.
+static FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
+const FAMILY: &str = "sans-serif";
+/// Dots drawn for each pixel of a size below: plotters has whole dots only, and small figures would show it.
+const SCALE: u32 = 2;
+
+/// Red, green, blue.
+pub(super) type Colour = [u8; 3];
+pub(super) type Point = (f64, f64);
+
+/// A shape in a panel's coordinates; what is called a width, radius or size is in pixels.
+#[derive(Clone, Debug)]
+pub(super) enum Mark {
+    /// Lines, each through some points.
+    Lines {
+        runs: Vec<Vec<Point>>,
+        width: f64,
+    },
+    Dashed {
+        from: Point,
+        to: Point,
+    },
+    Dots {
+        points: Vec<Point>,
+        radius: f64,
+    },
+    /// A filled circle whose radius is in the panel's unit.
+    Disc {
+        centre: Point,
+        radius: f64,
+    },
+    Plus {
+        at: Point,
+        size: f64,
+    },
+    Asterisk {
+        at: Point,
+        size: f64,
+    },
+}
+
+/// A mark, and what the legend calls it.
+#[derive(Clone, Debug)]
+pub(super) struct Layer {
+    pub(super) mark: Mark,
+    pub(super) colour: Colour,
+    pub(super) name: Option<&'static str>,
+}
+
+/// An axis with ticks at chosen places.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) label: &'static str,
+    pub(super) range: [f64; 2],
+    pub(super) ticks: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    pub(super) title: String,
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    pub(super) layers: Vec<Layer>,
+}
+
+/// How a figure's panels stand, and the size of what each of them plots into, pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Arrangement {
+    Stacked { width: u32, height: u32 },
+    SideBySide { side: u32 },
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Figure {
+    pub(super) title: &'static str,
+    pub(super) panels: Vec<Panel>,
+    /// What the legend has before the panels' named layers.
+    pub(super) key: Vec<Layer>,
+    pub(super) arrangement: Arrangement,
+}
+
+const TITLE: u32 = 30;
+const LEGEND: u32 = 26;
+/// Around what a panel plots into.
+const LEFT: u32 = 62;
+const RIGHT: u32 = 12;
+const TOP: u32 = 24;
+const BOTTOM: u32 = 44;
+/// Of a dashed line.
+const DASH: f64 = 2.0;
+const GAP: f64 = 12.0;
+/// Width of a legend's sample.
+const SAMPLE: f64 = 24.0;
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let share = (value - self.range[0]) / (self.range[1] - self.range[0]);
+        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range[0]..self.range[1]
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, value: &f64) -> String {
+        tick(*value)
+    }
+}
+
+impl Figure {
+    /// Width and height, pixels.
+    fn size(&self) -> (u32, u32) {
+        let count = self.panels.len() as u32;
+        let (width, height) = match self.arrangement {
+            Arrangement::Stacked { width, height } => (LEFT + width + RIGHT, count * (TOP + height + BOTTOM)),
+            Arrangement::SideBySide { side } => (count * (LEFT + side + RIGHT), TOP + side + BOTTOM),
+        };
+        (width, height + TITLE + LEGEND)
+    }
+
+    /// As SVG, text being text.
+    pub(super) fn svg(&self) -> Result<String> {
+        let mut text = String::new();
+        let (width, height) = self.size();
+        self.draw(&SVGBackend::with_string(&mut text, (SCALE * width, SCALE * height)).into_drawing_area())?;
+        Ok(text)
+    }
+
+    /// As PNG.
+    pub(super) fn png(&self) -> Result<Vec<u8>> {
+        let (width, height) = self.size();
+        let (width, height) = (SCALE * width, SCALE * height);
+        let mut pixels = vec![0; (3 * width * height) as usize];
+        self.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area())?;
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder.write_header().and_then(|mut writer| {
+            writer.write_image_data(&pixels)?;
+            writer.finish()
+        });
+        written.map_err(cannot)?;
+        Ok(bytes)
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
+        font()?;
+        area.fill(&WHITE).map_err(cannot)?;
+        let (width, height) = self.size();
+        let title = text(16, HPos::Center);
+        area.draw_text(self.title, &title, (dots(f64::from(width) / 2.0), dots(f64::from(TITLE) / 2.0)))
+            .map_err(cannot)?;
+        let (_, rest) = area.split_vertically((TITLE * SCALE) as i32);
+        let (panels, legend) = rest.split_vertically(((height - TITLE - LEGEND) * SCALE) as i32);
+        let shape = match self.arrangement {
+            Arrangement::Stacked { .. } => (self.panels.len(), 1),
+            Arrangement::SideBySide { .. } => (1, self.panels.len()),
+        };
+        for (panel, area) in self.panels.iter().zip(panels.split_evenly(shape)) {
+            panel.draw(&area)?;
+        }
+        self.draw_legend(&legend)
+    }
+
+    /// Names what is drawn, each once, in a row.
+    fn draw_legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
+        let mut named: Vec<(&str, &Layer)> = Vec::new();
+        for layer in self.key.iter().chain(self.panels.iter().flat_map(|panel| &panel.layers)) {
+            if let Some(name) = layer.name.filter(|name| named.iter().all(|(known, _)| known != name)) {
+                named.push((name, layer));
+            }
+        }
+        let style = text(13, HPos::Left);
+        let mut x = LEFT.into();
+        for (name, layer) in named {
+            let ends = [(x, 0.0), (x + SAMPLE, 0.0)];
+            let at = (x + SAMPLE / 2.0, 0.0);
+            let sample = match &layer.mark {
+                Mark::Lines { width, .. } => Mark::Lines { runs: vec![ends.to_vec()], width: *width },
+                Mark::Dashed { .. } => Mark::Dashed { from: ends[0], to: ends[1] },
+                Mark::Dots { radius, .. } => Mark::Dots { points: vec![at], radius: *radius },
+                Mark::Disc { .. } => Mark::Disc { centre: at, radius: 6.0 },
+                Mark::Plus { size, .. } => Mark::Plus { at, size: *size },
+                Mark::Asterisk { size, .. } => Mark::Asterisk { at, size: *size },
+            };
+            let (left, top) = area.get_base_pixel();
+            let middle = dots(f64::from(LEGEND) / 2.0);
+            let place = |point: Point| (left + dots(point.0), top + middle + dots(point.1));
+            draw_mark(&sample, layer.colour, &area.use_screen_coord(), &place, f64::from(SCALE))?;
+            x += SAMPLE + 6.0;
+            area.draw_text(name, &style, (dots(x), middle)).map_err(cannot)?;
+            let (width, _) = area.estimate_text_size(name, &style).map_err(cannot)?;
+            x += f64::from(width) / f64::from(SCALE) + 22.0;
+        }
+        Ok(())
+    }
+}
+
+impl Panel {
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
+        let (width, _) = area.dim_in_pixel();
+        let middle = (width as i32 + dots(f64::from(LEFT)) - dots(f64::from(RIGHT))) / 2;
+        let title = text(13, HPos::Center);
+        area.draw_text(&self.title, &title, (middle, dots(f64::from(TOP) / 2.0))).map_err(cannot)?;
+        let upwards = text(13, HPos::Center).transform(FontTransform::Rotate270);
+        let height = (area.dim_in_pixel().1 as i32 + dots(f64::from(TOP)) - dots(f64::from(BOTTOM))) / 2;
+        area.draw_text(self.y.label, &upwards, (dots(11.0), height)).map_err(cannot)?;
+        let mut chart = ChartBuilder::on(area)
+            .margin_top(TOP * SCALE)
+            .margin_right(RIGHT * SCALE)
+            .set_label_area_size(LabelAreaPosition::Left, LEFT * SCALE)
+            .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM * SCALE)
+            .build_cartesian_2d(self.x.clone(), self.y.clone())
+            .map_err(cannot)?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .axis_style(stroke([0; 3], 1.0))
+            .set_all_tick_mark_size(5 * SCALE)
+            .x_desc(self.x.label)
+            .label_style((FAMILY, 12 * SCALE))
+            .axis_desc_style((FAMILY, 13 * SCALE))
+            .draw()
+            .map_err(cannot)?;
+        let plotted = chart.plotting_area();
+        let place = |point: Point| plotted.map_coordinate(&point);
+        let unit = f64::from(plotted.dim_in_pixel().0) / (self.x.range[1] - self.x.range[0]);
+        for layer in &self.layers {
+            draw_mark(&layer.mark, layer.colour, &area.use_screen_coord(), &place, unit)?;
+        }
+        Ok(())
+    }
+}
+
+/// Draws `mark` with `place` taking its points, and `unit` its lengths, to dots of the whole picture.
+fn draw_mark<B: DrawingBackend>(
+    mark: &Mark,
+    colour: Colour,
+    area: &DrawingArea<B, Shift>,
+    place: &dyn Fn(Point) -> (i32, i32),
+    unit: f64,
+) -> Result<()> {
+    let fill = stroke(colour, 1.0).filled();
+    let star = |at: Point, size: f64, strokes: u32| {
+        let (x, y) = place(at);
+        (0..strokes).try_for_each(|number| {
+            let angle = std::f64::consts::PI * (f64::from(number) / f64::from(strokes) + 0.5);
+            let (right, down) = (dots(size * libm::cos(angle)), dots(size * libm::sin(angle)));
+            area.draw(&PathElement::new([(x - right, y - down), (x + right, y + down)], stroke(colour, 1.8)))
+        })
+    };
+    let drawn = match mark {
+        Mark::Lines { runs, width } => runs.iter().filter(|run| run.len() > 1).try_for_each(|run| {
+            let run: Vec<(i32, i32)> = run.iter().map(|&point| place(point)).collect();
+            area.draw(&PathElement::new(run, stroke(colour, *width)))
+        }),
+        Mark::Dashed { from, to } => {
+            let ((x0, y0), (x1, y1)) = (place(*from), place(*to));
+            let length = libm::hypot(f64::from(x1 - x0), f64::from(y1 - y0));
+            let at = |along: f64| {
+                let share = (along / length).min(1.0);
+                let between = |a: i32, b: i32| a + (share * f64::from(b - a)).round() as i32;
+                (between(x0, x1), between(y0, y1))
+            };
+            let [dash, period] = [DASH, DASH + GAP].map(|pixels| pixels * f64::from(SCALE));
+            (0..(length / period).ceil() as u32).try_for_each(|number| {
+                let from = f64::from(number) * period;
+                area.draw(&PathElement::new([at(from), at(from + dash)], stroke(colour, 1.0)))
+            })
+        }
+        Mark::Dots { points, radius } => {
+            points.iter().try_for_each(|&point| area.draw(&Circle::new(place(point), dots(*radius), fill)))
+        }
+        Mark::Disc { centre, radius } => area.draw(&Circle::new(place(*centre), (radius * unit).round() as i32, fill)),
+        Mark::Plus { at, size } => star(*at, *size, 2),
+        Mark::Asterisk { at, size } => star(*at, *size, 3),
+    };
+    drawn.map_err(cannot)
+}
+
+/// A size in pixels as dots.
+fn dots(pixels: f64) -> i32 {
+    (pixels * f64::from(SCALE)).round() as i32
+}
+
+fn text(pixels: u32, aligned: HPos) -> TextStyle<'static> {
+    (FAMILY, pixels * SCALE).into_font().color(&BLACK).pos(Pos::new(aligned, VPos::Center))
+}
+
+fn stroke(colour: Colour, width: f64) -> ShapeStyle {
+    let [r, g, b] = colour;
+    RGBColor(r, g, b).stroke_width(dots(width).max(1) as u32)
+}
+
+/// `value` with no more decimals than it needs.
+fn tick(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
+}
+
+/// Makes the font known to plotters, once.
+fn font() -> Result<()> {
+    static KNOWN: OnceLock<bool> = OnceLock::new();
+    let known = *KNOWN.get_or_init(|| register_font(FAMILY, FontStyle::Normal, FONT).is_ok());
+    if known { Ok(()) } else { Err(Error::failed("cannot draw: the font that comes with it is broken")) }
+}
+
+fn cannot(error: impl std::fmt::Display) -> Error {
+    Error::failed(format!("cannot draw: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_short() {
+        assert_eq!([0.0, -45.0, 0.5, 1000.0, -12.5].map(tick), ["0", "−45", "0.5", "1000", "−12.5"]);
+    }
+}

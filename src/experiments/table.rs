@@ -1,0 +1,314 @@
+//! The table that the paper lacks: how far its percepts are from the truth.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::metric::{Errors, across, between_lines};
+use super::trial::{self, Moment, Signal, Trial};
+use crate::body::Body;
+use crate::error::Result;
+
+const SPEEDS_MM_S: [f64; 3] = [5.0, 20.0, 80.0];
+const NOISES_COUNTS: [f64; 3] = [0.0, 1.0, 3.0];
+/// What the quick table has of both, and the table by angle.
+const USUAL_SPEED_MM_S: f64 = 20.0;
+const USUAL_NOISE_COUNTS: f64 = 1.0;
+const RATE_HZ: f64 = 50.0;
+/// Frames over which the steadier speed is taken, 0.1 s.
+const SPAN_FRAMES: usize = 5;
+/// A path goes as far on either side of its middle, mm.
+const REACH_MM: f64 = 8.0;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Toucher {
+    Rod,
+    Ball,
+    Fingertip,
+}
+
+impl Toucher {
+    const ALL: [Self; 3] = [Self::Rod, Self::Ball, Self::Fingertip];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rod => "rod",
+            Self::Ball => "ball",
+            Self::Fingertip => "fingertip",
+        }
+    }
+
+    /// Angles of a rod, directions of what is round, degrees.
+    fn angles_deg(self) -> Vec<f64> {
+        match self {
+            Self::Rod => (0..36).map(|i| 5.0 * f64::from(i)).collect(),
+            _ => (0..12).map(|i| 30.0 * f64::from(i)).collect(),
+        }
+    }
+
+    /// Its keys in a simulation's file.
+    fn keys(self, angle_deg: f64) -> String {
+        match self {
+            Self::Rod => format!(
+                "indenter = \"rod\"\nradius_m = 0.0127\nlength_m = 0.05\nangle_deg = {angle_deg}\nhold = {{ newton = 30 }}"
+            ),
+            Self::Ball => "indenter = \"ball\"\nradius_m = 0.0127\nhold = { newton = 10 }".to_owned(),
+            Self::Fingertip => "indenter = \"fingertip\"\nhold = { newton = 5 }".to_owned(),
+        }
+    }
+}
+
+/// One simulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Case {
+    toucher: Toucher,
+    angle_deg: f64,
+    speed_mm_s: f64,
+    noise_counts: f64,
+}
+
+impl Case {
+    fn all(quick: bool) -> Vec<Self> {
+        let mut cases = Vec::new();
+        for toucher in Toucher::ALL {
+            for speed_mm_s in SPEEDS_MM_S {
+                for noise_counts in NOISES_COUNTS {
+                    let usual = speed_mm_s == USUAL_SPEED_MM_S && noise_counts == USUAL_NOISE_COUNTS;
+                    if usual || !quick {
+                        let angles = toucher.angles_deg().into_iter();
+                        cases.extend(angles.map(|angle_deg| Self { toucher, angle_deg, speed_mm_s, noise_counts }));
+                    }
+                }
+            }
+        }
+        cases
+    }
+
+    /// A rod rolls across its own axis over the middle of the board; what is round passes the middle at 3.6 mm, so that
+    /// it does not run along a row of sensors.
+    fn simulation(&self) -> String {
+        let (heading_deg, middle) = match self.toucher {
+            Toucher::Rod => (self.angle_deg - 90.0, [0.0, 0.0]),
+            _ => (self.angle_deg, [3.0, 2.0]),
+        };
+        let heading = heading_deg.to_radians();
+        let at = |mm: f64| {
+            let (u, v) = (middle[0] + mm * libm::cos(heading), middle[1] + mm * libm::sin(heading));
+            format!("[{:.9}, {:.9}]", u * 1e-3, v * 1e-3)
+        };
+        let duration_s = 2.0 * REACH_MM / self.speed_mm_s;
+        format!(
+            "rate_hz = {RATE_HZ}\nduration_s = {duration_s}\nseed = {}\n\
+             [skin]\nthickness_m = 0.007\nstiffness_pa = 400e3\n\
+             [sensor]\nkind = \"fsr\"\ntap = 38\nnoise_sigma = {}\n\
+             [[touch]]\non = \"hand/back\"\n{}\npath = [{}, {}]\ntimes_s = [0, {duration_s}]\n",
+            self.angle_deg,
+            self.noise_counts,
+            self.toucher.keys(self.angle_deg),
+            at(-REACH_MM),
+            at(REACH_MM),
+        )
+    }
+}
+
+/// The errors of one signal.
+#[derive(Clone, Debug, Default)]
+struct Scores {
+    frames: u64,
+    felt: u64,
+    /// mm, for a rod across it.
+    centroid: Errors,
+    /// Degrees.
+    two_points: Errors,
+    axis: Errors,
+    /// Per cent of the true speed: frame by frame, over 0.1 s, and the paper's own eq. 8.
+    speed: Errors,
+    steady_speed: Errors,
+    radial_speed: Errors,
+}
+
+impl Scores {
+    fn of(trial: &Trial, signal: usize) -> Self {
+        let mut scores = Self::default();
+        for (index, moment) in trial.moments.iter().enumerate() {
+            let earlier = index.checked_sub(SPAN_FRAMES).map(|earlier| &trial.moments[earlier]);
+            scores.see(moment, earlier, signal);
+        }
+        scores
+    }
+
+    fn see(&mut self, moment: &Moment, earlier: Option<&Moment>, signal: usize) {
+        let Some(truth) = &moment.truth else { return };
+        let percept = &moment.percepts[signal];
+        self.frames += 1;
+        self.felt += u64::from(percept.contact);
+        if let Some((seen, right)) = percept.centroid.zip(truth.uv) {
+            let error = [(seen[0] - right[0]) * 1e3, (seen[1] - right[1]) * 1e3];
+            self.centroid
+                .add(truth.angle.map_or_else(|| libm::hypot(error[0], error[1]), |angle| across(error, angle)));
+        }
+        if let Some(right) = truth.angle {
+            let compare = |errors: &mut Errors, seen: Option<f64>| {
+                seen.into_iter().for_each(|seen| errors.add(between_lines(seen, right).to_degrees()));
+            };
+            compare(&mut self.two_points, percept.orientation);
+            compare(&mut self.axis, percept.axis);
+        }
+        let Some(right) = truth.speed.filter(|&speed| speed > 0.0) else { return };
+        let per_cent = |seen: f64| 100.0 * (seen - right) / right;
+        percept.speed.into_iter().for_each(|seen| self.speed.add(per_cent(seen)));
+        percept.radial_speed.into_iter().for_each(|seen| self.radial_speed.add(per_cent(seen.abs())));
+        if let Some(earlier) = earlier {
+            if let Some((now, then)) = percept.centroid.zip(earlier.percepts[signal].centroid) {
+                let distance_m = libm::hypot(now[0] - then[0], now[1] - then[1]);
+                self.steady_speed.add(per_cent(distance_m / (moment.t_s - earlier.t_s)));
+            }
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.frames += other.frames;
+        self.felt += other.felt;
+        self.centroid.merge(&other.centroid);
+        self.two_points.merge(&other.two_points);
+        self.axis.merge(&other.axis);
+        self.speed.merge(&other.speed);
+        self.steady_speed.merge(&other.steady_speed);
+        self.radial_speed.merge(&other.radial_speed);
+    }
+}
+
+/// A row: all of a toucher's angles, or one. Errors are [RMS, worst].
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    indenter: &'static str,
+    signal: &'static str,
+    speed_mm_s: f64,
+    noise_counts: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angle_deg: Option<f64>,
+    frames: u64,
+    felt_percent: f64,
+    centroid_mm: Option<[f64; 2]>,
+    two_points_deg: Option<[f64; 2]>,
+    axis_deg: Option<[f64; 2]>,
+    speed_percent: Option<[f64; 2]>,
+    speed_over_100_ms_percent: Option<[f64; 2]>,
+    radial_speed_percent: Option<[f64; 2]>,
+}
+
+impl Row {
+    fn new(case: &Case, angle_deg: Option<f64>, signal: usize, scores: &Scores) -> Self {
+        Self {
+            indenter: case.toucher.name(),
+            signal: Signal::ALL[signal].name(),
+            speed_mm_s: case.speed_mm_s,
+            noise_counts: case.noise_counts,
+            angle_deg,
+            frames: scores.frames,
+            felt_percent: 100.0 * scores.felt as f64 / scores.frames.max(1) as f64,
+            centroid_mm: scores.centroid.summary(),
+            two_points_deg: scores.two_points.summary(),
+            axis_deg: scores.axis.summary(),
+            speed_percent: scores.speed.summary(),
+            speed_over_100_ms_percent: scores.steady_speed.summary(),
+            radial_speed_percent: scores.radial_speed.summary(),
+        }
+    }
+}
+
+/// All rows: over all angles of a toucher, and for rods by angle.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Table {
+    over_all_angles: Vec<Row>,
+    rods_by_angle: Vec<Row>,
+}
+
+impl Table {
+    /// Simulates everything on `body`, the bundled hand, telling `progress` the share that is done.
+    pub(super) fn new(body: &Body, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Self> {
+        let cases = Case::all(quick);
+        let done = AtomicUsize::new(0);
+        let scores = cases.par_iter().map(|case| {
+            let trial = trial::run("a simulation of the table", &case.simulation(), body, "hand/back")?;
+            let scores = [0, 1].map(|signal| Scores::of(&trial, signal));
+            progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / cases.len() as f64);
+            Ok(scores)
+        });
+        let scores: Vec<[Scores; 2]> = scores.collect::<Result<_>>()?;
+        let mut table = Self { over_all_angles: Vec::new(), rods_by_angle: Vec::new() };
+        let alike = |a: &(&Case, &[Scores; 2]), b: &(&Case, &[Scores; 2])| {
+            let key = |case: &Case| (case.toucher, case.speed_mm_s, case.noise_counts);
+            key(a.0) == key(b.0)
+        };
+        let pairs: Vec<(&Case, &[Scores; 2])> = cases.iter().zip(&scores).collect();
+        for group in pairs.chunk_by(alike) {
+            let (case, _) = group[0];
+            for signal in 0..2 {
+                let mut all = Scores::default();
+                group.iter().for_each(|(_, scores)| all.merge(&scores[signal]));
+                table.over_all_angles.push(Row::new(case, None, signal, &all));
+            }
+            let usual = case.speed_mm_s == USUAL_SPEED_MM_S && case.noise_counts == USUAL_NOISE_COUNTS;
+            if case.toucher == Toucher::Rod && usual {
+                for (case, scores) in group {
+                    let rows = (0..2).map(|signal| Row::new(case, Some(case.angle_deg), signal, &scores[signal]));
+                    table.rods_by_angle.extend(rows);
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// As Markdown, for people.
+    pub(super) fn markdown(&self) -> String {
+        let mut text = String::from(
+            "Each cell is RMS / worst over all frames of all angles.\n\n\
+             | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | two points ° | principal axis ° | \
+             speed % | speed over 0.1 s % |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        );
+        for row in &self.over_all_angles {
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {:.0} | {} | {} | {} | {} | {} |",
+                row.indenter,
+                row.signal,
+                row.speed_mm_s,
+                row.noise_counts,
+                row.felt_percent,
+                cell(row.centroid_mm, 2),
+                cell(row.two_points_deg, 1),
+                cell(row.axis_deg, 1),
+                cell(row.speed_percent, 0),
+                cell(row.speed_over_100_ms_percent, 0),
+            );
+        }
+        let _ = write!(
+            text,
+            "\nRods by angle, {USUAL_SPEED_MM_S} mm/s, noise of {USUAL_NOISE_COUNTS} count, RMS / worst.\n\n\
+             | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | centroid mm, raw | \
+             linearised |\n|---|---|---|---|---|---|---|\n",
+        );
+        for rows in self.rods_by_angle.chunks(2) {
+            let [raw, linearised] = rows else { continue };
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} | {} |",
+                raw.angle_deg.unwrap_or(0.0),
+                cell(raw.two_points_deg, 1),
+                cell(linearised.two_points_deg, 1),
+                cell(raw.axis_deg, 1),
+                cell(linearised.axis_deg, 1),
+                cell(raw.centroid_mm, 2),
+                cell(linearised.centroid_mm, 2),
+            );
+        }
+        text
+    }
+}
+
+fn cell(errors: Option<[f64; 2]>, decimals: usize) -> String {
+    errors.map_or_else(|| "–".to_owned(), |[rms, worst]| format!("{rms:.decimals$} / {worst:.decimals$}"))
+}

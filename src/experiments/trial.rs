@@ -1,0 +1,127 @@
+//! From a simulated touch to what both of the paper's signals make of it.
+
+use std::array;
+
+use crate::backend::BackendKind;
+use crate::body::Body;
+use crate::engine::{Engine, Options};
+use crate::error::Result;
+use crate::percept::{Outputs, Percept};
+use crate::scene::Scene;
+use crate::signal::{Frame, FsrCircuit, RawValue};
+use crate::source::{SimulatedSource, Source as _, Truth};
+
+/// The paper's two ways from counts to a calibrated sensor value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signal {
+    /// The reading turned round: about the logarithm of the force.
+    Raw,
+    /// In proportion to the force.
+    Linearised,
+}
+
+impl Signal {
+    pub(super) const ALL: [Self; 2] = [Self::Raw, Self::Linearised];
+    /// Readings so near to open are nothing but noise: under a sixth of the step that the break force makes.
+    const DEAD_BAND_COUNTS: u16 = 20;
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Raw => "logarithmic raw",
+            Self::Linearised => "linearised",
+        }
+    }
+
+    /// What `counts` stand for, 0 to 1000.
+    pub(super) fn value(self, counts: u16) -> f64 {
+        let circuit = FsrCircuit::default();
+        if counts >= FsrCircuit::OPEN_COUNTS - Self::DEAD_BAND_COUNTS {
+            return 0.0;
+        }
+        match self {
+            Self::Raw => circuit.logarithmic(counts),
+            Self::Linearised => circuit.linearised(counts, FsrCircuit::SATURATION_NEWTON),
+        }
+    }
+}
+
+/// One frame: what the sensors read and felt, what is true, and the field's percept from each of [`Signal::ALL`].
+#[derive(Clone, Debug)]
+pub(super) struct Moment {
+    pub(super) t_s: f64,
+    /// One a taxel, in the order of the body's pressure taxels.
+    pub(super) counts: Vec<u16>,
+    pub(super) forces_newton: Vec<f64>,
+    /// Of the touch that presses, if one does.
+    pub(super) truth: Option<Truth>,
+    pub(super) percepts: [Percept; 2],
+}
+
+/// The ids of the taxels that a simulation delivers, and its frames.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    pub(super) ids: Vec<u32>,
+    pub(super) moments: Vec<Moment>,
+}
+
+/// Runs the simulation in `text`, called `name` in messages, whose sensors give counts, over `field` of `body`.
+pub(super) fn run(name: &str, text: &str, body: &Body, field: &str) -> Result<Trial> {
+    let mut source = SimulatedSource::on_body(name, text, body.clone())?;
+    let ids = source.taxels().to_vec();
+    let mut frame = Frame::missing(0.0, ids.len());
+    let mut moments = Vec::new();
+    let mut signals: [Vec<Frame>; 2] = Default::default();
+    while source.next_frame(&mut frame)? {
+        let counts: Vec<u16> = frame.values.iter().map(|value| value.number().unwrap_or(0.0) as u16).collect();
+        for (signal, frames) in Signal::ALL.iter().zip(&mut signals) {
+            let values = counts.iter().map(|&counts| RawValue::new(signal.value(counts))).collect();
+            frames.push(Frame { t_s: frame.t_s, values, pose: Vec::new() });
+        }
+        let forces_newton = source.forces_newton().to_vec();
+        moments.push((frame.t_s, counts, forces_newton, source.truth().first().cloned()));
+    }
+    let mut percepts = Vec::with_capacity(2);
+    for frames in &signals {
+        let scene = Scene {
+            outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION,
+            fields: vec![field.to_owned()],
+            ..Scene::default()
+        };
+        let options = Options {
+            scene,
+            calibration: None,
+            backend: BackendKind::Reference,
+            batch: frames.len(),
+            ..Options::default()
+        };
+        let mut engine = Engine::new(body, options)?;
+        engine.listen(&ids)?;
+        let batch = engine.process(frames)?;
+        percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
+    }
+    let moments = moments.into_iter().enumerate().map(|(index, (t_s, counts, forces_newton, truth))| Moment {
+        t_s,
+        counts,
+        forces_newton,
+        truth,
+        percepts: array::from_fn(|signal| percepts[signal][index]),
+    });
+    Ok(Trial { ids, moments: moments.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_on_an_open_sensor_is_nothing_and_a_press_is_not() {
+        let circuit = FsrCircuit::default();
+        for signal in Signal::ALL {
+            assert!((1003..=1023).all(|counts| signal.value(counts) == 0.0));
+            let presses = [0.11, 1.0, 4.0, 10.0].map(|newton| signal.value(circuit.counts(newton)));
+            assert!(presses.windows(2).all(|pair| 0.0 < pair[0] && pair[0] < pair[1]), "{presses:?}");
+            assert_eq!(presses[3], 1000.0);
+        }
+        assert!(circuit.counts(FsrCircuit::BREAK_NEWTON) < 1023 - 6 * Signal::DEAD_BAND_COUNTS);
+    }
+}

@@ -1,0 +1,71 @@
+//! `somatic paper`.
+
+use serde_json::Value;
+
+use super::{done, fails, file, files_in, text_of};
+
+/// RMS and worst under `key`.
+fn errors(row: &Value, key: &str) -> [f64; 2] {
+    [0, 1].map(|i| row[key][i].as_f64().unwrap_or_else(|| panic!("no {key}: {row}")))
+}
+
+#[test]
+fn it_writes_the_figures_and_what_the_docs_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new/paper");
+    let printed = done(&["paper", "--quick", "--out", text_of(&out)]);
+    let names = ["fig3", "fig6", "fig7"].map(|name| [format!("{name}.png"), format!("{name}.svg")]).concat();
+    assert_eq!(files_in(&out), [names, vec!["table.json".into(), "table.md".into()]].concat());
+    assert!(printed.lines().count() == 8 && printed.lines().all(|line| std::path::Path::new(line).is_file()));
+
+    for (name, words) in [
+        ("fig3", &["counts", "logarithmic raw", "linearised", "force on the sensor", "time (s)"][..]),
+        ("fig6", &["rod, true", "orientation, linearised", "centroid, logarithmic raw", "v (mm)"]),
+        ("fig7", &["each 45°", "true", "filtered direction of motion", "orientation (°)", "−90", "135"]),
+    ] {
+        let svg = std::fs::read_to_string(out.join(format!("{name}.svg"))).unwrap();
+        words.iter().for_each(|word| assert!(svg.contains(word), "{name} has no {word}"));
+        assert!(svg.len() < 150_000 && !svg.contains("NaN"), "{name}: {}", svg.len());
+        let png = std::fs::read(out.join(format!("{name}.png"))).unwrap();
+        assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+        let side = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+        assert!(svg.contains(&format!("width=\"{}\" height=\"{}\"", side(16), side(20))), "{name}");
+        assert!(png.len() > 20_000, "{name} is nearly empty");
+    }
+
+    let docs = include_str!("../../docs/paper.md");
+    let table = std::fs::read_to_string(out.join("table.md")).unwrap();
+    let rows: Vec<&str> = table.lines().filter(|line| line.starts_with('|')).collect();
+    // Two heads of two lines, a row for each indenter and signal, one for each angle.
+    assert_eq!(rows.len(), 4 + 6 + 36);
+    for row in rows {
+        assert!(docs.contains(row), "docs/paper.md is out of date, see how it is made there: {row}");
+    }
+    let shown = docs.split("<!-- table -->").nth(1).unwrap();
+    assert_eq!(shown.lines().filter(|line| line.starts_with("| ")).count(), 2 + 54 + 36);
+
+    let table: Value = serde_json::from_slice(&std::fs::read(out.join("table.json")).unwrap()).unwrap();
+    let rods = table["rods_by_angle"].as_array().unwrap();
+    assert_eq!(rods.len(), 72);
+    for row in rods {
+        let ([rms, worst], [axis, axis_worst]) = (errors(row, "two_points_deg"), errors(row, "axis_deg"));
+        // The method picks two of nine sensors: it is coarse, but no rod may be seen across itself.
+        assert!(rms <= worst && worst < 45.0 && rms < 20.0 && axis <= axis_worst && axis < 10.0, "{row}");
+        if row["angle_deg"] == 0.0 {
+            assert!(worst < 1.0 && axis_worst < 1.0, "along a row of sensors nothing is in doubt: {row}");
+        }
+    }
+    for row in table["over_all_angles"].as_array().unwrap() {
+        assert_eq!(row["two_points_deg"].is_null(), row["indenter"] != "rod");
+        assert!(errors(row, "centroid_mm")[1] < 5.0 && row["felt_percent"] == 100.0, "{row}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_is_one_line() {
+    let (_folder, path) = file("taken", "x");
+    let error = fails(1, &["paper", "--quick", "--out", text_of(&path)]);
+    assert!(error.lines().count() == 1 && error.contains("taken"), "{error}");
+    assert!(fails(2, &["paper"]).contains("--out"));
+    assert!(done(&["help", "paper"]).contains("Examples:"));
+}
