@@ -43,6 +43,55 @@ fn on_curve(curve: Curve, x: f32) -> f32 {
     return clamp(p, min(before.p, after.p), max(before.p, after.p));
 }
 
+// A raw value before its taxel's response.
+struct Reading {
+    // raw - baseline.
+    above: f32,
+    // What is known of it so far; UNUSABLE where there is nothing to respond to.
+    status: u32,
+}
+
+fn reading(index: u32, taxel: Taxel) -> Reading {
+    let slot = index / batch.frames;
+    let frame = index % batch.frames;
+    let bits = raw[frame * batch.slots + slot];
+    let size = bits & SIZE_BITS;
+    if bits == MISSING {
+        return Reading(0.0, INCOMPLETE | UNUSABLE);
+    }
+    if size > HUGE_BITS || taxel.response == MASKED {
+        // Infinity and NaN have larger bits than any number.
+        return Reading(0.0, FAULTY_INPUT | UNUSABLE);
+    }
+    let value = bitcast<f32>(select(bits, 0u, is_tiny(size)));
+    // The range is asked of the value as it came; where it came too small to compute with, its sign decides at 0.
+    let low = value < taxel.raw_low || (is_tiny(size) && taxel.raw_low == 0.0 && bits != size);
+    let high = value > taxel.raw_high || (is_tiny(size) && taxel.raw_high == 0.0 && bits == size);
+    let status = select(0u, OUT_OF_RANGE, low || high) | select(0u, FAULTY_INPUT, is_tiny(size));
+    return Reading(value - taxel.baseline, status);
+}
+
+// Writes the pressure `p` that a taxel's response makes of `seen`.
+fn write(index: u32, taxel: Taxel, seen: Reading, p: f32) {
+    var pressure = 0.0;
+    var status = seen.status;
+    if (status & UNUSABLE) == 0u {
+        let size = bitcast<u32>(p) & SIZE_BITS;
+        if size > HUGE_BITS {
+            status = FAULTY_INPUT | UNUSABLE;
+        } else {
+            status |= select(0u, FAULTY_INPUT, is_tiny(size));
+            if !is_tiny(size) && p > taxel.dead_band {
+                pressure = p;
+                status |= select(0u, SATURATED, p > taxel.p_max);
+            }
+        }
+    }
+    pressures[index] = pressure;
+    statuses[index] = status;
+}
+
+// Where no taxel has a curve.
 @compute @workgroup_size(GROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -53,41 +102,27 @@ fn main(
     if index >= batch.frames * batch.slots {
         return;
     }
-    let slot = index / batch.frames;
-    let frame = index % batch.frames;
-    let bits = raw[frame * batch.slots + slot];
-    let taxel = taxels[slot];
-    let size = bits & SIZE_BITS;
+    let taxel = taxels[index / batch.frames];
+    let seen = reading(index, taxel);
+    write(index, taxel, seen, seen.above * taxel.gain);
+}
 
-    var pressure = 0.0;
-    var status = 0u;
-    if bits == MISSING {
-        status = INCOMPLETE | UNUSABLE;
-    } else if size > HUGE_BITS || taxel.response == MASKED {
-        // Infinity and NaN have larger bits than any number.
-        status = FAULTY_INPUT | UNUSABLE;
-    } else {
-        let value = bitcast<f32>(select(bits, 0u, is_tiny(size)));
-        // The range is asked of the value as it came; where it came too small to compute with, its sign decides at 0.
-        let low = value < taxel.raw_low || (is_tiny(size) && taxel.raw_low == 0.0 && bits != size);
-        let high = value > taxel.raw_high || (is_tiny(size) && taxel.raw_high == 0.0 && bits == size);
-        status |= select(0u, OUT_OF_RANGE, low || high);
-        let above = value - taxel.baseline;
-        var p = above * taxel.gain;
-        if taxel.response >= FIRST_CURVE {
-            p = on_curve(curves[taxel.response - FIRST_CURVE], above);
-        }
-        let p_size = bitcast<u32>(p) & SIZE_BITS;
-        if p_size > HUGE_BITS {
-            status = FAULTY_INPUT | UNUSABLE;
-        } else {
-            status |= select(0u, FAULTY_INPUT, is_tiny(size) || is_tiny(p_size));
-            if !is_tiny(p_size) && p > taxel.dead_band {
-                pressure = p;
-                status |= select(0u, SATURATED, p > taxel.p_max);
-            }
-        }
+// Where some have.
+@compute @workgroup_size(GROUP)
+fn curved(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let index = invocation(group, groups, local);
+    if index >= batch.frames * batch.slots {
+        return;
     }
-    pressures[index] = pressure;
-    statuses[index] = status;
+    let taxel = taxels[index / batch.frames];
+    let seen = reading(index, taxel);
+    if taxel.response >= FIRST_CURVE {
+        write(index, taxel, seen, on_curve(curves[taxel.response - FIRST_CURVE], seen.above));
+    } else {
+        write(index, taxel, seen, seen.above * taxel.gain);
+    }
 }

@@ -155,10 +155,11 @@ impl Gpu {
         let wide_fields = table(&device, "wide fields", &wide);
 
         let wanted = plan.stages();
-        let curves = table(&device, "curves", &plan.curves.curves);
-        let knots = table(&device, "knots", &plan.curves.knots);
+        let (curves, knots) =
+            (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
         let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
-        let mut stages = vec![Stage::new(&device, &shaders::CALIBRATE, "main", Over::Taxels, &buffers)];
+        let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
+        let mut stages = vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Taxels, &buffers[..used])];
         let mut over_fields = |shader: &StageShader, buffers: [&wgpu::Buffer; 8]| {
             stages.push(Stage::new(&device, shader, "main", Over::Fields, &buffers));
             if !wide.is_empty() {
