@@ -160,11 +160,11 @@ impl Scores {
         let per_cent = |seen: f64| 100.0 * (seen - right) / right;
         percept.speed.into_iter().for_each(|seen| self.speed.add(per_cent(seen)));
         percept.radial_speed.into_iter().for_each(|seen| self.radial_speed.add(per_cent(seen.abs())));
-        if let Some(earlier) = earlier {
-            if let Some((now, then)) = percept.centroid.zip(earlier.percepts[signal].centroid) {
-                let distance_m = libm::hypot(now[0] - then[0], now[1] - then[1]);
-                self.steady_speed.add(per_cent(distance_m / (moment.t_s - earlier.t_s)));
-            }
+        if let Some(earlier) = earlier
+            && let Some((now, then)) = percept.centroid.zip(earlier.percepts[signal].centroid)
+        {
+            let distance_m = libm::hypot(now[0] - then[0], now[1] - then[1]);
+            self.steady_speed.add(per_cent(distance_m / (moment.t_s - earlier.t_s)));
         }
     }
 
