@@ -85,12 +85,11 @@ mod tests {
 
     #[test]
     fn smoothing_takes_its_time_and_no_notice_of_the_seam() {
-        let mut filter = DirectionFilter::new([0.0, 1.0], 0.2);
-        let mut place = [0.0, 0.0];
+        let mut filter = DirectionFilter::new([0.0, 10.0], 0.2);
+        let mut place = [0.0_f64, 0.0];
         filter.push(0.0, Some(place));
         let mut step = |t_s: f64, angle: f64| {
-            place = [place[0] + libm::cos(angle), place[1] + libm::sin(angle)].map(|x: f64| x);
-            filter.window_m = [0.0, 10.0];
+            place = [place[0] + libm::cos(angle), place[1] + libm::sin(angle)];
             filter.push(t_s, Some(place)).unwrap()
         };
         assert_eq!(step(0.1, 0.0), 0.0);
