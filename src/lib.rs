@@ -1,4 +1,48 @@
 //! A sense of touch for whole robots: touch frames in, percepts out.
+//!
+//! A robot's skin is a set of **taxels**, sensors that sit on its surface. A **receptive field** is a named set of taxels;
+//! fields overlap and nest. For every field and every frame `somatic` gives a **percept**: how hard the field is pressed
+//! and where, how what presses it is oriented, how it moves. What is not defined is absent with a reason, never NaN and
+//! never 0.
+//!
+//! # The way through
+//!
+//! 1. A [`Body`] is read from glTF: links, surfaces, taxels, and the outlines of fields. `docs/layout.md` specifies the
+//!    encoding; [`bundled`] has three bodies to try.
+//! 2. A [`Scene`] says what is wanted of it: which fields, which [`Outputs`]. A [`Calibration`] says how one robot's sensors
+//!    answer, and what of their input is not to be believed.
+//! 3. An [`Engine`] makes a [`Plan`] of these, picks a backend, and turns [`Frame`]s into [`Percepts`].
+//!
+//! ```
+//! use somatic::{Body, Engine, Options, RawValue, bundled};
+//!
+//! # fn main() -> somatic::Result<()> {
+//! let body = Body::from_bytes("hand", bundled::HAND)?;
+//! let mut engine = Engine::new(&body, Options::default())?;
+//!
+//! // One frame: every value missing, then those that your driver has.
+//! let mut frame = engine.frame(0.0);
+//! for id in 0..9 {
+//!     frame.values[engine.value_of(id).unwrap()] = RawValue::new(f64::from(10 * id));
+//! }
+//! let percepts = engine.process(&[frame])?;
+//! for percept in percepts.touched(0) {
+//!     println!("{:?} N at {:?} m, {:?}", percept.total, percept.position, percept.flags);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Three backends, one answer
+//!
+//! `reference` is double precision and reads like the equations. `cpu` is single precision in lanes on all cores, `gpu` is
+//! WGSL through wgpu. Both are held to the reference by bounds derived from the arithmetic; [`Engine::process_and_compare`]
+//! does it on your own input. However a recording is cut into calls, a backend's percepts are the same bits.
+//!
+//! # Features
+//!
+//! `cli` (default) is the command and what only it needs; `gpu` (default) is the WGSL backend. A robot that embeds the
+//! library on its CPU goes without both, and builds in a fraction of the time.
 
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
@@ -19,6 +63,7 @@ pub mod signal;
 pub mod sink;
 pub mod source;
 mod stage;
+mod whole;
 
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, Comparison};
@@ -28,15 +73,3 @@ pub use error::{Error, Result};
 pub use percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Pose, RawValue};
-
-use std::io::Write as _;
-use std::path::Path;
-
-/// Writes `bytes` at `path`, whole or not at all: to a temporary file beside it, then renamed over it.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))?;
-    file.write_all(bytes).map_err(|e| Error::io(path, &e))?;
-    file.persist(path).map_err(|e| Error::io(path, &e.error))?;
-    Ok(())
-}

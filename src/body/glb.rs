@@ -251,6 +251,6 @@ impl Glb {
     /// The folder cannot be written to, or the disk is full.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        crate::write_whole(path, &self.to_bytes()?)
+        crate::whole::write(path, &self.to_bytes()?)
     }
 }

@@ -13,7 +13,7 @@ use self::table::Table;
 use crate::body::Body;
 use crate::bundled;
 use crate::error::{Error, Result};
-use crate::write_whole;
+use crate::whole;
 
 /// Writes the paper's figures and the table into `folder`, which is made where there is none, and gives the files
 /// written: each complete, or not there. `quick` leaves most of the table away. `progress` hears the share done.
@@ -26,7 +26,7 @@ pub fn write(folder: &Path, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Res
     let mut written = Vec::new();
     let mut put = |name: String, bytes: &[u8]| {
         let path = folder.join(name);
-        write_whole(&path, bytes)?;
+        whole::write(&path, bytes)?;
         written.push(path);
         Ok::<(), Error>(())
     };

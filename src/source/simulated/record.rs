@@ -9,6 +9,7 @@ use super::{SimulatedSource, Truth};
 use crate::error::{Error, Result};
 use crate::signal::Frame;
 use crate::source::Source as _;
+use crate::whole::beside;
 
 /// The truth's columns.
 const COLUMNS: [&str; 22] = [
@@ -38,11 +39,6 @@ pub fn write_recording(simulation: &mut SimulatedSource, csv_path: &Path, truth_
         let _ = std::fs::remove_file(csv_path);
     })?;
     Ok(simulation.frames())
-}
-
-fn beside(path: &Path) -> Result<NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))
 }
 
 fn write(
