@@ -20,7 +20,10 @@ pub fn backends() -> Vec<BackendKind> {
 /// Whether there is an adapter. With `SOMATIC_REQUIRE_GPU=1` its absence fails the test.
 pub fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
+    #[cfg(feature = "gpu")]
     let found = *FOUND.get_or_init(|| !somatic::backend::gpu::adapters().is_empty());
+    #[cfg(not(feature = "gpu"))]
+    let found = *FOUND.get_or_init(|| false);
     if !found {
         assert!(
             std::env::var("SOMATIC_REQUIRE_GPU").as_deref() != Ok("1"),
