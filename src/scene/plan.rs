@@ -27,10 +27,25 @@ pub(crate) struct Stages {
     pub(crate) touches: bool,
 }
 
+impl Stages {
+    /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
+    fn of(outputs: Outputs) -> Self {
+        let wants = |some| outputs.intersects(some);
+        let touches = wants(Outputs::TOUCHES);
+        let position = wants(Outputs::POSITION | Outputs::NORMAL) || touches;
+        let orientation = wants(Outputs::ORIENTATION);
+        let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
+        let motion = wants(Outputs::MOTION);
+        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
+        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches }
+    }
+}
+
 /// What a backend runs: only the taxels, fields and stages that the scene needs.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(crate) outputs: Outputs,
+    stages: Stages,
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
     /// The body's taxels that are read, by ascending id; a *slot* is an index into this.
@@ -119,6 +134,7 @@ impl Plan {
         let slot_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let mut plan = Self {
             outputs: scene.outputs,
+            stages: Stages::of(scene.outputs),
             columns: scene.outputs,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
@@ -166,7 +182,8 @@ impl Plan {
             }));
         }
         plan.body_taxels = body_taxels;
-        if plan.stages().hysteresis {
+        plan.stages.hysteresis = plan.fields.iter().any(|field| field.thresholds != Thresholds::default());
+        if plan.stages.hysteresis {
             plan.columns |= Outputs::TOTAL;
         }
         if plan.stages().position {
@@ -246,15 +263,7 @@ impl Plan {
     }
 
     pub(crate) fn stages(&self) -> Stages {
-        let wants = |outputs| self.outputs.intersects(outputs);
-        let touches = wants(Outputs::TOUCHES);
-        let position = wants(Outputs::POSITION | Outputs::NORMAL) || touches;
-        let orientation = wants(Outputs::ORIENTATION);
-        let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
-        let motion = wants(Outputs::MOTION);
-        let hysteresis = self.fields.iter().any(|field| field.thresholds != Thresholds::default());
-        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
-        Stages { centroid, orientation, axis, hysteresis, motion, position, touches }
+        self.stages
     }
 }
 

@@ -13,7 +13,7 @@ impl Gpu {
     /// From the device's order (field by field) to the percepts' (frame by frame), lengths in metres.
     pub(super) fn unpack(&self, what: What, bytes: &[u8], frames: usize, cells: &mut CellsMut<'_>) {
         let fields = self.plan.fields.len();
-        let units: Vec<f32> = self.plan.fields.iter().map(|field| field.unit_m).collect();
+        let unit_of = |field: usize| self.plan.fields[field].unit_m;
         let each = |f: &mut dyn FnMut(usize, usize, usize)| {
             for field in 0..fields {
                 for frame in 0..frames {
@@ -48,7 +48,7 @@ impl Gpu {
                 let centroids: &[[f32; 4]] = cast_slice(bytes);
                 each(&mut |field, from, to| {
                     let [u, v, depth, _] = centroids[from];
-                    cells.centroid[to] = [u, v, depth].map(|x| x * units[field]);
+                    cells.centroid[to] = [u, v, depth].map(|x| x * unit_of(field));
                 });
             }
             What::Orientations => {
@@ -58,7 +58,7 @@ impl Gpu {
             What::Motions => {
                 let motions: &[layout::Motion] = cast_slice(bytes);
                 each(&mut |field, from, to| {
-                    let (motion, unit_m) = (&motions[from], units[field]);
+                    let (motion, unit_m) = (&motions[from], unit_of(field));
                     cells.flags[to] |= Flags::from_bits_truncate(motion.status & ((1 << PRESENT) - 1));
                     cells.present[to] |= motion_outputs(motion.status >> PRESENT) & self.plan.outputs;
                     let write = |column: &mut [f32], value: f32| {
