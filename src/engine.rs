@@ -7,7 +7,7 @@ use std::ops::Range;
 use self::host::{Host, Links};
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
-use crate::backend::{self, Backend, BackendKind, RawBatch, Step};
+use crate::backend::{self, Backend, BackendKind, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
@@ -57,6 +57,8 @@ pub struct Engine {
     why: String,
     intake: Intake,
     raw: Vec<RawValue>,
+    /// Whether the frames at hand are what the plan reads, so that `raw` is empty.
+    direct: bool,
     steps: Vec<Step>,
     last_t_s: Option<f64>,
     max_gap_s: f64,
@@ -147,6 +149,7 @@ impl Engine {
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
             raw: Vec::new(),
+            direct: false,
             tare,
             frames_done: 0,
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
@@ -253,7 +256,7 @@ impl Engine {
         }
         if self.tare && !frames.is_empty() {
             self.tare = false;
-            self.take_as_baselines(check.as_deref_mut());
+            self.take_as_baselines(&frames[0], check.as_deref_mut());
         }
         let mut start = 0;
         for index in 0..frames.len() {
@@ -264,7 +267,7 @@ impl Engine {
             }
             if let Some(kept) = &mut self.upkeep {
                 let slots = self.plan.slots();
-                kept.upkeep.observe(frames[index].t_s, &self.raw[index * slots..][..slots]);
+                kept.upkeep.observe(frames[index].t_s, Self::rows(self.direct, &self.raw, frames, slots).row(index));
             }
         }
         self.segment(frames, start..frames.len(), check)?;
@@ -273,9 +276,10 @@ impl Engine {
     }
 
     /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
-    fn take_as_baselines(&mut self, check: Option<&mut Check>) {
-        for slot in 0..self.plan.slots() {
-            if let Some(value) = self.raw[slot].number() {
+    fn take_as_baselines(&mut self, first: &Frame, check: Option<&mut Check>) {
+        let row = if self.direct { &first.values } else { &self.raw };
+        for (slot, value) in row.iter().enumerate().take(self.plan.slots()) {
+            if let Some(value) = value.number() {
                 let made = self.plan.taxels[slot];
                 self.plan.keep_up(slot, value as f32, false, &made);
             }
@@ -298,7 +302,7 @@ impl Engine {
         let raw = RawBatch {
             first: range.start,
             frames: range.len(),
-            values: &self.raw[range.start * slots..range.end * slots],
+            rows: Self::rows(self.direct, &self.raw, frames, slots).part(range.clone()),
             steps: &self.steps[range.clone()],
         };
         let host = Host { plan: &self.plan, links: &self.links };
@@ -335,6 +339,11 @@ impl Engine {
         }
     }
 
+    /// Where the gathered frames' values lie.
+    fn rows<'a>(direct: bool, raw: &'a [RawValue], frames: &'a [Frame], slots: usize) -> Rows<'a> {
+        if direct { Rows::Frames(frames) } else { Rows::Packed { values: raw, slots } }
+    }
+
     fn gather(&mut self, frames: &[Frame]) -> Result<()> {
         for (index, frame) in frames.iter().enumerate() {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
@@ -349,8 +358,11 @@ impl Engine {
             }
         }
         self.raw.clear();
-        for frame in frames {
-            self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
+        self.direct = self.intake.is_transparent(&self.plan.body_taxels);
+        if !self.direct {
+            for frame in frames {
+                self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
+            }
         }
         self.steps.clear();
         for frame in frames {

@@ -7,13 +7,15 @@
 mod batch;
 
 use bitflags::bitflags;
+use bytemuck::{Pod, Zeroable};
 
 pub use batch::Percepts;
 pub(crate) use batch::{CellsMut, Columns, Values};
 
 bitflags! {
     /// Why a quantity is absent or in doubt, and what was wrong with the input.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
+    #[repr(transparent)]
     pub struct Flags: u32 {
         /// The field is not in contact: everything that needs a touch is absent.
         const NO_CONTACT = 1 << 0;
@@ -57,7 +59,8 @@ impl Flags {
 
 bitflags! {
     /// Quantities a percept can hold: what is asked for, and what is present.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
+    #[repr(transparent)]
     pub struct Outputs: u32 {
         /// S = Σ wᵢPᵢ.
         const TOTAL = 1 << 0;

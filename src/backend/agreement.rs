@@ -235,7 +235,7 @@ mod tests {
         percepts.active[0] = 3;
         let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
         (columns.total[0], columns.peak[0], columns.area[0]) = (10.0, 5.0, 1.0);
-        columns.centroid[0] = [0.1, 0.2, 0.0];
+        columns.set_centroid(0, [0.1, 0.2, 0.0]);
         (columns.orientation[0], columns.axis[0], columns.anisotropy[0]) = (0.001, 1.0, 0.5);
         columns.direction[0] = 3.139;
         change(&mut percepts, &mut columns);
@@ -286,8 +286,8 @@ mod tests {
             ("total", |_, c| c.total[0] += 0.011),
             ("peak", |_, c| c.peak[0] -= 0.011),
             ("area", |_, c| c.area[0] = f64::NAN),
-            ("centroid", |_, c| c.centroid[0][0] += 0.011),
-            ("centroid", |_, c| c.centroid[0][1] -= 0.011),
+            ("centroid", |_, c| c.centroid_u[0] += 0.011),
+            ("centroid", |_, c| c.centroid_v[0] -= 0.011),
             ("position", |p, _| p.position[0][2] += 0.011),
             ("normal", |p, _| p.normal[0][0] += 0.011),
             ("orientation", |_, c| c.orientation[0] += 0.011),

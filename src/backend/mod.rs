@@ -6,13 +6,14 @@ pub(crate) mod cpu;
 pub mod gpu;
 pub(crate) mod reference;
 
+use std::ops::Range;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::Plan;
-use crate::signal::RawValue;
+use crate::signal::{Frame, RawValue};
 
 /// Which backend is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,15 +51,44 @@ impl FromStr for BackendKind {
     }
 }
 
-/// A batch of raw values: frames one after the other, each with one value a slot.
+/// A batch of raw values, frame by frame.
 #[derive(Clone, Copy)]
 pub(crate) struct RawBatch<'a> {
     /// Where its first frame stands in the percepts.
     pub(crate) first: usize,
     pub(crate) frames: usize,
-    pub(crate) values: &'a [RawValue],
+    pub(crate) rows: Rows<'a>,
     /// Per frame, the time since the one before.
     pub(crate) steps: &'a [Step],
+}
+
+/// Where frames' raw values lie, each frame's with one value a slot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Rows<'a> {
+    /// One frame after the other.
+    Packed { values: &'a [RawValue], slots: usize },
+    /// As the source delivered them, where that is what the plan reads.
+    Frames(&'a [Frame]),
+}
+
+impl<'a> Rows<'a> {
+    /// The values of frame `frame`.
+    pub(crate) fn row(self, frame: usize) -> &'a [RawValue] {
+        match self {
+            Self::Packed { values, slots } => &values[frame * slots..][..slots],
+            Self::Frames(frames) => &frames[frame].values,
+        }
+    }
+
+    /// The rows of `frames`.
+    pub(crate) fn part(self, frames: Range<usize>) -> Self {
+        match self {
+            Self::Packed { values, slots } => {
+                Self::Packed { values: &values[frames.start * slots..frames.end * slots], slots }
+            }
+            Self::Frames(all) => Self::Frames(&all[frames]),
+        }
+    }
 }
 
 /// The time since the frame before.
@@ -131,7 +161,12 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
     const ENOUGH: Duration = Duration::from_millis(60);
     let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
-    let raw = RawBatch { first: 0, frames: batch, values: &values, steps: &steps };
+    let raw = RawBatch {
+        first: 0,
+        frames: batch,
+        rows: Rows::Packed { values: &values, slots: plan.slots() },
+        steps: &steps,
+    };
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures());
     let mut times = Vec::with_capacity(CALLS);

@@ -79,8 +79,7 @@ impl Reference {
 
     /// One frame's pressures, taxel by taxel.
     fn pressures(&self, raw: &RawBatch<'_>, frame: usize) -> Vec<Pressure> {
-        let values = &raw.values[frame * self.plan.slots()..][..self.plan.slots()];
-        let taxels = values.iter().zip(&self.plan.calibrations).enumerate();
+        let taxels = raw.rows.row(frame).iter().zip(&self.plan.calibrations).enumerate();
         taxels.map(|(slot, (&raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
     }
 
@@ -215,7 +214,7 @@ impl Reference {
         let c = centroid::reference(&pressed);
         if stages.centroid {
             let place = if field.charted { c.truncate().extend(0.0) } else { c };
-            columns.centroid[cell] = (place * f64::from(field.unit_m)).to_array();
+            columns.set_centroid(cell, (place * f64::from(field.unit_m)).to_array());
             present |= Outputs::POSITION;
             if field.charted {
                 present |= Outputs::CENTROID | Outputs::NORMAL;

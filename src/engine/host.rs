@@ -72,8 +72,8 @@ impl Host<'_> {
     /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
     fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
         let place = match &percepts.values {
-            Values::F32(columns) => DVec3::from_array(columns.centroid[cell].map(f64::from)),
-            Values::F64(columns) => DVec3::from_array(columns.centroid[cell]),
+            Values::F32(columns) => DVec3::from_array(columns.centroid(cell)),
+            Values::F64(columns) => DVec3::from_array(columns.centroid(cell)),
         };
         let (position, normal) = Self::on_skin(field, world, place);
         percepts.in_world[cell] = world.is_some();

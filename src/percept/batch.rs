@@ -9,7 +9,10 @@ pub(crate) struct Columns<T> {
     pub(crate) peak: Vec<T>,
     pub(crate) area: Vec<T>,
     /// (u, v, depth) in the chart; of a field without one, along its anchor's axes from the field's origin.
-    pub(crate) centroid: Vec<[T; 3]>,
+    pub(crate) centroid_u: Vec<T>,
+    pub(crate) centroid_v: Vec<T>,
+    /// Kept only where positions are wanted.
+    pub(crate) centroid_depth: Vec<T>,
     pub(crate) orientation: Vec<T>,
     pub(crate) axis: Vec<T>,
     pub(crate) anisotropy: Vec<T>,
@@ -22,26 +25,33 @@ pub(crate) struct Columns<T> {
 }
 
 impl<T: Clone + Default> Columns<T> {
+    /// Makes room for `cells` cells of each wanted column. Those that every cell is written into keep what they held.
     fn resize(&mut self, wanted: Outputs, cells: usize) {
-        fn column<V: Clone + Default>(column: &mut Vec<V>, wanted: bool, cells: usize) {
-            column.clear();
-            column.resize(if wanted { cells } else { 0 }, V::default());
-        }
-        // Motion is made from the centroids' column.
+        let fit = |column: &mut Vec<T>, output| {
+            column.resize(if wanted.intersects(output) { cells } else { 0 }, T::default())
+        };
+        // Motion is made from the centroids' columns.
         let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::MOTION;
-        column(&mut self.total, wanted.contains(Outputs::TOTAL), cells);
-        column(&mut self.peak, wanted.contains(Outputs::PEAK), cells);
-        column(&mut self.area, wanted.contains(Outputs::AREA), cells);
-        column(&mut self.centroid, wanted.intersects(place), cells);
-        column(&mut self.orientation, wanted.contains(Outputs::ORIENTATION), cells);
-        column(&mut self.axis, wanted.contains(Outputs::AXIS), cells);
-        column(&mut self.anisotropy, wanted.contains(Outputs::ANISOTROPY), cells);
-        column(&mut self.displacement, wanted.contains(Outputs::DISPLACEMENT), cells);
-        column(&mut self.direction, wanted.contains(Outputs::DIRECTION), cells);
-        column(&mut self.distance, wanted.contains(Outputs::DISTANCE), cells);
-        column(&mut self.radial_distance, wanted.contains(Outputs::RADIAL_DISTANCE), cells);
-        column(&mut self.speed, wanted.contains(Outputs::SPEED), cells);
-        column(&mut self.radial_speed, wanted.contains(Outputs::RADIAL_SPEED), cells);
+        fit(&mut self.total, Outputs::TOTAL);
+        fit(&mut self.peak, Outputs::PEAK);
+        fit(&mut self.area, Outputs::AREA);
+        fit(&mut self.centroid_u, place);
+        fit(&mut self.centroid_v, place);
+        fit(&mut self.centroid_depth, Outputs::POSITION | Outputs::NORMAL);
+        fit(&mut self.orientation, Outputs::ORIENTATION);
+        fit(&mut self.axis, Outputs::AXIS);
+        fit(&mut self.anisotropy, Outputs::ANISOTROPY);
+        let clear = |column: &mut Vec<T>, output| {
+            column.clear();
+            column.resize(if wanted.contains(output) { cells } else { 0 }, T::default());
+        };
+        self.displacement.clear();
+        self.displacement.resize(if wanted.contains(Outputs::DISPLACEMENT) { cells } else { 0 }, Default::default());
+        clear(&mut self.direction, Outputs::DIRECTION);
+        clear(&mut self.distance, Outputs::DISTANCE);
+        clear(&mut self.radial_distance, Outputs::RADIAL_DISTANCE);
+        clear(&mut self.speed, Outputs::SPEED);
+        clear(&mut self.radial_speed, Outputs::RADIAL_SPEED);
     }
 }
 
@@ -121,9 +131,9 @@ impl Percepts {
         let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
         refill(&mut self.t_s, frames, 0.0);
         refill(&mut self.in_world, cells, false);
-        refill(&mut self.flags, cells, Flags::empty());
-        refill(&mut self.present, cells, Outputs::empty());
-        refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
+        self.flags.resize(cells, Flags::empty());
+        self.present.resize(cells, Outputs::empty());
+        self.active.resize(when(Outputs::ACTIVE, cells), 0);
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
         refill(&mut self.pressures, frames * self.slots, 0.0);
@@ -237,7 +247,22 @@ impl Percepts {
     }
 }
 
-impl<T: Copy + Into<f64>> Columns<T> {
+impl<T: Copy + Default + Into<f64>> Columns<T> {
+    /// A cell's centroid, (u, v, depth), m; depth is 0 where it is not kept.
+    pub(crate) fn centroid(&self, cell: usize) -> [f64; 3] {
+        let depth = self.centroid_depth.get(cell).copied().unwrap_or_default();
+        [self.centroid_u[cell], self.centroid_v[cell], depth].map(Into::into)
+    }
+
+    /// Sets a cell's centroid, (u, v, depth), m, in the columns that are kept.
+    pub(crate) fn set_centroid(&mut self, cell: usize, [u, v, depth]: [T; 3]) {
+        self.centroid_u[cell] = u;
+        self.centroid_v[cell] = v;
+        if let Some(kept) = self.centroid_depth.get_mut(cell) {
+            *kept = depth;
+        }
+    }
+
     fn fill(&self, percept: &mut Percept, present: Outputs, cell: usize) {
         let scalar = |output, column: &[T]| present.contains(output).then(|| column[cell].into());
         percept.total = scalar(Outputs::TOTAL, &self.total);
@@ -252,10 +277,8 @@ impl<T: Copy + Into<f64>> Columns<T> {
         percept.speed = scalar(Outputs::SPEED, &self.speed);
         percept.radial_speed = scalar(Outputs::RADIAL_SPEED, &self.radial_speed);
         percept.displacement = present.contains(Outputs::DISPLACEMENT).then(|| self.displacement[cell].map(Into::into));
-        percept.centroid = present.contains(Outputs::CENTROID).then(|| {
-            let [u, v, _] = self.centroid[cell];
-            [u.into(), v.into()]
-        });
+        percept.centroid =
+            present.contains(Outputs::CENTROID).then(|| [self.centroid_u[cell].into(), self.centroid_v[cell].into()]);
     }
 }
 
@@ -271,7 +294,9 @@ pub(crate) struct CellsMut<'a> {
     pub(crate) total: &'a mut [f32],
     pub(crate) peak: &'a mut [f32],
     pub(crate) area: &'a mut [f32],
-    pub(crate) centroid: &'a mut [[f32; 3]],
+    pub(crate) centroid_u: &'a mut [f32],
+    pub(crate) centroid_v: &'a mut [f32],
+    pub(crate) centroid_depth: &'a mut [f32],
     pub(crate) orientation: &'a mut [f32],
     pub(crate) axis: &'a mut [f32],
     pub(crate) anisotropy: &'a mut [f32],
@@ -297,7 +322,9 @@ impl Percepts {
             total: &mut columns.total,
             peak: &mut columns.peak,
             area: &mut columns.area,
-            centroid: &mut columns.centroid,
+            centroid_u: &mut columns.centroid_u,
+            centroid_v: &mut columns.centroid_v,
+            centroid_depth: &mut columns.centroid_depth,
             orientation: &mut columns.orientation,
             axis: &mut columns.axis,
             anisotropy: &mut columns.anisotropy,
@@ -312,6 +339,14 @@ impl Percepts {
 }
 
 impl CellsMut<'_> {
+    pub(crate) fn fields(&self) -> usize {
+        self.fields
+    }
+
+    pub(crate) fn frames(&self) -> usize {
+        self.flags.len() / self.fields.max(1)
+    }
+
     /// The first `frames` frames, and the rest.
     pub(crate) fn split_at(self, frames: usize) -> (Self, Self) {
         fn split<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
@@ -335,7 +370,9 @@ impl CellsMut<'_> {
             total => later_total,
             peak => later_peak,
             area => later_area,
-            centroid => later_centroid,
+            centroid_u => later_centroid_u,
+            centroid_v => later_centroid_v,
+            centroid_depth => later_centroid_depth,
             orientation => later_orientation,
             axis => later_axis,
             anisotropy => later_anisotropy,
@@ -360,7 +397,9 @@ impl CellsMut<'_> {
             total: self.total,
             peak: self.peak,
             area: self.area,
-            centroid: self.centroid,
+            centroid_u: self.centroid_u,
+            centroid_v: self.centroid_v,
+            centroid_depth: self.centroid_depth,
             orientation: self.orientation,
             axis: self.axis,
             anisotropy: self.anisotropy,

@@ -4,7 +4,7 @@ mod curves;
 mod plan;
 
 pub use plan::Plan;
-pub(crate) use plan::PlanField;
+pub(crate) use plan::{PlanField, Stages};
 
 use crate::percept::Outputs;
 use crate::signal::FsrSignal;

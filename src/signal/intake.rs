@@ -50,6 +50,16 @@ impl Intake {
         self.taxel_of_value.len()
     }
 
+    /// Whether frames of values for the taxels `slots` pass as they are.
+    pub(crate) fn is_transparent(&self, slots: &[usize]) -> bool {
+        let checks = &self.calibration.checks;
+        self.max_age_s <= 0.0
+            && checks.settle_frames <= self.frames_seen
+            && checks.broken_frame_share.is_none()
+            && checks.isolated_ratio.is_none()
+            && self.taxel_of_value == slots
+    }
+
     /// Appends to `out` the values of the taxels `slots` in `frame`.
     pub(crate) fn take(&mut self, frame: &Frame, slots: &[usize], out: &mut Vec<RawValue>) {
         self.now.fill(RawValue::MISSING);

@@ -324,7 +324,7 @@ mod tests {
                 $columns.total = vec![0.1, 0.0, 12.0, 0.0];
                 $columns.peak[0] = 1e-30;
                 $columns.area[0] = 2.5e-5;
-                $columns.centroid[0] = [0.3, -0.7, 9.0];
+                $columns.set_centroid(0, [0.3, -0.7, 9.0]);
                 $columns.orientation[0] = 1.5;
                 $columns.axis[0] = 0.0;
                 $columns.anisotropy[0] = 1.0;

@@ -27,7 +27,7 @@ pub(crate) fn between_lines(a: f64, b: f64) -> f64 {
 
 /// Coefficients of Q in atan(a) ≈ a + a·z·Q(z), z = a², 0 ≤ a ≤ 1, lowest first: a minimax fit of relative error 2.6e-9.
 /// `shaders/shared/angle.wgsl` has the same numbers.
-const ATAN: [f32; 9] = [
+pub(crate) const ATAN: [f32; 9] = [
     -0.333_333,
     0.199_985_49,
     -0.142_642_42,
@@ -63,7 +63,8 @@ pub(crate) fn full_f32(x: f32, y: f32) -> f32 {
     if y < 0.0 { -size } else { size }
 }
 
-/// The angle of the line along (x, y), in [0, π): [`of_line`] in f32.
+/// The angle of the line along (x, y), in [0, π): [`of_line`] in f32, as lanes have it.
+#[cfg(test)]
 pub(crate) fn of_line_f32(x: f32, y: f32) -> f32 {
     let flip = y < 0.0 || (y == 0.0 && x < 0.0);
     let (x, y) = if flip { (-x, -y) } else { (x, y) };

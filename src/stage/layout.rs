@@ -6,6 +6,10 @@ use bytemuck::{Pod, Zeroable};
 #[cfg(feature = "gpu")]
 pub(crate) const WIDE: usize = 4096;
 
+/// A field of as many members or more has sixteen of them abreast on the CPU: fewer do as well one after the other, with
+/// sixteen frames or fields abreast.
+pub(crate) const MANY: usize = 128;
+
 /// What changes from batch to batch.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]

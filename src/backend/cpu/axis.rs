@@ -1,52 +1,64 @@
-//! axis in f32 lanes; see [`crate::stage::axis`].
+//! axis in lanes; see [`crate::stage::axis`].
 
-use super::{Lanes, scale_of};
+use fearless_simd::prelude::*;
+
+use super::angle::of_line;
+use super::simd::{F, bits_where, splat};
+use super::touch::{Line, Members, Touch};
 use crate::percept::{Flags, Outputs};
-use crate::stage::angle::of_line_f32;
-use crate::stage::layout::Member;
 
 /// 2⁻³⁰.
 const TOGETHER: f32 = 1.0 / 1_073_741_824.0;
 const ISOTROPIC_UNDER: f32 = 1e-3;
 
-pub(super) fn lanes<const L: usize>(members: &[Member], pressures: &[[f32; L]], lanes: &mut Lanes<L>) {
-    let scale = lanes.total.map(scale_of);
-    let (mut a, mut b, mut d) = ([0.0_f32; L], [0.0_f32; L], [0.0_f32; L]);
-    for member in members {
-        let pressures = &pressures[member.slot as usize];
-        for lane in 0..L {
-            let q = (member.weight * pressures[lane]) * scale[lane];
-            let x = member.u - lanes.centroid[0][lane];
-            let y = member.v - lanes.centroid[1][lane];
-            let qx = q * x;
-            a[lane] += qx * x;
-            b[lane] += qx * y;
-            d[lane] += (q * y) * y;
-        }
+/// a, b and d of the second moments.
+pub(super) struct Moments<S: Simd> {
+    pub(super) a: F<S>,
+    pub(super) b: F<S>,
+    pub(super) d: F<S>,
+}
+
+/// Sums them up.
+#[inline(always)]
+pub(super) fn moments<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Moments<S> {
+    let none = splat(simd, 0.0);
+    let mut sums = Moments::<S> { a: none, b: none, d: none };
+    for member in 0..members.count() {
+        let part = members.part(simd, member, at);
+        let q = (part.weight * part.pressure) * touch.scale;
+        let x = part.u - touch.u;
+        let y = part.v - touch.v;
+        let qx = q * x;
+        sums.a += qx * x;
+        sums.b += qx * y;
+        sums.d += (q * y) * y;
     }
-    for lane in 0..L {
-        match lanes.active[lane] {
-            0 => continue,
-            1 => {
-                lanes.flags[lane] |= Flags::ONE_TAXEL.bits();
-                continue;
-            }
-            _ => {}
-        }
-        let trace = a[lane] + d[lane];
-        if trace <= TOGETHER * (lanes.total[lane] * scale[lane]) {
-            lanes.flags[lane] |= Flags::COINCIDENT.bits();
-            continue;
-        }
-        let (x, y) = (a[lane] - d[lane], 2.0 * b[lane]);
-        let h = (x * x + y * y).sqrt();
-        lanes.anisotropy[lane] = (h / trace).min(1.0);
-        lanes.present[lane] |= Outputs::ANISOTROPY.bits();
-        if lanes.anisotropy[lane] < ISOTROPIC_UNDER {
-            lanes.flags[lane] |= Flags::ISOTROPIC.bits();
-            continue;
-        }
-        lanes.axis[lane] = if x >= 0.0 { of_line_f32(h + x, y) } else { of_line_f32(y, h - x) };
-        lanes.present[lane] |= Outputs::AXIS.bits();
-    }
+    sums
+}
+
+/// The principal axis where there is one, and the anisotropy.
+#[inline(always)]
+pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Moments { a, b, d }: &Moments<S>) -> (Line<S>, F<S>) {
+    let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    let single = touch.touched & touch.active.simd_le(one);
+    let several = touch.touched & touch.active.simd_gt(one);
+    let trace = a + d;
+    let coincident = several & trace.simd_le((touch.total * touch.scale) * TOGETHER);
+    let spread = several & !coincident;
+    let (x, y) = (a - d, b * 2.0);
+    let h = (x * x + y * y).sqrt();
+    let anisotropy = spread.select((h / trace).min(one), none);
+    let isotropic = spread & anisotropy.simd_lt(splat(simd, ISOTROPIC_UNDER));
+    let found = spread & !isotropic;
+    // Of the two equal forms of the bisector, the one that adds numbers of one sign.
+    let right = x.simd_ge(none);
+    let angle = of_line(simd, right.select(h + x, y), right.select(y, h - x));
+    let line = Line {
+        angle: found.select(angle, none),
+        flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())
+            | bits_where(simd, coincident, Flags::COINCIDENT.bits())
+            | bits_where(simd, isotropic, Flags::ISOTROPIC.bits()),
+        present: bits_where(simd, spread, Outputs::ANISOTROPY.bits()) | bits_where(simd, found, Outputs::AXIS.bits()),
+    };
+    (line, anisotropy)
 }

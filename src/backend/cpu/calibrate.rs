@@ -1,74 +1,157 @@
-//! calibrate in f32 lanes; see [`crate::stage::calibrate`].
+//! calibrate in lanes: sixteen taxels of one frame abreast; see [`crate::stage::calibrate`].
 
+use fearless_simd::prelude::*;
+
+use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width};
 use crate::percept::Flags;
 use crate::scene::Plan;
-use crate::signal::RawValue;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
-use crate::stage::layout::{FIRST_CURVE, Knot, MASKED, Taxel};
+use crate::stage::layout::{FIRST_CURVE, Knot, MASKED};
 
-/// Reads `count ≤ L` frames, each with its values side by side, into lanes by taxel.
-pub(super) fn lanes<const L: usize>(
-    plan: &Plan,
-    raw: &[RawValue],
-    count: usize,
-    pressures: &mut [[f32; L]],
-    statuses: &mut [[u32; L]],
-) {
-    for (slot, taxel) in plan.taxels.iter().enumerate() {
-        let slots = plan.taxels.len();
-        let (pressures, statuses) = (&mut pressures[slot], &mut statuses[slot]);
-        if taxel.response < FIRST_CURVE {
-            for lane in 0..count {
-                let straight = |above| above * taxel.gain;
-                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, straight);
-            }
-        } else {
-            let knots = plan.knots_of(slot);
-            for lane in 0..count {
-                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, |x| on_curve(knots, x));
-            }
-        }
-        // Lanes beyond the batch's end are empty frames.
-        pressures[count..].fill(0.0);
-        statuses[count..].fill(0);
+/// Sixteen taxels' calibration, quantity by quantity.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tile {
+    baseline: Row<f32>,
+    gain: Row<f32>,
+    dead_band: Row<f32>,
+    p_max: Row<f32>,
+    raw_low: Row<f32>,
+    raw_high: Row<f32>,
+    response: Row<u32>,
+    /// Whether any has a curve, any is masked.
+    curved: bool,
+    masked: bool,
+}
+
+impl Tile {
+    /// All of the plan's taxels, by ascending slot; what fills up the last tile is unpressed.
+    pub(super) fn all(plan: &Plan) -> Vec<Self> {
+        plan.taxels
+            .chunks(LANES)
+            .map(|taxels| {
+                let mut tile = Self {
+                    baseline: [0.0; LANES],
+                    gain: [0.0; LANES],
+                    dead_band: [0.0; LANES],
+                    p_max: [f32::MAX; LANES],
+                    raw_low: [f32::MIN; LANES],
+                    raw_high: [f32::MAX; LANES],
+                    response: [0; LANES],
+                    curved: taxels.iter().any(|taxel| taxel.response >= FIRST_CURVE),
+                    masked: taxels.iter().any(|taxel| taxel.response == MASKED),
+                };
+                for (lane, taxel) in taxels.iter().enumerate() {
+                    tile.baseline[lane] = taxel.baseline;
+                    tile.gain[lane] = taxel.gain;
+                    tile.dead_band[lane] = taxel.dead_band;
+                    tile.p_max[lane] = taxel.p_max;
+                    tile.raw_low[lane] = taxel.raw_low;
+                    tile.raw_high[lane] = taxel.raw_high;
+                    tile.response[lane] = taxel.response;
+                }
+                tile
+            })
+            .collect()
     }
 }
 
-fn one(raw: RawValue, taxel: &Taxel, response: impl Fn(f32) -> f32) -> (f32, u32) {
-    let is_tiny = |size: u32| size != 0 && size < TINY_BITS;
-    let bits = raw.to_bits();
+/// Raw bits to pressures and statuses; whether any status says anything. `first` is the tile's first slot.
+#[inline(always)]
+pub(super) fn tile<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tile: &Tile,
+    first: usize,
+    raw: &Row<u32>,
+    pressures: &mut Row<f32>,
+    statuses: &mut Row<u32>,
+) -> bool {
+    let mut any = false;
+    let mut at = 0;
+    while at < LANES {
+        let lanes = at..at + width::<S>();
+        let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
+        let bits = U::<S>::from_slice(simd, &raw[lanes.clone()]);
+        let above = bits.bitcast::<F<S>>() - of(&tile.baseline);
+        let pressure = above * of(&tile.gain);
+        let plain = fine(simd, bits)
+            & fine(simd, pressure.bitcast())
+            & bits.bitcast::<F<S>>().simd_ge(of(&tile.raw_low))
+            & bits.bitcast::<F<S>>().simd_le(of(&tile.raw_high))
+            & pressure.simd_le(of(&tile.p_max));
+        if plain.all_true() && !tile.curved && !tile.masked {
+            let over = pressure.simd_gt(of(&tile.dead_band));
+            store(simd, over.select(pressure, splat(simd, 0.0)), pressures, at);
+            store_u(simd, splat_u(simd, 0), statuses, at);
+        } else {
+            any |= with_care(simd, plan, tile, first, bits, at, pressures, statuses);
+        }
+        at += width::<S>();
+    }
+    any
+}
+
+/// Where a number is 0 or neither tiny nor unbelievable.
+#[inline(always)]
+fn fine<S: Simd>(simd: S, bits: U<S>) -> super::simd::M<S> {
     let size = bits & SIZE_BITS;
-    if raw.is_missing() {
-        return (0.0, Flags::INCOMPLETE.bits() | UNUSABLE);
+    (size - splat_u(simd, TINY_BITS)).simd_le(splat_u(simd, HUGE_BITS - TINY_BITS)) | size.simd_eq(splat_u(simd, 0))
+}
+
+/// Everything that a value can be.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "the same as `tile`, and where")]
+fn with_care<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tile: &Tile,
+    first: usize,
+    bits: U<S>,
+    at: usize,
+    pressures: &mut Row<f32>,
+    statuses: &mut Row<u32>,
+) -> bool {
+    let lanes = at..at + width::<S>();
+    let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
+    let response = U::<S>::from_slice(simd, &tile.response[lanes.clone()]);
+    let (none, nothing) = (splat(simd, 0.0), splat_u(simd, 0));
+    let is_tiny = |size: U<S>| size.simd_gt(nothing) & size.simd_lt(splat_u(simd, TINY_BITS));
+    let is_huge = |size: U<S>| size.simd_gt(splat_u(simd, HUGE_BITS));
+
+    let size = bits & SIZE_BITS;
+    let missing = bits.simd_eq(splat_u(simd, u32::MAX));
+    let value = bits.bitcast::<F<S>>();
+    let beyond = value.simd_lt(of(&tile.raw_low)) | value.simd_gt(of(&tile.raw_high));
+    let value = is_tiny(size).select(none, value);
+    let above = value - of(&tile.baseline);
+    let mut pressure = above * of(&tile.gain);
+    if tile.curved {
+        for lane in 0..width::<S>() {
+            let slot = first + at + lane;
+            if tile.response[at + lane] >= FIRST_CURVE {
+                pressure[lane] = on_curve(plan.knots_of(slot), above[lane]);
+            }
+        }
     }
+    let pressure_size = pressure.bitcast::<U<S>>() & SIZE_BITS;
+    let unbelievable = is_huge(size) | is_huge(pressure_size) | response.simd_eq(splat_u(simd, MASKED));
+    let altered = is_tiny(size) | is_tiny(pressure_size);
+    let over = pressure.simd_gt(of(&tile.dead_band)) & !is_tiny(pressure_size);
+    let usable = !(missing | unbelievable);
     let faulty = Flags::FAULTY_INPUT.bits();
-    if size > HUGE_BITS || taxel.response == MASKED {
-        return (0.0, faulty | UNUSABLE);
-    }
-    let value = f32::from_bits(bits);
-    let beyond = value < taxel.raw_low || value > taxel.raw_high;
-    let mut status = if beyond { Flags::OUT_OF_RANGE.bits() } else { 0 };
-    let value = if is_tiny(size) { 0.0 } else { value };
-    let pressure = response(value - taxel.baseline);
-    let pressure_size = pressure.to_bits() & SIZE_BITS;
-    if pressure_size > HUGE_BITS {
-        return (0.0, faulty | UNUSABLE);
-    }
-    if is_tiny(size) || is_tiny(pressure_size) {
-        status |= faulty;
-    }
-    if is_tiny(pressure_size) || pressure <= taxel.dead_band {
-        return (0.0, status);
-    }
-    if pressure > taxel.p_max {
-        status |= Flags::SATURATED.bits();
-    }
-    (pressure, status)
+    let said = bits_where(simd, beyond, Flags::OUT_OF_RANGE.bits())
+        | bits_where(simd, altered, faulty)
+        | bits_where(simd, over & pressure.simd_gt(of(&tile.p_max)), Flags::SATURATED.bits());
+    let left_out = missing.select(splat_u(simd, Flags::INCOMPLETE.bits() | UNUSABLE), splat_u(simd, faulty | UNUSABLE));
+    let status = usable.select(said, left_out);
+    store(simd, (usable & over).select(pressure, none), pressures, at);
+    store_u(simd, status, statuses, at);
+    status.simd_gt(nothing).any_true()
 }
 
 fn on_curve(knots: &[Knot], x: f32) -> f32 {
     let (first, last) = (knots[0], knots[knots.len() - 1]);
-    if x <= first.raw {
+    if x.is_nan() || x <= first.raw {
         return first.p;
     }
     if x >= last.raw {

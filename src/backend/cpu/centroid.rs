@@ -1,33 +1,25 @@
-//! centroid in f32 lanes; see [`crate::stage::centroid`].
+//! centroid in lanes; see [`crate::stage::centroid`].
 
-use super::Lanes;
-use crate::percept::Outputs;
-use crate::scene::PlanField;
-use crate::stage::layout::Member;
+use fearless_simd::prelude::*;
 
-pub(super) fn lanes<const L: usize>(
-    field: &PlanField,
-    members: &[Member],
-    pressures: &[[f32; L]],
-    lanes: &mut Lanes<L>,
-) {
-    let mut sum = [[0.0_f32; L]; 3];
-    for (member, depth) in members.iter().zip(&field.depths) {
-        let pressures = &pressures[member.slot as usize];
-        for lane in 0..L {
-            let pull = member.weight * pressures[lane];
-            sum[0][lane] += pull * member.u;
-            sum[1][lane] += pull * member.v;
-            sum[2][lane] += pull * depth;
-        }
+use super::contact::Sums;
+use super::simd::{F, M, splat};
+use super::touch::Members;
+
+/// (u, v) where `touched`, 0 elsewhere.
+#[inline(always)]
+pub(super) fn quotients<S: Simd>(simd: S, sums: &Sums<S>, touched: M<S>) -> (F<S>, F<S>) {
+    let none = splat(simd, 0.0);
+    (touched.select(sums.u / sums.total, none), touched.select(sums.v / sums.total, none))
+}
+
+/// The numerator of the third coordinate, which only fields without a chart need.
+#[inline(always)]
+pub(super) fn depth<S: Simd, P: Members<S>>(simd: S, members: P, at: usize) -> F<S> {
+    let mut sum = splat(simd, 0.0);
+    for member in 0..members.count() {
+        let part = members.part(simd, member, at);
+        sum += (part.weight * part.pressure) * members.depth(simd, member, at);
     }
-    let found = if field.charted { Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL } else { Outputs::POSITION };
-    for lane in 0..L {
-        if lanes.active[lane] > 0 {
-            lanes.centroid[0][lane] = sum[0][lane] / lanes.total[lane];
-            lanes.centroid[1][lane] = sum[1][lane] / lanes.total[lane];
-            lanes.centroid[2][lane] = if field.charted { 0.0 } else { sum[2][lane] / lanes.total[lane] };
-            lanes.present[lane] |= found.bits();
-        }
-    }
+    sum
 }

@@ -1,57 +1,58 @@
-//! contact in f32 lanes; see [`crate::stage::contact`].
+//! contact in lanes; see [`crate::stage::contact`].
 
-use super::Lanes;
-use crate::percept::{Flags, Outputs};
-use crate::scene::{Plan, PlanField};
+use fearless_simd::prelude::*;
+
+use super::simd::{F, U, splat, splat_u};
+use super::touch::Members;
 use crate::stage::calibrate::UNUSABLE;
-use crate::stage::layout::Member;
 
-pub(super) fn lanes<const L: usize>(
-    plan: &Plan,
-    field: &PlanField,
-    members: &[Member],
-    pressures: &[[f32; L]],
-    statuses: &[[u32; L]],
-) -> Lanes<L> {
-    let mut total = [0.0; L];
-    let mut peak = [0.0_f32; L];
-    let mut area = [0.0; L];
-    let mut active = [0; L];
-    let mut flags = [0; L];
-    let mut unusable = [UNUSABLE; L];
-    for member in members {
-        let slot = member.slot as usize;
-        let (pressures, statuses, member_area) = (&pressures[slot], &statuses[slot], plan.taxels[slot].area);
-        for lane in 0..L {
-            let pressure = pressures[lane];
-            flags[lane] |= statuses[lane];
-            unusable[lane] &= statuses[lane];
-            total[lane] += member.weight * pressure;
-            peak[lane] = peak[lane].max(pressure);
-            let pressed = pressure > 0.0;
-            active[lane] += u32::from(pressed);
-            area[lane] += if pressed { member_area } else { 0.0 };
+/// S, how many taxels are pressed, and the numerators of the centroid.
+pub(super) struct Sums<S: Simd> {
+    pub(super) total: F<S>,
+    pub(super) active: F<S>,
+    pub(super) u: F<S>,
+    pub(super) v: F<S>,
+}
+
+/// One pass over the members; the centroid's sums ride along where they are wanted.
+#[inline(always)]
+pub(super) fn sums<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, centroid: bool) -> Sums<S> {
+    let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    let (mut total, mut active, mut u, mut v) = (none, none, none, none);
+    for member in 0..members.count() {
+        let part = members.part(simd, member, at);
+        let pull = part.weight * part.pressure;
+        total += pull;
+        active += part.pressure.simd_gt(none).select(one, none);
+        if centroid {
+            u += pull * part.u;
+            v += pull * part.v;
         }
     }
-    let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
-    let sums = if field.area_known { sums | Outputs::AREA } else { sums }.bits();
-    let always = if field.charted { Flags::empty() } else { Flags::NO_CHART }.bits();
-    let mut present = [0; L];
-    for lane in 0..L {
-        let untouched = if active[lane] == 0 { Flags::NO_CONTACT.bits() } else { 0 };
-        flags[lane] = (flags[lane] & !UNUSABLE) | always | untouched;
-        present[lane] = if unusable[lane] & UNUSABLE == 0 { sums } else { 0 };
+    Sums { total, active, u, v }
+}
+
+/// The largest P, and the area of the pressed taxels, m².
+#[inline(always)]
+pub(super) fn peak_and_area<S: Simd, P: Members<S>>(simd: S, members: P, at: usize) -> (F<S>, F<S>) {
+    let none = splat(simd, 0.0);
+    let (mut peak, mut area) = (none, none);
+    for member in 0..members.count() {
+        let pressure = members.part(simd, member, at).pressure;
+        peak = peak.max(pressure);
+        area += pressure.simd_gt(none).select(members.area(simd, member, at), none);
     }
-    Lanes {
-        flags,
-        present,
-        total,
-        peak,
-        area,
-        active,
-        centroid: [[0.0; L]; 3],
-        orientation: [0.0; L],
-        axis: [0.0; L],
-        anisotropy: [0.0; L],
+    (peak, area)
+}
+
+/// What calibration says of any member, and what it says of all.
+#[inline(always)]
+pub(super) fn statuses<S: Simd, P: Members<S>>(simd: S, members: P, at: usize) -> (U<S>, U<S>) {
+    let (mut any, mut all) = (splat_u(simd, 0), splat_u(simd, UNUSABLE));
+    for member in 0..members.count() {
+        let status = members.status(simd, member, at);
+        any |= status;
+        all &= status;
     }
+    (any, all)
 }

@@ -1,45 +1,101 @@
-//! Backend `cpu`: single precision, up to [`LANES`] frames side by side, all cores.
+//! Backend `cpu`: single precision, sixteen cells abreast, all cores, with the widest instructions of the machine.
 //!
-//! Every lane does the operations of its frame in one fixed order, never fused, so that percepts have the same bits
-//! however a recording is cut and whatever instructions the compiler picks.
+//! A batch has sixteen frames of a field abreast ([`batch`]), a single frame sixteen fields ([`live`]); what is computed
+//! is written once ([`touch`] and the stages). Every lane does the operations of its cell in one fixed order, never
+//! fused, so that percepts have the same bits however a recording is cut and whatever instructions there are.
 
+mod angle;
 mod axis;
+mod batch;
 mod calibrate;
 mod centroid;
 mod contact;
 mod hysteresis;
+mod live;
 mod motion;
 mod orientation;
+mod simd;
+mod touch;
+mod wide;
 
-use super::{Backend, RawBatch};
+use std::sync::Mutex;
+
+use fearless_simd::{Level, dispatch};
+
+use self::simd::LANES;
+use super::{Backend, RawBatch, Rows};
 use crate::error::Result;
-use crate::percept::{CellsMut, Outputs, Percepts};
-use crate::scene::{Plan, PlanField};
-use crate::signal::RawValue;
+use crate::percept::{CellsMut, Percepts};
+use crate::scene::Plan;
 
-/// Frames that are computed side by side.
-const LANES: usize = 16;
 /// Frames that one task takes; a multiple of [`LANES`].
 const TASK: usize = 8 * LANES;
 
 /// The backend, with the memory it needs from frame to frame.
 pub(crate) struct Cpu {
     plan: Plan,
-    single: Scratch<1>,
+    tables: Tables,
+    level: Level,
+    live: live::Live,
+    /// What tasks work in, one for each that runs.
+    scratches: Mutex<Vec<batch::Scratch>>,
     /// Per field, whether the frame before was in contact.
     touched: Vec<bool>,
     /// Per field, its centroid in the frame before, in its unit, if that was in contact.
     last: Vec<Option<[f32; 2]>>,
 }
 
+/// The plan as lanes read it.
+struct Tables {
+    tiles: Vec<calibrate::Tile>,
+    /// The members of the fields that have many.
+    wide: Vec<wide::Table>,
+}
+
 impl Cpu {
     pub(crate) fn new(plan: &Plan) -> Self {
+        Self::with_level(plan, Level::new())
+    }
+
+    /// With the instructions of `level`.
+    fn with_level(plan: &Plan, level: Level) -> Self {
+        let wide = plan.fields.iter().filter(|field| field.wide.is_some()).map(|field| {
+            let members = plan.members_of(field).iter().zip(&field.depths);
+            wide::Table::new(members.map(|(member, &depth)| {
+                let area = plan.taxels[member.slot as usize].area;
+                (member.slot, [member.weight, member.u, member.v, depth, area])
+            }))
+        });
         Self {
-            plan: plan.clone(),
-            single: Scratch::new(plan.slots()),
+            tables: Tables { tiles: calibrate::Tile::all(plan), wide: wide.collect() },
+            level,
+            live: live::Live::new(plan),
+            scratches: Mutex::new(Vec::new()),
             touched: vec![false; plan.fields.len()],
             last: vec![None; plan.fields.len()],
+            plan: plan.clone(),
         }
+    }
+
+    /// Halves the batch until a task remains, and runs the halves in parallel.
+    fn batch(&self, raw: Rows<'_>, first: usize, cells: CellsMut<'_>) {
+        let frames = cells.frames();
+        if frames > TASK {
+            let left = (frames / TASK).div_ceil(2) * TASK;
+            let (left_cells, right_cells) = cells.split_at(left);
+            rayon::join(|| self.batch(raw, first, left_cells), || self.batch(raw, first + left, right_cells));
+            return;
+        }
+        let free = self.scratches.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(self.plan.slots()));
+        let (mut rest, mut done) = (cells, 0);
+        while done < frames {
+            let (mut cells, later) = rest.split_at(LANES.min(frames - done));
+            let (plan, tables, at) = (&self.plan, &self.tables, first + done);
+            dispatch!(self.level, simd => batch::block(simd, plan, tables, raw, at, &mut scratch, &mut cells));
+            (rest, done) = (later, done + LANES);
+        }
+        self.scratches.lock().unwrap_or_else(|e| e.into_inner()).push(scratch);
     }
 }
 
@@ -49,7 +105,14 @@ impl Backend for Cpu {
     }
 
     fn describe(&self) -> String {
-        format!("single precision, {} threads", rayon::current_num_threads())
+        let words = match format!("{:?}", self.level) {
+            level if level.starts_with("Avx512") => "AVX-512",
+            level if level.starts_with("Avx2") => "AVX2",
+            level if level.starts_with("Sse") => "SSE",
+            level if level.starts_with("Neon") => "NEON",
+            _ => "scalar code",
+        };
+        format!("single precision, {words}, {} threads", rayon::current_num_threads())
     }
 
     fn restart(&mut self) {
@@ -59,20 +122,21 @@ impl Backend for Cpu {
 
     fn recalibrate(&mut self, plan: &Plan) {
         self.plan.recalibrate(plan);
+        self.tables.tiles = calibrate::Tile::all(plan);
     }
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
-        let mut cells = all.split_at(raw.first).1;
+        let mut cells = all.split_at(raw.first).1.split_at(raw.frames).0;
         if raw.frames < LANES {
             let mut rest = cells.reborrow();
-            for frame in raw.values.chunks_exact(self.plan.slots().max(1)) {
+            for frame in 0..raw.frames {
                 let (mut first, later) = rest.split_at(1);
-                self.single.block(&self.plan, frame, 1, &mut first);
+                self.live.frame(self.level, &self.plan, &self.tables, raw.rows.row(frame), &mut first);
                 rest = later;
             }
         } else {
-            batch(&self.plan, raw.values, raw.frames, cells.reborrow());
+            self.batch(raw.rows, 0, cells.reborrow());
         }
         // What hangs on the frame before goes through the frames in order.
         let stages = self.plan.stages();
@@ -84,117 +148,4 @@ impl Backend for Cpu {
         }
         Ok(())
     }
-}
-
-/// Halves the batch until a task remains, and runs the halves in parallel.
-fn batch(plan: &Plan, raw: &[RawValue], frames: usize, cells: CellsMut<'_>) {
-    if frames > TASK {
-        let left = (frames / TASK).div_ceil(2) * TASK;
-        let (left_raw, right_raw) = raw.split_at(left * plan.slots());
-        let (left_cells, right_cells) = cells.split_at(left);
-        rayon::join(|| batch(plan, left_raw, left, left_cells), || batch(plan, right_raw, frames - left, right_cells));
-        return;
-    }
-    let mut scratch = Scratch::<LANES>::new(plan.slots());
-    let mut rest = cells;
-    for (block, raw) in raw.chunks(LANES * plan.slots()).enumerate() {
-        let count = LANES.min(frames - block * LANES);
-        let (mut cells, later) = rest.split_at(count);
-        scratch.block(plan, raw, count, &mut cells);
-        rest = later;
-    }
-}
-
-/// Pressures and statuses of `L` frames, taxel by taxel.
-struct Scratch<const L: usize> {
-    pressures: Vec<[f32; L]>,
-    statuses: Vec<[u32; L]>,
-}
-
-/// What a field's stages know of `L` frames, each filled by the stage of its name.
-#[derive(Clone, Copy)]
-struct Lanes<const L: usize> {
-    /// Flags, as [`crate::percept::Flags`].
-    flags: [u32; L],
-    /// Quantities present, as [`Outputs`].
-    present: [u32; L],
-    total: [f32; L],
-    peak: [f32; L],
-    area: [f32; L],
-    active: [u32; L],
-    centroid: [[f32; L]; 3],
-    orientation: [f32; L],
-    axis: [f32; L],
-    anisotropy: [f32; L],
-}
-
-impl<const L: usize> Scratch<L> {
-    fn new(slots: usize) -> Self {
-        Self { pressures: vec![[0.0; L]; slots], statuses: vec![[0; L]; slots] }
-    }
-
-    /// All stages for `count ≤ L` frames of `raw`, frame by frame as recordings have them.
-    fn block(&mut self, plan: &Plan, raw: &[RawValue], count: usize, cells: &mut CellsMut<'_>) {
-        calibrate::lanes(plan, raw, count, &mut self.pressures, &mut self.statuses);
-        if !cells.pressures.is_empty() {
-            for (slot, lanes) in self.pressures.iter().enumerate() {
-                for lane in 0..count {
-                    cells.pressures[lane * plan.slots() + slot] = lanes[lane].into();
-                }
-            }
-        }
-        let stages = plan.stages();
-        for (index, field) in plan.fields.iter().enumerate() {
-            let members = plan.members_of(field);
-            let mut lanes = contact::lanes(plan, field, members, &self.pressures, &self.statuses);
-            let touched = lanes.active.iter().any(|&active| active > 0);
-            if touched && stages.centroid {
-                centroid::lanes(field, members, &self.pressures, &mut lanes);
-            }
-            if touched && stages.orientation && field.charted {
-                orientation::lanes(members, &self.pressures, &mut lanes);
-            }
-            if touched && stages.axis && field.charted {
-                axis::lanes(members, &self.pressures, &mut lanes);
-            }
-            for lane in 0..count {
-                store(plan, field, &lanes, lane, cells, lane * plan.fields.len() + index);
-            }
-        }
-    }
-}
-
-/// Copies one lane into its cell: lengths in metres, only what was asked for.
-fn store<const L: usize>(
-    plan: &Plan,
-    field: &PlanField,
-    lanes: &Lanes<L>,
-    lane: usize,
-    cells: &mut CellsMut<'_>,
-    cell: usize,
-) {
-    let outputs = plan.columns;
-    cells.set_status(cell, lanes.flags[lane], lanes.present[lane] & plan.outputs.bits());
-    let write = |output, column: &mut [f32], value: f32| {
-        if outputs.contains(output) {
-            column[cell] = value;
-        }
-    };
-    write(Outputs::TOTAL, cells.total, lanes.total[lane]);
-    write(Outputs::PEAK, cells.peak, lanes.peak[lane]);
-    write(Outputs::AREA, cells.area, lanes.area[lane]);
-    write(Outputs::ORIENTATION, cells.orientation, lanes.orientation[lane]);
-    write(Outputs::AXIS, cells.axis, lanes.axis[lane]);
-    write(Outputs::ANISOTROPY, cells.anisotropy, lanes.anisotropy[lane]);
-    if outputs.contains(Outputs::ACTIVE) {
-        cells.active[cell] = lanes.active[lane];
-    }
-    if let Some(centroid) = cells.centroid.get_mut(cell) {
-        *centroid = lanes.centroid.map(|axis| axis[lane] * field.unit_m);
-    }
-}
-
-/// The power of two that brings `total` into [1, 2).
-fn scale_of(total: f32) -> f32 {
-    f32::from_bits((254 << 23) - (total.to_bits() & 0x7F80_0000))
 }

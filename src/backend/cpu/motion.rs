@@ -16,7 +16,7 @@ pub(super) fn scan(plan: &Plan, steps: &[Step], cells: &mut CellsMut<'_>, last: 
                 *last = None;
                 continue;
             }
-            let [u, v, _] = cells.centroid[cell].map(|metres| metres / field.unit_m);
+            let [u, v] = [cells.centroid_u[cell], cells.centroid_v[cell]].map(|metres| metres / field.unit_m);
             match last.replace([u, v]) {
                 None => cells.flags[cell] |= Flags::NO_PREVIOUS,
                 Some(_) if !step.flags.is_empty() => cells.flags[cell] |= step.flags,

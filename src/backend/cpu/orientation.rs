@@ -1,61 +1,79 @@
-//! orientation in f32 lanes; see [`crate::stage::orientation`].
+//! orientation in lanes; see [`crate::stage::orientation`].
 
-use super::{Lanes, scale_of};
+use fearless_simd::prelude::*;
+
+use super::angle::of_line;
+use super::simd::{F, bits_where, splat};
+use super::touch::{Line, Members, Touch};
 use crate::percept::{Flags, Outputs};
-use crate::stage::angle::of_line_f32;
-use crate::stage::layout::Member;
 
 /// 2⁻¹⁴.
 const NEAR: f32 = 1.0 / 16_384.0;
 
-pub(super) fn lanes<const L: usize>(members: &[Member], pressures: &[[f32; L]], lanes: &mut Lanes<L>) {
-    let scale = lanes.total.map(scale_of);
-    // The three largest squared distances, and the points of the two largest. Strictly larger, so that the lower id stays.
-    let (mut r1, mut r2, mut r3) = ([-1.0_f32; L], [-1.0_f32; L], [-1.0_f32; L]);
-    let (mut x1, mut y1, mut x2, mut y2) = ([0.0; L], [0.0; L], [0.0; L], [0.0; L]);
-    for member in members {
-        let pressures = &pressures[member.slot as usize];
-        for lane in 0..L {
-            let pressure = pressures[lane];
-            let q = (member.weight * pressure) * scale[lane];
-            let x = (member.u - lanes.centroid[0][lane]) * q;
-            let y = (member.v - lanes.centroid[1][lane]) * q;
-            let r = if pressure > 0.0 { x * x + y * y } else { -1.0 };
-            let (first, second, third) = (r > r1[lane], r > r2[lane], r > r3[lane]);
-            r3[lane] = if second {
-                r2[lane]
-            } else if third {
-                r
-            } else {
-                r3[lane]
-            };
-            (r2[lane], x2[lane], y2[lane]) = if first {
-                (r1[lane], x1[lane], y1[lane])
-            } else if second {
-                (r, x, y)
-            } else {
-                (r2[lane], x2[lane], y2[lane])
-            };
-            (r1[lane], x1[lane], y1[lane]) = if first { (r, x, y) } else { (r1[lane], x1[lane], y1[lane]) };
-        }
+/// The two farthest points, and the three largest squared distances; 0 or −1 where there are no more.
+pub(super) struct Farthest<S: Simd> {
+    pub(super) r: [F<S>; 3],
+    pub(super) x: [F<S>; 2],
+    pub(super) y: [F<S>; 2],
+}
+
+/// Finds them.
+///
+/// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
+/// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
+#[inline(always)]
+pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Farthest<S> {
+    let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
+    let mut far = Farthest::<S> { r: [unset; 3], x: [none; 2], y: [none; 2] };
+    for member in 0..members.count() {
+        // Strictly larger, so that the lower id stays.
+        let (r, x, y) = point(simd, members, member, at, touch);
+        let (first, second) = (r.simd_gt(far.r[0]), r.simd_gt(far.r[1]));
+        far.r[2] = far.r[2].max(far.r[1].min(r));
+        far.r[1] = far.r[1].max(far.r[0].min(r));
+        far.r[0] = far.r[0].max(r);
+        far.x[1] = first.select(far.x[0], second.select(x, far.x[1]));
+        far.y[1] = first.select(far.y[0], second.select(y, far.y[1]));
+        far.x[0] = first.select(x, far.x[0]);
+        far.y[0] = first.select(y, far.y[0]);
     }
-    for lane in 0..L {
-        match lanes.active[lane] {
-            0 => {}
-            1 => lanes.flags[lane] |= Flags::ONE_TAXEL.bits(),
-            active => {
-                let (x, y) = (x1[lane] - x2[lane], y1[lane] - y2[lane]);
-                let near = NEAR * r1[lane].sqrt();
-                if (x * x + y * y).sqrt() <= near {
-                    lanes.flags[lane] |= Flags::COINCIDENT.bits();
-                    continue;
-                }
-                if active > 2 && r2[lane].sqrt() - r3[lane].max(0.0).sqrt() <= near {
-                    lanes.flags[lane] |= Flags::TIE.bits();
-                }
-                lanes.orientation[lane] = of_line_f32(x, y);
-                lanes.present[lane] |= Outputs::ORIENTATION.bits();
-            }
-        }
+    far
+}
+
+/// A member's point e − c, and its squared distance.
+#[inline(always)]
+pub(super) fn point<S: Simd, P: Members<S>>(
+    simd: S,
+    members: P,
+    member: usize,
+    at: usize,
+    touch: &Touch<S>,
+) -> (F<S>, F<S>, F<S>) {
+    let part = members.part(simd, member, at);
+    let q = (part.weight * part.pressure) * touch.scale;
+    let x = (part.u - touch.u) * q;
+    let y = (part.v - touch.v) * q;
+    (x * x + y * y, x, y)
+}
+
+/// The line through the two farthest points, where there is one.
+#[inline(always)]
+pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, far: &Farthest<S>) -> Line<S> {
+    let (none, one, two) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, 2.0));
+    let single = touch.touched & touch.active.simd_le(one);
+    let several = touch.touched & touch.active.simd_gt(one);
+    let (x, y) = (far.x[0] - far.x[1], far.y[0] - far.y[1]);
+    let [first, second, third] = far.r;
+    let (first, second, third) = (first.max(none).sqrt(), second.max(none).sqrt(), third.max(none).sqrt());
+    let near = first * NEAR;
+    let coincident = several & (x * x + y * y).sqrt().simd_le(near);
+    let found = several & !coincident;
+    let tie = found & touch.active.simd_gt(two) & (second - third).simd_le(near);
+    Line {
+        angle: found.select(of_line(simd, x, y), none),
+        flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())
+            | bits_where(simd, coincident, Flags::COINCIDENT.bits())
+            | bits_where(simd, tie, Flags::TIE.bits()),
+        present: bits_where(simd, found, Outputs::ORIENTATION.bits()),
     }
 }

@@ -234,17 +234,20 @@ impl Gpu {
         self.packed_steps.clear();
         self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
         let header = layout::Batch { frames, slots, fields, wide: self.wide };
-        let values: &[u8] = cast_slice(raw.values);
+        let size = u64::from(frames) * u64::from(slots) * 4;
         let lost =
             |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
         {
             let from = HEADER + u64::from(frames) * STEP;
-            let end = from + values.len() as u64;
+            let end = from + size;
             let mut mapped = self.upload.get_mapped_range_mut(0..end.next_multiple_of(4)).map_err(|e| lost(&e))?;
             let mut mapped = mapped.slice(..);
             mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(&header));
             mapped.slice(HEADER as usize..from as usize).copy_from_slice(cast_slice(&self.packed_steps));
-            mapped.slice(from as usize..end as usize).copy_from_slice(values);
+            for frame in 0..raw.frames {
+                let at = from as usize + frame * slots as usize * 4;
+                mapped.slice(at..at + slots as usize * 4).copy_from_slice(cast_slice(raw.rows.row(frame)));
+            }
         }
         self.upload.unmap();
 
@@ -252,7 +255,7 @@ impl Gpu {
         encoder.copy_buffer_to_buffer(&self.upload, 0, &self.batch, 0, HEADER);
         let steps = u64::from(frames) * STEP;
         encoder.copy_buffer_to_buffer(&self.upload, HEADER, &self.steps, 0, steps);
-        encoder.copy_buffer_to_buffer(&self.upload, HEADER + steps, &self.raw, 0, values.len() as u64);
+        encoder.copy_buffer_to_buffer(&self.upload, HEADER + steps, &self.raw, 0, size);
         for stage in &self.stages {
             let mut pass = encoder
                 .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
@@ -327,11 +330,10 @@ impl Backend for Gpu {
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
         let mut rest = all.split_at(raw.first).1;
-        let steps = raw.steps.chunks(self.capacity);
-        for (values, steps) in raw.values.chunks(self.capacity * self.plan.slots()).zip(steps) {
-            let frames = steps.len();
+        for (part, steps) in raw.steps.chunks(self.capacity).enumerate() {
+            let (first, frames) = (part * self.capacity, steps.len());
             let (mut cells, later) = rest.split_at(frames);
-            self.submit(&RawBatch { first: 0, frames, values, steps }, &mut cells)?;
+            self.submit(&RawBatch { first: 0, frames, rows: raw.rows.part(first..first + frames), steps }, &mut cells)?;
             rest = later;
         }
         Ok(())

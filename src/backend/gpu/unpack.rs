@@ -48,7 +48,11 @@ impl Gpu {
                 let centroids: &[[f32; 4]] = cast_slice(bytes);
                 each(&mut |field, from, to| {
                     let [u, v, depth, _] = centroids[from];
-                    cells.centroid[to] = [u, v, depth].map(|x| x * unit_of(field));
+                    let unit_m = unit_of(field);
+                    (cells.centroid_u[to], cells.centroid_v[to]) = (u * unit_m, v * unit_m);
+                    if let Some(kept) = cells.centroid_depth.get_mut(to) {
+                        *kept = depth * unit_m;
+                    }
                 });
             }
             What::Orientations => {

@@ -1,0 +1,228 @@
+//! Many frames: sixteen frames of a field abreast.
+
+use bytemuck::cast_slice;
+use fearless_simd::prelude::*;
+
+use super::super::Rows;
+use super::Tables;
+use super::calibrate;
+use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, transpose_u};
+use super::touch::{Abreast, Cells, Kind, Members, Part, strip, touch};
+use super::wide::{Values, Wide};
+use crate::percept::{CellsMut, Flags, Outputs};
+use crate::scene::Plan;
+use crate::stage::layout::{Member, Taxel};
+
+/// What a task needs to work in.
+pub(super) struct Scratch {
+    /// By slot, a lane a frame.
+    pressures: Vec<Row<f32>>,
+    statuses: Vec<Row<u32>>,
+    /// Tiles whose statuses say something.
+    faulty: Vec<usize>,
+    /// Sixteen fields' answers, a lane a frame.
+    cells: Box<[Cells; LANES]>,
+    values: Values,
+}
+
+impl Scratch {
+    pub(super) fn new(slots: usize) -> Self {
+        let padded = slots.next_multiple_of(LANES);
+        Self {
+            pressures: vec![[0.0; LANES]; padded],
+            statuses: vec![[0; LANES]; padded],
+            faulty: Vec::new(),
+            cells: Box::new([Cells::EMPTY; LANES]),
+            values: Values::default(),
+        }
+    }
+}
+
+/// A field's members over sixteen frames.
+#[derive(Clone, Copy)]
+struct OverFrames<'a> {
+    members: &'a [Member],
+    depths: &'a [f32],
+    taxels: &'a [Taxel],
+    pressures: &'a [Row<f32>],
+    statuses: &'a [Row<u32>],
+}
+
+impl<S: Simd> Members<S> for OverFrames<'_> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.members.len()
+    }
+
+    #[inline(always)]
+    fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+        let Member { slot, weight, u, v } = self.members[member];
+        Part {
+            pressure: load(simd, &self.pressures[slot as usize], at),
+            weight: splat(simd, weight),
+            u: splat(simd, u),
+            v: splat(simd, v),
+        }
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, member: usize, _: usize) -> F<S> {
+        splat(simd, self.depths[member])
+    }
+
+    #[inline(always)]
+    fn area(self, simd: S, member: usize, _: usize) -> F<S> {
+        splat(simd, self.taxels[self.members[member].slot as usize].area)
+    }
+
+    #[inline(always)]
+    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
+        load_u(simd, &self.statuses[self.members[member].slot as usize], at)
+    }
+}
+
+/// All stages for the frames of `raw` from `first` on, as many as `cells` has, which is at most sixteen.
+#[inline(always)]
+pub(super) fn block<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tables: &Tables,
+    raw: Rows<'_>,
+    first: usize,
+    scratch: &mut Scratch,
+    cells: &mut CellsMut<'_>,
+) {
+    let frames = cells.frames();
+    let faults = read(simd, plan, tables, raw, first, frames, scratch);
+    if !cells.pressures.is_empty() {
+        let slots = plan.slots();
+        for (slot, lanes) in scratch.pressures.iter().take(slots).enumerate() {
+            for (frame, &pressure) in lanes.iter().take(frames).enumerate() {
+                cells.pressures[frame * slots + slot] = pressure.into();
+            }
+        }
+    }
+    let Scratch { pressures, statuses, cells: answers, values, .. } = scratch;
+    for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
+        for (field, answer) in fields.iter().zip(answers.iter_mut()) {
+            let mut kind = Kind::EMPTY;
+            (0..LANES).for_each(|lane| kind.set(lane, field.charted, field.area_known, field.unit_m));
+            if let Some(table) = field.wide.map(|wide| &tables.wide[wide]) {
+                let mut one = Cells::EMPTY;
+                for frame in 0..frames {
+                    let at = |slot: usize| pressures[slot][frame];
+                    values.gather(table, faults, at, |slot| statuses[slot][frame]);
+                    let sweep = Wide { table, values };
+                    strip(simd, sweep, &kind, plan.stages(), plan.columns, faults, &mut one, 0);
+                    answer.take(frame, &one);
+                }
+            } else {
+                let members = OverFrames {
+                    members: plan.members_of(field),
+                    depths: &field.depths,
+                    taxels: &plan.taxels,
+                    pressures,
+                    statuses,
+                };
+                touch(simd, Abreast(members), &kind, plan.stages(), plan.columns, faults, answer);
+            }
+        }
+        write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
+    }
+}
+
+/// Calibrates up to sixteen frames, and turns them so that a taxel's frames stand abreast. Whether any value is anything
+/// but a plain number.
+#[inline(always)]
+fn read<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tables: &Tables,
+    raw: Rows<'_>,
+    first: usize,
+    frames: usize,
+    scratch: &mut Scratch,
+) -> bool {
+    for tile in scratch.faulty.drain(..) {
+        scratch.statuses[tile * LANES..][..LANES].fill([0; LANES]);
+    }
+    let (mut pressures, mut statuses) = ([[0.0; LANES]; LANES], [[0; LANES]; LANES]);
+    for (index, tile) in tables.tiles.iter().enumerate() {
+        let slot = index * LANES;
+        let mut faults = false;
+        for frame in 0..frames {
+            let mut bits = [0_u32; LANES];
+            let values: &[u32] = cast_slice(&raw.row(first + frame)[slot..]);
+            match values.first_chunk::<LANES>() {
+                Some(values) => bits = *values,
+                None => bits[..values.len()].copy_from_slice(values),
+            }
+            faults |= calibrate::tile(simd, plan, tile, slot, &bits, &mut pressures[frame], &mut statuses[frame]);
+        }
+        let mut turned = pressures;
+        transpose(simd, &mut turned);
+        scratch.pressures[slot..slot + LANES].copy_from_slice(&turned);
+        if faults {
+            let mut turned = statuses;
+            transpose_u(simd, &mut turned);
+            scratch.statuses[slot..slot + LANES].copy_from_slice(&turned);
+            scratch.faulty.push(index);
+        }
+    }
+    !scratch.faulty.is_empty()
+}
+
+/// Writes the answers of `count` fields from `first` on into `frames` frames' cells.
+#[inline(always)]
+fn write<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    first: usize,
+    count: usize,
+    frames: usize,
+    outputs: Outputs,
+    cells: &mut CellsMut<'_>,
+) {
+    let fields = cells.fields();
+    let place = |frame: usize| frame * fields + first..frame * fields + first + count;
+    let floats = |column: &mut [f32], of: fn(&Cells) -> &Row<f32>| {
+        if column.is_empty() {
+            return;
+        }
+        let mut rows = [[0.0; LANES]; LANES];
+        for (row, answer) in rows.iter_mut().zip(answers) {
+            *row = *of(answer);
+        }
+        transpose(simd, &mut rows);
+        for (frame, row) in rows.iter().take(frames).enumerate() {
+            column[place(frame)].copy_from_slice(&row[..count]);
+        }
+    };
+    floats(cells.total, |cells| &cells.total);
+    floats(cells.peak, |cells| &cells.peak);
+    floats(cells.area, |cells| &cells.area);
+    floats(cells.centroid_u, |cells| &cells.u);
+    floats(cells.centroid_v, |cells| &cells.v);
+    floats(cells.centroid_depth, |cells| &cells.depth);
+    floats(cells.orientation, |cells| &cells.orientation);
+    floats(cells.axis, |cells| &cells.axis);
+    floats(cells.anisotropy, |cells| &cells.anisotropy);
+    let integers = |column: &mut [u32], of: fn(&Cells) -> &Row<u32>, mask: u32| {
+        if column.is_empty() {
+            return;
+        }
+        let mut rows = [[0; LANES]; LANES];
+        for (row, answer) in rows.iter_mut().zip(answers) {
+            *row = *of(answer);
+        }
+        transpose_u(simd, &mut rows);
+        for (frame, row) in rows.iter().take(frames).enumerate() {
+            for (value, bits) in column[place(frame)].iter_mut().zip(row) {
+                *value = bits & mask;
+            }
+        }
+    };
+    integers(cells.active, |cells| &cells.active, u32::MAX);
+    integers(bytemuck::cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    integers(bytemuck::cast_slice_mut::<Outputs, u32>(cells.present), |cells| &cells.present, outputs.bits());
+}

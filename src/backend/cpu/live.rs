@@ -1,0 +1,313 @@
+//! One frame: sixteen fields abreast.
+
+use bytemuck::cast_slice;
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+use super::Tables;
+use super::calibrate;
+use super::simd::{F, LANES, Row, U, load, load_u};
+use super::touch::{Abreast, Cells, Kind, Members, Part, strip, touch};
+use super::wide::{Table, Values, Wide};
+use crate::percept::{CellsMut, Flags, Outputs};
+use crate::scene::{Plan, Stages};
+use crate::signal::RawValue;
+
+/// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
+const SHARED: usize = 1 << 16;
+
+/// Sixteen narrow fields of about as many members, a lane each; or one wide field.
+#[derive(Clone, Debug)]
+enum Group {
+    Narrow(Box<Narrow>),
+    Wide { field: usize, kind: Box<Kind>, table: usize },
+}
+
+#[derive(Clone, Debug)]
+struct Narrow {
+    /// Per lane, which field; fewer at the end.
+    fields: Vec<usize>,
+    kind: Kind,
+    /// By member; lanes that have no more go on with an unpressed one.
+    slots: Vec<Row<u32>>,
+    weights: Vec<Row<f32>>,
+    u: Vec<Row<f32>>,
+    v: Vec<Row<f32>>,
+    depths: Vec<Row<f32>>,
+    areas: Vec<Row<f32>>,
+}
+
+impl Narrow {
+    fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
+        let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
+        let blank = vec![[0.0; LANES]; rows];
+        let mut group = Self {
+            fields: fields.to_vec(),
+            kind: Kind::EMPTY,
+            slots: vec![[unpressed as u32; LANES]; rows],
+            weights: blank.clone(),
+            u: blank.clone(),
+            v: blank.clone(),
+            depths: blank.clone(),
+            areas: blank,
+        };
+        for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
+            group.kind.set(lane, field.charted, field.area_known, field.unit_m);
+            for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
+                group.slots[row][lane] = member.slot;
+                group.weights[row][lane] = member.weight;
+                group.u[row][lane] = member.u;
+                group.v[row][lane] = member.v;
+                group.depths[row][lane] = *depth;
+                group.areas[row][lane] = plan.taxels[member.slot as usize].area;
+            }
+        }
+        group
+    }
+}
+
+/// A group's values in this frame.
+#[derive(Clone, Copy)]
+struct OverFields<'a> {
+    group: &'a Narrow,
+    pressures: &'a [Row<f32>],
+    statuses: &'a [Row<u32>],
+}
+
+impl<S: Simd> Members<S> for OverFields<'_> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.group.slots.len()
+    }
+
+    #[inline(always)]
+    fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+        Part {
+            pressure: load(simd, &self.pressures[member], at),
+            weight: load(simd, &self.group.weights[member], at),
+            u: load(simd, &self.group.u[member], at),
+            v: load(simd, &self.group.v[member], at),
+        }
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.depths[member], at)
+    }
+
+    #[inline(always)]
+    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.areas[member], at)
+    }
+
+    #[inline(always)]
+    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
+        load_u(simd, &self.statuses[member], at)
+    }
+}
+
+/// What one thread needs beside.
+#[derive(Clone, Debug, Default)]
+struct Gathered {
+    pressures: Vec<Row<f32>>,
+    statuses: Vec<Row<u32>>,
+    values: Values,
+}
+
+/// The plan laid out for one frame, and the memory for it.
+#[derive(Clone, Debug)]
+pub(super) struct Live {
+    groups: Vec<Group>,
+    /// Per group.
+    answers: Vec<Cells>,
+    /// By slot, and a last row of taxels that nothing presses.
+    pressures: Vec<Row<f32>>,
+    statuses: Vec<Row<u32>>,
+    gathered: Gathered,
+    shared: bool,
+}
+
+impl Live {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let tiles = plan.slots().div_ceil(LANES);
+        let (mut wide, mut narrow) = (Vec::new(), Vec::new());
+        for (field, of) in plan.fields.iter().enumerate() {
+            if let Some(table) = of.wide {
+                let mut kind = Kind::EMPTY;
+                (0..LANES).for_each(|lane| kind.set(lane, of.charted, of.area_known, of.unit_m));
+                wide.push(Group::Wide { field, kind: Box::new(kind), table });
+            } else {
+                narrow.push(field);
+            }
+        }
+        // Fields of one size stay in their order.
+        narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
+        let mut groups = wide;
+        let unpressed = tiles * LANES;
+        let narrow = narrow.chunks(LANES).map(|fields| Group::Narrow(Box::new(Narrow::new(plan, fields, unpressed))));
+        groups.extend(narrow);
+        Self {
+            answers: vec![Cells::EMPTY; groups.len()],
+            groups,
+            pressures: vec![[0.0; LANES]; tiles + 1],
+            statuses: vec![[0; LANES]; tiles + 1],
+            gathered: Gathered::default(),
+            shared: plan.memberships() >= SHARED && rayon::current_num_threads() > 1,
+        }
+    }
+
+    /// All stages for the frame `raw`, into `cells`, which is one frame.
+    pub(super) fn frame(
+        &mut self,
+        level: Level,
+        plan: &Plan,
+        tables: &Tables,
+        raw: &[RawValue],
+        cells: &mut CellsMut<'_>,
+    ) {
+        let faults = dispatch!(level, simd => read(simd, plan, tables, raw, &mut self.pressures, &mut self.statuses));
+        let frame = Frame {
+            plan,
+            tables,
+            pressures: self.pressures.as_flattened(),
+            statuses: self.statuses.as_flattened(),
+            faults,
+        };
+        if self.shared {
+            self.groups.par_iter().zip(&mut self.answers).for_each_init(
+                Gathered::default,
+                |gathered, (group, answer)| {
+                    dispatch!(level, simd => frame.group(simd, group, gathered, answer));
+                },
+            );
+        } else {
+            let (groups, answers, gathered) = (&self.groups, &mut self.answers, &mut self.gathered);
+            dispatch!(level, simd => frame.groups(simd, groups, gathered, answers));
+        }
+        if !cells.pressures.is_empty() {
+            for (kept, &pressure) in cells.pressures.iter_mut().zip(frame.pressures) {
+                *kept = pressure.into();
+            }
+        }
+        for (group, answer) in self.groups.iter().zip(&self.answers) {
+            match group {
+                Group::Wide { field, .. } => write(std::slice::from_ref(field), answer, plan.outputs, cells),
+                Group::Narrow(group) => write(&group.fields, answer, plan.outputs, cells),
+            }
+        }
+    }
+}
+
+/// A calibrated frame.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    plan: &'a Plan,
+    tables: &'a Tables,
+    pressures: &'a [f32],
+    statuses: &'a [u32],
+    faults: bool,
+}
+
+impl Frame<'_> {
+    #[inline(always)]
+    fn groups<S: Simd>(&self, simd: S, groups: &[Group], gathered: &mut Gathered, answers: &mut [Cells]) {
+        for (group, answer) in groups.iter().zip(answers) {
+            self.group(simd, group, gathered, answer);
+        }
+    }
+
+    #[inline(always)]
+    fn group<S: Simd>(&self, simd: S, group: &Group, gathered: &mut Gathered, answer: &mut Cells) {
+        let (stages, columns): (Stages, Outputs) = (self.plan.stages(), self.plan.columns);
+        match group {
+            Group::Narrow(group) => {
+                gather(&group.slots, self.pressures, &mut gathered.pressures);
+                if self.faults {
+                    gather(&group.slots, self.statuses, &mut gathered.statuses);
+                    self.leave_out_what_is_not_there(group, &mut gathered.statuses);
+                }
+                let Gathered { pressures, statuses, .. } = &*gathered;
+                let members = OverFields { group, pressures, statuses };
+                touch(simd, Abreast(members), &group.kind, stages, columns, self.faults, answer);
+            }
+            Group::Wide { kind, table, .. } => {
+                let table: &Table = &self.tables.wide[*table];
+                let values = &mut gathered.values;
+                values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
+                let sweep = Wide { table, values };
+                strip(simd, sweep, kind, stages, columns, self.faults, answer, 0);
+            }
+        }
+    }
+
+    /// Lanes that have no more members do not keep the others from being all unusable.
+    fn leave_out_what_is_not_there(&self, group: &Narrow, statuses: &mut [Row<u32>]) {
+        for (lane, &field) in group.fields.iter().enumerate() {
+            for row in &mut statuses[self.plan.fields[field].count..group.slots.len()] {
+                row[lane] = crate::stage::calibrate::UNUSABLE;
+            }
+        }
+    }
+}
+
+/// Brings the values of `slots` side by side.
+#[inline(always)]
+fn gather<T: Copy + Default>(slots: &[Row<u32>], values: &[T], rows: &mut Vec<Row<T>>) {
+    if rows.len() < slots.len() {
+        rows.resize(slots.len(), [T::default(); LANES]);
+    }
+    for (row, slots) in rows.iter_mut().zip(slots) {
+        for (value, &slot) in row.iter_mut().zip(slots) {
+            *value = values[slot as usize];
+        }
+    }
+}
+
+/// Calibrates a frame; whether any value is anything but a plain number.
+#[inline(always)]
+fn read<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tables: &Tables,
+    raw: &[RawValue],
+    pressures: &mut [Row<f32>],
+    statuses: &mut [Row<u32>],
+) -> bool {
+    let mut faults = false;
+    let rows = pressures.iter_mut().zip(statuses);
+    for (index, (tile, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
+        let mut bits = [0_u32; LANES];
+        let values: &[u32] = cast_slice(&raw[index * LANES..]);
+        match values.first_chunk::<LANES>() {
+            Some(values) => bits = *values,
+            None => bits[..values.len()].copy_from_slice(values),
+        }
+        faults |= calibrate::tile(simd, plan, tile, index * LANES, &bits, pressures, statuses);
+    }
+    faults
+}
+
+/// Puts a group's lanes where their fields belong.
+fn write(fields: &[usize], answer: &Cells, outputs: Outputs, cells: &mut CellsMut<'_>) {
+    fn put<T: Copy>(fields: &[usize], column: &mut [T], row: &Row<T>) {
+        if column.is_empty() {
+            return;
+        }
+        for (&field, &value) in fields.iter().zip(row) {
+            column[field] = value;
+        }
+    }
+    put(fields, cells.total, &answer.total);
+    put(fields, cells.peak, &answer.peak);
+    put(fields, cells.area, &answer.area);
+    put(fields, cells.centroid_u, &answer.u);
+    put(fields, cells.centroid_v, &answer.v);
+    put(fields, cells.centroid_depth, &answer.depth);
+    put(fields, cells.orientation, &answer.orientation);
+    put(fields, cells.axis, &answer.axis);
+    put(fields, cells.anisotropy, &answer.anisotropy);
+    put(fields, cells.active, &answer.active);
+    put(fields, bytemuck::cast_slice_mut::<Flags, u32>(cells.flags), &answer.flags);
+    put(fields, bytemuck::cast_slice_mut::<Outputs, u32>(cells.present), &answer.present.map(|p| p & outputs.bits()));
+}

@@ -1,0 +1,100 @@
+//! Sixteen lanes on whatever vectors the machine has.
+//!
+//! Lanes never mix, so that a lane's bits do not depend on how many of them one instruction takes. Everything that
+//! computes here is `inline(always)`, up to the `dispatch!` that chooses the instructions: only then can vectors stay in
+//! registers.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x16, u32x16};
+
+/// Lanes side by side.
+pub(super) const LANES: usize = 16;
+
+/// As many lanes as one instruction takes.
+pub(super) type F<S> = <S as Simd>::f32s;
+/// The same of integers.
+pub(super) type U<S> = <S as Simd>::u32s;
+/// The same of decisions.
+pub(super) type M<S> = <S as Simd>::mask32s;
+
+/// One value a lane.
+pub(super) type Row<T> = [T; LANES];
+
+/// How many lanes one instruction takes; it divides [`LANES`].
+#[inline(always)]
+pub(super) const fn width<S: Simd>() -> usize {
+    <F<S> as SimdBase<S>>::LEN
+}
+
+/// The lanes from `at` on.
+#[inline(always)]
+pub(super) fn load<S: Simd>(simd: S, row: &Row<f32>, at: usize) -> F<S> {
+    F::<S>::from_slice(simd, &row[at..at + width::<S>()])
+}
+
+#[inline(always)]
+pub(super) fn store<S: Simd>(_: S, lanes: F<S>, row: &mut Row<f32>, at: usize) {
+    lanes.store_slice(&mut row[at..at + width::<S>()]);
+}
+
+#[inline(always)]
+pub(super) fn load_u<S: Simd>(simd: S, row: &Row<u32>, at: usize) -> U<S> {
+    U::<S>::from_slice(simd, &row[at..at + width::<S>()])
+}
+
+#[inline(always)]
+pub(super) fn store_u<S: Simd>(_: S, lanes: U<S>, row: &mut Row<u32>, at: usize) {
+    lanes.store_slice(&mut row[at..at + width::<S>()]);
+}
+
+#[inline(always)]
+pub(super) fn splat<S: Simd>(simd: S, value: f32) -> F<S> {
+    F::<S>::splat(simd, value)
+}
+
+#[inline(always)]
+pub(super) fn splat_u<S: Simd>(simd: S, value: u32) -> U<S> {
+    U::<S>::splat(simd, value)
+}
+
+/// `bits` where `mask` holds, 0 elsewhere.
+#[inline(always)]
+pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
+    mask.select(splat_u(simd, bits), splat_u(simd, 0))
+}
+
+/// Turns rows into columns: lane j of row i becomes lane i of row j. Four perfect shuffles do it.
+#[inline(always)]
+pub(super) fn transpose<S: Simd>(simd: S, rows: &mut [Row<f32>; LANES]) {
+    let mut now = [f32x16::splat(simd, 0.0); LANES];
+    for (now, row) in now.iter_mut().zip(rows.iter()) {
+        *now = f32x16::from_slice(simd, row);
+    }
+    for _ in 0..4 {
+        let before = now;
+        for i in 0..LANES / 2 {
+            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
+        }
+    }
+    for (now, row) in now.iter().zip(rows) {
+        now.store_slice(row);
+    }
+}
+
+/// The same of integers.
+#[inline(always)]
+pub(super) fn transpose_u<S: Simd>(simd: S, rows: &mut [Row<u32>; LANES]) {
+    let mut now = [u32x16::splat(simd, 0); LANES];
+    for (now, row) in now.iter_mut().zip(rows.iter()) {
+        *now = u32x16::from_slice(simd, row);
+    }
+    for _ in 0..4 {
+        let before = now;
+        for i in 0..LANES / 2 {
+            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
+        }
+    }
+    for (now, row) in now.iter().zip(rows) {
+        now.store_slice(row);
+    }
+}

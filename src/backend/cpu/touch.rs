@@ -1,0 +1,305 @@
+//! A touch in lanes: contact, centroid, orientation and axis of [`LANES`](super::simd::LANES) cells at a time.
+//!
+//! Whether the lanes are frames of one field or fields of one frame, each does the operations of its own cell in one
+//! fixed order, never fused: percepts have the same bits either way, and on every instruction set.
+
+use fearless_simd::prelude::*;
+
+use super::axis::{self, Moments};
+use super::centroid;
+use super::contact::{self, Sums};
+use super::orientation::{self, Farthest};
+use super::simd::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
+use crate::percept::{Flags, Outputs};
+use crate::scene::Stages;
+use crate::stage::calibrate::UNUSABLE;
+
+/// A taxel's part in a field, a lane each.
+pub(super) struct Part<S: Simd> {
+    pub(super) pressure: F<S>,
+    pub(super) weight: F<S>,
+    pub(super) u: F<S>,
+    pub(super) v: F<S>,
+}
+
+/// Where lanes find their fields' members, from lane `at` on.
+pub(super) trait Members<S: Simd>: Copy {
+    /// The longest lane's number of members; shorter ones go on with pressures of 0.
+    fn count(self) -> usize;
+    fn part(self, simd: S, member: usize, at: usize) -> Part<S>;
+    /// The third coordinate.
+    fn depth(self, simd: S, member: usize, at: usize) -> F<S>;
+    /// m².
+    fn area(self, simd: S, member: usize, at: usize) -> F<S>;
+    /// What calibration says of the value, where it said anything of any.
+    fn status(self, simd: S, member: usize, at: usize) -> U<S>;
+}
+
+/// Goes over all members, once a quantity.
+pub(super) trait Sweep<S: Simd>: Copy {
+    /// S, how many are pressed, and the centroid's numerators where `centroid` says so.
+    fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S>;
+    /// The largest P, and the area of the pressed taxels, m².
+    fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>);
+    /// What calibration says of the members together, and where it left all of them out.
+    fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>);
+    /// The numerator of the centroid's third coordinate.
+    fn depth(self, simd: S, at: usize) -> F<S>;
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S>;
+    fn moments(self, simd: S, at: usize, touch: &Touch<S>) -> Moments<S>;
+}
+
+/// A cell a lane, each going over its members in their order.
+#[derive(Clone, Copy)]
+pub(super) struct Abreast<P>(pub(super) P);
+
+impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
+    #[inline(always)]
+    fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S> {
+        contact::sums(simd, self.0, at, centroid)
+    }
+
+    #[inline(always)]
+    fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>) {
+        contact::peak_and_area(simd, self.0, at)
+    }
+
+    #[inline(always)]
+    fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>) {
+        let (any, all) = contact::statuses(simd, self.0, at);
+        (any & !UNUSABLE, (all & UNUSABLE).simd_gt(splat_u(simd, 0)))
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, at: usize) -> F<S> {
+        centroid::depth(simd, self.0, at)
+    }
+
+    #[inline(always)]
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S> {
+        orientation::farthest(simd, self.0, at, touch)
+    }
+
+    #[inline(always)]
+    fn moments(self, simd: S, at: usize, touch: &Touch<S>) -> Moments<S> {
+        axis::moments(simd, self.0, at, touch)
+    }
+}
+
+/// What the lanes' fields are like.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind {
+    /// Whether any has no chart, any has one.
+    pub(super) any_uncharted: bool,
+    pub(super) any_charted: bool,
+    /// Flags that a field always has.
+    pub(super) always: Row<u32>,
+    /// The sums it can give.
+    pub(super) sums: Row<u32>,
+    /// What it can give with its centroid.
+    pub(super) found: Row<u32>,
+    /// m.
+    pub(super) unit_m: Row<f32>,
+}
+
+impl Kind {
+    /// Of lanes without a field.
+    pub(super) const EMPTY: Self = Self {
+        any_uncharted: false,
+        any_charted: false,
+        always: [0; LANES],
+        sums: [0; LANES],
+        found: [0; LANES],
+        unit_m: [1.0; LANES],
+    };
+
+    /// Says what the field in `lane` is like.
+    pub(super) fn set(&mut self, lane: usize, charted: bool, area_known: bool, unit_m: f32) {
+        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
+        let in_chart = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        self.any_charted |= charted;
+        self.any_uncharted |= !charted;
+        self.always[lane] = if charted { Flags::empty() } else { Flags::NO_CHART }.bits();
+        self.sums[lane] = if area_known { sums | Outputs::AREA } else { sums }.bits();
+        self.found[lane] = if charted { in_chart } else { Outputs::POSITION }.bits();
+        self.unit_m[lane] = unit_m;
+    }
+}
+
+/// What the stages found, a row each; lengths in metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells {
+    pub(super) flags: Row<u32>,
+    pub(super) present: Row<u32>,
+    pub(super) total: Row<f32>,
+    pub(super) peak: Row<f32>,
+    pub(super) area: Row<f32>,
+    pub(super) active: Row<u32>,
+    pub(super) u: Row<f32>,
+    pub(super) v: Row<f32>,
+    pub(super) depth: Row<f32>,
+    pub(super) orientation: Row<f32>,
+    pub(super) axis: Row<f32>,
+    pub(super) anisotropy: Row<f32>,
+}
+
+impl Cells {
+    pub(super) const EMPTY: Self = Self {
+        flags: [0; LANES],
+        present: [0; LANES],
+        total: [0.0; LANES],
+        peak: [0.0; LANES],
+        area: [0.0; LANES],
+        active: [0; LANES],
+        u: [0.0; LANES],
+        v: [0.0; LANES],
+        depth: [0.0; LANES],
+        orientation: [0.0; LANES],
+        axis: [0.0; LANES],
+        anisotropy: [0.0; LANES],
+    };
+
+    /// Makes `lane` what the first lane of `other` is.
+    pub(super) fn take(&mut self, lane: usize, other: &Self) {
+        self.flags[lane] = other.flags[0];
+        self.present[lane] = other.present[0];
+        self.total[lane] = other.total[0];
+        self.peak[lane] = other.peak[0];
+        self.area[lane] = other.area[0];
+        self.active[lane] = other.active[0];
+        self.u[lane] = other.u[0];
+        self.v[lane] = other.v[0];
+        self.depth[lane] = other.depth[0];
+        self.orientation[lane] = other.orientation[0];
+        self.axis[lane] = other.axis[0];
+        self.anisotropy[lane] = other.anisotropy[0];
+    }
+}
+
+/// What the lanes know of their touch so far.
+#[derive(Clone, Copy)]
+pub(super) struct Touch<S: Simd> {
+    /// Number of pressed taxels: whole numbers, exact in single precision as no field has 2²⁴ members.
+    pub(super) active: F<S>,
+    pub(super) touched: M<S>,
+    pub(super) total: F<S>,
+    /// The power of two that brings the total into [1, 2).
+    pub(super) scale: F<S>,
+    /// In the field's unit.
+    pub(super) u: F<S>,
+    pub(super) v: F<S>,
+}
+
+/// A line in a field's chart: its angle where there is one, and what is to be said.
+pub(super) struct Line<S: Simd> {
+    pub(super) angle: F<S>,
+    pub(super) flags: U<S>,
+    pub(super) present: U<S>,
+}
+
+/// All stages for one set of lanes; `faults`: whether calibration said something of any value. Columns that no stage of
+/// `stages` or output of `outputs` fills are left as they are.
+#[inline(always)]
+pub(super) fn touch<S: Simd, P: Sweep<S>>(
+    simd: S,
+    members: P,
+    kind: &Kind,
+    stages: Stages,
+    outputs: Outputs,
+    faults: bool,
+    cells: &mut Cells,
+) {
+    let mut at = 0;
+    while at < LANES {
+        strip(simd, members, kind, stages, outputs, faults, cells, at);
+        at += width::<S>();
+    }
+}
+
+/// [`touch`] for as many lanes as one instruction takes, from `at` on.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "the same as `touch`, and where")]
+pub(super) fn strip<S: Simd, P: Sweep<S>>(
+    simd: S,
+    members: P,
+    kind: &Kind,
+    stages: Stages,
+    outputs: Outputs,
+    faults: bool,
+    cells: &mut Cells,
+    at: usize,
+) {
+    let sums = members.sums(simd, at, stages.centroid);
+    let none = splat(simd, 0.0);
+    let touched = sums.total.simd_gt(none);
+    let mut flags = load_u(simd, &kind.always, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
+    let mut present = load_u(simd, &kind.sums, at);
+    if faults {
+        let (said, unusable) = members.statuses(simd, at);
+        flags |= said;
+        present = unusable.select(splat_u(simd, 0), present);
+    }
+    store(simd, sums.total, &mut cells.total, at);
+    if outputs.intersects(Outputs::PEAK | Outputs::AREA) {
+        let (peak, area) = members.peak_and_area(simd, at);
+        store(simd, peak, &mut cells.peak, at);
+        store(simd, area, &mut cells.area, at);
+    }
+    if outputs.contains(Outputs::ACTIVE) {
+        store_u(simd, sums.active.to_int::<U<S>>(), &mut cells.active, at);
+    }
+    if !(touched.any_true() && kind.any_charted) {
+        for column in [&mut cells.orientation, &mut cells.axis, &mut cells.anisotropy] {
+            store(simd, none, column, at);
+        }
+    }
+    if !touched.any_true() {
+        for column in [&mut cells.u, &mut cells.v, &mut cells.depth] {
+            store(simd, none, column, at);
+        }
+        store_u(simd, flags, &mut cells.flags, at);
+        store_u(simd, present, &mut cells.present, at);
+        return;
+    }
+    if stages.centroid {
+        let found = load_u(simd, &kind.found, at);
+        present |= touched.select(found, splat_u(simd, 0));
+        let unit = load(simd, &kind.unit_m, at);
+        let (u, v) = centroid::quotients(simd, &sums, touched);
+        store(simd, u * unit, &mut cells.u, at);
+        store(simd, v * unit, &mut cells.v, at);
+        let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
+        let depth = if kind.any_uncharted {
+            let depth = members.depth(simd, at) / sums.total;
+            (touched & !charted).select(depth, none) * unit
+        } else {
+            none
+        };
+        store(simd, depth, &mut cells.depth, at);
+        let touched = touched & charted;
+        let scale = scale_of(simd, sums.total);
+        let touch = Touch { active: sums.active, touched, total: sums.total, scale, u, v };
+        if stages.orientation && kind.any_charted {
+            let line = orientation::line(simd, &touch, &members.farthest(simd, at, &touch));
+            store(simd, line.angle, &mut cells.orientation, at);
+            flags |= line.flags;
+            present |= line.present;
+        }
+        if stages.axis && kind.any_charted {
+            let (line, anisotropy) = axis::line(simd, &touch, &members.moments(simd, at, &touch));
+            store(simd, line.angle, &mut cells.axis, at);
+            store(simd, anisotropy, &mut cells.anisotropy, at);
+            flags |= line.flags;
+            present |= line.present;
+        }
+    }
+    store_u(simd, flags, &mut cells.flags, at);
+    store_u(simd, present, &mut cells.present, at);
+}
+
+/// The power of two that brings `total` into [1, 2).
+#[inline(always)]
+fn scale_of<S: Simd>(simd: S, total: F<S>) -> F<S> {
+    let exponent = total.bitcast::<U<S>>() & 0x7F80_0000;
+    (splat_u(simd, 254 << 23) - exponent).bitcast()
+}
