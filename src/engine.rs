@@ -7,7 +7,7 @@ use std::ops::Range;
 use self::host::{Host, Links};
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
-use crate::backend::{self, Backend, BackendKind, RawBatch, Rows, Step};
+use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
@@ -57,8 +57,8 @@ pub struct Engine {
     why: String,
     intake: Intake,
     raw: Vec<RawValue>,
-    /// Whether the frames at hand are what the plan reads, so that `raw` is empty.
-    direct: bool,
+    /// Where frames have the plan's values, if those pass as they are; `raw` stays empty then.
+    picks: Option<Picks>,
     steps: Vec<Step>,
     last_t_s: Option<f64>,
     max_gap_s: f64,
@@ -136,7 +136,7 @@ impl Engine {
         let plan = Plan::new(body, &fields, &scene, &calibration)?;
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
-        Ok(Self {
+        let mut engine = Self {
             steps: Vec::new(),
             last_t_s: None,
             max_gap_s: scene.max_gap_s,
@@ -149,7 +149,7 @@ impl Engine {
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
             raw: Vec::new(),
-            direct: false,
+            picks: None,
             tare,
             frames_done: 0,
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
@@ -159,7 +159,9 @@ impl Engine {
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
             },
             plan,
-        })
+        };
+        engine.pick();
+        Ok(engine)
     }
 
     /// What is run.
@@ -194,7 +196,15 @@ impl Engine {
             taxel_of_value.push(taxel);
         }
         self.intake.listen(taxel_of_value);
+        self.pick();
         Ok(())
+    }
+
+    /// Finds out whether values can be read where they are. Upkeep looks at all of them, gathered.
+    fn pick(&mut self) {
+        let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
+        let width = self.intake.width();
+        self.picks = picks.filter(|_| self.upkeep.is_none()).map(|places| Picks::new(places, width));
     }
 
     /// A frame for all of the body's taxels by ascending id, every value missing.
@@ -267,7 +277,7 @@ impl Engine {
             }
             if let Some(kept) = &mut self.upkeep {
                 let slots = self.plan.slots();
-                kept.upkeep.observe(frames[index].t_s, Self::rows(self.direct, &self.raw, frames, slots).row(index));
+                kept.upkeep.observe(frames[index].t_s, &self.raw[index * slots..][..slots]);
             }
         }
         self.segment(frames, start..frames.len(), check)?;
@@ -277,8 +287,9 @@ impl Engine {
 
     /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
     fn take_as_baselines(&mut self, first: &Frame, check: Option<&mut Check>) {
-        let row = if self.direct { &first.values } else { &self.raw };
-        for (slot, value) in row.iter().enumerate().take(self.plan.slots()) {
+        let slots = self.plan.slots();
+        let first = rows(self.picks.as_ref(), &self.raw, std::slice::from_ref(first), slots);
+        for (slot, value) in first.row(0).enumerate() {
             if let Some(value) = value.number() {
                 let made = self.plan.taxels[slot];
                 self.plan.keep_up(slot, value as f32, false, &made);
@@ -302,7 +313,7 @@ impl Engine {
         let raw = RawBatch {
             first: range.start,
             frames: range.len(),
-            rows: Self::rows(self.direct, &self.raw, frames, slots).part(range.clone()),
+            rows: rows(self.picks.as_ref(), &self.raw, frames, slots).part(range.clone()),
             steps: &self.steps[range.clone()],
         };
         let host = Host { plan: &self.plan, links: &self.links };
@@ -339,11 +350,6 @@ impl Engine {
         }
     }
 
-    /// Where the gathered frames' values lie.
-    fn rows<'a>(direct: bool, raw: &'a [RawValue], frames: &'a [Frame], slots: usize) -> Rows<'a> {
-        if direct { Rows::Frames(frames) } else { Rows::Packed { values: raw, slots } }
-    }
-
     fn gather(&mut self, frames: &[Frame]) -> Result<()> {
         for (index, frame) in frames.iter().enumerate() {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
@@ -358,8 +364,7 @@ impl Engine {
             }
         }
         self.raw.clear();
-        self.direct = self.intake.is_transparent(&self.plan.body_taxels);
-        if !self.direct {
+        if self.picks.is_none() {
             for frame in frames {
                 self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
             }
@@ -370,6 +375,14 @@ impl Engine {
             self.last_t_s = Some(frame.t_s);
         }
         Ok(())
+    }
+}
+
+/// Where the values of `frames` lie: where `picks` says, or gathered in `raw`.
+fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], slots: usize) -> Rows<'a> {
+    match picks {
+        Some(picks) => Rows::Picked { frames, picks },
+        None => Rows::Packed { values: raw, slots },
     }
 }
 

@@ -62,31 +62,83 @@ pub(crate) struct RawBatch<'a> {
     pub(crate) steps: &'a [Step],
 }
 
-/// Where frames' raw values lie, each frame's with one value a slot.
+/// Where in a frame a plan finds its values.
+#[derive(Clone, Debug)]
+pub(crate) struct Picks {
+    /// Per slot.
+    pub(crate) places: Vec<u32>,
+    /// Per sixteen slots whose values lie within 32 of a frame: where those start, and which of their bytes are wanted.
+    pub(crate) near: Vec<Option<(usize, [u8; 64])>>,
+}
+
+impl Picks {
+    /// For frames of `width` values.
+    pub(crate) fn new(places: Vec<u32>, width: usize) -> Self {
+        let near = places.chunks(16).map(|places| {
+            let (low, high) = (*places.iter().min()? as usize, *places.iter().max()? as usize);
+            let from = low.min(width.checked_sub(32)?);
+            let mut bytes = [0; 64];
+            // What fills up the last ones is as good a value as any.
+            let places_and_more = places.iter().chain(std::iter::repeat(&places[0]));
+            for (bytes, &place) in bytes.chunks_exact_mut(4).zip(places_and_more) {
+                let first = 4 * (place as usize - from);
+                bytes.iter_mut().zip(first..).for_each(|(byte, index)| *byte = index as u8);
+            }
+            (high < from + 32).then_some((from, bytes))
+        });
+        Self { near: near.collect(), places }
+    }
+}
+
+/// Where frames' raw values lie.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Rows<'a> {
-    /// One frame after the other.
+    /// Gathered: one frame after the other, each with one value a slot.
     Packed { values: &'a [RawValue], slots: usize },
-    /// As the source delivered them, where that is what the plan reads.
-    Frames(&'a [Frame]),
+    /// As the source delivered them, each slot's value where `picks` says.
+    Picked { frames: &'a [Frame], picks: &'a Picks },
 }
 
 impl<'a> Rows<'a> {
-    /// The values of frame `frame`.
-    pub(crate) fn row(self, frame: usize) -> &'a [RawValue] {
+    /// The values of frame `frame`, by slot.
+    pub(crate) fn row(self, frame: usize) -> impl Iterator<Item = RawValue> + 'a {
+        let (values, picks): (&[RawValue], &[u32]) = match self {
+            Self::Packed { values, slots } => (&values[frame * slots..][..slots], &[]),
+            Self::Picked { frames, picks } => (&frames[frame].values, &picks.places),
+        };
+        let count = if picks.is_empty() { values.len() } else { picks.len() };
+        (0..count).map(move |slot| values[picks.get(slot).map_or(slot, |&pick| pick as usize)])
+    }
+
+    /// The bits of frame `frame` from slot `first` on, as far as `bits` goes; zeros after the last.
+    #[inline(always)]
+    pub(crate) fn read(self, frame: usize, first: usize, bits: &mut [u32]) {
+        let straight = |values: &[RawValue], bits: &mut [u32]| {
+            let values: &[u32] = bytemuck::cast_slice(values);
+            let count = values.len().min(bits.len());
+            bits[..count].copy_from_slice(&values[..count]);
+            bits[count..].fill(0);
+        };
         match self {
-            Self::Packed { values, slots } => &values[frame * slots..][..slots],
-            Self::Frames(frames) => &frames[frame].values,
+            Self::Packed { values, slots } => straight(&values[frame * slots + first..(frame + 1) * slots], bits),
+            Self::Picked { frames, picks } => {
+                let values = &frames[frame].values[..];
+                let picks = &picks.places[first..picks.places.len().min(first + bits.len())];
+                bits[picks.len()..].fill(0);
+                for (bits, &pick) in bits.iter_mut().zip(picks) {
+                    *bits = values[pick as usize].to_bits();
+                }
+            }
         }
     }
 
     /// The rows of `frames`.
-    pub(crate) fn part(self, frames: Range<usize>) -> Self {
+    pub(crate) fn part(self, part: Range<usize>) -> Self {
         match self {
             Self::Packed { values, slots } => {
-                Self::Packed { values: &values[frames.start * slots..frames.end * slots], slots }
+                Self::Packed { values: &values[part.start * slots..part.end * slots], slots }
             }
-            Self::Frames(all) => Self::Frames(&all[frames]),
+            Self::Picked { frames, picks } => Self::Picked { frames: &frames[part], picks },
         }
     }
 }

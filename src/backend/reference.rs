@@ -79,8 +79,8 @@ impl Reference {
 
     /// One frame's pressures, taxel by taxel.
     fn pressures(&self, raw: &RawBatch<'_>, frame: usize) -> Vec<Pressure> {
-        let taxels = raw.rows.row(frame).iter().zip(&self.plan.calibrations).enumerate();
-        taxels.map(|(slot, (&raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
+        let taxels = raw.rows.row(frame).zip(&self.plan.calibrations).enumerate();
+        taxels.map(|(slot, (raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
     }
 
     /// A field's pressed taxels, by ascending id.

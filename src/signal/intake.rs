@@ -50,14 +50,19 @@ impl Intake {
         self.taxel_of_value.len()
     }
 
-    /// Whether frames of values for the taxels `slots` pass as they are.
-    pub(crate) fn is_transparent(&self, slots: &[usize]) -> bool {
+    /// Where a frame has the values of the taxels `slots`, if values pass as they are and none of these is never there.
+    pub(crate) fn picks(&self, slots: &[usize]) -> Option<Vec<u32>> {
         let checks = &self.calibration.checks;
-        self.max_age_s <= 0.0
-            && checks.settle_frames <= self.frames_seen
-            && checks.broken_frame_share.is_none()
-            && checks.isolated_ratio.is_none()
-            && self.taxel_of_value == slots
+        let checked =
+            checks.settle_frames > 0 || checks.broken_frame_share.is_some() || checks.isolated_ratio.is_some();
+        if checked || self.max_age_s > 0.0 {
+            return None;
+        }
+        let mut value_of = vec![None; self.now.len()];
+        for (value, &taxel) in self.taxel_of_value.iter().enumerate() {
+            value_of[taxel] = u32::try_from(value).ok();
+        }
+        slots.iter().map(|&slot| value_of[slot]).collect()
     }
 
     /// Appends to `out` the values of the taxels `slots` in `frame`.

@@ -1,13 +1,13 @@
 //! Many frames: sixteen frames of a field abreast.
 
-use bytemuck::cast_slice;
+use bytemuck::cast_slice_mut;
 use fearless_simd::prelude::*;
 
 use super::super::Rows;
 use super::Tables;
 use super::calibrate;
-use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, transpose_u};
-use super::touch::{Abreast, Cells, Kind, Members, Part, strip, touch};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u};
+use super::touch::{Abreast, Cells, Members, OneKind, Part, strip, touch};
 use super::wide::{Values, Wide};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::Plan;
@@ -105,8 +105,7 @@ pub(super) fn block<S: Simd>(
     let Scratch { pressures, statuses, cells: answers, values, .. } = scratch;
     for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
         for (field, answer) in fields.iter().zip(answers.iter_mut()) {
-            let mut kind = Kind::EMPTY;
-            (0..LANES).for_each(|lane| kind.set(lane, field.charted, field.area_known, field.unit_m));
+            let kind = OneKind::new(field);
             if let Some(table) = field.wide.map(|wide| &tables.wide[wide]) {
                 let mut one = Cells::EMPTY;
                 for frame in 0..frames {
@@ -146,26 +145,28 @@ fn read<S: Simd>(
     for tile in scratch.faulty.drain(..) {
         scratch.statuses[tile * LANES..][..LANES].fill([0; LANES]);
     }
+    let mut bits = [[0; LANES]; LANES];
     let (mut pressures, mut statuses) = ([[0.0; LANES]; LANES], [[0; LANES]; LANES]);
     for (index, tile) in tables.tiles.iter().enumerate() {
         let slot = index * LANES;
+        // All of them first: what was stored piece by piece is not yet to be had as a whole.
+        for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
+            simd::read(simd, raw, first + frame, index, tables.shuffles, bits);
+        }
         let mut faults = false;
         for frame in 0..frames {
-            let mut bits = [0_u32; LANES];
-            let values: &[u32] = cast_slice(&raw.row(first + frame)[slot..]);
-            match values.first_chunk::<LANES>() {
-                Some(values) => bits = *values,
-                None => bits[..values.len()].copy_from_slice(values),
-            }
-            faults |= calibrate::tile(simd, plan, tile, slot, &bits, &mut pressures[frame], &mut statuses[frame]);
+            let (pressures, statuses) = (&mut pressures[frame], &mut statuses[frame]);
+            faults |= calibrate::tile(simd, plan, tile, slot, &bits[frame], pressures, statuses);
         }
-        let mut turned = pressures;
-        transpose(simd, &mut turned);
-        scratch.pressures[slot..slot + LANES].copy_from_slice(&turned);
+        let turned = transpose(simd, |frame| pressures[frame]);
+        for (lanes, turned) in scratch.pressures[slot..slot + LANES].iter_mut().zip(&turned) {
+            turned.store_slice(lanes);
+        }
         if faults {
-            let mut turned = statuses;
-            transpose_u(simd, &mut turned);
-            scratch.statuses[slot..slot + LANES].copy_from_slice(&turned);
+            let turned = transpose_u(simd, |frame| statuses[frame]);
+            for (lanes, turned) in scratch.statuses[slot..slot + LANES].iter_mut().zip(&turned) {
+                turned.store_slice(lanes);
+            }
             scratch.faulty.push(index);
         }
     }
@@ -189,13 +190,14 @@ fn write<S: Simd>(
         if column.is_empty() {
             return;
         }
-        let mut rows = [[0.0; LANES]; LANES];
-        for (row, answer) in rows.iter_mut().zip(answers) {
-            *row = *of(answer);
-        }
-        transpose(simd, &mut rows);
+        let rows = transpose(simd, |field| *of(&answers[field]));
         for (frame, row) in rows.iter().take(frames).enumerate() {
-            column[place(frame)].copy_from_slice(&row[..count]);
+            let cells = &mut column[place(frame)];
+            if cells.len() == LANES {
+                row.store_slice(cells);
+            } else {
+                cells.copy_from_slice(&row.as_slice()[..count]);
+            }
         }
     };
     floats(cells.total, |cells| &cells.total);
@@ -211,18 +213,17 @@ fn write<S: Simd>(
         if column.is_empty() {
             return;
         }
-        let mut rows = [[0; LANES]; LANES];
-        for (row, answer) in rows.iter_mut().zip(answers) {
-            *row = *of(answer);
-        }
-        transpose_u(simd, &mut rows);
+        let rows = transpose_u(simd, |field| *of(&answers[field]));
         for (frame, row) in rows.iter().take(frames).enumerate() {
-            for (value, bits) in column[place(frame)].iter_mut().zip(row) {
-                *value = bits & mask;
+            let (row, cells) = (*row & mask, &mut column[place(frame)]);
+            if cells.len() == LANES {
+                row.store_slice(cells);
+            } else {
+                cells.copy_from_slice(&row.as_slice()[..count]);
             }
         }
     };
     integers(cells.active, |cells| &cells.active, u32::MAX);
-    integers(bytemuck::cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
-    integers(bytemuck::cast_slice_mut::<Outputs, u32>(cells.present), |cells| &cells.present, outputs.bits());
+    integers(cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    integers(cast_slice_mut::<Outputs, u32>(cells.present), |cells| &cells.present, outputs.bits());
 }

@@ -6,7 +6,7 @@ use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, 
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
-use crate::stage::layout::{FIRST_CURVE, Knot, MASKED};
+use crate::stage::layout::{FIRST_CURVE, Knot, MASKED, STRAIGHT, Taxel};
 
 /// Sixteen taxels' calibration, quantity by quantity.
 #[derive(Clone, Copy, Debug)]
@@ -18,9 +18,10 @@ pub(super) struct Tile {
     raw_low: Row<f32>,
     raw_high: Row<f32>,
     response: Row<u32>,
-    /// Whether any has a curve, any is masked.
-    curved: bool,
-    masked: bool,
+    /// Whether P is the raw value of all of them, with nothing to check but that it is a number.
+    raw_is_pressure: bool,
+    /// Whether none has a curve or is masked.
+    straight: bool,
 }
 
 impl Tile {
@@ -37,8 +38,8 @@ impl Tile {
                     raw_low: [f32::MIN; LANES],
                     raw_high: [f32::MAX; LANES],
                     response: [0; LANES],
-                    curved: taxels.iter().any(|taxel| taxel.response >= FIRST_CURVE),
-                    masked: taxels.iter().any(|taxel| taxel.response == MASKED),
+                    raw_is_pressure: taxels.len() == LANES && taxels.iter().all(raw_is_pressure),
+                    straight: taxels.iter().all(|taxel| taxel.response == STRAIGHT),
                 };
                 for (lane, taxel) in taxels.iter().enumerate() {
                     tile.baseline[lane] = taxel.baseline;
@@ -53,6 +54,12 @@ impl Tile {
             })
             .collect()
     }
+}
+
+fn raw_is_pressure(taxel: &Taxel) -> bool {
+    let Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area: _, response } = *taxel;
+    let unlimited = p_max >= f32::MAX && raw_low <= f32::MIN && raw_high >= f32::MAX;
+    response == STRAIGHT && baseline == 0.0 && gain == 1.0 && dead_band == 0.0 && unlimited
 }
 
 /// Raw bits to pressures and statuses; whether any status says anything. `first` is the tile's first slot.
@@ -72,6 +79,12 @@ pub(super) fn tile<S: Simd>(
         let lanes = at..at + width::<S>();
         let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
         let bits = U::<S>::from_slice(simd, &raw[lanes.clone()]);
+        if tile.raw_is_pressure && fine(simd, bits).all_true() {
+            store(simd, bits.bitcast::<F<S>>().max(splat(simd, 0.0)), pressures, at);
+            store_u(simd, splat_u(simd, 0), statuses, at);
+            at += width::<S>();
+            continue;
+        }
         let above = bits.bitcast::<F<S>>() - of(&tile.baseline);
         let pressure = above * of(&tile.gain);
         let plain = fine(simd, bits)
@@ -79,7 +92,7 @@ pub(super) fn tile<S: Simd>(
             & bits.bitcast::<F<S>>().simd_ge(of(&tile.raw_low))
             & bits.bitcast::<F<S>>().simd_le(of(&tile.raw_high))
             & pressure.simd_le(of(&tile.p_max));
-        if plain.all_true() && !tile.curved && !tile.masked {
+        if tile.straight && plain.all_true() {
             let over = pressure.simd_gt(of(&tile.dead_band));
             store(simd, over.select(pressure, splat(simd, 0.0)), pressures, at);
             store_u(simd, splat_u(simd, 0), statuses, at);
@@ -125,7 +138,7 @@ fn with_care<S: Simd>(
     let value = is_tiny(size).select(none, value);
     let above = value - of(&tile.baseline);
     let mut pressure = above * of(&tile.gain);
-    if tile.curved {
+    if !tile.straight {
         for lane in 0..width::<S>() {
             let slot = first + at + lane;
             if tile.response[at + lane] >= FIRST_CURVE {

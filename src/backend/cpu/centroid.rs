@@ -10,7 +10,9 @@ use super::touch::Members;
 #[inline(always)]
 pub(super) fn quotients<S: Simd>(simd: S, sums: &Sums<S>, touched: M<S>) -> (F<S>, F<S>) {
     let none = splat(simd, 0.0);
-    (touched.select(sums.u / sums.total, none), touched.select(sums.v / sums.total, none))
+    // One division for both: a unit in the last place more, of the five that the bound allows.
+    let share = touched.select(splat(simd, 1.0) / sums.total, none);
+    (sums.u * share, sums.v * share)
 }
 
 /// The numerator of the third coordinate, which only fields without a chart need.

@@ -1,18 +1,18 @@
 //! One frame: sixteen fields abreast.
 
-use bytemuck::cast_slice;
+use bytemuck::cast_slice_mut;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
+use super::super::Rows;
 use super::Tables;
 use super::calibrate;
-use super::simd::{F, LANES, Row, U, load, load_u};
-use super::touch::{Abreast, Cells, Kind, Members, Part, strip, touch};
+use super::simd::{self, F, LANES, Row, U, load, load_u};
+use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part, strip, touch};
 use super::wide::{Table, Values, Wide};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::{Plan, Stages};
-use crate::signal::RawValue;
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
@@ -21,21 +21,29 @@ const SHARED: usize = 1 << 16;
 #[derive(Clone, Debug)]
 enum Group {
     Narrow(Box<Narrow>),
-    Wide { field: usize, kind: Box<Kind>, table: usize },
+    Wide { field: usize, kind: OneKind, table: usize },
 }
 
 #[derive(Clone, Debug)]
 struct Narrow {
     /// Per lane, which field; fewer at the end.
     fields: Vec<usize>,
-    kind: Kind,
+    /// Where they are, if one stands after the other.
+    together: Option<usize>,
+    kinds: Kinds,
     /// By member; lanes that have no more go on with an unpressed one.
     slots: Vec<Row<u32>>,
-    weights: Vec<Row<f32>>,
-    u: Vec<Row<f32>>,
-    v: Vec<Row<f32>>,
+    members: Vec<MemberRow>,
     depths: Vec<Row<f32>>,
     areas: Vec<Row<f32>>,
+}
+
+/// A member of each field of a group.
+#[derive(Clone, Copy, Debug)]
+struct MemberRow {
+    weight: Row<f32>,
+    u: Row<f32>,
+    v: Row<f32>,
 }
 
 impl Narrow {
@@ -44,21 +52,20 @@ impl Narrow {
         let blank = vec![[0.0; LANES]; rows];
         let mut group = Self {
             fields: fields.to_vec(),
-            kind: Kind::EMPTY,
+            together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
+            kinds: Kinds::EMPTY,
             slots: vec![[unpressed as u32; LANES]; rows],
-            weights: blank.clone(),
-            u: blank.clone(),
-            v: blank.clone(),
+            members: vec![MemberRow { weight: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] }; rows],
             depths: blank.clone(),
             areas: blank,
         };
         for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
-            group.kind.set(lane, field.charted, field.area_known, field.unit_m);
+            group.kinds.set(lane, field);
             for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
                 group.slots[row][lane] = member.slot;
-                group.weights[row][lane] = member.weight;
-                group.u[row][lane] = member.u;
-                group.v[row][lane] = member.v;
+                group.members[row].weight[lane] = member.weight;
+                group.members[row].u[lane] = member.u;
+                group.members[row].v[lane] = member.v;
                 group.depths[row][lane] = *depth;
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
@@ -83,11 +90,12 @@ impl<S: Simd> Members<S> for OverFields<'_> {
 
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+        let MemberRow { weight, u, v } = &self.group.members[member];
         Part {
             pressure: load(simd, &self.pressures[member], at),
-            weight: load(simd, &self.group.weights[member], at),
-            u: load(simd, &self.group.u[member], at),
-            v: load(simd, &self.group.v[member], at),
+            weight: load(simd, weight, at),
+            u: load(simd, u, at),
+            v: load(simd, v, at),
         }
     }
 
@@ -134,9 +142,7 @@ impl Live {
         let (mut wide, mut narrow) = (Vec::new(), Vec::new());
         for (field, of) in plan.fields.iter().enumerate() {
             if let Some(table) = of.wide {
-                let mut kind = Kind::EMPTY;
-                (0..LANES).for_each(|lane| kind.set(lane, of.charted, of.area_known, of.unit_m));
-                wide.push(Group::Wide { field, kind: Box::new(kind), table });
+                wide.push(Group::Wide { field, kind: OneKind::new(of), table });
             } else {
                 narrow.push(field);
             }
@@ -157,16 +163,17 @@ impl Live {
         }
     }
 
-    /// All stages for the frame `raw`, into `cells`, which is one frame.
+    /// All stages for a frame of `raw`, into `cells`, which is one frame.
     pub(super) fn frame(
         &mut self,
         level: Level,
         plan: &Plan,
         tables: &Tables,
-        raw: &[RawValue],
+        raw: (Rows<'_>, usize),
         cells: &mut CellsMut<'_>,
     ) {
-        let faults = dispatch!(level, simd => read(simd, plan, tables, raw, &mut self.pressures, &mut self.statuses));
+        let Self { pressures, statuses, .. } = self;
+        let faults = dispatch!(level, simd => read(simd, plan, tables, raw, pressures, statuses));
         let frame = Frame {
             plan,
             tables,
@@ -192,8 +199,11 @@ impl Live {
         }
         for (group, answer) in self.groups.iter().zip(&self.answers) {
             match group {
-                Group::Wide { field, .. } => write(std::slice::from_ref(field), answer, plan.outputs, cells),
-                Group::Narrow(group) => write(&group.fields, answer, plan.outputs, cells),
+                Group::Wide { field, .. } => write(&Run { first: *field, count: 1 }, answer, plan.outputs, cells),
+                Group::Narrow(group) => match group.together {
+                    Some(first) => write(&Run { first, count: group.fields.len() }, answer, plan.outputs, cells),
+                    None => write(&group.fields, answer, plan.outputs, cells),
+                },
             }
         }
     }
@@ -229,7 +239,7 @@ impl Frame<'_> {
                 }
                 let Gathered { pressures, statuses, .. } = &*gathered;
                 let members = OverFields { group, pressures, statuses };
-                touch(simd, Abreast(members), &group.kind, stages, columns, self.faults, answer);
+                touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
             }
             Group::Wide { kind, table, .. } => {
                 let table: &Table = &self.tables.wide[*table];
@@ -270,44 +280,69 @@ fn read<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
-    raw: &[RawValue],
+    (raw, frame): (Rows<'_>, usize),
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
     let mut faults = false;
     let rows = pressures.iter_mut().zip(statuses);
     for (index, (tile, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
-        let mut bits = [0_u32; LANES];
-        let values: &[u32] = cast_slice(&raw[index * LANES..]);
-        match values.first_chunk::<LANES>() {
-            Some(values) => bits = *values,
-            None => bits[..values.len()].copy_from_slice(values),
-        }
+        let mut bits = [0; LANES];
+        simd::read(simd, raw, frame, index, tables.shuffles, &mut bits);
         faults |= calibrate::tile(simd, plan, tile, index * LANES, &bits, pressures, statuses);
     }
     faults
 }
 
-/// Puts a group's lanes where their fields belong.
-fn write(fields: &[usize], answer: &Cells, outputs: Outputs, cells: &mut CellsMut<'_>) {
-    fn put<T: Copy>(fields: &[usize], column: &mut [T], row: &Row<T>) {
-        if column.is_empty() {
-            return;
-        }
-        for (&field, &value) in fields.iter().zip(row) {
+/// Where lanes belong.
+trait Places {
+    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]);
+}
+
+impl Places for Vec<usize> {
+    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
+        for (&field, &value) in self.iter().zip(row) {
             column[field] = value;
         }
     }
-    put(fields, cells.total, &answer.total);
-    put(fields, cells.peak, &answer.peak);
-    put(fields, cells.area, &answer.area);
-    put(fields, cells.centroid_u, &answer.u);
-    put(fields, cells.centroid_v, &answer.v);
-    put(fields, cells.centroid_depth, &answer.depth);
-    put(fields, cells.orientation, &answer.orientation);
-    put(fields, cells.axis, &answer.axis);
-    put(fields, cells.anisotropy, &answer.anisotropy);
-    put(fields, cells.active, &answer.active);
-    put(fields, bytemuck::cast_slice_mut::<Flags, u32>(cells.flags), &answer.flags);
-    put(fields, bytemuck::cast_slice_mut::<Outputs, u32>(cells.present), &answer.present.map(|p| p & outputs.bits()));
+}
+
+/// Fields one after the other.
+struct Run {
+    first: usize,
+    count: usize,
+}
+
+impl Places for Run {
+    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
+        let column = &mut column[self.first..self.first + self.count];
+        match column.as_mut_array::<LANES>() {
+            Some(whole) => *whole = *row,
+            None => column.copy_from_slice(&row[..self.count]),
+        }
+    }
+}
+
+/// Puts a group's lanes where their fields belong.
+fn write(places: &impl Places, answer: &Cells, outputs: Outputs, cells: &mut CellsMut<'_>) {
+    let floats = |row: &Row<f32>, column: &mut [f32]| {
+        if !column.is_empty() {
+            places.put(row, column);
+        }
+    };
+    floats(&answer.total, cells.total);
+    floats(&answer.peak, cells.peak);
+    floats(&answer.area, cells.area);
+    floats(&answer.u, cells.centroid_u);
+    floats(&answer.v, cells.centroid_v);
+    floats(&answer.depth, cells.centroid_depth);
+    floats(&answer.orientation, cells.orientation);
+    floats(&answer.axis, cells.axis);
+    floats(&answer.anisotropy, cells.anisotropy);
+    if !cells.active.is_empty() {
+        places.put(&answer.active, cells.active);
+    }
+    places.put(&answer.flags, cast_slice_mut::<Flags, u32>(cells.flags));
+    let present = answer.present.map(|present| present & outputs.bits());
+    places.put(&present, cast_slice_mut::<Outputs, u32>(cells.present));
 }

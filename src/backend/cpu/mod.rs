@@ -47,6 +47,8 @@ pub(crate) struct Cpu {
 
 /// The plan as lanes read it.
 struct Tables {
+    /// Whether sixteen values are better shuffled out of 32 than read one by one.
+    shuffles: bool,
     tiles: Vec<calibrate::Tile>,
     /// The members of the fields that have many.
     wide: Vec<wide::Table>,
@@ -67,7 +69,11 @@ impl Cpu {
             }))
         });
         Self {
-            tables: Tables { tiles: calibrate::Tile::all(plan), wide: wide.collect() },
+            tables: Tables {
+                shuffles: matches!(instructions(level), "AVX-512" | "AVX2"),
+                tiles: calibrate::Tile::all(plan),
+                wide: wide.collect(),
+            },
             level,
             live: live::Live::new(plan),
             scratches: Mutex::new(Vec::new()),
@@ -99,20 +105,20 @@ impl Cpu {
     }
 }
 
+/// What `level` is called.
+fn instructions(level: Level) -> &'static str {
+    let name = format!("{level:?}");
+    let known = [("Avx512", "AVX-512"), ("Avx2", "AVX2"), ("Sse", "SSE"), ("Neon", "NEON"), ("Wasm", "SIMD128")];
+    known.into_iter().find(|(start, _)| name.starts_with(start)).map_or("scalar code", |(_, name)| name)
+}
+
 impl Backend for Cpu {
     fn name(&self) -> &'static str {
         "cpu"
     }
 
     fn describe(&self) -> String {
-        let words = match format!("{:?}", self.level) {
-            level if level.starts_with("Avx512") => "AVX-512",
-            level if level.starts_with("Avx2") => "AVX2",
-            level if level.starts_with("Sse") => "SSE",
-            level if level.starts_with("Neon") => "NEON",
-            _ => "scalar code",
-        };
-        format!("single precision, {words}, {} threads", rayon::current_num_threads())
+        format!("single precision, {}, {} threads", instructions(self.level), rayon::current_num_threads())
     }
 
     fn restart(&mut self) {
@@ -127,12 +133,18 @@ impl Backend for Cpu {
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
-        let mut cells = all.split_at(raw.first).1.split_at(raw.frames).0;
-        if raw.frames < LANES {
+        let mut cells = if raw.first == 0 && raw.frames == all.frames() {
+            all
+        } else {
+            all.split_at(raw.first).1.split_at(raw.frames).0
+        };
+        if raw.frames == 1 {
+            self.live.frame(self.level, &self.plan, &self.tables, (raw.rows, 0), &mut cells);
+        } else if raw.frames < LANES {
             let mut rest = cells.reborrow();
             for frame in 0..raw.frames {
                 let (mut first, later) = rest.split_at(1);
-                self.live.frame(self.level, &self.plan, &self.tables, raw.rows.row(frame), &mut first);
+                self.live.frame(self.level, &self.plan, &self.tables, (raw.rows, frame), &mut first);
                 rest = later;
             }
         } else {

@@ -63,12 +63,12 @@ pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, far: &Farthest<S>) -> Lin
     let single = touch.touched & touch.active.simd_le(one);
     let several = touch.touched & touch.active.simd_gt(one);
     let (x, y) = (far.x[0] - far.x[1], far.y[0] - far.y[1]);
-    let [first, second, third] = far.r;
-    let (first, second, third) = (first.max(none).sqrt(), second.max(none).sqrt(), third.max(none).sqrt());
-    let near = first * NEAR;
-    let coincident = several & (x * x + y * y).sqrt().simd_le(near);
+    // Distances are compared by their squares, as roots are dear.
+    let near = far.r[0].max(none).sqrt() * NEAR;
+    let limit = far.r[2].max(none).sqrt() + near;
+    let coincident = several & (x * x + y * y).simd_le(near * near);
     let found = several & !coincident;
-    let tie = found & touch.active.simd_gt(two) & (second - third).simd_le(near);
+    let tie = found & touch.active.simd_gt(two) & far.r[1].simd_le(limit * limit);
     Line {
         angle: found.select(of_line(simd, x, y), none),
         flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())

@@ -5,7 +5,9 @@
 //! registers.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x16, u32x16};
+use fearless_simd::{f32x16, u8x64, u32x16};
+
+use super::super::Rows;
 
 /// Lanes side by side.
 pub(super) const LANES: usize = 16;
@@ -63,38 +65,61 @@ pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
     mask.select(splat_u(simd, bits), splat_u(simd, 0))
 }
 
-/// Turns rows into columns: lane j of row i becomes lane i of row j. Four perfect shuffles do it.
+/// Reads the bits of frame `frame` from slot 16 · `tile` on.
 #[inline(always)]
-pub(super) fn transpose<S: Simd>(simd: S, rows: &mut [Row<f32>; LANES]) {
-    let mut now = [f32x16::splat(simd, 0.0); LANES];
-    for (now, row) in now.iter_mut().zip(rows.iter()) {
-        *now = f32x16::from_slice(simd, row);
-    }
-    for _ in 0..4 {
-        let before = now;
-        for i in 0..LANES / 2 {
-            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
+pub(super) fn read<S: Simd>(simd: S, raw: Rows<'_>, frame: usize, tile: usize, shuffles: bool, bits: &mut Row<u32>) {
+    if let (Rows::Picked { frames, picks }, true) = (raw, shuffles) {
+        if let Some((from, bytes)) = &picks.near[tile] {
+            let values: &[u32] = bytemuck::cast_slice(&frames[frame].values[*from..from + 2 * LANES]);
+            let [low, high] = [&values[..LANES], &values[LANES..]];
+            let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
+            low.concat_swizzle_dyn(high, u8x64::from_slice(simd, bytes)).store_slice(bits);
+            return;
         }
     }
-    for (now, row) in now.iter().zip(rows) {
-        now.store_slice(row);
+    raw.read(frame, tile * LANES, bits);
+}
+
+/// Rows turned into columns: lane j of row i becomes lane i of column j. Four perfect shuffles do it.
+#[inline(always)]
+pub(super) fn transpose<S: Simd>(simd: S, row: impl Fn(usize) -> Row<f32>) -> [f32x16<S>; LANES] {
+    let mut now = [f32x16::splat(simd, 0.0); LANES];
+    let mut i = 0;
+    while i < LANES {
+        now[i] = f32x16::from_slice(simd, &row(i));
+        i += 1;
     }
+    let mut round = 0;
+    while round < 4 {
+        let before = now;
+        let mut i = 0;
+        while i < LANES / 2 {
+            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
+            i += 1;
+        }
+        round += 1;
+    }
+    now
 }
 
 /// The same of integers.
 #[inline(always)]
-pub(super) fn transpose_u<S: Simd>(simd: S, rows: &mut [Row<u32>; LANES]) {
+pub(super) fn transpose_u<S: Simd>(simd: S, row: impl Fn(usize) -> Row<u32>) -> [u32x16<S>; LANES] {
     let mut now = [u32x16::splat(simd, 0); LANES];
-    for (now, row) in now.iter_mut().zip(rows.iter()) {
-        *now = u32x16::from_slice(simd, row);
+    let mut i = 0;
+    while i < LANES {
+        now[i] = u32x16::from_slice(simd, &row(i));
+        i += 1;
     }
-    for _ in 0..4 {
+    let mut round = 0;
+    while round < 4 {
         let before = now;
-        for i in 0..LANES / 2 {
+        let mut i = 0;
+        while i < LANES / 2 {
             (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
+            i += 1;
         }
+        round += 1;
     }
-    for (now, row) in now.iter().zip(rows) {
-        now.store_slice(row);
-    }
+    now
 }

@@ -11,7 +11,7 @@ use super::contact::{self, Sums};
 use super::orientation::{self, Farthest};
 use super::simd::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
 use crate::percept::{Flags, Outputs};
-use crate::scene::Stages;
+use crate::scene::{PlanField, Stages};
 use crate::stage::calibrate::UNUSABLE;
 
 /// A taxel's part in a field, a lane each.
@@ -87,42 +87,139 @@ impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
 }
 
 /// What the lanes' fields are like.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Kind {
-    /// Whether any has no chart, any has one.
-    pub(super) any_uncharted: bool,
-    pub(super) any_charted: bool,
+pub(super) trait Kind<S: Simd> {
+    /// Whether any has a chart.
+    fn any_charted(&self) -> bool;
+    /// Whether any has none.
+    fn any_uncharted(&self) -> bool;
     /// Flags that a field always has.
-    pub(super) always: Row<u32>,
+    fn always(&self, simd: S, at: usize) -> U<S>;
     /// The sums it can give.
-    pub(super) sums: Row<u32>,
+    fn sums(&self, simd: S, at: usize) -> U<S>;
     /// What it can give with its centroid.
-    pub(super) found: Row<u32>,
+    fn found(&self, simd: S, at: usize) -> U<S>;
     /// m.
-    pub(super) unit_m: Row<f32>,
+    fn unit_m(&self, simd: S, at: usize) -> F<S>;
 }
 
-impl Kind {
-    /// Of lanes without a field.
+/// Every lane's field is the same.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OneKind {
+    charted: bool,
+    always: u32,
+    sums: u32,
+    found: u32,
+    unit_m: f32,
+}
+
+impl OneKind {
+    pub(super) fn new(field: &PlanField) -> Self {
+        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
+        let in_chart = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        Self {
+            charted: field.charted,
+            always: if field.charted { Flags::empty() } else { Flags::NO_CHART }.bits(),
+            sums: if field.area_known { sums | Outputs::AREA } else { sums }.bits(),
+            found: if field.charted { in_chart } else { Outputs::POSITION }.bits(),
+            unit_m: field.unit_m,
+        }
+    }
+}
+
+impl<S: Simd> Kind<S> for OneKind {
+    #[inline(always)]
+    fn any_charted(&self) -> bool {
+        self.charted
+    }
+
+    #[inline(always)]
+    fn any_uncharted(&self) -> bool {
+        !self.charted
+    }
+
+    #[inline(always)]
+    fn always(&self, simd: S, _: usize) -> U<S> {
+        splat_u(simd, self.always)
+    }
+
+    #[inline(always)]
+    fn sums(&self, simd: S, _: usize) -> U<S> {
+        splat_u(simd, self.sums)
+    }
+
+    #[inline(always)]
+    fn found(&self, simd: S, _: usize) -> U<S> {
+        splat_u(simd, self.found)
+    }
+
+    #[inline(always)]
+    fn unit_m(&self, simd: S, _: usize) -> F<S> {
+        splat(simd, self.unit_m)
+    }
+}
+
+/// Every lane has a field of its own; lanes without one are charted and give nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kinds {
+    any_charted: bool,
+    any_uncharted: bool,
+    always: Row<u32>,
+    sums: Row<u32>,
+    found: Row<u32>,
+    unit_m: Row<f32>,
+}
+
+impl Kinds {
     pub(super) const EMPTY: Self = Self {
-        any_uncharted: false,
         any_charted: false,
+        any_uncharted: false,
         always: [0; LANES],
         sums: [0; LANES],
         found: [0; LANES],
         unit_m: [1.0; LANES],
     };
 
-    /// Says what the field in `lane` is like.
-    pub(super) fn set(&mut self, lane: usize, charted: bool, area_known: bool, unit_m: f32) {
-        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
-        let in_chart = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
-        self.any_charted |= charted;
-        self.any_uncharted |= !charted;
-        self.always[lane] = if charted { Flags::empty() } else { Flags::NO_CHART }.bits();
-        self.sums[lane] = if area_known { sums | Outputs::AREA } else { sums }.bits();
-        self.found[lane] = if charted { in_chart } else { Outputs::POSITION }.bits();
-        self.unit_m[lane] = unit_m;
+    /// Puts `field` into `lane`.
+    pub(super) fn set(&mut self, lane: usize, field: &PlanField) {
+        let kind = OneKind::new(field);
+        self.any_charted |= kind.charted;
+        self.any_uncharted |= !kind.charted;
+        self.always[lane] = kind.always;
+        self.sums[lane] = kind.sums;
+        self.found[lane] = kind.found;
+        self.unit_m[lane] = kind.unit_m;
+    }
+}
+
+impl<S: Simd> Kind<S> for Kinds {
+    #[inline(always)]
+    fn any_charted(&self) -> bool {
+        self.any_charted
+    }
+
+    #[inline(always)]
+    fn any_uncharted(&self) -> bool {
+        self.any_uncharted
+    }
+
+    #[inline(always)]
+    fn always(&self, simd: S, at: usize) -> U<S> {
+        load_u(simd, &self.always, at)
+    }
+
+    #[inline(always)]
+    fn sums(&self, simd: S, at: usize) -> U<S> {
+        load_u(simd, &self.sums, at)
+    }
+
+    #[inline(always)]
+    fn found(&self, simd: S, at: usize) -> U<S> {
+        load_u(simd, &self.found, at)
+    }
+
+    #[inline(always)]
+    fn unit_m(&self, simd: S, at: usize) -> F<S> {
+        load(simd, &self.unit_m, at)
     }
 }
 
@@ -203,7 +300,7 @@ pub(super) struct Line<S: Simd> {
 pub(super) fn touch<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
-    kind: &Kind,
+    kind: &impl Kind<S>,
     stages: Stages,
     outputs: Outputs,
     faults: bool,
@@ -222,7 +319,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>>(
 pub(super) fn strip<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
-    kind: &Kind,
+    kind: &impl Kind<S>,
     stages: Stages,
     outputs: Outputs,
     faults: bool,
@@ -232,8 +329,8 @@ pub(super) fn strip<S: Simd, P: Sweep<S>>(
     let sums = members.sums(simd, at, stages.centroid);
     let none = splat(simd, 0.0);
     let touched = sums.total.simd_gt(none);
-    let mut flags = load_u(simd, &kind.always, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
-    let mut present = load_u(simd, &kind.sums, at);
+    let mut flags = kind.always(simd, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
+    let mut present = kind.sums(simd, at);
     if faults {
         let (said, unusable) = members.statuses(simd, at);
         flags |= said;
@@ -248,7 +345,7 @@ pub(super) fn strip<S: Simd, P: Sweep<S>>(
     if outputs.contains(Outputs::ACTIVE) {
         store_u(simd, sums.active.to_int::<U<S>>(), &mut cells.active, at);
     }
-    if !(touched.any_true() && kind.any_charted) {
+    if !(touched.any_true() && kind.any_charted()) {
         for column in [&mut cells.orientation, &mut cells.axis, &mut cells.anisotropy] {
             store(simd, none, column, at);
         }
@@ -262,14 +359,14 @@ pub(super) fn strip<S: Simd, P: Sweep<S>>(
         return;
     }
     if stages.centroid {
-        let found = load_u(simd, &kind.found, at);
+        let found = kind.found(simd, at);
         present |= touched.select(found, splat_u(simd, 0));
-        let unit = load(simd, &kind.unit_m, at);
+        let unit = kind.unit_m(simd, at);
         let (u, v) = centroid::quotients(simd, &sums, touched);
         store(simd, u * unit, &mut cells.u, at);
         store(simd, v * unit, &mut cells.v, at);
         let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
-        let depth = if kind.any_uncharted {
+        let depth = if kind.any_uncharted() {
             let depth = members.depth(simd, at) / sums.total;
             (touched & !charted).select(depth, none) * unit
         } else {
@@ -279,13 +376,13 @@ pub(super) fn strip<S: Simd, P: Sweep<S>>(
         let touched = touched & charted;
         let scale = scale_of(simd, sums.total);
         let touch = Touch { active: sums.active, touched, total: sums.total, scale, u, v };
-        if stages.orientation && kind.any_charted {
+        if stages.orientation && kind.any_charted() {
             let line = orientation::line(simd, &touch, &members.farthest(simd, at, &touch));
             store(simd, line.angle, &mut cells.orientation, at);
             flags |= line.flags;
             present |= line.present;
         }
-        if stages.axis && kind.any_charted {
+        if stages.axis && kind.any_charted() {
             let (line, anisotropy) = axis::line(simd, &touch, &members.moments(simd, at, &touch));
             store(simd, line.angle, &mut cells.axis, at);
             store(simd, anisotropy, &mut cells.anisotropy, at);

@@ -25,6 +25,7 @@ use super::{Backend, RawBatch};
 use crate::error::{Error, Result};
 use crate::percept::{CellsMut, Outputs, Percepts};
 use crate::scene::Plan;
+use crate::signal::RawValue;
 use crate::stage::layout;
 
 /// Invocations a group, as `shaders/shared/layout.wgsl` has it.
@@ -52,6 +53,7 @@ pub(crate) struct Gpu {
     readback: wgpu::Buffer,
     /// The batch's steps as the device reads them; kept so that a call allocates nothing.
     packed_steps: Vec<layout::Step>,
+    packed_row: Vec<RawValue>,
     /// What a restart sets to zero.
     memory: [wgpu::Buffer; 2],
 }
@@ -224,6 +226,7 @@ impl Gpu {
             results,
             readback,
             packed_steps: Vec::with_capacity(capacity),
+            packed_row: Vec::with_capacity(plan.slots()),
             memory: [touched, last],
         })
     }
@@ -245,8 +248,10 @@ impl Gpu {
             mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(&header));
             mapped.slice(HEADER as usize..from as usize).copy_from_slice(cast_slice(&self.packed_steps));
             for frame in 0..raw.frames {
+                self.packed_row.clear();
+                self.packed_row.extend(raw.rows.row(frame));
                 let at = from as usize + frame * slots as usize * 4;
-                mapped.slice(at..at + slots as usize * 4).copy_from_slice(cast_slice(raw.rows.row(frame)));
+                mapped.slice(at..at + slots as usize * 4).copy_from_slice(cast_slice(&self.packed_row));
             }
         }
         self.upload.unmap();
