@@ -13,7 +13,7 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Unfit, Upkeep, UpkeepKeys};
+use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
 use crate::stage::{layout, touches};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
@@ -88,7 +88,8 @@ impl Check {
             reference: Reference::new(plan),
             memories: vec![touches::Memory::default(); plan.fields.len()],
             right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
-                .with_columns(plan.columns, plan.kept_pressures()),
+                .with_columns(plan.columns, plan.kept_pressures())
+                .with_letters(plan.letters().len()),
             bounds: Vec::new(),
         }
     }
@@ -97,7 +98,7 @@ impl Check {
 /// Upkeep, and what it needs of the engine.
 struct KeptUp {
     upkeep: Upkeep,
-    /// The taxels as the calibration has them.
+    /// The taxels as the calibration has them, slot by slot.
     made: Vec<layout::Taxel>,
     /// Per field, whether it was in contact in this epoch.
     touched: Vec<bool>,
@@ -132,6 +133,12 @@ impl Engine {
         }
         let fields = FieldSet::new(body)?;
         let plan = Plan::new(body, &fields, &scene, &calibration)?;
+        let upkeep = KeptUp::new(&plan, calibration.upkeep);
+        if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
+            return Err(Error::usage(
+                "the calibration's [upkeep] must know what is touched; ask for letter `sustained` too",
+            ));
+        }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         Ok(Self {
@@ -139,9 +146,10 @@ impl Engine {
             last_t_s: None,
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
-                .with_columns(plan.columns, plan.kept_pressures()),
+                .with_columns(plan.columns, plan.kept_pressures())
+                .with_letters(plan.letters().len()),
             check: None,
-            upkeep: KeptUp::new(&plan, calibration.upkeep),
+            upkeep,
             memories: vec![touches::Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
@@ -229,7 +237,7 @@ impl Engine {
             None => Box::new(Check::new(&self.plan)),
         };
         let done = self.advance(frames, Some(&mut check));
-        let names: Vec<&str> = self.plan.fields.iter().map(|field| field.name.as_str()).collect();
+        let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
         let agreement = done.map(|()| compare(&check.right, &check.bounds, &self.percepts, &names));
         self.check = Some(check);
         Ok((&self.percepts, agreement?))
@@ -263,8 +271,8 @@ impl Engine {
                 start = index;
             }
             if let Some(kept) = &mut self.upkeep {
-                let slots = self.plan.slots();
-                kept.upkeep.observe(frames[index].t_s, &self.raw[index * slots..][..slots]);
+                let channels = self.plan.channels();
+                kept.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }
         self.segment(frames, start..frames.len(), check)?;
@@ -274,10 +282,10 @@ impl Engine {
 
     /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
     fn take_as_baselines(&mut self, check: Option<&mut Check>) {
-        for slot in 0..self.plan.slots() {
-            if let Some(value) = self.raw[slot].number() {
-                let made = self.plan.taxels[slot];
-                self.plan.keep_up(slot, value as f32, false, &made);
+        let made = self.plan.taxels.clone();
+        for channel in 0..self.plan.channels() {
+            if let Some(value) = self.raw[channel].number() {
+                self.plan.keep_up(channel, value as f32, false, &made);
             }
         }
         if let Some(kept) = &mut self.upkeep {
@@ -294,11 +302,11 @@ impl Engine {
         if range.is_empty() {
             return Ok(());
         }
-        let slots = self.plan.slots();
+        let channels = self.plan.channels();
         let raw = RawBatch {
             first: range.start,
             frames: range.len(),
-            values: &self.raw[range.start * slots..range.end * slots],
+            values: &self.raw[range.start * channels..range.end * channels],
             steps: &self.steps[range.clone()],
         };
         let host = Host { plan: &self.plan, links: &self.links };
@@ -322,11 +330,11 @@ impl Engine {
     /// Lets upkeep judge the epoch, and calibrates from now on as it says.
     fn close_epoch(&mut self, check: Option<&mut Check>) {
         let Some(kept) = &mut self.upkeep else { return };
-        let changed = kept.upkeep.close(&self.plan.touched_slots(&kept.touched));
+        let changed = kept.upkeep.close(&self.plan.touched_channels(&kept.touched));
         kept.touched.fill(false);
         if changed {
-            for (slot, ((baseline, unfit), made)) in kept.upkeep.taxels().zip(&kept.made).enumerate() {
-                self.plan.keep_up(slot, baseline, unfit.is_some(), made);
+            for (channel, (baseline, unfit)) in kept.upkeep.taxels().enumerate() {
+                self.plan.keep_up(channel, baseline, unfit.is_some(), &kept.made);
             }
             self.backend.recalibrate(&self.plan);
             if let Some(check) = check {

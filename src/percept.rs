@@ -147,8 +147,10 @@ pub struct Touch {
 /// One field's percept for one frame. Lengths in metres, angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percept {
-    /// Index of the field.
+    /// Index of the field, as [`crate::Plan::fields`] counts: once for each letter.
     pub field: usize,
+    /// Which of the run's letters it is of, as [`crate::Plan::letters`] counts.
+    pub letter: usize,
     /// Whether the field is touched.
     pub contact: bool,
     /// Why quantities are absent, or in doubt.

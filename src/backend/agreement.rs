@@ -83,7 +83,12 @@ impl fmt::Display for Agreement {
 const MOST_WORDS: usize = 10;
 
 /// Compares `candidate` with `reference`, whose cells may differ by `bounds`.
-pub(crate) fn compare(reference: &Percepts, bounds: &[CellBound], candidate: &Percepts, names: &[&str]) -> Agreement {
+pub(crate) fn compare(
+    reference: &Percepts,
+    bounds: &[CellBound],
+    candidate: &Percepts,
+    names: &[impl fmt::Display],
+) -> Agreement {
     let mut agreement = Agreement::default();
     for frame in 0..reference.frames() {
         for (field, name) in names.iter().enumerate() {

@@ -50,7 +50,7 @@ impl FromStr for BackendKind {
     }
 }
 
-/// A batch of raw values: frames one after the other, each with one value a slot.
+/// A batch of raw values: frames one after the other, each with one value a channel.
 #[derive(Clone, Copy)]
 pub(crate) struct RawBatch<'a> {
     /// Where its first frame stands in the percepts.
@@ -129,7 +129,7 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
 fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration> {
     const CALLS: usize = 15;
     const ENOUGH: Duration = Duration::from_millis(60);
-    let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
+    let values: Vec<RawValue> = (0..batch * plan.channels()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
     let raw = RawBatch { first: 0, frames: batch, values: &values, steps: &steps };
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)

@@ -6,10 +6,12 @@ use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
+use crate::signal::RawValue;
 use crate::stage::calibrate::{Pressure, UNUSABLE};
+use crate::stage::change::Heard;
 use crate::stage::hysteresis::ContactState;
 use crate::stage::{
-    Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position, touches,
+    Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation, position, touches,
 };
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
@@ -45,8 +47,11 @@ pub(crate) struct Reference {
     plan: Plan,
     /// Per field, what the frame before left.
     before: Vec<Before>,
-    /// The same for the bounds, which are worked out apart.
+    /// The raw values of the frame before, by channel.
+    raw_before: Vec<RawValue>,
+    /// The same two for the bounds, which are worked out apart.
     bound_before: Vec<BoundBefore>,
+    bound_raw_before: Vec<RawValue>,
 }
 
 /// What a field's next percept hangs on.
@@ -73,15 +78,32 @@ impl Reference {
         Self {
             plan: plan.clone(),
             before: vec![Before::default(); fields],
+            raw_before: vec![RawValue::MISSING; plan.channels()],
             bound_before: vec![BoundBefore::default(); fields],
+            bound_raw_before: vec![RawValue::MISSING; plan.channels()],
         }
     }
 
-    /// One frame's pressures, taxel by taxel.
-    fn pressures(&self, raw: &RawBatch<'_>, frame: usize) -> Vec<Pressure> {
-        let values = &raw.values[frame * self.plan.slots()..][..self.plan.slots()];
-        let taxels = values.iter().zip(&self.plan.calibrations).enumerate();
-        taxels.map(|(slot, (&raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
+    /// One frame's pressures and changes, slot by slot; `before` has the raw values of the frame before.
+    fn pressures(&self, values: &[RawValue], before: &[RawValue], step: &Step) -> Vec<Pressure> {
+        let plan = &self.plan;
+        let heard = |values: &[RawValue], slot: usize| {
+            let (channel, knots) = (plan.channel_of(slot), plan.knots_of(slot));
+            let raw = values[channel];
+            Heard { raw, pressure: calibrate::reference(raw, &plan.calibrations[channel], knots) }
+        };
+        let mut pressures: Vec<Pressure> = (0..plan.calibrated()).map(|slot| heard(values, slot).pressure).collect();
+        for taxel in &plan.taxels[plan.calibrated()..] {
+            let slot = taxel.response as usize;
+            let now = Heard { raw: values[plan.channel_of(slot)], pressure: pressures[slot] };
+            pressures.push(change::reference(now, heard(before, slot), step.dt_s, step.flags, taxel.dead_band));
+        }
+        pressures
+    }
+
+    /// The raw values of the batch's frame `frame`.
+    fn row<'a>(&self, raw: &RawBatch<'a>, frame: usize) -> &'a [RawValue] {
+        &raw.values[frame * self.plan.channels()..][..self.plan.channels()]
     }
 
     /// A field's pressed taxels, by ascending id.
@@ -98,7 +120,7 @@ impl Reference {
                     pressure: value,
                     excess: (bound - 2.0 * U * value).max(0.0),
                     place,
-                    area: self.plan.areas[member.slot as usize],
+                    area: self.plan.areas[self.plan.channel_of(member.slot as usize)],
                 }
             })
             .collect()
@@ -108,7 +130,9 @@ impl Reference {
     pub(crate) fn bounds(&mut self, raw: &RawBatch<'_>) -> Vec<CellBound> {
         let mut bounds = Vec::with_capacity(raw.frames * self.plan.fields.len());
         for frame in 0..raw.frames {
-            let pressures = self.pressures(raw, frame);
+            let values = self.row(raw, frame);
+            let pressures = self.pressures(values, &self.bound_raw_before, &raw.steps[frame]);
+            self.bound_raw_before.copy_from_slice(values);
             for index in 0..self.plan.fields.len() {
                 let (bound, before) = self.bound(index, &pressures, &raw.steps[frame]);
                 self.bound_before[index] = before;
@@ -334,7 +358,9 @@ impl Backend for Reference {
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let fields = self.plan.fields.len();
         for frame in 0..raw.frames {
-            let pressures = self.pressures(raw, frame);
+            let values = self.row(raw, frame);
+            let pressures = self.pressures(values, &self.raw_before, &raw.steps[frame]);
+            self.raw_before.copy_from_slice(values);
             if !percepts.pressures.is_empty() {
                 let slots = self.plan.slots();
                 let kept = &mut percepts.pressures[(raw.first + frame) * slots..][..slots];

@@ -59,6 +59,8 @@ pub struct Percepts {
     /// The outputs, and what stages work on.
     columns: Outputs,
     fields: usize,
+    /// Letters that every field is there in, one after the other.
+    letters: usize,
     /// Taxels whose pressures are kept, 0 unless a stage works on them.
     slots: usize,
     pub(crate) first_frame: u64,
@@ -85,6 +87,7 @@ impl Percepts {
             outputs,
             columns: outputs,
             fields,
+            letters: 1,
             slots: 0,
             first_frame: 0,
             t_s: Vec::new(),
@@ -102,6 +105,12 @@ impl Percepts {
             touches: Vec::new(),
             touch_ends: Vec::new(),
         }
+    }
+
+    /// The same, for fields of which each stands there in `letters` letters, one after the other.
+    pub(crate) fn with_letters(mut self, letters: usize) -> Self {
+        self.letters = letters.max(1);
+        self
     }
 
     /// The same, with room for `columns` beside the outputs, and for the pressures of `slots` taxels.
@@ -156,7 +165,7 @@ impl Percepts {
         self.t_s.len()
     }
 
-    /// Number of fields in every frame.
+    /// Number of fields in every frame, each counted once for each letter.
     #[must_use]
     pub fn fields(&self) -> usize {
         self.fields
@@ -183,6 +192,7 @@ impl Percepts {
         let has = |output| present.contains(output);
         let mut percept = Percept {
             field,
+            letter: field % self.letters,
             contact: !flags.contains(Flags::NO_CONTACT),
             flags,
             total: None,

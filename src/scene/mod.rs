@@ -7,7 +7,7 @@ pub use plan::Plan;
 pub(crate) use plan::PlanField;
 
 use crate::percept::Outputs;
-use crate::signal::FsrSignal;
+use crate::signal::Letter;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +20,18 @@ pub struct Scene {
     pub max_age_s: f64,
     /// The longest step between frames over which motion is measured, s.
     pub max_gap_s: f64,
-    /// Which signal the sensors of the paper's circuit deliver, instead of what the calibration says.
-    pub signal: Option<FsrSignal>,
+    /// What sensors are read as; every field is computed once for each. Usually one, the pressure itself.
+    pub letters: Vec<Letter>,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0, signal: None }
+        Self {
+            outputs: Outputs::USUAL,
+            fields: Vec::new(),
+            max_age_s: 0.0,
+            max_gap_s: 10.0,
+            letters: vec![Letter::default()],
+        }
     }
 }

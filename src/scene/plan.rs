@@ -11,7 +11,7 @@ use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
-use crate::signal::{Calibration, Response, TaxelCalibration};
+use crate::signal::{Calibration, ContactThresholds, FsrSignal, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::{layout, motion};
 
@@ -48,12 +48,16 @@ pub struct Plan {
     stages: Stages,
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
-    /// The body's taxels that are read, by ascending id; a *slot* is an index into this.
+    letters: Vec<Letter>,
+    /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
-    /// Per slot.
+    /// Per channel.
     pub(crate) calibrations: Vec<TaxelCalibration>,
-    /// Per slot, m².
+    /// Per channel, m².
     pub(crate) areas: Vec<f64>,
+    /// How many slots are calibrated from raw values: all channels in each signal, signal by signal. The slots after them
+    /// are changes of these: all channels in each letter that is one.
+    calibrated: usize,
     /// Per slot, as the f32 backends read them.
     pub(crate) taxels: Vec<layout::Taxel>,
     /// What their responses refer to.
@@ -63,10 +67,12 @@ pub struct Plan {
     pub(crate) members: Vec<layout::Member>,
 }
 
-/// A field as a backend sees it.
+/// A field in one letter, as a backend sees it.
 #[derive(Clone, Debug)]
 pub(crate) struct PlanField {
     pub(crate) name: String,
+    /// Which of the scene's letters its taxels are read in.
+    pub(crate) letter: usize,
     /// Name of the anchor, or [`WORLD`].
     pub(crate) link: String,
     /// The anchor's index in the body.
@@ -102,7 +108,8 @@ impl Plan {
     ///
     /// # Errors
     /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has.
+    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has, for no letter, or for
+    /// one twice.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
             let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
@@ -113,7 +120,9 @@ impl Plan {
         }
         calibration.check_body(&body.name)?;
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
-        if let Some(signal) = scene.signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
+        Letter::check(&scene.letters)?;
+        let signal = scene.letters.iter().find_map(|letter| letter.signal);
+        if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
                 "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; see docs/calibration.md"
             )));
@@ -131,30 +140,31 @@ impl Plan {
         let read: BTreeSet<usize> =
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
-        let slot_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
+        let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let mut plan = Self {
             outputs: scene.outputs,
             stages: Stages::of(scene.outputs),
             columns: scene.outputs,
+            letters: scene.letters.clone(),
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
+            calibrated: 0,
             taxels: Vec::new(),
             curves: Curves::default(),
             fields: Vec::with_capacity(chosen.len()),
             members: Vec::new(),
             body_taxels: Vec::new(),
         };
-        for (of_taxel, &area) in plan.calibrations.iter().zip(&plan.areas) {
-            let response = plan.curves.response_of(calibration, of_taxel, scene.signal)?;
-            plan.taxels.push(taxel(of_taxel, area, response));
-        }
+        let first_slots = plan.lay_out_slots(calibration)?;
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
+            let first = plan.fields.len();
             plan.fields.push(PlanField {
                 name: field.name.clone(),
+                letter: 0,
                 link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
                 anchor: field.anchor,
                 first: plan.members.len(),
@@ -163,7 +173,7 @@ impl Plan {
                 divided: parents.contains(&index),
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unit_m,
-                thresholds: thresholds(calibration, &field.name),
+                thresholds: Thresholds::default(),
                 still_within: motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32,
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
@@ -173,13 +183,23 @@ impl Plan {
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
             });
-            let places = &plan.fields[plan.fields.len() - 1].places;
-            plan.members.extend(field.members.iter().zip(places).map(|(member, place)| layout::Member {
-                slot: slot_of(member.taxel),
-                weight: member.weight as f32,
-                u: place.x as f32,
-                v: place.y as f32,
-            }));
+            // The same in every letter, but for what it reads and when it counts as touched.
+            for letter in 1..plan.letters.len() {
+                plan.fields.push(PlanField { letter, ..plan.fields[first].clone() });
+            }
+            for (letter, &first_slot) in first_slots.iter().enumerate() {
+                let in_letter = &mut plan.fields[first + letter];
+                in_letter.first = plan.members.len();
+                in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
+                plan.members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| {
+                    layout::Member {
+                        slot: first_slot + channel_of(member.taxel),
+                        weight: member.weight as f32,
+                        u: place.x as f32,
+                        v: place.y as f32,
+                    }
+                }));
+            }
         }
         plan.body_taxels = body_taxels;
         plan.stages.hysteresis = plan.fields.iter().any(|field| field.thresholds != Thresholds::default());
@@ -198,27 +218,68 @@ impl Plan {
         self.outputs
     }
 
-    /// Calibrates the taxel in `slot` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how it was
-    /// before any upkeep.
-    pub(crate) fn keep_up(&mut self, slot: usize, baseline: f32, unfit: bool, made: &layout::Taxel) {
-        let response = if unfit { layout::MASKED } else { made.response };
-        self.taxels[slot] = layout::Taxel { baseline, response, ..*made };
-        self.calibrations[slot].baseline = baseline;
-        self.calibrations[slot].mask = response == layout::MASKED;
+    /// Makes the taxels, slot by slot: every signal's pressures, then every changing letter's changes of them. Gives each
+    /// letter's first slot.
+    fn lay_out_slots(&mut self, calibration: &Calibration) -> Result<Vec<u32>> {
+        let mut signals: Vec<Option<FsrSignal>> = Vec::new();
+        for letter in &self.letters {
+            if !signals.contains(&letter.signal) {
+                signals.push(letter.signal);
+                for (of_taxel, &area) in self.calibrations.iter().zip(&self.areas) {
+                    let response = self.curves.response_of(calibration, of_taxel, letter.signal)?;
+                    self.taxels.push(taxel(of_taxel, area, response));
+                }
+            }
+        }
+        self.calibrated = self.taxels.len();
+        let mut first_slots = Vec::with_capacity(self.letters.len());
+        for letter in &self.letters {
+            let signal = signals.iter().position(|&signal| signal == letter.signal).unwrap_or_default();
+            let pressures = signal * self.areas.len();
+            if letter.receptor == Receptor::Sustained {
+                first_slots.push(pressures as u32);
+                continue;
+            }
+            first_slots.push(self.taxels.len() as u32);
+            let dead_band = calibration.change.dead_band;
+            self.taxels.extend((pressures as u32..).zip(&self.areas).map(|(response, &area)| layout::Taxel {
+                dead_band,
+                p_max: f32::MAX,
+                area: area as f32,
+                response,
+                ..layout::Taxel::default()
+            }));
+        }
+        Ok(first_slots)
     }
 
-    /// Per slot, whether one of its own fields is in contact, where `touched` says it of each field. A taxel's own fields
-    /// are those that no child divides further, so that a body that is touched somewhere is not touched everywhere.
-    pub(crate) fn touched_slots(&self, touched: &[bool]) -> Vec<bool> {
-        let mut own = vec![false; self.slots()];
-        let mut finest = vec![false; self.slots()];
+    /// Calibrates the taxel at `channel` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how all
+    /// slots were before any upkeep.
+    pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
+        for slot in (channel..self.calibrated).step_by(self.channels()) {
+            let response = if unfit { layout::MASKED } else { made[slot].response };
+            self.taxels[slot] = layout::Taxel { baseline, response, ..made[slot] };
+            self.calibrations[channel].mask = response == layout::MASKED;
+        }
+        self.calibrations[channel].baseline = baseline;
+    }
+
+    /// Per channel, whether one of its own fields is in lasting contact, where `touched` says it of each field. A taxel's
+    /// own fields are those that no child divides further, so that a body that is touched somewhere is not touched
+    /// everywhere.
+    pub(crate) fn touched_channels(&self, touched: &[bool]) -> Vec<bool> {
+        let mut own = vec![false; self.channels()];
+        let mut finest = vec![false; self.channels()];
+        let lasting = |field: &PlanField| self.letters[field.letter].receptor == Receptor::Sustained;
+        let fields: Vec<_> = self.fields.iter().zip(touched).filter(|(field, _)| lasting(field)).collect();
         for divided in [false, true] {
-            for (field, &touched) in self.fields.iter().zip(touched).filter(|(field, _)| field.divided == divided) {
-                for slot in self.members_of(field).iter().map(|member| member.slot as usize) {
-                    if !divided || !finest[slot] {
-                        own[slot] |= touched;
+            for &(field, &touched) in fields.iter().filter(|(field, _)| field.divided == divided) {
+                for member in self.members_of(field) {
+                    let channel = self.channel_of(member.slot as usize);
+                    if !divided || !finest[channel] {
+                        own[channel] |= touched;
                     }
-                    finest[slot] |= !divided;
+                    finest[channel] |= !divided;
                 }
             }
         }
@@ -233,8 +294,33 @@ impl Plan {
 
     /// Number of taxels that are read.
     #[must_use]
+    pub fn channels(&self) -> usize {
+        self.body_taxels.len()
+    }
+
+    /// Number of values that fields are made of in a frame: a taxel has one for each signal and letter that needs it.
+    #[must_use]
     pub fn slots(&self) -> usize {
         self.taxels.len()
+    }
+
+    /// How many of the slots, the first ones, are pressures calibrated from raw values; the others are their changes.
+    pub(crate) fn calibrated(&self) -> usize {
+        self.calibrated
+    }
+
+    pub(crate) fn has_changes(&self) -> bool {
+        self.calibrated < self.slots()
+    }
+
+    pub(crate) fn channel_of(&self, slot: usize) -> usize {
+        slot % self.channels()
+    }
+
+    /// The letters that every field is read in; what [`crate::Percept::letter`] counts.
+    #[must_use]
+    pub fn letters(&self) -> &[Letter] {
+        &self.letters
     }
 
     /// Number of (field, taxel) pairs: the work of a frame.
@@ -243,12 +329,24 @@ impl Plan {
         self.members.len()
     }
 
-    /// Names of the fields, in the order of the percepts, each with the link it answers in.
+    /// Names of the fields, in the order of the percepts, each with the link it answers in. A field stands there once for
+    /// each of [`Plan::letters`], in their order.
     pub fn fields(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
         self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
     }
 
-    /// Per slot.
+    /// What people call a field of the percepts: its name, and what tells its letter from what is usual.
+    #[must_use]
+    pub fn label(&self, field: usize) -> String {
+        self.fields.get(field).map_or(String::new(), |f| format!("{}{}", f.name, self.mark_of(f.letter)))
+    }
+
+    /// What is to be said of a letter, as [`Plan::letters`] counts.
+    fn mark_of(&self, letter: usize) -> Mark {
+        self.letters.get(letter).map_or(Mark::default(), |own| own.mark(&self.letters))
+    }
+
+    /// Per slot that is calibrated.
     pub(crate) fn knots_of(&self, slot: usize) -> &[layout::Knot] {
         self.curves.of(self.taxels[slot].response)
     }
@@ -303,8 +401,11 @@ fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
     field.members.iter().map(|member| beside(member.taxel)).collect()
 }
 
-fn thresholds(calibration: &Calibration, field: &str) -> Thresholds {
-    let contact = calibration.fields.get(field).copied().unwrap_or(calibration.contact);
+fn thresholds(calibration: &Calibration, field: &str, receptor: Receptor) -> Thresholds {
+    let contact: ContactThresholds = match receptor {
+        Receptor::Sustained => calibration.fields.get(field).copied().unwrap_or(calibration.contact),
+        Receptor::Change => calibration.change.contact,
+    };
     Thresholds { on: contact.on, off: contact.off }
 }
 

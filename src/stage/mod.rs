@@ -13,6 +13,7 @@ pub(crate) mod angle;
 pub(crate) mod axis;
 pub(crate) mod calibrate;
 pub(crate) mod centroid;
+pub(crate) mod change;
 pub(crate) mod contact;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;

@@ -14,23 +14,34 @@ pub(super) fn lanes<const L: usize>(
     pressures: &mut [[f32; L]],
     statuses: &mut [[u32; L]],
 ) {
-    for (slot, taxel) in plan.taxels.iter().enumerate() {
-        let slots = plan.taxels.len();
+    let channels = plan.channels();
+    for (slot, taxel) in plan.taxels[..plan.calibrated()].iter().enumerate() {
+        let channel = plan.channel_of(slot);
         let (pressures, statuses) = (&mut pressures[slot], &mut statuses[slot]);
         if taxel.response < FIRST_CURVE {
             for lane in 0..count {
                 let straight = |above| above * taxel.gain;
-                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, straight);
+                (pressures[lane], statuses[lane]) = one(raw[lane * channels + channel], taxel, straight);
             }
         } else {
             let knots = plan.knots_of(slot);
             for lane in 0..count {
-                (pressures[lane], statuses[lane]) = one(raw[lane * slots + slot], taxel, |x| on_curve(knots, x));
+                (pressures[lane], statuses[lane]) = one(raw[lane * channels + channel], taxel, |x| on_curve(knots, x));
             }
         }
         // Lanes beyond the batch's end are empty frames.
         pressures[count..].fill(0.0);
         statuses[count..].fill(0);
+    }
+}
+
+/// The pressure and status of one taxel in one frame.
+pub(super) fn single(plan: &Plan, slot: usize, raw: RawValue) -> (f32, u32) {
+    let taxel = &plan.taxels[slot];
+    if taxel.response < FIRST_CURVE {
+        one(raw, taxel, |above| above * taxel.gain)
+    } else {
+        one(raw, taxel, |x| on_curve(plan.knots_of(slot), x))
     }
 }
 

@@ -6,12 +6,13 @@
 mod axis;
 mod calibrate;
 mod centroid;
+mod change;
 mod contact;
 mod hysteresis;
 mod motion;
 mod orientation;
 
-use super::{Backend, RawBatch};
+use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{CellsMut, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
@@ -26,6 +27,8 @@ const TASK: usize = 8 * LANES;
 pub(crate) struct Cpu {
     plan: Plan,
     single: Scratch<1>,
+    /// The raw values of the frame before, where the plan has changes.
+    before: Vec<RawValue>,
     /// Per field, whether the frame before was in contact.
     touched: Vec<bool>,
     /// Per field, its centroid in the frame before, in its unit, if that was in contact.
@@ -37,6 +40,7 @@ impl Cpu {
         Self {
             plan: plan.clone(),
             single: Scratch::new(plan.slots()),
+            before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],
             last: vec![None; plan.fields.len()],
         }
@@ -66,13 +70,17 @@ impl Backend for Cpu {
         let mut cells = all.split_at(raw.first).1;
         if raw.frames < LANES {
             let mut rest = cells.reborrow();
-            for frame in raw.values.chunks_exact(self.plan.slots().max(1)) {
+            let mut before = &self.before[..];
+            for (frame, step) in raw.values.chunks_exact(self.plan.channels().max(1)).zip(raw.steps) {
                 let (mut first, later) = rest.split_at(1);
-                self.single.block(&self.plan, frame, 1, &mut first);
-                rest = later;
+                self.single.block(&self.plan, before, frame, std::slice::from_ref(step), &mut first);
+                (rest, before) = (later, frame);
             }
         } else {
-            batch(&self.plan, raw.values, raw.frames, cells.reborrow());
+            batch(&self.plan, &self.before, raw.values, raw.steps, cells.reborrow());
+        }
+        if self.plan.has_changes() && raw.frames > 0 {
+            self.before.copy_from_slice(&raw.values[raw.values.len() - self.plan.channels()..]);
         }
         // What hangs on the frame before goes through the frames in order.
         let stages = self.plan.stages();
@@ -87,21 +95,26 @@ impl Backend for Cpu {
 }
 
 /// Halves the batch until a task remains, and runs the halves in parallel.
-fn batch(plan: &Plan, raw: &[RawValue], frames: usize, cells: CellsMut<'_>) {
+fn batch(plan: &Plan, before: &[RawValue], raw: &[RawValue], steps: &[Step], cells: CellsMut<'_>) {
+    let (frames, channels) = (steps.len(), plan.channels());
     if frames > TASK {
         let left = (frames / TASK).div_ceil(2) * TASK;
-        let (left_raw, right_raw) = raw.split_at(left * plan.slots());
+        let (left_raw, right_raw) = raw.split_at(left * channels);
+        let (left_steps, right_steps) = steps.split_at(left);
+        let between = &left_raw[left_raw.len() - channels..];
         let (left_cells, right_cells) = cells.split_at(left);
-        rayon::join(|| batch(plan, left_raw, left, left_cells), || batch(plan, right_raw, frames - left, right_cells));
+        rayon::join(
+            || batch(plan, before, left_raw, left_steps, left_cells),
+            || batch(plan, between, right_raw, right_steps, right_cells),
+        );
         return;
     }
     let mut scratch = Scratch::<LANES>::new(plan.slots());
-    let mut rest = cells;
-    for (block, raw) in raw.chunks(LANES * plan.slots()).enumerate() {
-        let count = LANES.min(frames - block * LANES);
-        let (mut cells, later) = rest.split_at(count);
-        scratch.block(plan, raw, count, &mut cells);
-        rest = later;
+    let (mut rest, mut before) = (cells, before);
+    for (raw, steps) in raw.chunks(LANES * channels).zip(steps.chunks(LANES)) {
+        let (mut cells, later) = rest.split_at(steps.len());
+        scratch.block(plan, before, raw, steps, &mut cells);
+        (rest, before) = (later, &raw[raw.len() - channels..]);
     }
 }
 
@@ -133,9 +146,11 @@ impl<const L: usize> Scratch<L> {
         Self { pressures: vec![[0.0; L]; slots], statuses: vec![[0; L]; slots] }
     }
 
-    /// All stages for `count ≤ L` frames of `raw`, frame by frame as recordings have them.
-    fn block(&mut self, plan: &Plan, raw: &[RawValue], count: usize, cells: &mut CellsMut<'_>) {
+    /// All stages for `steps.len() ≤ L` frames of `raw`, frame by frame as recordings have them; `before` is the one before.
+    fn block(&mut self, plan: &Plan, before: &[RawValue], raw: &[RawValue], steps: &[Step], cells: &mut CellsMut<'_>) {
+        let count = steps.len();
         calibrate::lanes(plan, raw, count, &mut self.pressures, &mut self.statuses);
+        change::lanes(plan, before, steps, &mut self.pressures, &mut self.statuses);
         if !cells.pressures.is_empty() {
             for (slot, lanes) in self.pressures.iter().enumerate() {
                 for lane in 0..count {
