@@ -8,7 +8,6 @@ use glam::DVec2;
 use super::reference::CellBound;
 use crate::percept::{Flags, Outputs, Percept, Percepts, Touch};
 use crate::stage::angle::{between_directions, between_lines};
-use crate::stage::touches;
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -178,11 +177,11 @@ impl Cell<'_> {
                 ));
             }
             let distance = |a: &f64, b: &f64| (a - b).abs();
-            let total = Some(touches::BOUND * right.total);
+            let total = Some(limit.total * right.total);
             self.quantity(Outputs::TOUCHES, Some(right.total), Some(got.total), total, distance);
             let part = |touch: &Touch, axis: usize| touch.centroid.map(|c| c[axis]);
             for axis in 0..2 {
-                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit), distance);
+                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit.place), distance);
             }
         }
     }
@@ -229,6 +228,7 @@ impl Cell<'_> {
 mod tests {
     use super::*;
     use crate::percept::{Precision, Values};
+    use crate::stage::touches::TouchBound;
 
     const NAMES: [&str; 1] = ["field"];
 
@@ -321,7 +321,7 @@ mod tests {
         let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
-        let limit = CellBound { touch: Some(1e-6), ..bound() };
+        let limit = CellBound { touch: Some(TouchBound { total: 1e-6, place: 1e-6 }), ..bound() };
         assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
         let moved = |by: f64| Touch { centroid: Some([0.1, 0.2 + by]), ..touch };
         assert!(compare(&right, &[limit], &touched(&[moved(0.9e-6)]), &NAMES).holds());

@@ -10,6 +10,8 @@ use crate::signal::RawValue;
 use crate::stage::calibrate::{Pressure, UNUSABLE};
 use crate::stage::change::Heard;
 use crate::stage::hysteresis::ContactState;
+use crate::stage::layout::Member;
+use crate::stage::touches::TouchBound;
 use crate::stage::{
     Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation, position, touches,
 };
@@ -38,8 +40,8 @@ pub(crate) struct CellBound {
     pub(crate) radial_distance: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) radial_speed: Option<f64>,
-    /// A touch's centroid, per coordinate, m; `None` from the first doubt on, as identities remember.
-    pub(crate) touch: Option<f64>,
+    /// A touch's, with its place in m; `None` from the first doubt on, as identities remember.
+    pub(crate) touch: Option<TouchBound>,
 }
 
 /// The backend.
@@ -68,8 +70,7 @@ struct BoundBefore {
     state: ContactState,
     /// The centroid, and its bound as a distance.
     centroid: Option<(DVec2, f64)>,
-    /// Whether touches have been in doubt since the start.
-    touches_in_doubt: bool,
+    touches: touches::Doubt,
 }
 
 impl Reference {
@@ -145,7 +146,7 @@ impl Reference {
     fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
         let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
         let state = ContactState { contact: false, in_doubt: true };
-        let unknown = BoundBefore { state, centroid: None, touches_in_doubt: true };
+        let unknown = BoundBefore { state, centroid: None, touches: touches::Doubt::FOR_GOOD };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
@@ -160,9 +161,8 @@ impl Reference {
             bound.in_doubt = Flags::all() - INPUT;
             return (bound, BoundBefore { state, ..unknown });
         }
-        let touches_in_doubt = before.touches_in_doubt;
         if !state.contact {
-            return (bound, BoundBefore { state, centroid: None, touches_in_doubt });
+            return (bound, BoundBefore { state, centroid: None, touches: before.touches.release() });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -192,8 +192,16 @@ impl Reference {
         if let Some(now) = kept {
             moved(&mut bound, field, now, before, step);
         }
-        bound.touch = (!touches_in_doubt).then_some(touches::BOUND * unit);
-        (bound, BoundBefore { state, centroid: kept, touches_in_doubt })
+        let mut touches = before.touches;
+        if self.plan.stages().touches {
+            let pull = |member: &Member| f64::from(member.weight) * pressures[member.slot as usize].value;
+            let pulls: Vec<f64> = self.plan.members_of(field).iter().map(pull).collect();
+            let lost = pressed.iter().map(|taxel| taxel.excess / taxel.pressure).fold(0.0, f64::max);
+            touches = touches.after(&field.skin(), &pulls, c, lost);
+            let limit = touches::bound(lost);
+            bound.touch = (!touches.in_doubt).then_some(TouchBound { place: limit.place * unit, ..limit });
+        }
+        (bound, BoundBefore { state, centroid: kept, touches })
     }
 
     fn cell(

@@ -9,10 +9,12 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use console::Term;
 use somatic::error::nearest;
-use somatic::signal::{FsrSignal, Unfit};
+use somatic::signal::{FsrSignal, Letter, Receptor, Unfit};
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
 use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
-use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
+use somatic::{
+    Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Plan, Result, Scene, bundled,
+};
 
 use super::feed::{Arrival, Feed, Manner};
 use super::live::{About, View};
@@ -24,6 +26,7 @@ Examples:
   somatic run --source touch.csv --sink percepts.ndjson  a recording, as fast as possible
   somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
   somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
+  somatic run --source touch.csv --letters sustained,change --outputs total
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic run --body mat --source night.csv --backend gpu --verify
 
@@ -71,10 +74,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// Which signal force-sensing resistors deliver, raw or linear, instead of what the calibration says.
-    #[arg(long, value_name = "SIGNAL", value_parser = PossibleValuesParser::new(["raw", "linear"])
-        .try_map(|name| name.parse::<FsrSignal>()))]
-    signal: Option<FsrSignal>,
+    /// What of the sensors' pressures is looked at: how hard they are pressed (sustained), or how fast that changes, per
+    /// second (change). Every field is there once for each.
+    #[arg(long, value_name = "LETTER,...", value_delimiter = ',', default_value = "sustained",
+        value_parser = PossibleValuesParser::new(["sustained", "change"]).try_map(|name| name.parse::<Receptor>()))]
+    letters: Vec<Receptor>,
+
+    /// Which signal force-sensing resistors deliver, instead of what the calibration says; with both, every field is there
+    /// once for each.
+    #[arg(long, value_name = "SIGNAL,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["raw", "linear"]).try_map(|name| name.parse::<FsrSignal>()))]
+    signal: Vec<FsrSignal>,
 
     /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
     #[arg(long)]
@@ -125,6 +135,20 @@ fn output(name: &str) -> Result<Outputs> {
     })
 }
 
+/// What sinks call the fields.
+fn field_names(plan: &Plan) -> Vec<FieldNames> {
+    let name = |(index, (field, link)): (usize, (&str, &str))| {
+        let mark = plan.mark(index);
+        FieldNames {
+            field: field.into(),
+            link: link.into(),
+            letter: mark.receptor.map(|receptor| receptor.to_string()),
+            signal: mark.signal.map(|signal| signal.to_string()),
+        }
+    };
+    plan.fields().enumerate().map(name).collect()
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     arguments.check()?;
     let sinks = arguments.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
@@ -153,8 +177,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let sinks = if sinks.is_empty() && !at_terminal { vec![SinkSpec::Stdout] } else { sinks };
-    let names: Vec<FieldNames> =
-        engine.plan().fields().map(|(field, link)| FieldNames { field: field.into(), link: link.into() }).collect();
+    let names = field_names(engine.plan());
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: arguments.all_fields };
     let view = view.open(&about);
     let sinks = sinks.iter().map(|sink| sink.open(&names, arguments.all_fields)).collect::<Result<_>>()?;
@@ -191,7 +214,7 @@ impl Arguments {
             fields: self.fields.clone(),
             max_age_s: self.max_age,
             max_gap_s: self.max_gap,
-            signal: self.signal,
+            letters: Letter::all_of(&self.letters, &self.signal),
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

@@ -104,9 +104,8 @@ impl Host<'_> {
         let members = self.plan.members_of(field);
         let pulls: Vec<f64> =
             members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
-        let skin = touches::Skin { places: &field.places, beside: &field.beside, spacing: field.spacing };
         let unit_m = f64::from(field.unit_m);
-        let found = memory.follow(&skin, &pulls);
+        let found = memory.follow(&field.skin(), &pulls);
         let several = found.len() > 1;
         percepts.push_touches(found.iter().map(|touch| {
             let place = touch.place * unit_m;

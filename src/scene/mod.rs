@@ -2,6 +2,7 @@
 
 mod curves;
 mod plan;
+mod slots;
 
 pub use plan::Plan;
 pub(crate) use plan::PlanField;

@@ -11,9 +11,9 @@ use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
-use crate::signal::{Calibration, ContactThresholds, FsrSignal, Letter, Mark, Receptor, Response, TaxelCalibration};
+use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
-use crate::stage::{layout, motion};
+use crate::stage::{layout, motion, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Plan {
     stages: Stages,
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
-    letters: Vec<Letter>,
+    pub(super) letters: Vec<Letter>,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
@@ -57,7 +57,7 @@ pub struct Plan {
     pub(crate) areas: Vec<f64>,
     /// How many slots are calibrated from raw values: all channels in each signal, signal by signal. The slots after them
     /// are changes of these: all channels in each letter that is one.
-    calibrated: usize,
+    pub(super) calibrated: usize,
     /// Per slot, as the f32 backends read them.
     pub(crate) taxels: Vec<layout::Taxel>,
     /// What their responses refer to.
@@ -101,6 +101,13 @@ pub(crate) struct PlanField {
     pub(crate) chart: Option<Chart>,
     /// The surface over the chart, where positions are wanted.
     pub(crate) lift: Option<Lift>,
+}
+
+impl PlanField {
+    /// As the stage that tells touches apart sees it.
+    pub(crate) fn skin(&self) -> touches::Skin<'_> {
+        touches::Skin { places: &self.places, beside: &self.beside, spacing: self.spacing }
+    }
 }
 
 impl Plan {
@@ -218,41 +225,6 @@ impl Plan {
         self.outputs
     }
 
-    /// Makes the taxels, slot by slot: every signal's pressures, then every changing letter's changes of them. Gives each
-    /// letter's first slot.
-    fn lay_out_slots(&mut self, calibration: &Calibration) -> Result<Vec<u32>> {
-        let mut signals: Vec<Option<FsrSignal>> = Vec::new();
-        for letter in &self.letters {
-            if !signals.contains(&letter.signal) {
-                signals.push(letter.signal);
-                for (of_taxel, &area) in self.calibrations.iter().zip(&self.areas) {
-                    let response = self.curves.response_of(calibration, of_taxel, letter.signal)?;
-                    self.taxels.push(taxel(of_taxel, area, response));
-                }
-            }
-        }
-        self.calibrated = self.taxels.len();
-        let mut first_slots = Vec::with_capacity(self.letters.len());
-        for letter in &self.letters {
-            let signal = signals.iter().position(|&signal| signal == letter.signal).unwrap_or_default();
-            let pressures = signal * self.areas.len();
-            if letter.receptor == Receptor::Sustained {
-                first_slots.push(pressures as u32);
-                continue;
-            }
-            first_slots.push(self.taxels.len() as u32);
-            let dead_band = calibration.change.dead_band;
-            self.taxels.extend((pressures as u32..).zip(&self.areas).map(|(response, &area)| layout::Taxel {
-                dead_band,
-                p_max: f32::MAX,
-                area: area as f32,
-                response,
-                ..layout::Taxel::default()
-            }));
-        }
-        Ok(first_slots)
-    }
-
     /// Calibrates the taxel at `channel` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how all
     /// slots were before any upkeep.
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
@@ -335,15 +307,17 @@ impl Plan {
         self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
     }
 
-    /// What people call a field of the percepts: its name, and what tells its letter from what is usual.
+    /// What is to be said of the letter of field `field` of the percepts, beside the field's name.
     #[must_use]
-    pub fn label(&self, field: usize) -> String {
-        self.fields.get(field).map_or(String::new(), |f| format!("{}{}", f.name, self.mark_of(f.letter)))
+    pub fn mark(&self, field: usize) -> Mark {
+        let letter = self.fields.get(field).map(|field| self.letters[field.letter]);
+        letter.map_or(Mark::default(), |letter| letter.mark(&self.letters))
     }
 
-    /// What is to be said of a letter, as [`Plan::letters`] counts.
-    fn mark_of(&self, letter: usize) -> Mark {
-        self.letters.get(letter).map_or(Mark::default(), |own| own.mark(&self.letters))
+    /// What people call field `field` of the percepts: its name, and what is to be said of its letter.
+    #[must_use]
+    pub fn label(&self, field: usize) -> String {
+        self.fields.get(field).map_or(String::new(), |named| format!("{}{}", named.name, self.mark(field)))
     }
 
     /// Per slot that is calibrated.
@@ -407,19 +381,6 @@ fn thresholds(calibration: &Calibration, field: &str, receptor: Receptor) -> Thr
         Receptor::Change => calibration.change.contact,
     };
     Thresholds { on: contact.on, off: contact.off }
-}
-
-fn taxel(calibration: &TaxelCalibration, area: f64, response: u32) -> layout::Taxel {
-    layout::Taxel {
-        baseline: calibration.baseline,
-        gain: calibration.gain,
-        dead_band: calibration.dead_band,
-        p_max: calibration.p_max,
-        raw_low: calibration.raw_range[0],
-        raw_high: calibration.raw_range[1],
-        area: area as f32,
-        response,
-    }
 }
 
 /// The least power of two that is at least `radius_m`, within what single precision can square.

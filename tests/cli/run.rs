@@ -358,6 +358,37 @@ fn a_bad_live_frame_names_its_line_and_keeps_what_was_answered() {
     assert!(error.starts_with("somatic: error: stdin: line 2"), "{error}");
 }
 
+#[test]
+fn letters_and_signals_are_told_where_there_are_several() {
+    let (_folder, path) = file("touch.csv", "t,4\n0,0\n0.1,5\n0.2,5\n0.3,0\n");
+    let run = ["run", "--quiet", "--backend", "cpu", "--source", text_of(&path), "--fields", "hand/palm"];
+    let seen = |more: &[&str]| -> Vec<Vec<String>> {
+        let text = done(&[&run[..], &["--outputs", "total"], more].concat());
+        let told = |field: &Value| format!("{} {} {}", field["letter"], field["signal"], field["total"]);
+        frames(&text).iter().map(|frame| fields(frame).iter().map(told).collect()).collect()
+    };
+    let plain = seen(&[]);
+    assert_eq!(plain[1], ["null null 5.0"]);
+    assert_eq!(seen(&["--letters", "sustained"]), plain);
+    let both = seen(&["--letters", "sustained,change"]);
+    assert_eq!(both[1], [r#""sustained" null 5.0"#, r#""change" null 50.0"#]);
+    assert_eq!((&both[0][..], &both[2][..]), (&[][..], &[r#""sustained" null 5.0"#.to_owned()][..]));
+    assert!(both[3].len() == 1 && both[3][0].starts_with(r#""change" null 5"#), "{both:?}");
+    assert_eq!(seen(&["--letters", "change"])[2].len(), 0);
+
+    let (_keep, fsr) = file("fsr.toml", "[all]\nsensor = \"fsr\"\n");
+    let signals = seen(&["--calibration", text_of(&fsr), "--signal", "raw,linear"]);
+    assert!(signals[1].len() == 2 && signals[1][0].starts_with(r#"null "raw""#), "{signals:?}");
+    assert!(signals[1][1].starts_with(r#"null "linear""#), "{signals:?}");
+    let one = seen(&["--calibration", text_of(&fsr), "--signal", "raw"]);
+    assert!(one[1].len() == 1 && one[1][0].starts_with("null null"), "{one:?}");
+
+    assert!(fails(2, &[&run[..], &["--letters", "chnage"]].concat()).contains("change"));
+    assert!(fails(2, &[&run[..], &["--letters", "change,change"]].concat()).contains("asked for twice"));
+    let taught = done(&["help", "run"]);
+    assert!(taught.contains("--letters") && taught.contains("sustained, change"), "{taught}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_brings_a_run_that_waits_for_input_to_a_clean_end() {

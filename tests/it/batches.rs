@@ -1,6 +1,6 @@
 //! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
 
-use somatic::{BackendKind, Body, Engine, Frame, Options, Percepts, RawValue};
+use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor};
 
 use crate::common::{backends, frame};
 
@@ -14,7 +14,8 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let calibration = "[checks]\nsettle_frames = 2\nisolated_ratio = 3\nisolated_above = 500\n[all]\np_max = 900";
     let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
-    let scene = somatic::Scene { max_age_s: 0.1, ..somatic::Scene::default() };
+    let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
+    let scene = somatic::Scene { max_age_s: 0.1, letters, ..somatic::Scene::default() };
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {

@@ -2,6 +2,7 @@
 
 mod batches;
 mod bodies;
+mod change;
 mod common;
 mod draft;
 mod extremes;
