@@ -18,7 +18,7 @@ pub struct ContactThresholds {
     pub off: f32,
 }
 
-/// What holds for the letter [`super::Receptor::Change`] of every taxel and field, in P per second.
+/// What holds for the letter [`crate::signal::Receptor::Change`] of every taxel and field, in P per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChangeCalibration {
     /// Changes up to this one count as 0.
