@@ -9,7 +9,7 @@ use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::{Pressure, UNUSABLE};
 use crate::stage::hysteresis::ContactState;
 use crate::stage::{
-    Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position, touches,
+    Pressed, U, axis, calibrate, centroid, contact, filter, hysteresis, motion, orientation, position, touches,
 };
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
@@ -38,6 +38,10 @@ pub(crate) struct CellBound {
     pub(crate) radial_speed: Option<f64>,
     /// A touch's centroid, per coordinate, m; `None` from the first doubt on, as identities remember.
     pub(crate) touch: Option<f64>,
+    /// As a distance, m.
+    pub(crate) filtered_displacement: Option<f64>,
+    pub(crate) filtered_direction: Option<f64>,
+    pub(crate) filtered_speed: Option<f64>,
 }
 
 /// The backend.
@@ -65,6 +69,7 @@ struct BoundBefore {
     centroid: Option<(DVec2, f64)>,
     /// Whether touches have been in doubt since the start.
     touches_in_doubt: bool,
+    filter: filter::Doubt,
 }
 
 impl Reference {
@@ -121,7 +126,8 @@ impl Reference {
     fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
         let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
         let state = ContactState { contact: false, in_doubt: true };
-        let unknown = BoundBefore { state, centroid: None, touches_in_doubt: true };
+        let filter = filter::Doubt::of_contact();
+        let unknown = BoundBefore { state, centroid: None, touches_in_doubt: true, filter };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
@@ -138,7 +144,7 @@ impl Reference {
         }
         let touches_in_doubt = before.touches_in_doubt;
         if !state.contact {
-            return (bound, BoundBefore { state, centroid: None, touches_in_doubt });
+            return (bound, BoundBefore { state, touches_in_doubt, ..BoundBefore::default() });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -169,7 +175,17 @@ impl Reference {
             moved(&mut bound, field, now, before, step);
         }
         bound.touch = (!touches_in_doubt).then_some(touches::BOUND * unit);
-        (bound, BoundBefore { state, centroid: kept, touches_in_doubt })
+        let mut filter = before.filter;
+        if field.charted && self.plan.stages().filter {
+            let clock = filter::Clock::new(step.dt_s, step.flags);
+            let (place, place_bound) = (c.truncate() * unit, c_bound.truncate().length() * unit);
+            let limit = filter.follow(&field.filter, clock, place, place_bound);
+            bound.in_doubt |= limit.in_doubt;
+            bound.filtered_displacement = limit.displacement;
+            bound.filtered_direction = limit.direction;
+            bound.filtered_speed = limit.speed;
+        }
+        (bound, BoundBefore { state, centroid: kept, touches_in_doubt, filter })
     }
 
     fn cell(

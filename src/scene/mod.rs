@@ -1,13 +1,16 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
 mod curves;
+mod filter;
 mod plan;
 
+pub use filter::MotionFilter;
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
 
 use crate::percept::Outputs;
 use crate::signal::FsrSignal;
+pub use crate::stage::filter::FilterBy;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,10 +25,19 @@ pub struct Scene {
     pub max_gap_s: f64,
     /// Which signal the sensors of the paper's circuit deliver, instead of what the calibration says.
     pub signal: Option<FsrSignal>,
+    /// Which motion counts, for [`Outputs::FILTERED`].
+    pub filter: MotionFilter,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0, signal: None }
+        Self {
+            outputs: Outputs::USUAL,
+            fields: Vec::new(),
+            max_age_s: 0.0,
+            max_gap_s: 10.0,
+            signal: None,
+            filter: MotionFilter::default(),
+        }
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod axis;
 pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod contact;
+pub(crate) mod filter;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;
 pub(crate) mod motion;
