@@ -231,7 +231,10 @@ impl Reference {
         let c = centroid::reference(&pressed);
         if stages.centroid {
             let place = if field.charted { c.truncate().extend(0.0) } else { c };
-            columns.centroid[cell] = (place * f64::from(field.unit_m)).to_array();
+            // The stages that stand on it may be wanted without it.
+            if let Some(centroid) = columns.centroid.get_mut(cell) {
+                *centroid = (place * f64::from(field.unit_m)).to_array();
+            }
             present |= Outputs::POSITION;
             if field.charted {
                 present |= Outputs::CENTROID | Outputs::NORMAL;

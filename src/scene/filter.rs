@@ -24,7 +24,8 @@ pub struct MotionFilter {
     pub time_constant_s: f64,
 }
 
-/// Shares of a field's spacing that are its window where none is given.
+/// Shares of a field's spacing that are its window where none is given. On the bundled hand's back a sixteenth is 0.48 mm:
+/// over 3 s, noise of 3 counts spreads a resting rod's linearised centroid over 0.40 mm, of 1.5 counts over 0.20 mm.
 const LOW: f64 = 1.0 / 16.0;
 const HIGH: f64 = 3.0;
 /// How many times its low end the high end of a window is at least, unless both are given.

@@ -5,6 +5,7 @@ mod bodies;
 mod common;
 mod draft;
 mod extremes;
+mod filter;
 mod house;
 mod legal;
 mod letters;
