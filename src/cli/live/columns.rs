@@ -87,7 +87,7 @@ const COLUMNS: [Column; 9] = [
     },
     Column {
         heading: "going",
-        width: 6,
+        width: 7,
         outputs: Outputs::FILTERED_DIRECTION,
         gives_way: 3,
         text: |p, _| p.filtered_direction.map(arrow),
@@ -205,7 +205,7 @@ mod tests {
         let texts = [0.0, 0.4, PI / 2.0, PI, -PI + 0.01, -PI / 2.0, -0.4].map(arrow);
         assert_eq!(texts, ["0° →", "23° ↗", "90° ↑", "180° ←", "-179° ←", "-90° ↓", "-23° ↘"]);
         // The widest there is fits its column.
-        assert_eq!(arrow(-3.0).chars().count(), 6);
+        assert_eq!(arrow(-3.0).chars().count(), 7);
     }
 
     #[test]
