@@ -4,7 +4,7 @@ mod host;
 
 use std::ops::Range;
 
-use self::host::{Host, Links};
+use self::host::{Host, Links, Memory};
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, RawBatch, Step};
@@ -14,7 +14,7 @@ use crate::field::{FieldSet, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
-use crate::stage::{layout, touches};
+use crate::stage::{layout, motion::SHORTEST_STEP_S};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -65,8 +65,8 @@ pub struct Engine {
     check: Option<Box<Check>>,
     /// What the calibration's upkeep does, if it does anything.
     upkeep: Option<KeptUp>,
-    /// Per field, the touches of the frame before.
-    memories: Vec<touches::Memory>,
+    /// Per field, what the host's stages remember.
+    memories: Vec<Memory>,
     /// Whether the first frame is still to be taken as the baselines.
     tare: bool,
     frames_done: u64,
@@ -77,7 +77,7 @@ pub struct Engine {
 /// The reference's side of a comparison.
 struct Check {
     reference: Reference,
-    memories: Vec<touches::Memory>,
+    memories: Vec<Memory>,
     right: Percepts,
     bounds: Vec<CellBound>,
 }
@@ -86,7 +86,7 @@ impl Check {
     fn new(plan: &Plan) -> Self {
         Self {
             reference: Reference::new(plan),
-            memories: vec![touches::Memory::default(); plan.fields.len()],
+            memories: vec![Memory::default(); plan.fields.len()],
             right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
                 .with_columns(plan.columns, plan.kept_pressures())
                 .with_letters(plan.letters().len()),
@@ -150,7 +150,7 @@ impl Engine {
                 .with_letters(plan.letters().len()),
             check: None,
             upkeep,
-            memories: vec![touches::Memory::default(); plan.fields.len()],
+            memories: vec![Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
@@ -377,9 +377,6 @@ fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
     let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
     Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }
 }
-
-/// Speeds over shorter steps could pass what single precision holds.
-const SHORTEST_STEP_S: f64 = 1e-12;
 
 /// Ascending ids in few words: `0–35, 64–103`.
 fn ranges(ids: &[u32]) -> String {

@@ -67,7 +67,7 @@ impl fmt::Display for Agreement {
         let verdict = if self.holds() { "agrees" } else { "DISAGREES" };
         write!(f, "{verdict} with the reference in {} of {} percepts", self.cells - self.failed, self.cells)?;
         for (name, c) in &self.quantities {
-            write!(f, "\n  {name:<12} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
+            write!(f, "\n  {name:<21} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
             write!(f, "; {} compared, {} too close to call", c.compared, c.undecided)?;
         }
         write!(f, "\n  {} percepts with a flag too close to call", self.undecided_flags)?;
@@ -161,6 +161,12 @@ impl Cell<'_> {
         self.quantity(Outputs::RADIAL_DISTANCE, right_radial, got_radial, limit, distance);
         self.quantity(Outputs::SPEED, right.speed, got.speed, bound.speed, distance);
         self.quantity(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed, distance);
+        let (right_step, got_step) = (right.filtered_displacement, got.filtered_displacement);
+        self.quantity(Outputs::FILTERED_DISPLACEMENT, right_step, got_step, bound.filtered_displacement, apart);
+        let (right_way, got_way) = (right.filtered_direction, got.filtered_direction);
+        self.quantity(Outputs::FILTERED_DIRECTION, right_way, got_way, bound.filtered_direction, between);
+        let (right_speed, got_speed) = (right.filtered_speed, got.filtered_speed);
+        self.quantity(Outputs::FILTERED_SPEED, right_speed, got_speed, bound.filtered_speed, distance);
     }
 
     fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
@@ -268,6 +274,9 @@ mod tests {
             speed: near,
             radial_speed: near,
             touch: None,
+            filtered_displacement: near,
+            filtered_direction: near,
+            filtered_speed: near,
         }
     }
 
@@ -287,7 +296,7 @@ mod tests {
     #[test]
     fn every_quantity_beyond_its_bound_fails() {
         type Change = fn(&mut Percepts, &mut crate::percept::Columns<f64>);
-        let changes: [(&str, Change); 20] = [
+        let changes: [(&str, Change); 24] = [
             ("total", |_, c| c.total[0] += 0.011),
             ("peak", |_, c| c.peak[0] -= 0.011),
             ("area", |_, c| c.area[0] = f64::NAN),
@@ -304,6 +313,10 @@ mod tests {
             ("radial_distance", |_, c| c.radial_distance[0] = -0.011),
             ("speed", |_, c| c.speed[0] = f64::INFINITY),
             ("radial_speed", |_, c| c.radial_speed[0] = 0.011),
+            ("filtered_displacement", |p, _| p.filtered_displacement[0] = [0.008, -0.008]),
+            ("filtered_direction", |p, _| p.filtered_direction[0] = -0.011),
+            ("filtered_speed", |p, _| p.filtered_speed[0] = 0.011),
+            ("filtered_speed", |p, _| p.present[0] -= Outputs::FILTERED_SPEED),
             ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
             ("active", |p, _| p.active[0] = 2),
             ("flags", |p, _| p.flags[0] |= Flags::TIE),

@@ -13,7 +13,7 @@ use crate::stage::hysteresis::ContactState;
 use crate::stage::layout::Member;
 use crate::stage::touches::TouchBound;
 use crate::stage::{
-    Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation, position, touches,
+    Pressed, U, axis, calibrate, centroid, change, contact, filter, hysteresis, motion, orientation, position, touches,
 };
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
@@ -42,6 +42,10 @@ pub(crate) struct CellBound {
     pub(crate) radial_speed: Option<f64>,
     /// A touch's, with its place in m; `None` from the first doubt on, as identities remember.
     pub(crate) touch: Option<TouchBound>,
+    /// As a distance, m.
+    pub(crate) filtered_displacement: Option<f64>,
+    pub(crate) filtered_direction: Option<f64>,
+    pub(crate) filtered_speed: Option<f64>,
 }
 
 /// The backend.
@@ -71,6 +75,7 @@ struct BoundBefore {
     /// The centroid, and its bound as a distance.
     centroid: Option<(DVec2, f64)>,
     touches: touches::Doubt,
+    filter: filter::Doubt,
 }
 
 impl Reference {
@@ -146,7 +151,8 @@ impl Reference {
     fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
         let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
         let state = ContactState { contact: false, in_doubt: true };
-        let unknown = BoundBefore { state, centroid: None, touches: touches::Doubt::FOR_GOOD };
+        let filter = filter::Doubt::of_contact();
+        let unknown = BoundBefore { state, centroid: None, touches: touches::Doubt::FOR_GOOD, filter };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
@@ -162,7 +168,7 @@ impl Reference {
             return (bound, BoundBefore { state, ..unknown });
         }
         if !state.contact {
-            return (bound, BoundBefore { state, centroid: None, touches: before.touches.release() });
+            return (bound, BoundBefore { state, touches: before.touches.release(), ..BoundBefore::default() });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -201,7 +207,17 @@ impl Reference {
             let limit = touches::bound(lost);
             bound.touch = (!touches.in_doubt).then_some(TouchBound { place: limit.place * unit, ..limit });
         }
-        (bound, BoundBefore { state, centroid: kept, touches })
+        let mut filter = before.filter;
+        if field.charted && self.plan.stages().filter {
+            let clock = filter::Clock::new(step.dt_s, step.flags);
+            let (place, place_bound) = (c.truncate() * unit, c_bound.truncate().length() * unit);
+            let limit = filter.follow(&field.filter, clock, place, place_bound);
+            bound.in_doubt |= limit.in_doubt;
+            bound.filtered_displacement = limit.displacement;
+            bound.filtered_direction = limit.direction;
+            bound.filtered_speed = limit.speed;
+        }
+        (bound, BoundBefore { state, centroid: kept, touches, filter })
     }
 
     fn cell(
@@ -247,7 +263,10 @@ impl Reference {
         let c = centroid::reference(&pressed);
         if stages.centroid {
             let place = if field.charted { c.truncate().extend(0.0) } else { c };
-            columns.centroid[cell] = (place * f64::from(field.unit_m)).to_array();
+            // The stages that stand on it may be wanted without it.
+            if let Some(centroid) = columns.centroid.get_mut(cell) {
+                *centroid = (place * f64::from(field.unit_m)).to_array();
+            }
             present |= Outputs::POSITION;
             if field.charted {
                 present |= Outputs::CENTROID | Outputs::NORMAL;

@@ -72,6 +72,9 @@ pub struct Percepts {
     pub(crate) values: Values,
     pub(crate) position: Vec<[f64; 3]>,
     pub(crate) normal: Vec<[f64; 3]>,
+    pub(crate) filtered_displacement: Vec<[f64; 2]>,
+    pub(crate) filtered_direction: Vec<f64>,
+    pub(crate) filtered_speed: Vec<f64>,
     /// P, frame by frame, each taxel by taxel.
     pub(crate) pressures: Vec<f64>,
     touches: Vec<Touch>,
@@ -101,6 +104,9 @@ impl Percepts {
             },
             position: Vec::new(),
             normal: Vec::new(),
+            filtered_displacement: Vec::new(),
+            filtered_direction: Vec::new(),
+            filtered_speed: Vec::new(),
             pressures: Vec::new(),
             touches: Vec::new(),
             touch_ends: Vec::new(),
@@ -135,6 +141,9 @@ impl Percepts {
         refill(&mut self.active, when(Outputs::ACTIVE, cells), 0);
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        refill(&mut self.filtered_displacement, when(Outputs::FILTERED_DISPLACEMENT, cells), [0.0; 2]);
+        refill(&mut self.filtered_direction, when(Outputs::FILTERED_DIRECTION, cells), 0.0);
+        refill(&mut self.filtered_speed, when(Outputs::FILTERED_SPEED, cells), 0.0);
         refill(&mut self.pressures, frames * self.slots, 0.0);
         self.touches.clear();
         self.touch_ends.clear();
@@ -211,6 +220,9 @@ impl Percepts {
             radial_distance: None,
             speed: None,
             radial_speed: None,
+            filtered_displacement: has(Outputs::FILTERED_DISPLACEMENT).then(|| self.filtered_displacement[cell]),
+            filtered_direction: has(Outputs::FILTERED_DIRECTION).then(|| self.filtered_direction[cell]),
+            filtered_speed: has(Outputs::FILTERED_SPEED).then(|| self.filtered_speed[cell]),
             in_world: self.in_world[cell],
         };
         match &self.values {

@@ -1,14 +1,17 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
 mod curves;
+mod filter;
 mod plan;
 mod slots;
 
+pub use filter::MotionFilter;
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
 
 use crate::percept::Outputs;
 use crate::signal::Letter;
+pub use crate::stage::filter::FilterBy;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +26,8 @@ pub struct Scene {
     pub max_gap_s: f64,
     /// What sensors are read as; every field is computed once for each. Usually one, the pressure itself.
     pub letters: Vec<Letter>,
+    /// Which motion counts, for [`Outputs::FILTERED`].
+    pub filter: MotionFilter,
 }
 
 impl Default for Scene {
@@ -33,6 +38,7 @@ impl Default for Scene {
             max_age_s: 0.0,
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
+            filter: MotionFilter::default(),
         }
     }
 }

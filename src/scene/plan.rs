@@ -13,7 +13,7 @@ use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
-use crate::stage::{layout, motion, touches};
+use crate::stage::{filter, layout, motion, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,7 @@ pub(crate) struct Stages {
     pub(crate) motion: bool,
     pub(crate) position: bool,
     pub(crate) touches: bool,
+    pub(crate) filter: bool,
 }
 
 impl Stages {
@@ -36,8 +37,9 @@ impl Stages {
         let orientation = wants(Outputs::ORIENTATION);
         let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
         let motion = wants(Outputs::MOTION);
-        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
-        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches }
+        let filter = wants(Outputs::FILTERED);
+        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion || filter;
+        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter }
     }
 }
 
@@ -89,6 +91,8 @@ pub(crate) struct PlanField {
     pub(crate) thresholds: Thresholds,
     /// The distance in the unit up to which its centroid counts as still.
     pub(crate) still_within: f32,
+    /// How its motion is filtered.
+    pub(crate) filter: filter::Settings,
     /// Per member, the members beside it, where separate touches are wanted.
     pub(crate) beside: Vec<Vec<u32>>,
     /// About how far members lie apart, in the unit.
@@ -115,8 +119,8 @@ impl Plan {
     ///
     /// # Errors
     /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has, for no letter, or for
-    /// one twice.
+    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has, for no letter, for one
+    /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
             let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
@@ -169,6 +173,7 @@ impl Plan {
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             let first = plan.fields.len();
+            let still_within = motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32;
             plan.fields.push(PlanField {
                 name: field.name.clone(),
                 letter: 0,
@@ -181,7 +186,8 @@ impl Plan {
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unit_m,
                 thresholds: Thresholds::default(),
-                still_within: motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32,
+                still_within,
+                filter: scene.filter.settings(field.spacing_m(), f64::from(still_within * unit_m))?,
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
@@ -213,7 +219,7 @@ impl Plan {
         if plan.stages.hysteresis {
             plan.columns |= Outputs::TOTAL;
         }
-        if plan.stages().position {
+        if plan.stages().position || plan.stages().filter {
             plan.columns |= Outputs::CENTROID;
         }
         Ok(plan)

@@ -262,6 +262,18 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
     named(line, "radial_distance", percept.radial_distance);
     named(line, "speed", percept.speed);
     named(line, "radial_speed", percept.radial_speed);
+    // Made by the host, in double precision whatever the backend.
+    if let Some(displacement) = percept.filtered_displacement {
+        key(line, "filtered_displacement");
+        print(line, &displacement);
+    }
+    let filtered = [("filtered_direction", percept.filtered_direction), ("filtered_speed", percept.filtered_speed)];
+    for (name, value) in filtered {
+        if let Some(value) = value {
+            key(line, name);
+            print(line, &value);
+        }
+    }
 }
 
 fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
@@ -317,7 +329,7 @@ mod tests {
         percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
         percepts.present = vec![
-            (Outputs::all() - Outputs::MOTION) | Outputs::DISPLACEMENT,
+            (Outputs::USUAL - Outputs::MOTION) | Outputs::DISPLACEMENT,
             Outputs::TOTAL,
             Outputs::TOTAL | Outputs::POSITION,
             Outputs::empty(),

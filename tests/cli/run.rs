@@ -150,6 +150,41 @@ fn what_makes_no_sense_is_wrong_usage() {
 }
 
 #[test]
+fn filtered_motion_is_given_where_it_is_asked_for() {
+    let run = ["run", "--backend", "cpu", "--fields", "hand/back", "--outputs", "filtered_direction,filtered_speed"];
+    let counted = |more: &[&str]| {
+        let frames = frames(&done(&[&run[..], more].concat()));
+        let having = |key: &str| frames.iter().flat_map(fields).filter(|field| field[key].is_number()).count();
+        (having("filtered_direction"), having("filtered_speed"))
+    };
+    let (directions, speeds) = counted(&[]);
+    assert!(speeds > 20 && directions > speeds, "{directions} {speeds}");
+    // Wider steps are fewer.
+    let wide = counted(&["--filter-window", "2mm.."]);
+    assert!(wide.1 > 2 && wide.1 < speeds / 2 && wide.0 > wide.1, "{wide:?}");
+    assert!(counted(&["--filter-by", "radial"]).1 > 20);
+    for other in [["--filter-by", "radial"], ["--filter-time", "1"]] {
+        assert_ne!(done(&run), done(&[&run[..], &other].concat()), "{other:?}");
+    }
+
+    for (arguments, why) in [
+        (&["--filter-time", "nan"][..], "filter time of NaN"),
+        (&["--filter-time", "-1"], "filter time of -1"),
+        (&["--filter-window", "-1mm..2mm"], "from -1 mm"),
+        (&["--filter-window", "3mm..2mm"], "the smaller first"),
+        (&["--filter-window", "3..4"], "has no unit"),
+    ] {
+        let error = fails(2, &[&run[..], arguments].concat());
+        assert!(error.contains(why) && error.lines().count() == 1, "{error}");
+    }
+    for flag in [["--filter-time", "1"], ["--filter-window", "1mm.."], ["--filter-by", "radial"]] {
+        let error = fails(2, &[&["run", "--backend", "cpu"][..], &flag].concat());
+        assert!(error.contains(flag[0]) && error.contains("--outputs filtered_direction"), "{error}");
+    }
+    assert!(fails(2, &[&run[..], &["--filter-by", "area"]].concat()).contains("radial"));
+}
+
+#[test]
 fn what_is_not_there_is_named_in_one_line() {
     for arguments in [
         ["run", "--body", "no/such.glb", "--source", "-"],

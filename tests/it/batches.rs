@@ -7,7 +7,8 @@ use crate::common::{backends, frame};
 /// Everything a frame's percepts say, with numbers as bits.
 fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
     // f64's `{:?}` prints the shortest number that reads back to the same bits.
-    percepts.frame(frame).map(|p| format!("{} {p:?}", percepts.t_s(frame))).collect()
+    let touches = |field| percepts.touches(frame, field);
+    percepts.frame(frame).map(|p| format!("{} {p:?} {:?}", percepts.t_s(frame), touches(p.field))).collect()
 }
 
 fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option<&[u32]>) -> Vec<Vec<String>> {
@@ -15,7 +16,8 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
     let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
-    let scene = somatic::Scene { max_age_s: 0.1, letters, ..somatic::Scene::default() };
+    let outputs = somatic::Outputs::all();
+    let scene = somatic::Scene { outputs, max_age_s: 0.1, letters, ..somatic::Scene::default() };
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {

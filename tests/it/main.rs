@@ -6,6 +6,7 @@ mod change;
 mod common;
 mod draft;
 mod extremes;
+mod filter;
 mod house;
 mod legal;
 mod letters;

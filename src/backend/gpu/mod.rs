@@ -209,7 +209,7 @@ impl Gpu {
         }
 
         let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
-        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::FILTERED;
         let results: Vec<Column> = [
             (true, What::Cells, cells, 4),
             (plan.outputs.intersects(sums), What::Contacts, contacts, 16),
