@@ -54,7 +54,7 @@ struct Reading {
 fn reading(index: u32, taxel: Taxel) -> Reading {
     let slot = index / batch.frames;
     let frame = index % batch.frames;
-    let bits = raw[frame * batch.slots + slot];
+    let bits = raw[frame * batch.channels + slot % batch.channels];
     let size = bits & SIZE_BITS;
     if bits == MISSING {
         return Reading(0.0, INCOMPLETE | UNUSABLE);
@@ -99,7 +99,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let index = invocation(group, groups, local);
-    if index >= batch.frames * batch.slots {
+    if index >= batch.frames * batch.calibrated {
         return;
     }
     let taxel = taxels[index / batch.frames];
@@ -115,7 +115,7 @@ fn curved(
     @builtin(local_invocation_index) local: u32,
 ) {
     let index = invocation(group, groups, local);
-    if index >= batch.frames * batch.slots {
+    if index >= batch.frames * batch.calibrated {
         return;
     }
     let taxel = taxels[index / batch.frames];

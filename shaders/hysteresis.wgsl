@@ -7,8 +7,9 @@
 // 1 where the frame before was in contact.
 @group(0) @binding(4) var<storage, read_write> touched: array<u32>;
 
-// What a field says of its input, and of itself, whether it is touched or not.
-const KEPT = SATURATED | FAULTY_INPUT | OUT_OF_RANGE | INCOMPLETE | NO_CHART;
+// What a field says of its input, and of itself, whether it is touched or not. The last two are a
+// change's here: motion comes later.
+const KEPT = SATURATED | FAULTY_INPUT | OUT_OF_RANGE | INCOMPLETE | NO_CHART | NO_PREVIOUS | BAD_DT;
 const SUMS = TOTAL | PEAK | ACTIVE | AREA;
 
 @compute @workgroup_size(GROUP)

@@ -4,7 +4,7 @@ mod host;
 
 use std::ops::Range;
 
-use self::host::{Host, Links};
+use self::host::{Host, Links, Memory};
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
@@ -13,8 +13,8 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Unfit, Upkeep, UpkeepKeys};
-use crate::stage::{layout, touches};
+use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
+use crate::stage::{layout, motion::SHORTEST_STEP_S};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -67,8 +67,8 @@ pub struct Engine {
     check: Option<Box<Check>>,
     /// What the calibration's upkeep does, if it does anything.
     upkeep: Option<KeptUp>,
-    /// Per field, the touches of the frame before.
-    memories: Vec<touches::Memory>,
+    /// Per field, what the host's stages remember.
+    memories: Vec<Memory>,
     /// Whether the first frame is still to be taken as the baselines.
     tare: bool,
     frames_done: u64,
@@ -79,7 +79,7 @@ pub struct Engine {
 /// The reference's side of a comparison.
 struct Check {
     reference: Reference,
-    memories: Vec<touches::Memory>,
+    memories: Vec<Memory>,
     right: Percepts,
     bounds: Vec<CellBound>,
 }
@@ -88,9 +88,10 @@ impl Check {
     fn new(plan: &Plan) -> Self {
         Self {
             reference: Reference::new(plan),
-            memories: vec![touches::Memory::default(); plan.fields.len()],
+            memories: vec![Memory::default(); plan.fields.len()],
             right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
-                .with_columns(plan.columns, plan.kept_pressures()),
+                .with_columns(plan.columns, plan.kept_pressures())
+                .with_letters(plan.letters().len()),
             bounds: Vec::new(),
         }
     }
@@ -99,7 +100,7 @@ impl Check {
 /// Upkeep, and what it needs of the engine.
 struct KeptUp {
     upkeep: Upkeep,
-    /// The taxels as the calibration has them.
+    /// The taxels as the calibration has them, slot by slot.
     made: Vec<layout::Taxel>,
     /// Per field, whether it was in contact in this epoch.
     touched: Vec<bool>,
@@ -134,6 +135,12 @@ impl Engine {
         }
         let fields = FieldSet::new(body)?;
         let plan = Plan::new(body, &fields, &scene, &calibration)?;
+        let upkeep = KeptUp::new(&plan, calibration.upkeep);
+        if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
+            return Err(Error::usage(
+                "the calibration's [upkeep] must know what is touched; ask for letter `sustained` too",
+            ));
+        }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         let mut engine = Self {
@@ -141,10 +148,11 @@ impl Engine {
             last_t_s: None,
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
-                .with_columns(plan.columns, plan.kept_pressures()),
+                .with_columns(plan.columns, plan.kept_pressures())
+                .with_letters(plan.letters().len()),
             check: None,
-            upkeep: KeptUp::new(&plan, calibration.upkeep),
-            memories: vec![touches::Memory::default(); plan.fields.len()],
+            upkeep,
+            memories: vec![Memory::default(); plan.fields.len()],
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
@@ -203,8 +211,8 @@ impl Engine {
     /// Finds out whether values can be read where they are. Upkeep looks at all of them, gathered.
     fn pick(&mut self) {
         let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
-        let width = self.intake.width();
-        self.picks = picks.filter(|_| self.upkeep.is_none()).map(|places| Picks::new(places, width));
+        let (width, calibrated) = (self.intake.width(), self.plan.calibrated());
+        self.picks = picks.filter(|_| self.upkeep.is_none()).map(|picks| Picks::new(&picks, calibrated, width));
     }
 
     /// A frame for all of the body's taxels by ascending id, every value missing.
@@ -242,7 +250,7 @@ impl Engine {
             None => Box::new(Check::new(&self.plan)),
         };
         let done = self.advance(frames, Some(&mut check));
-        let names: Vec<&str> = self.plan.fields.iter().map(|field| field.name.as_str()).collect();
+        let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
         let agreement = done.map(|()| compare(&check.right, &check.bounds, &self.percepts, &names));
         self.check = Some(check);
         Ok((&self.percepts, agreement?))
@@ -276,8 +284,8 @@ impl Engine {
                 start = index;
             }
             if let Some(kept) = &mut self.upkeep {
-                let slots = self.plan.slots();
-                kept.upkeep.observe(frames[index].t_s, &self.raw[index * slots..][..slots]);
+                let channels = self.plan.channels();
+                kept.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }
         self.segment(frames, start..frames.len(), check)?;
@@ -287,12 +295,12 @@ impl Engine {
 
     /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
     fn take_as_baselines(&mut self, first: &Frame, check: Option<&mut Check>) {
-        let slots = self.plan.slots();
-        let first = rows(self.picks.as_ref(), &self.raw, std::slice::from_ref(first), slots);
-        for (slot, value) in first.row(0).enumerate() {
+        let made = self.plan.taxels.clone();
+        let channels = self.plan.channels();
+        let first = rows(self.picks.as_ref(), &self.raw, std::slice::from_ref(first), channels);
+        for (channel, value) in first.row(0).enumerate() {
             if let Some(value) = value.number() {
-                let made = self.plan.taxels[slot];
-                self.plan.keep_up(slot, value as f32, false, &made);
+                self.plan.keep_up(channel, value as f32, false, &made);
             }
         }
         if let Some(kept) = &mut self.upkeep {
@@ -309,11 +317,11 @@ impl Engine {
         if range.is_empty() {
             return Ok(());
         }
-        let slots = self.plan.slots();
+        let channels = self.plan.channels();
         let raw = RawBatch {
             first: range.start,
             frames: range.len(),
-            rows: rows(self.picks.as_ref(), &self.raw, frames, slots).part(range.clone()),
+            rows: rows(self.picks.as_ref(), &self.raw, frames, channels).part(range.clone()),
             steps: &self.steps[range.clone()],
         };
         let host = Host { plan: &self.plan, links: &self.links };
@@ -337,11 +345,11 @@ impl Engine {
     /// Lets upkeep judge the epoch, and calibrates from now on as it says.
     fn close_epoch(&mut self, check: Option<&mut Check>) {
         let Some(kept) = &mut self.upkeep else { return };
-        let changed = kept.upkeep.close(&self.plan.touched_slots(&kept.touched));
+        let changed = kept.upkeep.close(&self.plan.touched_channels(&kept.touched));
         kept.touched.fill(false);
         if changed {
-            for (slot, ((baseline, unfit), made)) in kept.upkeep.taxels().zip(&kept.made).enumerate() {
-                self.plan.keep_up(slot, baseline, unfit.is_some(), made);
+            for (channel, (baseline, unfit)) in kept.upkeep.taxels().enumerate() {
+                self.plan.keep_up(channel, baseline, unfit.is_some(), &kept.made);
             }
             self.backend.recalibrate(&self.plan);
             if let Some(check) = check {
@@ -379,10 +387,10 @@ impl Engine {
 }
 
 /// Where the values of `frames` lie: where `picks` says, or gathered in `raw`.
-fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], slots: usize) -> Rows<'a> {
+fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], channels: usize) -> Rows<'a> {
     match picks {
         Some(picks) => Rows::Picked { frames, picks },
-        None => Rows::Packed { values: raw, slots },
+        None => Rows::Packed { values: raw, channels },
     }
 }
 
@@ -394,9 +402,6 @@ fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
     let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
     Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }
 }
-
-/// Speeds over shorter steps could pass what single precision holds.
-const SHORTEST_STEP_S: f64 = 1e-12;
 
 /// Ascending ids in few words: `0–35, 64–103`.
 fn ranges(ids: &[u32]) -> String {

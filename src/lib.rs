@@ -72,4 +72,4 @@ pub use engine::{Engine, Options};
 pub use error::{Error, Result};
 pub use percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
 pub use scene::{Plan, Scene};
-pub use signal::{Calibration, Frame, Pose, RawValue};
+pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};

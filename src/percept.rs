@@ -27,7 +27,7 @@ bitflags! {
         const COINCIDENT = 1 << 3;
         /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
         const ISOTROPIC = 1 << 4;
-        /// The centroid did not move: there is no direction of motion.
+        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion.
         const STILL = 1 << 5;
         /// A pressed taxel is above its P_max; its value is kept.
         const SATURATED = 1 << 6;
@@ -47,6 +47,13 @@ bitflags! {
         const STALE = 1 << 13;
         /// The field is touched in several places: its centroid may lie where nobody touches.
         const SEVERAL = 1 << 14;
+        // From here on the host's alone: a word of the device has no room for them.
+        /// The centroid has not come as far as the filter's window from the last one that counted: filtered displacement
+        /// and speed are absent, the filtered direction stays what it was.
+        const HELD = 1 << 16;
+        /// The centroid went farther at once than the filter's window: it is taken for another touch, and filtered motion
+        /// starts anew.
+        const JUMPED = 1 << 17;
     }
 }
 
@@ -96,12 +103,22 @@ bitflags! {
         const RADIAL_SPEED = 1 << 15;
         /// The separate touches of the field, each with an identity; only on request.
         const TOUCHES = 1 << 16;
+        /// (Δu, Δv) since the last centroid that counted, m, where this one counts too; only on request, as is the rest of
+        /// filtered motion ([`crate::scene::MotionFilter`]).
+        const FILTERED_DISPLACEMENT = 1 << 17;
+        /// The direction of such steps, averaged over time, rad in (−π, π].
+        const FILTERED_DIRECTION = 1 << 18;
+        /// The length of such a step over the time that it took, m/s.
+        const FILTERED_SPEED = 1 << 19;
     }
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`].
-    pub const USUAL: Self = Self::all().difference(Self::TOUCHES);
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`] and [`Outputs::FILTERED`].
+    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED);
+
+    /// Motion that counts, of [`crate::scene::MotionFilter`].
+    pub const FILTERED: Self = Self::FILTERED_DISPLACEMENT.union(Self::FILTERED_DIRECTION).union(Self::FILTERED_SPEED);
 
     /// What the stage *motion* gives.
     pub(crate) const MOTION: Self = Self::DISPLACEMENT
@@ -150,8 +167,10 @@ pub struct Touch {
 /// One field's percept for one frame. Lengths in metres, angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percept {
-    /// Index of the field.
+    /// Index of the field, as [`crate::Plan::fields`] counts: once for each letter.
     pub field: usize,
+    /// Which of the run's letters it is of, as [`crate::Plan::letters`] counts.
+    pub letter: usize,
     /// Whether the field is touched.
     pub contact: bool,
     /// Why quantities are absent, or in doubt.
@@ -188,6 +207,12 @@ pub struct Percept {
     pub speed: Option<f64>,
     /// Radial distance over time, m/s.
     pub radial_speed: Option<f64>,
+    /// Displacement (Δu, Δv) since the last centroid that counted, m; only where this one counts too.
+    pub filtered_displacement: Option<[f64; 2]>,
+    /// Direction of such steps, averaged over time, rad in (−π, π].
+    pub filtered_direction: Option<f64>,
+    /// Length of such a step over the time that it took, m/s.
+    pub filtered_speed: Option<f64>,
     /// Whether position and normal are in the world, because the frame carried a pose, or in the field's anchor.
     pub in_world: bool,
 }

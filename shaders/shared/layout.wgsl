@@ -2,7 +2,9 @@
 
 struct Batch {
     frames: u32,
-    slots: u32,
+    channels: u32,
+    calibrated: u32,
+    changes: u32,
     fields: u32,
     wide: u32,
 }
@@ -15,7 +17,7 @@ struct Taxel {
     raw_low: f32,
     raw_high: f32,
     area: f32,
-    // STRAIGHT, MASKED, or FIRST_CURVE and up.
+    // STRAIGHT, MASKED, or FIRST_CURVE and up; of a change, the slot that changes.
     response: u32,
 }
 

@@ -8,7 +8,6 @@ use glam::DVec2;
 use super::reference::CellBound;
 use crate::percept::{Flags, Outputs, Percept, Percepts, Touch};
 use crate::stage::angle::{between_directions, between_lines};
-use crate::stage::touches;
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,7 +67,7 @@ impl fmt::Display for Agreement {
         let verdict = if self.holds() { "agrees" } else { "DISAGREES" };
         write!(f, "{verdict} with the reference in {} of {} percepts", self.cells - self.failed, self.cells)?;
         for (name, c) in &self.quantities {
-            write!(f, "\n  {name:<12} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
+            write!(f, "\n  {name:<21} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
             write!(f, "; {} compared, {} too close to call", c.compared, c.undecided)?;
         }
         write!(f, "\n  {} percepts with a flag too close to call", self.undecided_flags)?;
@@ -83,7 +82,12 @@ impl fmt::Display for Agreement {
 const MOST_WORDS: usize = 10;
 
 /// Compares `candidate` with `reference`, whose cells may differ by `bounds`.
-pub(crate) fn compare(reference: &Percepts, bounds: &[CellBound], candidate: &Percepts, names: &[&str]) -> Agreement {
+pub(crate) fn compare(
+    reference: &Percepts,
+    bounds: &[CellBound],
+    candidate: &Percepts,
+    names: &[impl fmt::Display],
+) -> Agreement {
     let mut agreement = Agreement::default();
     for frame in 0..reference.frames() {
         for (field, name) in names.iter().enumerate() {
@@ -157,6 +161,12 @@ impl Cell<'_> {
         self.quantity(Outputs::RADIAL_DISTANCE, right_radial, got_radial, limit, distance);
         self.quantity(Outputs::SPEED, right.speed, got.speed, bound.speed, distance);
         self.quantity(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed, distance);
+        let (right_step, got_step) = (right.filtered_displacement, got.filtered_displacement);
+        self.quantity(Outputs::FILTERED_DISPLACEMENT, right_step, got_step, bound.filtered_displacement, apart);
+        let (right_way, got_way) = (right.filtered_direction, got.filtered_direction);
+        self.quantity(Outputs::FILTERED_DIRECTION, right_way, got_way, bound.filtered_direction, between);
+        let (right_speed, got_speed) = (right.filtered_speed, got.filtered_speed);
+        self.quantity(Outputs::FILTERED_SPEED, right_speed, got_speed, bound.filtered_speed, distance);
     }
 
     fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
@@ -173,11 +183,11 @@ impl Cell<'_> {
                 ));
             }
             let distance = |a: &f64, b: &f64| (a - b).abs();
-            let total = Some(touches::BOUND * right.total);
+            let total = Some(limit.total * right.total);
             self.quantity(Outputs::TOUCHES, Some(right.total), Some(got.total), total, distance);
             let part = |touch: &Touch, axis: usize| touch.centroid.map(|c| c[axis]);
             for axis in 0..2 {
-                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit), distance);
+                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit.place), distance);
             }
         }
     }
@@ -224,6 +234,7 @@ impl Cell<'_> {
 mod tests {
     use super::*;
     use crate::percept::{Precision, Values};
+    use crate::stage::touches::TouchBound;
 
     const NAMES: [&str; 1] = ["field"];
 
@@ -263,6 +274,9 @@ mod tests {
             speed: near,
             radial_speed: near,
             touch: None,
+            filtered_displacement: near,
+            filtered_direction: near,
+            filtered_speed: near,
         }
     }
 
@@ -282,7 +296,7 @@ mod tests {
     #[test]
     fn every_quantity_beyond_its_bound_fails() {
         type Change = fn(&mut Percepts, &mut crate::percept::Columns<f64>);
-        let changes: [(&str, Change); 20] = [
+        let changes: [(&str, Change); 24] = [
             ("total", |_, c| c.total[0] += 0.011),
             ("peak", |_, c| c.peak[0] -= 0.011),
             ("area", |_, c| c.area[0] = f64::NAN),
@@ -299,6 +313,10 @@ mod tests {
             ("radial_distance", |_, c| c.radial_distance[0] = -0.011),
             ("speed", |_, c| c.speed[0] = f64::INFINITY),
             ("radial_speed", |_, c| c.radial_speed[0] = 0.011),
+            ("filtered_displacement", |p, _| p.filtered_displacement[0] = [0.008, -0.008]),
+            ("filtered_direction", |p, _| p.filtered_direction[0] = -0.011),
+            ("filtered_speed", |p, _| p.filtered_speed[0] = 0.011),
+            ("filtered_speed", |p, _| p.present[0] -= Outputs::FILTERED_SPEED),
             ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
             ("active", |p, _| p.active[0] = 2),
             ("flags", |p, _| p.flags[0] |= Flags::TIE),
@@ -316,7 +334,7 @@ mod tests {
         let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
-        let limit = CellBound { touch: Some(1e-6), ..bound() };
+        let limit = CellBound { touch: Some(TouchBound { total: 1e-6, place: 1e-6 }), ..bound() };
         assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
         let moved = |by: f64| Touch { centroid: Some([0.1, 0.2 + by]), ..touch };
         assert!(compare(&right, &[limit], &touched(&[moved(0.9e-6)]), &NAMES).holds());

@@ -65,15 +65,17 @@ pub(crate) struct RawBatch<'a> {
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
-    /// Per slot.
+    /// Per slot that is calibrated, which are the channels once for every signal.
     pub(crate) places: Vec<u32>,
+    pub(crate) channels: usize,
     /// Per sixteen slots whose values lie within 32 of a frame: where those start, and which of their bytes are wanted.
     pub(crate) near: Vec<Option<(usize, [u8; 64])>>,
 }
 
 impl Picks {
-    /// For frames of `width` values.
-    pub(crate) fn new(places: Vec<u32>, width: usize) -> Self {
+    /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
+    pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
+        let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
         let near = places.chunks(16).map(|places| {
             let (low, high) = (*places.iter().min()? as usize, *places.iter().max()? as usize);
             let from = low.min(width.checked_sub(32)?);
@@ -86,46 +88,48 @@ impl Picks {
             }
             (high < from + 32).then_some((from, bytes))
         });
-        Self { near: near.collect(), places }
+        Self { near: near.collect(), channels: channels.len(), places }
     }
 }
 
 /// Where frames' raw values lie.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Rows<'a> {
-    /// Gathered: one frame after the other, each with one value a slot.
-    Packed { values: &'a [RawValue], slots: usize },
-    /// As the source delivered them, each slot's value where `picks` says.
+    /// Gathered: one frame after the other, each with one value a channel.
+    Packed { values: &'a [RawValue], channels: usize },
+    /// As the source delivered them, each value where `picks` says.
     Picked { frames: &'a [Frame], picks: &'a Picks },
 }
 
 impl<'a> Rows<'a> {
-    /// The values of frame `frame`, by slot.
+    /// The values of frame `frame`, by channel.
     pub(crate) fn row(self, frame: usize) -> impl Iterator<Item = RawValue> + 'a {
-        let (values, picks): (&[RawValue], &[u32]) = match self {
-            Self::Packed { values, slots } => (&values[frame * slots..][..slots], &[]),
-            Self::Picked { frames, picks } => (&frames[frame].values, &picks.places),
+        let (values, picks, channels): (&[RawValue], &[u32], usize) = match self {
+            Self::Packed { values, channels } => (&values[frame * channels..], &[], channels),
+            Self::Picked { frames, picks } => (&frames[frame].values, &picks.places, picks.channels),
         };
-        let count = if picks.is_empty() { values.len() } else { picks.len() };
-        (0..count).map(move |slot| values[picks.get(slot).map_or(slot, |&pick| pick as usize)])
+        (0..channels).map(move |channel| values[picks.get(channel).map_or(channel, |&pick| pick as usize)])
     }
 
-    /// The bits of frame `frame` from slot `first` on, as far as `bits` goes; zeros after the last.
+    /// The bits of frame `frame` for the slots from `first` on, as far as `bits` goes; zeros after the last.
     #[inline(always)]
-    pub(crate) fn read(self, frame: usize, first: usize, bits: &mut [u32]) {
-        let straight = |values: &[RawValue], bits: &mut [u32]| {
-            let values: &[u32] = bytemuck::cast_slice(values);
-            let count = values.len().min(bits.len());
-            bits[..count].copy_from_slice(&values[..count]);
-            bits[count..].fill(0);
-        };
+    pub(crate) fn read(self, frame: usize, first: usize, calibrated: usize, bits: &mut [u32]) {
+        let count = bits.len().min(calibrated - first);
+        bits[count..].fill(0);
         match self {
-            Self::Packed { values, slots } => straight(&values[frame * slots + first..(frame + 1) * slots], bits),
+            Self::Packed { values, channels } => {
+                let values: &[u32] = bytemuck::cast_slice(&values[frame * channels..][..channels]);
+                if first + count <= channels {
+                    bits[..count].copy_from_slice(&values[first..first + count]);
+                } else {
+                    for (bits, slot) in bits[..count].iter_mut().zip(first..) {
+                        *bits = values[slot % channels];
+                    }
+                }
+            }
             Self::Picked { frames, picks } => {
                 let values = &frames[frame].values[..];
-                let picks = &picks.places[first..picks.places.len().min(first + bits.len())];
-                bits[picks.len()..].fill(0);
-                for (bits, &pick) in bits.iter_mut().zip(picks) {
+                for (bits, &pick) in bits.iter_mut().zip(&picks.places[first..first + count]) {
                     *bits = values[pick as usize].to_bits();
                 }
             }
@@ -135,8 +139,8 @@ impl<'a> Rows<'a> {
     /// The rows of `frames`.
     pub(crate) fn part(self, part: Range<usize>) -> Self {
         match self {
-            Self::Packed { values, slots } => {
-                Self::Packed { values: &values[part.start * slots..part.end * slots], slots }
+            Self::Packed { values, channels } => {
+                Self::Packed { values: &values[part.start * channels..part.end * channels], channels }
             }
             Self::Picked { frames, picks } => Self::Picked { frames: &frames[part], picks },
         }
@@ -211,12 +215,12 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
 fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration> {
     const CALLS: usize = 15;
     const ENOUGH: Duration = Duration::from_millis(60);
-    let values: Vec<RawValue> = (0..batch * plan.slots()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
+    let values: Vec<RawValue> = (0..batch * plan.channels()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
     let raw = RawBatch {
         first: 0,
         frames: batch,
-        rows: Rows::Packed { values: &values, slots: plan.slots() },
+        rows: Rows::Packed { values: &values, channels: plan.channels() },
         steps: &steps,
     };
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)

@@ -6,10 +6,14 @@ use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
+use crate::signal::RawValue;
 use crate::stage::calibrate::{Pressure, UNUSABLE};
+use crate::stage::change::Heard;
 use crate::stage::hysteresis::ContactState;
+use crate::stage::layout::Member;
+use crate::stage::touches::TouchBound;
 use crate::stage::{
-    Pressed, U, axis, calibrate, centroid, contact, hysteresis, motion, orientation, position, touches,
+    Pressed, U, axis, calibrate, centroid, change, contact, filter, hysteresis, motion, orientation, position, touches,
 };
 
 /// How far a single-precision percept may be off in one cell. `None`: the reference's own margin to a decision is under
@@ -36,8 +40,12 @@ pub(crate) struct CellBound {
     pub(crate) radial_distance: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) radial_speed: Option<f64>,
-    /// A touch's centroid, per coordinate, m; `None` from the first doubt on, as identities remember.
-    pub(crate) touch: Option<f64>,
+    /// A touch's, with its place in m; `None` from the first doubt on, as identities remember.
+    pub(crate) touch: Option<TouchBound>,
+    /// As a distance, m.
+    pub(crate) filtered_displacement: Option<f64>,
+    pub(crate) filtered_direction: Option<f64>,
+    pub(crate) filtered_speed: Option<f64>,
 }
 
 /// The backend.
@@ -45,8 +53,11 @@ pub(crate) struct Reference {
     plan: Plan,
     /// Per field, what the frame before left.
     before: Vec<Before>,
-    /// The same for the bounds, which are worked out apart.
+    /// The raw values of the frame before, by channel.
+    raw_before: Vec<RawValue>,
+    /// The same two for the bounds, which are worked out apart.
     bound_before: Vec<BoundBefore>,
+    bound_raw_before: Vec<RawValue>,
 }
 
 /// What a field's next percept hangs on.
@@ -63,8 +74,8 @@ struct BoundBefore {
     state: ContactState,
     /// The centroid, and its bound as a distance.
     centroid: Option<(DVec2, f64)>,
-    /// Whether touches have been in doubt since the start.
-    touches_in_doubt: bool,
+    touches: touches::Doubt,
+    filter: filter::Doubt,
 }
 
 impl Reference {
@@ -73,14 +84,27 @@ impl Reference {
         Self {
             plan: plan.clone(),
             before: vec![Before::default(); fields],
+            raw_before: vec![RawValue::MISSING; plan.channels()],
             bound_before: vec![BoundBefore::default(); fields],
+            bound_raw_before: vec![RawValue::MISSING; plan.channels()],
         }
     }
 
-    /// One frame's pressures, taxel by taxel.
-    fn pressures(&self, raw: &RawBatch<'_>, frame: usize) -> Vec<Pressure> {
-        let taxels = raw.rows.row(frame).zip(&self.plan.calibrations).enumerate();
-        taxels.map(|(slot, (raw, taxel))| calibrate::reference(raw, taxel, self.plan.knots_of(slot))).collect()
+    /// One frame's pressures and changes, slot by slot; `before` has the raw values of the frame before.
+    fn pressures(&self, values: &[RawValue], before: &[RawValue], step: &Step) -> Vec<Pressure> {
+        let plan = &self.plan;
+        let heard = |values: &[RawValue], slot: usize| {
+            let (channel, knots) = (plan.channel_of(slot), plan.knots_of(slot));
+            let raw = values[channel];
+            Heard { raw, pressure: calibrate::reference(raw, &plan.calibrations[channel], knots) }
+        };
+        let mut pressures: Vec<Pressure> = (0..plan.calibrated()).map(|slot| heard(values, slot).pressure).collect();
+        for taxel in &plan.taxels[plan.calibrated()..] {
+            let slot = taxel.response as usize;
+            let now = Heard { raw: values[plan.channel_of(slot)], pressure: pressures[slot] };
+            pressures.push(change::reference(now, heard(before, slot), step.dt_s, step.flags, taxel.dead_band));
+        }
+        pressures
     }
 
     /// A field's pressed taxels, by ascending id.
@@ -97,7 +121,7 @@ impl Reference {
                     pressure: value,
                     excess: (bound - 2.0 * U * value).max(0.0),
                     place,
-                    area: self.plan.areas[member.slot as usize],
+                    area: self.plan.areas[self.plan.channel_of(member.slot as usize)],
                 }
             })
             .collect()
@@ -107,7 +131,9 @@ impl Reference {
     pub(crate) fn bounds(&mut self, raw: &RawBatch<'_>) -> Vec<CellBound> {
         let mut bounds = Vec::with_capacity(raw.frames * self.plan.fields.len());
         for frame in 0..raw.frames {
-            let pressures = self.pressures(raw, frame);
+            let values: Vec<RawValue> = raw.rows.row(frame).collect();
+            let pressures = self.pressures(&values, &self.bound_raw_before, &raw.steps[frame]);
+            self.bound_raw_before = values;
             for index in 0..self.plan.fields.len() {
                 let (bound, before) = self.bound(index, &pressures, &raw.steps[frame]);
                 self.bound_before[index] = before;
@@ -120,7 +146,8 @@ impl Reference {
     fn bound(&self, index: usize, pressures: &[Pressure], step: &Step) -> (CellBound, BoundBefore) {
         let (field, before) = (&self.plan.fields[index], self.bound_before[index]);
         let state = ContactState { contact: false, in_doubt: true };
-        let unknown = BoundBefore { state, centroid: None, touches_in_doubt: true };
+        let filter = filter::Doubt::of_contact();
+        let unknown = BoundBefore { state, centroid: None, touches: touches::Doubt::FOR_GOOD, filter };
         if self.plan.members_of(field).iter().any(|member| pressures[member.slot as usize].in_doubt) {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
@@ -135,9 +162,8 @@ impl Reference {
             bound.in_doubt = Flags::all() - INPUT;
             return (bound, BoundBefore { state, ..unknown });
         }
-        let touches_in_doubt = before.touches_in_doubt;
         if !state.contact {
-            return (bound, BoundBefore { state, centroid: None, touches_in_doubt });
+            return (bound, BoundBefore { state, touches: before.touches.release(), ..BoundBefore::default() });
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
@@ -167,8 +193,26 @@ impl Reference {
         if let Some(now) = kept {
             moved(&mut bound, field, now, before, step);
         }
-        bound.touch = (!touches_in_doubt).then_some(touches::BOUND * unit);
-        (bound, BoundBefore { state, centroid: kept, touches_in_doubt })
+        let mut touches = before.touches;
+        if self.plan.stages().touches {
+            let pull = |member: &Member| f64::from(member.weight) * pressures[member.slot as usize].value;
+            let pulls: Vec<f64> = self.plan.members_of(field).iter().map(pull).collect();
+            let lost = pressed.iter().map(|taxel| taxel.excess / taxel.pressure).fold(0.0, f64::max);
+            touches = touches.after(&field.skin(), &pulls, c, lost);
+            let limit = touches::bound(lost);
+            bound.touch = (!touches.in_doubt).then_some(TouchBound { place: limit.place * unit, ..limit });
+        }
+        let mut filter = before.filter;
+        if field.charted && self.plan.stages().filter {
+            let clock = filter::Clock::new(step.dt_s, step.flags);
+            let (place, place_bound) = (c.truncate() * unit, c_bound.truncate().length() * unit);
+            let limit = filter.follow(&field.filter, clock, place, place_bound);
+            bound.in_doubt |= limit.in_doubt;
+            bound.filtered_displacement = limit.displacement;
+            bound.filtered_direction = limit.direction;
+            bound.filtered_speed = limit.speed;
+        }
+        (bound, BoundBefore { state, centroid: kept, touches, filter })
     }
 
     fn cell(
@@ -214,7 +258,10 @@ impl Reference {
         let c = centroid::reference(&pressed);
         if stages.centroid {
             let place = if field.charted { c.truncate().extend(0.0) } else { c };
-            columns.set_centroid(cell, (place * f64::from(field.unit_m)).to_array());
+            // The stages that stand on it may be wanted without it.
+            if !columns.centroid_u.is_empty() {
+                columns.set_centroid(cell, (place * f64::from(field.unit_m)).to_array());
+            }
             present |= Outputs::POSITION;
             if field.charted {
                 present |= Outputs::CENTROID | Outputs::NORMAL;
@@ -333,7 +380,9 @@ impl Backend for Reference {
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let fields = self.plan.fields.len();
         for frame in 0..raw.frames {
-            let pressures = self.pressures(raw, frame);
+            let values: Vec<RawValue> = raw.rows.row(frame).collect();
+            let pressures = self.pressures(&values, &self.raw_before, &raw.steps[frame]);
+            self.raw_before = values;
             if !percepts.pressures.is_empty() {
                 let slots = self.plan.slots();
                 let kept = &mut percepts.pressures[(raw.first + frame) * slots..][..slots];

@@ -202,8 +202,9 @@ struct Table {
 impl Table {
     fn new(about: &About<'_>) -> Self {
         let (name, what, _) = about.engine.backend();
-        let row = |(field, _): (&str, &str)| Row {
-            name: field.to_owned(),
+        let plan = about.engine.plan();
+        let row = |field: usize| Row {
+            name: plan.label(field),
             latest: None,
             touched_at: None,
             frames_touched: 0,
@@ -212,9 +213,9 @@ impl Table {
         Self {
             title: format!("{} ← {}", about.body, about.source),
             backend: format!("{name}, {what}"),
-            outputs: about.engine.plan().outputs(),
+            outputs: plan.outputs(),
             all_fields: about.all_fields,
-            rows: about.engine.plan().fields().map(row).collect(),
+            rows: (0..plan.fields().len()).map(row).collect(),
             largest_total: 0.0,
             in_world: false,
             tallest: 0,

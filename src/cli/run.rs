@@ -9,10 +9,13 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use console::Term;
 use somatic::error::nearest;
-use somatic::signal::{FsrSignal, Unfit};
+use somatic::scene::{FilterBy, MotionFilter};
+use somatic::signal::{FsrSignal, Letter, Receptor, Unfit};
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
 use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
-use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Result, Scene, bundled};
+use somatic::{
+    Agreement, BackendKind, Body, Calibration, Engine, Error, Options, Outputs, Plan, Result, Scene, bundled,
+};
 
 use super::feed::{Arrival, Feed, Manner};
 use super::live::{About, View};
@@ -24,6 +27,8 @@ Examples:
   somatic run --source touch.csv --sink percepts.ndjson  a recording, as fast as possible
   somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
   somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
+  somatic run --source touch.csv --letters sustained,change --outputs total
+  somatic run --outputs filtered_direction --filter-window 0.5mm.. --filter-time 0.2
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic run --body mat --source night.csv --backend gpu --verify
 
@@ -71,10 +76,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// Which signal force-sensing resistors deliver, raw or linear, instead of what the calibration says.
-    #[arg(long, value_name = "SIGNAL", value_parser = PossibleValuesParser::new(["raw", "linear"])
-        .try_map(|name| name.parse::<FsrSignal>()))]
-    signal: Option<FsrSignal>,
+    /// What of the sensors' pressures is looked at: how hard they are pressed (sustained), or how fast that changes, per
+    /// second (change). Every field is there once for each.
+    #[arg(long, value_name = "LETTER,...", value_delimiter = ',', default_value = "sustained",
+        value_parser = PossibleValuesParser::new(["sustained", "change"]).try_map(|name| name.parse::<Receptor>()))]
+    letters: Vec<Receptor>,
+
+    /// Which signal force-sensing resistors deliver, instead of what the calibration says; with both, every field is there
+    /// once for each.
+    #[arg(long, value_name = "SIGNAL,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["raw", "linear"]).try_map(|name| name.parse::<FsrSignal>()))]
+    signal: Vec<FsrSignal>,
 
     /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
     #[arg(long)]
@@ -100,6 +112,22 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "S", default_value_t = 10.0)]
     max_gap: f64,
 
+    /// Which motion counts, for the filtered_* outputs: the centroid's way from where it last counted. What is shorter is
+    /// held back until it has added up, so that slow motion passes and jitter does not; what is longer is another touch.
+    /// Either end may be left out [default: from 1/16 of the spacing of a field's taxels to 3 times that].
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    filter_window: Option<String>,
+
+    /// What that window measures: the way, or the paper's change of the distance from the chart's origin, which is blind to
+    /// motion around it [default: distance].
+    #[arg(long, value_name = "MEASURE", value_parser = PossibleValuesParser::new(["distance", "radial"])
+        .try_map(|name| name.parse::<FilterBy>()))]
+    filter_by: Option<FilterBy>,
+
+    /// How long filtered_direction takes to turn (its time constant), in seconds; 0 is at once [default: 0.1].
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    filter_time: Option<f64>,
+
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
     verify: bool,
@@ -111,7 +139,7 @@ pub(super) struct Arguments {
 
 fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
-    format!("Only these quantities: {} [default: all but touches]", names.join(", "))
+    format!("Only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
 }
 
 fn output(name: &str) -> Result<Outputs> {
@@ -123,6 +151,20 @@ fn output(name: &str) -> Result<Outputs> {
         };
         Error::usage(format!("there is no output `{name}`; {hint}"))
     })
+}
+
+/// What sinks call the fields.
+fn field_names(plan: &Plan) -> Vec<FieldNames> {
+    let name = |(index, (field, link)): (usize, (&str, &str))| {
+        let mark = plan.mark(index);
+        FieldNames {
+            field: field.into(),
+            link: link.into(),
+            letter: mark.receptor.map(|receptor| receptor.to_string()),
+            signal: mark.signal.map(|signal| signal.to_string()),
+        }
+    };
+    plan.fields().enumerate().map(name).collect()
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
@@ -153,8 +195,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let sinks = if sinks.is_empty() && !at_terminal { vec![SinkSpec::Stdout] } else { sinks };
-    let names: Vec<FieldNames> =
-        engine.plan().fields().map(|(field, link)| FieldNames { field: field.into(), link: link.into() }).collect();
+    let names = field_names(engine.plan());
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: arguments.all_fields };
     let view = view.open(&about);
     let sinks = sinks.iter().map(|sink| sink.open(&names, arguments.all_fields)).collect::<Result<_>>()?;
@@ -184,6 +225,27 @@ impl Arguments {
         Ok(())
     }
 
+    /// Which motion counts, if that is asked for.
+    fn filter(&self, outputs: Outputs) -> Result<MotionFilter> {
+        let usual = MotionFilter::default();
+        let given = [
+            ("--filter-window", self.filter_window.is_some()),
+            ("--filter-by", self.filter_by.is_some()),
+            ("--filter-time", self.filter_time.is_some()),
+        ];
+        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
+            return Err(Error::usage(format!(
+                "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
+            )));
+        }
+        let filter = MotionFilter {
+            by: self.filter_by.unwrap_or(usual.by),
+            time_constant_s: self.filter_time.unwrap_or(usual.time_constant_s),
+            ..usual
+        };
+        self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
+    }
+
     fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
         let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL);
         let scene = Scene {
@@ -191,7 +253,8 @@ impl Arguments {
             fields: self.fields.clone(),
             max_age_s: self.max_age,
             max_gap_s: self.max_gap,
-            signal: self.signal,
+            letters: Letter::all_of(&self.letters, &self.signal),
+            filter: self.filter(outputs)?,
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

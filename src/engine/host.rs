@@ -1,21 +1,29 @@
-//! What the host does for every backend alike: places on the surface and in the world, and separate touches.
+//! What the host does for every backend alike: places on the surface and in the world, separate touches, filtered motion.
 
 use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
-use crate::backend::{Backend, RawBatch};
+use crate::backend::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
-use crate::stage::{position, touches};
+use crate::stage::{filter, position, touches};
 
 /// What poses are applied to: the body's links and how they hang together at rest.
 pub(super) struct Links {
     pub(super) index_of: HashMap<String, usize>,
     pub(super) parent: Vec<Option<usize>>,
     pub(super) world_from_link: Vec<DAffine3>,
+}
+
+/// What the host's stages remember of a field.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// The touches of the frame before.
+    touches: touches::Memory,
+    filter: filter::Memory,
 }
 
 /// What the host does for every backend alike.
@@ -32,25 +40,29 @@ impl Host<'_> {
         frames: &[Frame],
         raw: &RawBatch<'_>,
         percepts: &mut Percepts,
-        memories: &mut [touches::Memory],
+        memories: &mut [Memory],
     ) -> Result<()> {
         backend.run(raw, percepts)?;
         let stages = self.plan.stages();
-        for (index, frame) in (raw.first..).zip(frames) {
+        for ((index, frame), step) in (raw.first..).zip(frames).zip(raw.steps) {
             percepts.t_s[index] = frame.t_s;
-            if !stages.position {
+            if !(stages.position || stages.filter) {
                 continue;
             }
             for (number, field) in self.plan.fields.iter().enumerate() {
                 let cell = index * self.plan.fields.len() + number;
                 let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
+                let posed = contact && stages.position;
                 let world =
-                    if contact { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
-                if contact {
+                    if posed { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
+                if posed {
                     self.place(field, world.as_ref(), cell, percepts);
                 }
                 if stages.touches {
-                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number]);
+                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number].touches);
+                }
+                if stages.filter && field.charted {
+                    self.filter(field, step, cell, percepts, &mut memories[number].filter);
                 }
             }
         }
@@ -71,10 +83,7 @@ impl Host<'_> {
 
     /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
     fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
-        let place = match &percepts.values {
-            Values::F32(columns) => DVec3::from_array(columns.centroid(cell)),
-            Values::F64(columns) => DVec3::from_array(columns.centroid(cell)),
-        };
+        let place = centroid(percepts, cell);
         let (position, normal) = Self::on_skin(field, world, place);
         percepts.in_world[cell] = world.is_some();
         if self.plan.outputs.contains(Outputs::POSITION) {
@@ -82,6 +91,34 @@ impl Host<'_> {
         }
         if self.plan.outputs.contains(Outputs::NORMAL) {
             percepts.normal[cell] = normal.to_array();
+        }
+    }
+
+    /// Tells which of a cell's motion counts.
+    fn filter(
+        &self,
+        field: &PlanField,
+        step: &Step,
+        cell: usize,
+        percepts: &mut Percepts,
+        memory: &mut filter::Memory,
+    ) {
+        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
+            memory.release();
+            return;
+        }
+        let clock = filter::Clock::new(step.dt_s, step.flags);
+        let found = memory.follow(&field.filter, clock, centroid(percepts, cell).truncate());
+        percepts.flags[cell] |= found.flags;
+        percepts.present[cell] |= found.present & self.plan.outputs;
+        if let Some(displacement) = percepts.filtered_displacement.get_mut(cell) {
+            *displacement = found.displacement.to_array();
+        }
+        if let Some(direction) = percepts.filtered_direction.get_mut(cell) {
+            *direction = found.direction;
+        }
+        if let Some(speed) = percepts.filtered_speed.get_mut(cell) {
+            *speed = found.speed;
         }
     }
 
@@ -104,9 +141,8 @@ impl Host<'_> {
         let members = self.plan.members_of(field);
         let pulls: Vec<f64> =
             members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
-        let skin = touches::Skin { places: &field.places, beside: &field.beside, spacing: field.spacing };
         let unit_m = f64::from(field.unit_m);
-        let found = memory.follow(&skin, &pulls);
+        let found = memory.follow(&field.skin(), &pulls);
         let several = found.len() > 1;
         percepts.push_touches(found.iter().map(|touch| {
             let place = touch.place * unit_m;
@@ -122,6 +158,14 @@ impl Host<'_> {
         if several {
             percepts.flags[cell] |= Flags::SEVERAL;
         }
+    }
+}
+
+/// A cell's centroid as the backend has it, m.
+fn centroid(percepts: &Percepts, cell: usize) -> DVec3 {
+    match &percepts.values {
+        Values::F32(columns) => DVec3::from_array(columns.centroid(cell)),
+        Values::F64(columns) => DVec3::from_array(columns.centroid(cell)),
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use super::filter::DirectionFilter;
 use super::plot::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 use super::trial::{self, Moment, Signal, Trial};
 use crate::body::Body;
@@ -22,9 +21,6 @@ const INSTANTS_S: [f64; 6] = [0.8, 1.3, 1.8, 2.3, 2.8, 3.3];
 const HALF_MM: f64 = 18.0;
 /// Of an Interlink 400's sensing disc, mm.
 const SENSOR_RADIUS_MM: f64 = 2.5;
-/// The window of ΔR: from about what noise makes in a frame to half of the sensors' pitch.
-const WINDOW_M: [f64; 2] = [0.5e-3, 6e-3];
-const TIME_CONSTANT_S: f64 = 0.15;
 
 const GREEN: Colour = [0, 150, 0];
 const BLUE: Colour = [0, 0, 230];
@@ -191,11 +187,8 @@ fn time_figure(rod: &Trial) -> Figure {
         direction.push(Layer { mark, colour: faint, name: Some(names[signal]) });
     }
     for signal in 0..2 {
-        let mut filter = DirectionFilter::new(WINDOW_M, TIME_CONSTANT_S);
-        let filtered: Vec<Option<f64>> =
-            rod.moments.iter().map(|moment| filter.push(moment.t_s, moment.percepts[signal].centroid)).collect();
-        let points = rod.moments.iter().zip(filtered).map(|(moment, angle)| (moment.t_s, angle));
-        direction.push(broken_line(points, PI, LINES[signal], 2.0, NAMES[signal]));
+        let filtered = |moment: &Moment| moment.percepts[signal].filtered_direction;
+        direction.push(curve(rod, &filtered, PI, LINES[signal], 2.0, NAMES[signal]));
     }
     let true_angle = |moment: &Moment| moment.truth.as_ref()?.angle;
     let mut orientation = vec![curve(rod, &true_angle, PI / 2.0, GREY, 4.0, "true")];

@@ -1,7 +1,6 @@
 //! The paper's own experiments, from simulation, and the table of errors that it lacks. `docs/paper.md` shows them.
 
 mod figures;
-mod filter;
 mod metric;
 mod plot;
 mod table;

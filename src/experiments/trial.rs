@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::Result;
 use crate::percept::{Outputs, Percept};
-use crate::scene::Scene;
+use crate::scene::{FilterBy, MotionFilter, Scene};
 use crate::signal::{Frame, FsrCircuit, RawValue};
 use crate::source::{SimulatedSource, Source as _, Truth};
 
@@ -44,6 +44,10 @@ impl Signal {
         }
     }
 }
+
+/// From about what noise makes in a frame to half of the sensors' pitch.
+const FILTER: MotionFilter =
+    MotionFilter { low_m: Some(0.5e-3), high_m: Some(6e-3), by: FilterBy::Distance, time_constant_s: 0.15 };
 
 /// One frame: what the sensors read and felt, what is true, and the field's percept from each of [`Signal::ALL`].
 #[derive(Clone, Debug)]
@@ -83,7 +87,8 @@ pub(super) fn run(name: &str, text: &str, body: &Body, field: &str) -> Result<Tr
     let mut percepts = Vec::with_capacity(2);
     for frames in &signals {
         let scene = Scene {
-            outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION,
+            outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED,
+            filter: FILTER,
             fields: vec![field.to_owned()],
             ..Scene::default()
         };

@@ -69,6 +69,8 @@ pub struct Percepts {
     /// The outputs, and what stages work on.
     columns: Outputs,
     fields: usize,
+    /// Letters that every field is there in, one after the other.
+    letters: usize,
     /// Taxels whose pressures are kept, 0 unless a stage works on them.
     slots: usize,
     pub(crate) first_frame: u64,
@@ -80,6 +82,9 @@ pub struct Percepts {
     pub(crate) values: Values,
     pub(crate) position: Vec<[f64; 3]>,
     pub(crate) normal: Vec<[f64; 3]>,
+    pub(crate) filtered_displacement: Vec<[f64; 2]>,
+    pub(crate) filtered_direction: Vec<f64>,
+    pub(crate) filtered_speed: Vec<f64>,
     /// P, frame by frame, each taxel by taxel.
     pub(crate) pressures: Vec<f64>,
     touches: Vec<Touch>,
@@ -95,6 +100,7 @@ impl Percepts {
             outputs,
             columns: outputs,
             fields,
+            letters: 1,
             slots: 0,
             first_frame: 0,
             t_s: Vec::new(),
@@ -108,10 +114,19 @@ impl Percepts {
             },
             position: Vec::new(),
             normal: Vec::new(),
+            filtered_displacement: Vec::new(),
+            filtered_direction: Vec::new(),
+            filtered_speed: Vec::new(),
             pressures: Vec::new(),
             touches: Vec::new(),
             touch_ends: Vec::new(),
         }
+    }
+
+    /// The same, for fields of which each stands there in `letters` letters, one after the other.
+    pub(crate) fn with_letters(mut self, letters: usize) -> Self {
+        self.letters = letters.max(1);
+        self
     }
 
     /// The same, with room for `columns` beside the outputs, and for the pressures of `slots` taxels.
@@ -136,12 +151,19 @@ impl Percepts {
         self.active.resize(when(Outputs::ACTIVE, cells), 0);
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        refill(&mut self.filtered_displacement, when(Outputs::FILTERED_DISPLACEMENT, cells), [0.0; 2]);
+        refill(&mut self.filtered_direction, when(Outputs::FILTERED_DIRECTION, cells), 0.0);
+        refill(&mut self.filtered_speed, when(Outputs::FILTERED_SPEED, cells), 0.0);
         refill(&mut self.pressures, frames * self.slots, 0.0);
         self.touches.clear();
         self.touch_ends.clear();
         match &mut self.values {
             Values::F32(columns) => columns.resize(self.columns, cells),
-            Values::F64(columns) => columns.resize(self.columns, cells),
+            Values::F64(columns) => {
+                // The reference leaves what is absent as it is.
+                columns.resize(self.columns, 0);
+                columns.resize(self.columns, cells);
+            }
         }
     }
 
@@ -166,7 +188,7 @@ impl Percepts {
         self.t_s.len()
     }
 
-    /// Number of fields in every frame.
+    /// Number of fields in every frame, each counted once for each letter.
     #[must_use]
     pub fn fields(&self) -> usize {
         self.fields
@@ -193,6 +215,7 @@ impl Percepts {
         let has = |output| present.contains(output);
         let mut percept = Percept {
             field,
+            letter: field % self.letters,
             contact: !flags.contains(Flags::NO_CONTACT),
             flags,
             total: None,
@@ -211,6 +234,9 @@ impl Percepts {
             radial_distance: None,
             speed: None,
             radial_speed: None,
+            filtered_displacement: has(Outputs::FILTERED_DISPLACEMENT).then(|| self.filtered_displacement[cell]),
+            filtered_direction: has(Outputs::FILTERED_DIRECTION).then(|| self.filtered_direction[cell]),
+            filtered_speed: has(Outputs::FILTERED_SPEED).then(|| self.filtered_speed[cell]),
             in_world: self.in_world[cell],
         };
         match &self.values {

@@ -1,13 +1,17 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
 mod curves;
+mod filter;
 mod plan;
+mod slots;
 
+pub use filter::MotionFilter;
 pub use plan::Plan;
 pub(crate) use plan::{PlanField, Stages};
 
 use crate::percept::Outputs;
-use crate::signal::FsrSignal;
+use crate::signal::Letter;
+pub use crate::stage::filter::FilterBy;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +24,21 @@ pub struct Scene {
     pub max_age_s: f64,
     /// The longest step between frames over which motion is measured, s.
     pub max_gap_s: f64,
-    /// Which signal the sensors of the paper's circuit deliver, instead of what the calibration says.
-    pub signal: Option<FsrSignal>,
+    /// What sensors are read as; every field is computed once for each. Usually one, the pressure itself.
+    pub letters: Vec<Letter>,
+    /// Which motion counts, for [`Outputs::FILTERED`].
+    pub filter: MotionFilter,
 }
 
 impl Default for Scene {
     fn default() -> Self {
-        Self { outputs: Outputs::USUAL, fields: Vec::new(), max_age_s: 0.0, max_gap_s: 10.0, signal: None }
+        Self {
+            outputs: Outputs::USUAL,
+            fields: Vec::new(),
+            max_age_s: 0.0,
+            max_gap_s: 10.0,
+            letters: vec![Letter::default()],
+            filter: MotionFilter::default(),
+        }
     }
 }

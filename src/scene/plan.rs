@@ -11,9 +11,9 @@ use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
-use crate::signal::{Calibration, Response, TaxelCalibration};
+use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
-use crate::stage::{layout, motion};
+use crate::stage::{filter, layout, motion, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,7 @@ pub(crate) struct Stages {
     pub(crate) motion: bool,
     pub(crate) position: bool,
     pub(crate) touches: bool,
+    pub(crate) filter: bool,
 }
 
 impl Stages {
@@ -36,8 +37,9 @@ impl Stages {
         let orientation = wants(Outputs::ORIENTATION);
         let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
         let motion = wants(Outputs::MOTION);
-        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion;
-        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches }
+        let filter = wants(Outputs::FILTERED);
+        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion || filter;
+        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter }
     }
 }
 
@@ -48,12 +50,16 @@ pub struct Plan {
     stages: Stages,
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
-    /// The body's taxels that are read, by ascending id; a *slot* is an index into this.
+    pub(super) letters: Vec<Letter>,
+    /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
-    /// Per slot.
+    /// Per channel.
     pub(crate) calibrations: Vec<TaxelCalibration>,
-    /// Per slot, m².
+    /// Per channel, m².
     pub(crate) areas: Vec<f64>,
+    /// How many slots are calibrated from raw values: all channels in each signal, signal by signal. The slots after them
+    /// are changes of these: all channels in each letter that is one.
+    pub(super) calibrated: usize,
     /// Per slot, as the f32 backends read them.
     pub(crate) taxels: Vec<layout::Taxel>,
     /// What their responses refer to.
@@ -63,10 +69,12 @@ pub struct Plan {
     pub(crate) members: Vec<layout::Member>,
 }
 
-/// A field as a backend sees it.
+/// A field in one letter, as a backend sees it.
 #[derive(Clone, Debug)]
 pub(crate) struct PlanField {
     pub(crate) name: String,
+    /// Which of the scene's letters its taxels are read in.
+    pub(crate) letter: usize,
     /// Name of the anchor, or [`WORLD`].
     pub(crate) link: String,
     /// The anchor's index in the body.
@@ -85,6 +93,8 @@ pub(crate) struct PlanField {
     pub(crate) thresholds: Thresholds,
     /// The distance in the unit up to which its centroid counts as still.
     pub(crate) still_within: f32,
+    /// How its motion is filtered.
+    pub(crate) filter: filter::Settings,
     /// Per member, the members beside it, where separate touches are wanted.
     pub(crate) beside: Vec<Vec<u32>>,
     /// About how far members lie apart, in the unit.
@@ -99,12 +109,20 @@ pub(crate) struct PlanField {
     pub(crate) lift: Option<Lift>,
 }
 
+impl PlanField {
+    /// As the stage that tells touches apart sees it.
+    pub(crate) fn skin(&self) -> touches::Skin<'_> {
+        touches::Skin { places: &self.places, beside: &self.beside, spacing: self.spacing }
+    }
+}
+
 impl Plan {
     /// The plan for `scene` on `body`, whose fields are `fields`, with one robot's `calibration`.
     ///
     /// # Errors
     /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has.
+    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has, for no letter, for one
+    /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
             let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
@@ -115,7 +133,9 @@ impl Plan {
         }
         calibration.check_body(&body.name)?;
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
-        if let Some(signal) = scene.signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
+        Letter::check(&scene.letters)?;
+        let signal = scene.letters.iter().find_map(|letter| letter.signal);
+        if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
                 "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; see docs/calibration.md"
             )));
@@ -133,30 +153,32 @@ impl Plan {
         let read: BTreeSet<usize> =
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
-        let slot_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
+        let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let mut plan = Self {
             outputs: scene.outputs,
             stages: Stages::of(scene.outputs),
             columns: scene.outputs,
+            letters: scene.letters.clone(),
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
+            calibrated: 0,
             taxels: Vec::new(),
             curves: Curves::default(),
             fields: Vec::with_capacity(chosen.len()),
             members: Vec::new(),
             body_taxels: Vec::new(),
         };
-        for (of_taxel, &area) in plan.calibrations.iter().zip(&plan.areas) {
-            let response = plan.curves.response_of(calibration, of_taxel, scene.signal)?;
-            plan.taxels.push(taxel(of_taxel, area, response));
-        }
+        let first_slots = plan.lay_out_slots(calibration)?;
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
+            let first = plan.fields.len();
+            let still_within = motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32;
             plan.fields.push(PlanField {
                 name: field.name.clone(),
+                letter: 0,
                 link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
                 anchor: field.anchor,
                 first: plan.members.len(),
@@ -165,8 +187,9 @@ impl Plan {
                 divided: parents.contains(&index),
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unit_m,
-                thresholds: thresholds(calibration, &field.name),
-                still_within: motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32,
+                thresholds: Thresholds::default(),
+                still_within,
+                filter: scene.filter.settings(field.spacing_m(), f64::from(still_within * unit_m))?,
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
@@ -177,20 +200,30 @@ impl Plan {
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
             });
-            let places = &plan.fields[plan.fields.len() - 1].places;
-            plan.members.extend(field.members.iter().zip(places).map(|(member, place)| layout::Member {
-                slot: slot_of(member.taxel),
-                weight: member.weight as f32,
-                u: place.x as f32,
-                v: place.y as f32,
-            }));
+            // The same in every letter, but for what it reads and when it counts as touched.
+            for letter in 1..plan.letters.len() {
+                plan.fields.push(PlanField { letter, ..plan.fields[first].clone() });
+            }
+            for (letter, &first_slot) in first_slots.iter().enumerate() {
+                let in_letter = &mut plan.fields[first + letter];
+                in_letter.first = plan.members.len();
+                in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
+                plan.members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| {
+                    layout::Member {
+                        slot: first_slot + channel_of(member.taxel),
+                        weight: member.weight as f32,
+                        u: place.x as f32,
+                        v: place.y as f32,
+                    }
+                }));
+            }
         }
         plan.body_taxels = body_taxels;
         plan.stages.hysteresis = plan.fields.iter().any(|field| field.thresholds != Thresholds::default());
         if plan.stages.hysteresis {
             plan.columns |= Outputs::TOTAL;
         }
-        if plan.stages().position {
+        if plan.stages().position || plan.stages().filter {
             plan.columns |= Outputs::CENTROID;
         }
         Ok(plan)
@@ -202,27 +235,33 @@ impl Plan {
         self.outputs
     }
 
-    /// Calibrates the taxel in `slot` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how it was
-    /// before any upkeep.
-    pub(crate) fn keep_up(&mut self, slot: usize, baseline: f32, unfit: bool, made: &layout::Taxel) {
-        let response = if unfit { layout::MASKED } else { made.response };
-        self.taxels[slot] = layout::Taxel { baseline, response, ..*made };
-        self.calibrations[slot].baseline = baseline;
-        self.calibrations[slot].mask = response == layout::MASKED;
+    /// Calibrates the taxel at `channel` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how all
+    /// slots were before any upkeep.
+    pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
+        for slot in (channel..self.calibrated).step_by(self.channels()) {
+            let response = if unfit { layout::MASKED } else { made[slot].response };
+            self.taxels[slot] = layout::Taxel { baseline, response, ..made[slot] };
+            self.calibrations[channel].mask = response == layout::MASKED;
+        }
+        self.calibrations[channel].baseline = baseline;
     }
 
-    /// Per slot, whether one of its own fields is in contact, where `touched` says it of each field. A taxel's own fields
-    /// are those that no child divides further, so that a body that is touched somewhere is not touched everywhere.
-    pub(crate) fn touched_slots(&self, touched: &[bool]) -> Vec<bool> {
-        let mut own = vec![false; self.slots()];
-        let mut finest = vec![false; self.slots()];
+    /// Per channel, whether one of its own fields is in lasting contact, where `touched` says it of each field. A taxel's
+    /// own fields are those that no child divides further, so that a body that is touched somewhere is not touched
+    /// everywhere.
+    pub(crate) fn touched_channels(&self, touched: &[bool]) -> Vec<bool> {
+        let mut own = vec![false; self.channels()];
+        let mut finest = vec![false; self.channels()];
+        let lasting = |field: &PlanField| self.letters[field.letter].receptor == Receptor::Sustained;
+        let fields: Vec<_> = self.fields.iter().zip(touched).filter(|(field, _)| lasting(field)).collect();
         for divided in [false, true] {
-            for (field, &touched) in self.fields.iter().zip(touched).filter(|(field, _)| field.divided == divided) {
-                for slot in self.members_of(field).iter().map(|member| member.slot as usize) {
-                    if !divided || !finest[slot] {
-                        own[slot] |= touched;
+            for &(field, &touched) in fields.iter().filter(|(field, _)| field.divided == divided) {
+                for member in self.members_of(field) {
+                    let channel = self.channel_of(member.slot as usize);
+                    if !divided || !finest[channel] {
+                        own[channel] |= touched;
                     }
-                    finest[slot] |= !divided;
+                    finest[channel] |= !divided;
                 }
             }
         }
@@ -237,8 +276,33 @@ impl Plan {
 
     /// Number of taxels that are read.
     #[must_use]
+    pub fn channels(&self) -> usize {
+        self.body_taxels.len()
+    }
+
+    /// Number of values that fields are made of in a frame: a taxel has one for each signal and letter that needs it.
+    #[must_use]
     pub fn slots(&self) -> usize {
         self.taxels.len()
+    }
+
+    /// How many of the slots, the first ones, are pressures calibrated from raw values; the others are their changes.
+    pub(crate) fn calibrated(&self) -> usize {
+        self.calibrated
+    }
+
+    pub(crate) fn has_changes(&self) -> bool {
+        self.calibrated < self.slots()
+    }
+
+    pub(crate) fn channel_of(&self, slot: usize) -> usize {
+        slot % self.channels()
+    }
+
+    /// The letters that every field is read in; what [`crate::Percept::letter`] counts.
+    #[must_use]
+    pub fn letters(&self) -> &[Letter] {
+        &self.letters
     }
 
     /// Number of (field, taxel) pairs: the work of a frame.
@@ -247,12 +311,26 @@ impl Plan {
         self.members.len()
     }
 
-    /// Names of the fields, in the order of the percepts, each with the link it answers in.
+    /// Names of the fields, in the order of the percepts, each with the link it answers in. A field stands there once for
+    /// each of [`Plan::letters`], in their order.
     pub fn fields(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
         self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
     }
 
-    /// Per slot.
+    /// What is to be said of the letter of field `field` of the percepts, beside the field's name.
+    #[must_use]
+    pub fn mark(&self, field: usize) -> Mark {
+        let letter = self.fields.get(field).map(|field| self.letters[field.letter]);
+        letter.map_or(Mark::default(), |letter| letter.mark(&self.letters))
+    }
+
+    /// What people call field `field` of the percepts: its name, and what is to be said of its letter.
+    #[must_use]
+    pub fn label(&self, field: usize) -> String {
+        self.fields.get(field).map_or(String::new(), |named| format!("{}{}", named.name, self.mark(field)))
+    }
+
+    /// Per slot that is calibrated.
     pub(crate) fn knots_of(&self, slot: usize) -> &[layout::Knot] {
         self.curves.of(self.taxels[slot].response)
     }
@@ -307,22 +385,12 @@ fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
     field.members.iter().map(|member| beside(member.taxel)).collect()
 }
 
-fn thresholds(calibration: &Calibration, field: &str) -> Thresholds {
-    let contact = calibration.fields.get(field).copied().unwrap_or(calibration.contact);
+fn thresholds(calibration: &Calibration, field: &str, receptor: Receptor) -> Thresholds {
+    let contact: ContactThresholds = match receptor {
+        Receptor::Sustained => calibration.fields.get(field).copied().unwrap_or(calibration.contact),
+        Receptor::Change => calibration.change.contact,
+    };
     Thresholds { on: contact.on, off: contact.off }
-}
-
-fn taxel(calibration: &TaxelCalibration, area: f64, response: u32) -> layout::Taxel {
-    layout::Taxel {
-        baseline: calibration.baseline,
-        gain: calibration.gain,
-        dead_band: calibration.dead_band,
-        p_max: calibration.p_max,
-        raw_low: calibration.raw_range[0],
-        raw_high: calibration.raw_range[1],
-        area: area as f32,
-        response,
-    }
 }
 
 /// The least power of two that is at least `radius_m`, within what single precision can square.

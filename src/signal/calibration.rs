@@ -3,6 +3,7 @@
 //! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
 
 mod response;
+mod thresholds;
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -12,6 +13,8 @@ use toml::Spanned;
 
 use self::response::{CurveKeys, Draft, only_for_fsr};
 pub use self::response::{FsrResponse, FsrSignal, Response};
+pub use self::thresholds::{ChangeCalibration, ContactThresholds};
+use self::thresholds::{ChangeKeys, ContactKeys};
 use super::FsrCircuit;
 use super::curve::Curve;
 use super::upkeep::UpkeepKeys;
@@ -82,19 +85,12 @@ pub struct Calibration {
     pub contact: ContactThresholds,
     /// The same for single fields, by name.
     pub fields: BTreeMap<String, ContactThresholds>,
+    /// The same for what changes, and which changes count.
+    pub change: ChangeCalibration,
     /// Which input is not to be believed.
     pub checks: Checks,
     /// How baselines follow drift, and which taxels are found unfit.
     pub upkeep: UpkeepKeys,
-}
-
-/// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactThresholds {
-    /// Contact begins over this.
-    pub on: f32,
-    /// Contact ends at this or below; at most `on`.
-    pub off: f32,
 }
 
 #[derive(Deserialize)]
@@ -110,25 +106,11 @@ struct File {
     #[serde(default)]
     contact: ContactKeys,
     #[serde(default)]
+    change: ChangeKeys,
+    #[serde(default)]
     checks: Checks,
     #[serde(default)]
     upkeep: UpkeepKeys,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ContactKeys {
-    on: Option<Spanned<f64>>,
-    off: Option<Spanned<f64>>,
-    #[serde(default)]
-    field: BTreeMap<String, FieldContactKeys>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FieldContactKeys {
-    on: Spanned<f64>,
-    off: Option<Spanned<f64>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -158,6 +140,7 @@ impl Calibration {
             curves: Vec::new(),
             contact: ContactThresholds::default(),
             fields: BTreeMap::new(),
+            change: ChangeCalibration::default(),
             checks: Checks::default(),
             upkeep: UpkeepKeys::default(),
         }
@@ -209,12 +192,10 @@ impl Calibration {
         let taxels = drafts.into_iter().map(|draft| draft.finish(&curves)).collect::<Result<_>>()?;
         check_checks(&file.checks)?;
         file.upkeep.check()?;
-        let contact = thresholds(file.contact.on.as_ref(), file.contact.off.as_ref(), text)?;
-        let mut fields = BTreeMap::new();
-        for (name, keys) in file.contact.field {
-            fields.insert(name, thresholds(Some(&keys.on), keys.off.as_ref(), text)?);
-        }
-        Ok(Self { body: file.body, taxels, curves, contact, fields, checks: file.checks, upkeep: file.upkeep })
+        let (contact, fields) = file.contact.read(text)?;
+        let change = file.change.read(text)?;
+        let File { body, checks, upkeep, .. } = file;
+        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
     }
 
     /// Refuses a body that the calibration says it is not for.
@@ -314,21 +295,6 @@ impl Keys {
     }
 }
 
-/// Thresholds of contact; `off` is `on` where it is not given.
-fn thresholds(on: Option<&Spanned<f64>>, off: Option<&Spanned<f64>>, text: &str) -> Result<ContactThresholds> {
-    let wrong = |key: &str, value: &Spanned<f64>, must: &str| {
-        let line = line_of(text, value.span().start);
-        Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref())).at(format!("line {line}")))
-    };
-    let on_value = on.map_or(0.0, |on| *on.get_ref());
-    let off_value = off.map_or(on_value, |off| *off.get_ref());
-    match (on, off) {
-        (Some(on), _) if !(0.0..=MOST).contains(&on_value) => wrong("on", on, "0 or more, in the unit of S"),
-        (_, Some(off)) if !(0.0..=on_value).contains(&off_value) => wrong("off", off, "between 0 and `on`"),
-        _ => Ok(ContactThresholds { on: on_value as f32, off: off_value as f32 }),
-    }
-}
-
 fn check_checks(checks: &Checks) -> Result<()> {
     let wrong = |key: &str, must: &str| Err(Error::failed(format!("[checks] `{key}` must be {must}")));
     if checks.broken_frame_share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
@@ -373,6 +339,7 @@ fn explain(message: &str) -> String {
         "isolated_ratio",
         "isolated_above",
         "contact",
+        "change",
         "upkeep",
         "cadence_s",
         "time_constant_s",
@@ -422,6 +389,20 @@ mod tests {
         assert!(why("all = 3").contains("line 1"));
         assert_eq!(why("[contact]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
         assert!(why("[contact]\non = -3").contains("line 2"));
+        assert_eq!(why("[change]\ndead_band = -1"), "line 2: `dead_band` is -1; it must be 0 or more, in P per second");
+        assert_eq!(why("[change]\non = nan"), "line 2: `on` is NaN; it must be 0 or more, in P per second");
+        assert_eq!(why("[change]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
+        assert!(why("[change]\nfield = 3").starts_with("line 2"));
+    }
+
+    #[test]
+    fn what_changes_has_thresholds_of_its_own() {
+        let read = |text: &str| Calibration::parse(text, &[]).unwrap().change;
+        let contact = ContactThresholds { on: 30.0, off: 20.0 };
+        assert_eq!(read("[change]\ndead_band = 5\non = 30\noff = 20"), ChangeCalibration { dead_band: 5.0, contact });
+        assert_eq!(read("[change]\non = 30").contact.off, 30.0);
+        assert_eq!(read("[contact]\non = 30"), ChangeCalibration::default());
     }
 
     #[test]

@@ -5,13 +5,17 @@ mod curve;
 mod frame;
 mod fsr;
 mod intake;
+mod letter;
 mod upkeep;
 
-pub use calibration::{Calibration, Checks, ContactThresholds, FsrResponse, FsrSignal, Response, TaxelCalibration};
+pub use calibration::{
+    Calibration, ChangeCalibration, Checks, ContactThresholds, FsrResponse, FsrSignal, Response, TaxelCalibration,
+};
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
 pub(crate) use intake::Intake;
+pub use letter::{Letter, Mark, Receptor};
 pub(crate) use upkeep::{Kept, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};

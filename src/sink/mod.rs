@@ -43,10 +43,14 @@ pub enum Flow {
 }
 
 /// What a sink calls a field.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FieldNames {
     /// The field's name.
     pub field: String,
     /// The link in whose frame its position and normal are given: its anchor.
     pub link: String,
+    /// What its taxels are read as, where that is to be said: `sustained` or `change`.
+    pub letter: Option<String>,
+    /// In which signal, where that is to be said: `raw` or `linear`.
+    pub signal: Option<String>,
 }

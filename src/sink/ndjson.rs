@@ -36,7 +36,13 @@ impl Head {
     fn new(names: &FieldNames) -> Self {
         let begin = |link: &str| {
             let text = |text: &str| serde_json::Value::from(text).to_string();
-            format!("{{\"field\":{},\"link\":{},\"contact\":", text(&names.field), text(link))
+            let mut head = format!("{{\"field\":{},\"link\":{}", text(&names.field), text(link));
+            for (key, value) in [("letter", &names.letter), ("signal", &names.signal)] {
+                if let Some(value) = value {
+                    head += &format!(",\"{key}\":{}", text(value));
+                }
+            }
+            head + ",\"contact\":"
         };
         Self { in_anchor: begin(&names.link), in_world: begin("world") }
     }
@@ -256,6 +262,18 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
     named(line, "radial_distance", percept.radial_distance);
     named(line, "speed", percept.speed);
     named(line, "radial_speed", percept.radial_speed);
+    // Made by the host, in double precision whatever the backend.
+    if let Some(displacement) = percept.filtered_displacement {
+        key(line, "filtered_displacement");
+        print(line, &displacement);
+    }
+    let filtered = [("filtered_direction", percept.filtered_direction), ("filtered_speed", percept.filtered_speed)];
+    for (name, value) in filtered {
+        if let Some(value) = value {
+            key(line, name);
+            print(line, &value);
+        }
+    }
 }
 
 fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
@@ -298,7 +316,7 @@ mod tests {
 
     fn names() -> Vec<FieldNames> {
         [("hand/palm", "hand"), ("say \"hi\"", "arm")]
-            .map(|(field, link)| FieldNames { field: field.into(), link: link.into() })
+            .map(|(field, link)| FieldNames { field: field.into(), link: link.into(), ..FieldNames::default() })
             .into()
     }
 
@@ -311,7 +329,7 @@ mod tests {
         percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
         percepts.present = vec![
-            (Outputs::all() - Outputs::MOTION) | Outputs::DISPLACEMENT,
+            (Outputs::USUAL - Outputs::MOTION) | Outputs::DISPLACEMENT,
             Outputs::TOTAL,
             Outputs::TOTAL | Outputs::POSITION,
             Outputs::empty(),
@@ -352,8 +370,12 @@ mod tests {
     }
 
     fn written(percepts: &Percepts, all_fields: bool) -> String {
+        written_as(percepts, &names(), all_fields)
+    }
+
+    fn written_as(percepts: &Percepts, names: &[FieldNames], all_fields: bool) -> String {
         let shared = Shared::default();
-        let mut sink = Box::new(NdjsonSink::to_writer("out", shared.clone(), &names(), all_fields));
+        let mut sink = Box::new(NdjsonSink::to_writer("out", shared.clone(), names, all_fields));
         assert_eq!(sink.write(percepts).unwrap(), Flow::Open);
         sink.finish().unwrap();
         String::from_utf8(shared.0.lock().unwrap().clone()).unwrap()
@@ -387,6 +409,17 @@ mod tests {
             let line: serde_json::Value = serde_json::from_str(line).unwrap();
             assert_eq!(line["fields"].as_array().unwrap().len(), 2);
         }
+    }
+
+    #[test]
+    fn a_letter_is_told_where_it_has_a_name() {
+        let mut names = names();
+        names[0].letter = Some("change".into());
+        names[0].signal = Some("raw".into());
+        names[1].signal = Some("linear".into());
+        let text = written_as(&percepts(Precision::F32), &names, true);
+        assert!(text.contains(r#""link":"hand","letter":"change","signal":"raw","contact":true"#), "{text}");
+        assert!(text.contains(r#""link":"arm","signal":"linear","contact":false"#), "{text}");
     }
 
     #[test]

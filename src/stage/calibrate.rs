@@ -124,9 +124,9 @@ fn interpolate(knots: &[Knot], x: f64) -> (f64, [f64; 3]) {
 }
 
 /// 2⁶⁰.
-const HUGE: f64 = 1_152_921_504_606_846_976.0;
+pub(crate) const HUGE: f64 = 1_152_921_504_606_846_976.0;
 /// 2⁻⁶⁰.
-const TINY: f64 = 1.0 / HUGE;
+pub(crate) const TINY: f64 = 1.0 / HUGE;
 
 #[cfg(test)]
 mod tests {

@@ -16,15 +16,19 @@ pub(crate) const MANY: usize = 128;
 pub(crate) struct Batch {
     /// Frames in this batch.
     pub(crate) frames: u32,
-    /// Taxels in a frame.
-    pub(crate) slots: u32,
+    /// Raw values in a frame.
+    pub(crate) channels: u32,
+    /// Slots that are calibrated from raw values, a whole number of times the channels.
+    pub(crate) calibrated: u32,
+    /// Slots after those, which are changes.
+    pub(crate) changes: u32,
     /// Fields.
     pub(crate) fields: u32,
     /// Fields of more than [`WIDE`] members.
     pub(crate) wide: u32,
 }
 
-/// A taxel's calibration.
+/// A taxel as a letter reads it: its calibration, or what holds for its changes.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Taxel {
@@ -36,7 +40,7 @@ pub(crate) struct Taxel {
     pub(crate) raw_high: f32,
     /// m².
     pub(crate) area: f32,
-    /// [`STRAIGHT`], [`MASKED`], or [`FIRST_CURVE`] and up: which of the curves.
+    /// [`STRAIGHT`], [`MASKED`], or [`FIRST_CURVE`] and up: which of the curves. Of a change: the slot that changes.
     pub(crate) response: u32,
 }
 
@@ -108,7 +112,7 @@ pub(crate) struct Field {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Member {
-    /// Which taxel of the frame.
+    /// Which taxel, and letter, of the frame.
     pub(crate) slot: u32,
     pub(crate) weight: f32,
     /// Place in the field's unit; the third coordinate stands apart, as only fields without a chart need it.

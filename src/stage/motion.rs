@@ -17,6 +17,9 @@ use glam::DVec2;
 use super::angle::ATAN2_ERROR;
 use super::{SLACK, U};
 
+/// Speeds over shorter steps could pass what single precision holds, s.
+pub(crate) const SHORTEST_STEP_S: f64 = 1e-12;
+
 /// How a centroid moved; lengths in the unit of the centroids.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Motion {

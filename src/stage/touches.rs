@@ -13,7 +13,10 @@
 //! where it is asked for. The pressures are the backend's own.
 //!
 //! **Bound.** Which taxels are pressed is the same on every backend, and so are the touches. A total carries its pressures'
-//! 2u; a mean 2u above and below of places that lie within the unit.
+//! 2u; a mean 2u above and below of places that lie within the unit. Where a pressure may be off by ε more than 2u, with r
+//! the largest ε/P, a total is off by r of itself more, and a mean by at most r/(1 − r) of the 2 that places lie apart. From
+//! then on identities are certain only while there is one touch and there was no more than one, not as far apart as a
+//! touch may leap.
 
 use glam::DVec3;
 
@@ -23,7 +26,53 @@ use super::{SLACK, U};
 const LEAP: f64 = 3.0;
 
 /// How far a coordinate of a touch's mean may be off, in the unit; relatively, its total by half of it.
-pub(crate) const BOUND: f64 = SLACK * 4.0 * U;
+const BOUND: f64 = SLACK * 4.0 * U;
+
+/// How far a single-precision touch may be off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TouchBound {
+    /// Relatively.
+    pub(crate) total: f64,
+    /// Per coordinate, as a length.
+    pub(crate) place: f64,
+}
+
+/// The bound, in the unit, of touches whose pressures are off by up to `lost` of themselves more than 2u.
+pub(crate) fn bound(lost: f64) -> TouchBound {
+    let moved = if lost < 0.5 { 2.0 * lost / (1.0 - lost) } else { 2.0 };
+    TouchBound { total: BOUND + SLACK * lost, place: BOUND + SLACK * moved }
+}
+
+/// What the doubt about a field's identities hangs on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Doubt {
+    /// Whether identities have been in doubt since the start.
+    pub(crate) in_doubt: bool,
+    /// Touches in the frame before, the field's mean place then, and how far its pressures may have been off.
+    before: (usize, DVec3, f64),
+}
+
+impl Doubt {
+    /// No identity is certain any more.
+    pub(crate) const FOR_GOOD: Self = Self { in_doubt: true, before: (0, DVec3::ZERO, 0.0) };
+
+    /// The doubt after a frame without contact.
+    pub(crate) fn release(self) -> Self {
+        Self { in_doubt: self.in_doubt, before: (0, DVec3::ZERO, 0.0) }
+    }
+
+    /// The doubt after a frame of `pulls`, wP by member, each off by up to `lost` of itself more than 2u.
+    pub(crate) fn after(self, skin: &Skin<'_>, pulls: &[f64], place: DVec3, lost: f64) -> Self {
+        let count = components(skin.beside, pulls).len();
+        let (count_before, place_before, lost_before) = self.before;
+        let leap = (place.distance(place_before) - LEAP * skin.spacing).abs();
+        // Per coordinate, of which there are three.
+        let near_the_limit = count_before > 0 && leap <= 2.0 * (bound(lost).place + bound(lost_before).place);
+        let doubtful = count > 1 || count_before > 1 || near_the_limit;
+        let in_doubt = self.in_doubt || (lost.max(lost_before) > 0.0 && doubtful);
+        Self { in_doubt, before: (count, place, lost) }
+    }
+}
 
 /// One touch of a field in one frame.
 #[derive(Clone, Debug, PartialEq)]

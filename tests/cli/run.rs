@@ -150,6 +150,41 @@ fn what_makes_no_sense_is_wrong_usage() {
 }
 
 #[test]
+fn filtered_motion_is_given_where_it_is_asked_for() {
+    let run = ["run", "--backend", "cpu", "--fields", "hand/back", "--outputs", "filtered_direction,filtered_speed"];
+    let counted = |more: &[&str]| {
+        let frames = frames(&done(&[&run[..], more].concat()));
+        let having = |key: &str| frames.iter().flat_map(fields).filter(|field| field[key].is_number()).count();
+        (having("filtered_direction"), having("filtered_speed"))
+    };
+    let (directions, speeds) = counted(&[]);
+    assert!(speeds > 20 && directions > speeds, "{directions} {speeds}");
+    // Wider steps are fewer.
+    let wide = counted(&["--filter-window", "2mm.."]);
+    assert!(wide.1 > 2 && wide.1 < speeds / 2 && wide.0 > wide.1, "{wide:?}");
+    assert!(counted(&["--filter-by", "radial"]).1 > 20);
+    for other in [["--filter-by", "radial"], ["--filter-time", "1"]] {
+        assert_ne!(done(&run), done(&[&run[..], &other].concat()), "{other:?}");
+    }
+
+    for (arguments, why) in [
+        (&["--filter-time", "nan"][..], "filter time of NaN"),
+        (&["--filter-time", "-1"], "filter time of -1"),
+        (&["--filter-window", "-1mm..2mm"], "from -1 mm"),
+        (&["--filter-window", "3mm..2mm"], "the smaller first"),
+        (&["--filter-window", "3..4"], "has no unit"),
+    ] {
+        let error = fails(2, &[&run[..], arguments].concat());
+        assert!(error.contains(why) && error.lines().count() == 1, "{error}");
+    }
+    for flag in [["--filter-time", "1"], ["--filter-window", "1mm.."], ["--filter-by", "radial"]] {
+        let error = fails(2, &[&["run", "--backend", "cpu"][..], &flag].concat());
+        assert!(error.contains(flag[0]) && error.contains("--outputs filtered_direction"), "{error}");
+    }
+    assert!(fails(2, &[&run[..], &["--filter-by", "area"]].concat()).contains("radial"));
+}
+
+#[test]
 fn what_is_not_there_is_named_in_one_line() {
     for arguments in [
         ["run", "--body", "no/such.glb", "--source", "-"],
@@ -356,6 +391,37 @@ fn a_bad_live_frame_names_its_line_and_keeps_what_was_answered() {
     assert_eq!(code_of(&mut run.child), Some(1));
     let error = stderr(&run.child.wait_with_output().unwrap());
     assert!(error.starts_with("somatic: error: stdin: line 2"), "{error}");
+}
+
+#[test]
+fn letters_and_signals_are_told_where_there_are_several() {
+    let (_folder, path) = file("touch.csv", "t,4\n0,0\n0.1,5\n0.2,5\n0.3,0\n");
+    let run = ["run", "--quiet", "--backend", "cpu", "--source", text_of(&path), "--fields", "hand/palm"];
+    let seen = |more: &[&str]| -> Vec<Vec<String>> {
+        let text = done(&[&run[..], &["--outputs", "total"], more].concat());
+        let told = |field: &Value| format!("{} {} {}", field["letter"], field["signal"], field["total"]);
+        frames(&text).iter().map(|frame| fields(frame).iter().map(told).collect()).collect()
+    };
+    let plain = seen(&[]);
+    assert_eq!(plain[1], ["null null 5.0"]);
+    assert_eq!(seen(&["--letters", "sustained"]), plain);
+    let both = seen(&["--letters", "sustained,change"]);
+    assert_eq!(both[1], [r#""sustained" null 5.0"#, r#""change" null 50.0"#]);
+    assert_eq!((&both[0][..], &both[2][..]), (&[][..], &[r#""sustained" null 5.0"#.to_owned()][..]));
+    assert!(both[3].len() == 1 && both[3][0].starts_with(r#""change" null 5"#), "{both:?}");
+    assert_eq!(seen(&["--letters", "change"])[2].len(), 0);
+
+    let (_keep, fsr) = file("fsr.toml", "[all]\nsensor = \"fsr\"\n");
+    let signals = seen(&["--calibration", text_of(&fsr), "--signal", "raw,linear"]);
+    assert!(signals[1].len() == 2 && signals[1][0].starts_with(r#"null "raw""#), "{signals:?}");
+    assert!(signals[1][1].starts_with(r#"null "linear""#), "{signals:?}");
+    let one = seen(&["--calibration", text_of(&fsr), "--signal", "raw"]);
+    assert!(one[1].len() == 1 && one[1][0].starts_with("null null"), "{one:?}");
+
+    assert!(fails(2, &[&run[..], &["--letters", "chnage"]].concat()).contains("change"));
+    assert!(fails(2, &[&run[..], &["--letters", "change,change"]].concat()).contains("asked for twice"));
+    let taught = done(&["help", "run"]);
+    assert!(taught.contains("--letters") && taught.contains("sustained, change"), "{taught}");
 }
 
 #[cfg(unix)]

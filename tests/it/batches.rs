@@ -1,20 +1,23 @@
 //! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
 
-use somatic::{BackendKind, Body, Engine, Frame, Options, Percepts, RawValue};
+use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor};
 
 use crate::common::{backends, frame};
 
 /// Everything a frame's percepts say, with numbers as bits.
 fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
     // f64's `{:?}` prints the shortest number that reads back to the same bits.
-    percepts.frame(frame).map(|p| format!("{} {p:?}", percepts.t_s(frame))).collect()
+    let touches = |field| percepts.touches(frame, field);
+    percepts.frame(frame).map(|p| format!("{} {p:?} {:?}", percepts.t_s(frame), touches(p.field))).collect()
 }
 
 fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option<&[u32]>) -> Vec<Vec<String>> {
     let calibration = "[checks]\nsettle_frames = 2\nisolated_ratio = 3\nisolated_above = 500\n[all]\np_max = 900";
     let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
-    let scene = somatic::Scene { max_age_s: 0.1, ..somatic::Scene::default() };
+    let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
+    let outputs = somatic::Outputs::all();
+    let scene = somatic::Scene { outputs, max_age_s: 0.1, letters, ..somatic::Scene::default() };
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {

@@ -40,6 +40,23 @@ fn at_rest(backend: BackendKind) -> Options {
     Options { backend, scene, ..Options::default() }
 }
 
+#[test]
+fn every_output_can_be_asked_for_alone() {
+    let frames = [frame(0.0, &[1.0, 2.0, 3.0, 0.5]), frame(0.1, &[3.0, 2.0, 0.0, 0.5])];
+    for outputs in Outputs::all().iter() {
+        let mut seen = Vec::new();
+        for backend in backends() {
+            let scene = Scene { outputs, ..Scene::default() };
+            let mut engine = Engine::new(&field(&SQUARE), Options { backend, scene, ..Options::default() }).unwrap();
+            let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
+            assert!(agreement.holds(), "{outputs:?} on {backend:?}: {agreement}");
+            assert!(agreement.quantities.keys().all(|name| Outputs::named(name) == Some(outputs)), "{agreement}");
+            seen.push(percepts.get(1, 0).flags);
+        }
+        assert!(seen.windows(2).all(|pair| pair[0] == pair[1]), "{outputs:?}: {seen:?}");
+    }
+}
+
 fn assert_finite(percept: &Percept) {
     let scalars = [percept.total, percept.peak, percept.area, percept.orientation, percept.axis, percept.anisotropy];
     let vectors = [percept.position, percept.normal];

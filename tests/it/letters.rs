@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use somatic::signal::{FsrCircuit, FsrSignal};
-use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Percept, RawValue, Scene};
+use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Percept, RawValue, Scene};
 
 use crate::common::{Flat, backends, frame};
 
@@ -18,7 +18,7 @@ fn parse(text: &str, count: u32) -> Calibration {
 }
 
 fn options(kind: BackendKind, calibration: &Calibration, signal: Option<FsrSignal>) -> Options {
-    let scene = Scene { signal, ..Scene::default() };
+    let scene = Scene { letters: vec![Letter { signal, ..Letter::default() }], ..Scene::default() };
     Options { scene, calibration: Some(calibration.clone()), backend: kind, batch: 64, ..Options::default() }
 }
 

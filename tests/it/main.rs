@@ -2,9 +2,11 @@
 
 mod batches;
 mod bodies;
+mod change;
 mod common;
 mod draft;
 mod extremes;
+mod filter;
 mod house;
 mod legal;
 mod letters;

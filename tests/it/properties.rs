@@ -3,7 +3,9 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, Modality, Taxel};
-use somatic::{BackendKind, Body, Flags, Percept, Percepts};
+use somatic::{
+    BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Percept, Percepts, Receptor, Scene,
+};
 
 use crate::common::{backends, engine, frame};
 
@@ -84,6 +86,57 @@ proptest! {
             let mut engine = engine(&body, kind);
             let (_, agreement) = engine.process_and_compare(&[frame(0.0, &values(&touches))]).unwrap();
             prop_assert!(agreement.holds(), "{kind:?}: {agreement}");
+        }
+    }
+
+    #[test]
+    fn every_backend_hears_changes_within_its_bounds_however_they_are_cut(
+        touches in touches(40),
+        // Per frame: what each taxel's pressure is multiplied by, taken in turn, and the time since the frame before.
+        frames in prop::collection::vec(
+            (prop::collection::vec(prop_oneof![2 => Just(1.0), 1 => Just(0.0), 1 => 0.9..1.1], 1..5),
+             prop_oneof![4 => Just(0.02), 1 => 1e-4..5.0, 1 => Just(0.0)]),
+            1..8,
+        ),
+        gain in prop_oneof![Just(1.0), 0.001..1e3],
+        keys in prop_oneof![Just(""), Just("[change]\ndead_band = 50\non = 300\noff = 120\n")],
+    ) {
+        let order: Vec<usize> = (0..touches.len()).collect();
+        let body = body(&touches, &order, &[chart([0.0; 2], 0.0)]);
+        let ids: Vec<u32> = (0..touches.len() as u32).collect();
+        let calibration = Calibration::parse(&format!("{keys}[all]\ngain = {gain}\n"), &ids).unwrap();
+        let (mut t_s, pressures) = (0.0, values(&touches));
+        let frames: Vec<Frame> = frames.iter().map(|(factors, dt_s)| {
+            t_s += dt_s;
+            let values: Vec<f64> = pressures.iter().zip(factors.iter().cycle()).map(|(p, f)| p * f).collect();
+            frame(t_s, &values)
+        }).collect();
+        for kind in backends() {
+            let run = |cut: usize| {
+                let scene = Scene {
+                    letters: Letter::all_of(&[Receptor::Change, Receptor::Sustained], &[]),
+                    outputs: somatic::Outputs::all(),
+                    ..Scene::default()
+                };
+                let calibration = Some(calibration.clone());
+                let mut engine =
+                    Engine::new(&body, Options { scene, calibration, backend: kind, batch: 64, ..Options::default() }).unwrap();
+                let mut seen: Vec<Percept> = Vec::new();
+                for part in frames.chunks(cut) {
+                    let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+                    prop_assert!(agreement.holds(), "{kind:?}: {agreement}");
+                    seen.extend((0..part.len()).flat_map(|frame| percepts.frame(frame)));
+                }
+                Ok(seen)
+            };
+            let whole = run(frames.len())?;
+            for cut in [1, 3] {
+                prop_assert_eq!(&run(cut)?, &whole, "{:?} cut by {}", kind, cut);
+            }
+            // To itself a recording that stands still is no change.
+            for pair in frames.windows(2).zip(whole.chunks(2).skip(1)).filter(|(pair, _)| pair[0].values == pair[1].values) {
+                prop_assert!(!pair.1[0].contact, "{:?}", pair.1[0]);
+            }
         }
     }
 

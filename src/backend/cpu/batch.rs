@@ -3,12 +3,12 @@
 use bytemuck::cast_slice_mut;
 use fearless_simd::prelude::*;
 
-use super::super::Rows;
+use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::calibrate;
 use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u};
 use super::touch::{Abreast, Cells, Members, OneKind, Part, strip, touch};
 use super::wide::{Values, Wide};
+use super::{calibrate, change};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::Plan;
 use crate::stage::layout::{Member, Taxel};
@@ -23,17 +23,21 @@ pub(super) struct Scratch {
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     values: Values,
+    /// Pressures and statuses of the frame before, where there are changes.
+    before: (Vec<Row<f32>>, Vec<Row<u32>>),
 }
 
 impl Scratch {
-    pub(super) fn new(slots: usize) -> Self {
-        let padded = slots.next_multiple_of(LANES);
+    pub(super) fn new(plan: &Plan) -> Self {
+        let padded = plan.slots().next_multiple_of(LANES);
+        let before = if plan.has_changes() { padded / LANES } else { 0 };
         Self {
             pressures: vec![[0.0; LANES]; padded],
             statuses: vec![[0; LANES]; padded],
             faulty: Vec::new(),
             cells: Box::new([Cells::EMPTY; LANES]),
             values: Values::default(),
+            before: (vec![[0.0; LANES]; before], vec![[0; LANES]; before]),
         }
     }
 }
@@ -81,19 +85,28 @@ impl<S: Simd> Members<S> for OverFrames<'_> {
     }
 }
 
-/// All stages for the frames of `raw` from `first` on, as many as `cells` has, which is at most sixteen.
+/// All stages for the frames of `raw` from `first` on, as many as `cells` has, which is at most sixteen; the one before
+/// them is in `before`.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "what a plan is run with, and where")]
 pub(super) fn block<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
-    raw: Rows<'_>,
+    raw: &RawBatch<'_>,
     first: usize,
+    before: (Rows<'_>, usize),
     scratch: &mut Scratch,
     cells: &mut CellsMut<'_>,
 ) {
     let frames = cells.frames();
-    let faults = read(simd, plan, tables, raw, first, frames, scratch);
+    let mut faults = read(simd, plan, tables, raw.rows, first, frames, scratch);
+    if plan.has_changes() {
+        let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
+        calibrate::frame(simd, plan, tables, before, was, said);
+        let before = (was.as_flattened(), said.as_flattened());
+        faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
+    }
     if !cells.pressures.is_empty() {
         let slots = plan.slots();
         for (slot, lanes) in scratch.pressures.iter().take(slots).enumerate() {
@@ -151,7 +164,7 @@ fn read<S: Simd>(
         let slot = index * LANES;
         // All of them first: what was stored piece by piece is not yet to be had as a whole.
         for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
-            simd::read(simd, raw, first + frame, index, tables.shuffles, bits);
+            simd::read(simd, raw, first + frame, index, plan.calibrated(), tables.shuffles, bits);
         }
         let mut faults = false;
         for frame in 0..frames {

@@ -2,7 +2,9 @@
 
 use fearless_simd::prelude::*;
 
-use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width};
+use super::super::Rows;
+use super::Tables;
+use super::simd::{F, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -27,7 +29,7 @@ pub(super) struct Tile {
 impl Tile {
     /// All of the plan's taxels, by ascending slot; what fills up the last tile is unpressed.
     pub(super) fn all(plan: &Plan) -> Vec<Self> {
-        plan.taxels
+        plan.taxels[..plan.calibrated()]
             .chunks(LANES)
             .map(|taxels| {
                 let mut tile = Self {
@@ -102,6 +104,26 @@ pub(super) fn tile<S: Simd>(
         at += width::<S>();
     }
     any
+}
+
+/// A frame's pressures and statuses, by slot; whether any status says anything.
+#[inline(always)]
+pub(super) fn frame<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tables: &Tables,
+    (raw, frame): (Rows<'_>, usize),
+    pressures: &mut [Row<f32>],
+    statuses: &mut [Row<u32>],
+) -> bool {
+    let mut faults = false;
+    let rows = pressures.iter_mut().zip(statuses);
+    for (index, (one, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
+        let mut bits = [0; LANES];
+        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, &mut bits);
+        faults |= tile(simd, plan, one, index * LANES, &bits, pressures, statuses);
+    }
+    faults
 }
 
 /// Where a number is 0 or neither tiny nor unbelievable.

@@ -3,12 +3,15 @@
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::Plan;
 
-/// What a field says of its input, and of itself, whether it is touched or not.
+/// What a field says of its input, and of itself, whether it is touched or not. The last two are a change's here: motion
+/// comes later.
 const KEPT: Flags = Flags::SATURATED
     .union(Flags::FAULTY_INPUT)
     .union(Flags::OUT_OF_RANGE)
     .union(Flags::INCOMPLETE)
-    .union(Flags::NO_CHART);
+    .union(Flags::NO_CHART)
+    .union(Flags::NO_PREVIOUS)
+    .union(Flags::BAD_DT);
 /// Quantities that an untouched field keeps.
 const SUMS: Outputs = Outputs::TOTAL.union(Outputs::PEAK).union(Outputs::ACTIVE).union(Outputs::AREA);
 

@@ -5,14 +5,14 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::super::Rows;
-use super::Tables;
-use super::calibrate;
-use super::simd::{self, F, LANES, Row, U, load, load_u};
+use super::super::{RawBatch, Rows, Step};
+use super::simd::{F, LANES, Row, U, load, load_u};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part, strip, touch};
 use super::wide::{Table, Values, Wide};
+use super::{Tables, calibrate, change, the_one_before};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::{Plan, Stages};
+use crate::signal::RawValue;
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
@@ -123,6 +123,20 @@ struct Gathered {
     values: Values,
 }
 
+/// A frame, the one before it, and the time between them.
+pub(super) struct Moment<'a> {
+    now: (Rows<'a>, usize),
+    before: (Rows<'a>, usize),
+    step: &'a Step,
+}
+
+impl<'a> Moment<'a> {
+    /// Frame `frame` of `raw`; `before` has the values of the frame before the first.
+    pub(super) fn new(raw: &RawBatch<'a>, frame: usize, before: &'a [RawValue]) -> Self {
+        Self { now: (raw.rows, frame), before: the_one_before(raw.rows, frame, before), step: &raw.steps[frame] }
+    }
+}
+
 /// The plan laid out for one frame, and the memory for it.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
@@ -132,6 +146,8 @@ pub(super) struct Live {
     /// By slot, and a last row of taxels that nothing presses.
     pressures: Vec<Row<f32>>,
     statuses: Vec<Row<u32>>,
+    /// Those of the frame before, where there are changes.
+    before: (Vec<Row<f32>>, Vec<Row<u32>>),
     gathered: Gathered,
     shared: bool,
 }
@@ -158,22 +174,34 @@ impl Live {
             groups,
             pressures: vec![[0.0; LANES]; tiles + 1],
             statuses: vec![[0; LANES]; tiles + 1],
+            before: if plan.has_changes() {
+                (vec![[0.0; LANES]; tiles], vec![[0; LANES]; tiles])
+            } else {
+                (Vec::new(), Vec::new())
+            },
             gathered: Gathered::default(),
             shared: plan.memberships() >= SHARED && rayon::current_num_threads() > 1,
         }
     }
 
-    /// All stages for a frame of `raw`, into `cells`, which is one frame.
+    /// All stages for one frame, into `cells`, which is one frame.
     pub(super) fn frame(
         &mut self,
         level: Level,
         plan: &Plan,
         tables: &Tables,
-        raw: (Rows<'_>, usize),
+        moment: &Moment<'_>,
         cells: &mut CellsMut<'_>,
     ) {
-        let Self { pressures, statuses, .. } = self;
-        let faults = dispatch!(level, simd => read(simd, plan, tables, raw, pressures, statuses));
+        let Self { pressures, statuses, before: (was, said), .. } = self;
+        let mut faults =
+            dispatch!(level, simd => calibrate::frame(simd, plan, tables, moment.now, pressures, statuses));
+        if plan.has_changes() {
+            dispatch!(level, simd => calibrate::frame(simd, plan, tables, moment.before, was, said));
+            let before = (was.as_flattened(), said.as_flattened());
+            let (pressures, statuses) = (pressures.as_flattened_mut(), statuses.as_flattened_mut());
+            faults |= change::frame(plan, moment.step, before, pressures, statuses);
+        }
         let frame = Frame {
             plan,
             tables,
@@ -272,26 +300,6 @@ fn gather<T: Copy + Default>(slots: &[Row<u32>], values: &[T], rows: &mut Vec<Ro
             *value = values[slot as usize];
         }
     }
-}
-
-/// Calibrates a frame; whether any value is anything but a plain number.
-#[inline(always)]
-fn read<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    tables: &Tables,
-    (raw, frame): (Rows<'_>, usize),
-    pressures: &mut [Row<f32>],
-    statuses: &mut [Row<u32>],
-) -> bool {
-    let mut faults = false;
-    let rows = pressures.iter_mut().zip(statuses);
-    for (index, (tile, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
-        let mut bits = [0; LANES];
-        simd::read(simd, raw, frame, index, tables.shuffles, &mut bits);
-        faults |= calibrate::tile(simd, plan, tile, index * LANES, &bits, pressures, statuses);
-    }
-    faults
 }
 
 /// Where lanes belong.

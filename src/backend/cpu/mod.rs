@@ -9,6 +9,7 @@ mod axis;
 mod batch;
 mod calibrate;
 mod centroid;
+mod change;
 mod contact;
 mod hysteresis;
 mod live;
@@ -22,11 +23,13 @@ use std::sync::Mutex;
 
 use fearless_simd::{Level, dispatch};
 
+use self::live::Moment;
 use self::simd::LANES;
 use super::{Backend, RawBatch, Rows};
 use crate::error::Result;
 use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
+use crate::signal::RawValue;
 
 /// Frames that one task takes; a multiple of [`LANES`].
 const TASK: usize = 8 * LANES;
@@ -39,6 +42,8 @@ pub(crate) struct Cpu {
     live: live::Live,
     /// What tasks work in, one for each that runs.
     scratches: Mutex<Vec<batch::Scratch>>,
+    /// The raw values of the frame before, where the plan has changes.
+    before: Vec<RawValue>,
     /// Per field, whether the frame before was in contact.
     touched: Vec<bool>,
     /// Per field, its centroid in the frame before, in its unit, if that was in contact.
@@ -77,6 +82,7 @@ impl Cpu {
             level,
             live: live::Live::new(plan),
             scratches: Mutex::new(Vec::new()),
+            before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],
             last: vec![None; plan.fields.len()],
             plan: plan.clone(),
@@ -84,7 +90,7 @@ impl Cpu {
     }
 
     /// Halves the batch until a task remains, and runs the halves in parallel.
-    fn batch(&self, raw: Rows<'_>, first: usize, cells: CellsMut<'_>) {
+    fn batch(&self, raw: &RawBatch<'_>, first: usize, cells: CellsMut<'_>) {
         let frames = cells.frames();
         if frames > TASK {
             let left = (frames / TASK).div_ceil(2) * TASK;
@@ -93,15 +99,24 @@ impl Cpu {
             return;
         }
         let free = self.scratches.lock().unwrap_or_else(|e| e.into_inner()).pop();
-        let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(self.plan.slots()));
+        let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan));
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
             let (plan, tables, at) = (&self.plan, &self.tables, first + done);
-            dispatch!(self.level, simd => batch::block(simd, plan, tables, raw, at, &mut scratch, &mut cells));
+            let before = the_one_before(raw.rows, at, &self.before);
+            dispatch!(self.level, simd => batch::block(simd, plan, tables, raw, at, before, &mut scratch, &mut cells));
             (rest, done) = (later, done + LANES);
         }
         self.scratches.lock().unwrap_or_else(|e| e.into_inner()).push(scratch);
+    }
+}
+
+/// Where the frame before frame `frame` of `rows` is; `before` has the one before the first.
+fn the_one_before<'a>(rows: Rows<'a>, frame: usize, before: &'a [RawValue]) -> (Rows<'a>, usize) {
+    match frame.checked_sub(1) {
+        Some(last) => (rows, last),
+        None => (Rows::Packed { values: before, channels: before.len() }, 0),
     }
 }
 
@@ -139,16 +154,26 @@ impl Backend for Cpu {
             all.split_at(raw.first).1.split_at(raw.frames).0
         };
         if raw.frames == 1 {
-            self.live.frame(self.level, &self.plan, &self.tables, (raw.rows, 0), &mut cells);
+            self.live.frame(self.level, &self.plan, &self.tables, &Moment::new(raw, 0, &self.before), &mut cells);
         } else if raw.frames < LANES {
             let mut rest = cells.reborrow();
             for frame in 0..raw.frames {
                 let (mut first, later) = rest.split_at(1);
-                self.live.frame(self.level, &self.plan, &self.tables, (raw.rows, frame), &mut first);
+                self.live.frame(
+                    self.level,
+                    &self.plan,
+                    &self.tables,
+                    &Moment::new(raw, frame, &self.before),
+                    &mut first,
+                );
                 rest = later;
             }
         } else {
-            self.batch(raw.rows, 0, cells.reborrow());
+            self.batch(raw, 0, cells.reborrow());
+        }
+        if self.plan.has_changes() && raw.frames > 0 {
+            self.before.clear();
+            self.before.extend(raw.rows.row(raw.frames - 1));
         }
         // What hangs on the frame before goes through the frames in order.
         let stages = self.plan.stages();

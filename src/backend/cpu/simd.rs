@@ -67,7 +67,15 @@ pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
 
 /// Reads the bits of frame `frame` from slot 16 · `tile` on.
 #[inline(always)]
-pub(super) fn read<S: Simd>(simd: S, raw: Rows<'_>, frame: usize, tile: usize, shuffles: bool, bits: &mut Row<u32>) {
+pub(super) fn read<S: Simd>(
+    simd: S,
+    raw: Rows<'_>,
+    frame: usize,
+    tile: usize,
+    calibrated: usize,
+    shuffles: bool,
+    bits: &mut Row<u32>,
+) {
     if let (Rows::Picked { frames, picks }, true) = (raw, shuffles) {
         if let Some((from, bytes)) = &picks.near[tile] {
             let values: &[u32] = bytemuck::cast_slice(&frames[frame].values[*from..from + 2 * LANES]);
@@ -77,7 +85,7 @@ pub(super) fn read<S: Simd>(simd: S, raw: Rows<'_>, frame: usize, tile: usize, s
             return;
         }
     }
-    raw.read(frame, tile * LANES, bits);
+    raw.read(frame, tile * LANES, calibrated, bits);
 }
 
 /// Rows turned into columns: lane j of row i becomes lane i of column j. Four perfect shuffles do it.

@@ -45,6 +45,8 @@ pub(crate) struct Gpu {
     batch: wgpu::Buffer,
     steps: wgpu::Buffer,
     raw: wgpu::Buffer,
+    /// The raw values of the frame before, where the plan has changes.
+    before: Option<wgpu::Buffer>,
     taxels: wgpu::Buffer,
     stages: Vec<Stage>,
     /// Number of wide fields.
@@ -95,7 +97,7 @@ impl Gpu {
 
     pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
         let limit = device.device.limits().max_storage_buffer_binding_size;
-        let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
+        let (slots, channels, fields) = (plan.slots() as u64, plan.channels() as u64, plan.fields.len() as u64);
         // The widest buffer that shaders bind, and the one that all results come back in.
         let widest = (slots * 4).max(fields * size_of::<layout::Motion>() as u64);
         let back = slots * 4 + fields * (4 + 16 + 16 + 4 + 8 + size_of::<layout::Motion>() as u64);
@@ -103,7 +105,7 @@ impl Gpu {
         let knots = (plan.curves.knots.len() * size_of::<layout::Knot>()) as u64;
         if tables > limit || widest > limit || knots > limit {
             return Err(Error::failed(format!(
-                "{} memberships and {slots} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+                "{} memberships and {channels} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
                 plan.members.len()
             )));
         }
@@ -125,14 +127,14 @@ impl Gpu {
         };
         let upload = buffer(
             "upload",
-            HEADER + frames * (STEP + slots * 4),
+            HEADER + frames * (STEP + channels * 4),
             wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
             true,
         );
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let batch = buffer("batch", HEADER, uniform, false);
         let steps = working("steps", frames * STEP);
-        let raw = working("raw", frames * slots * 4);
+        let raw = working("raw", frames * channels * 4);
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
@@ -161,7 +163,21 @@ impl Gpu {
             (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
         let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
         let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
-        let mut stages = vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Taxels, &buffers[..used])];
+        let calibrate = Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &buffers[..used]);
+        let mut stages = Vec::new();
+        // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
+        let before = plan.has_changes().then(|| working("raw before", channels * 4));
+        if let Some(before) = &before {
+            let one = buffer("one frame", HEADER, uniform, false);
+            device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1, wide.len() as u32)));
+            let calibrated = plan.calibrated() as u64 * 4;
+            let (pressed, heard) = (working("pressures before", calibrated), working("statuses before", calibrated));
+            let buffers = [&one, &taxels, before, &pressed, &heard, &curves, &knots];
+            stages.push(calibrate.again(&device, Over::CalibratedOnce, &buffers[..used]));
+            let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
+            stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, &buffers));
+        }
+        stages.insert(0, calibrate);
         let mut over_fields = |shader: &StageShader, buffers: [&wgpu::Buffer; 8]| {
             stages.push(Stage::new(&device, shader, "main", Over::Fields, &buffers));
             if !wide.is_empty() {
@@ -195,7 +211,7 @@ impl Gpu {
         }
 
         let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
-        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL;
+        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::FILTERED;
         let results: Vec<Column> = [
             (true, What::Cells, cells, 4),
             (plan.outputs.intersects(sums), What::Contacts, contacts, 16),
@@ -220,6 +236,7 @@ impl Gpu {
             batch,
             steps,
             raw,
+            before,
             taxels,
             stages,
             wide: wide.len() as u32,
@@ -234,10 +251,12 @@ impl Gpu {
     /// One submission: `raw.frames` is at most the capacity.
     fn submit(&mut self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
         let (frames, slots, fields) = (raw.frames as u32, self.plan.slots() as u32, self.plan.fields.len() as u32);
+        let calibrated = self.plan.calibrated() as u32;
         self.packed_steps.clear();
         self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let header = layout::Batch { frames, slots, fields, wide: self.wide };
-        let size = u64::from(frames) * u64::from(slots) * 4;
+        let header = header(&self.plan, frames, self.wide);
+        let channels = self.plan.channels();
+        let size = u64::from(frames) * channels as u64 * 4;
         let lost =
             |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
         {
@@ -250,8 +269,8 @@ impl Gpu {
             for frame in 0..raw.frames {
                 self.packed_row.clear();
                 self.packed_row.extend(raw.rows.row(frame));
-                let at = from as usize + frame * slots as usize * 4;
-                mapped.slice(at..at + slots as usize * 4).copy_from_slice(cast_slice(&self.packed_row));
+                let at = from as usize + frame * channels * 4;
+                mapped.slice(at..at + channels * 4).copy_from_slice(cast_slice(&self.packed_row));
             }
         }
         self.upload.unmap();
@@ -265,7 +284,9 @@ impl Gpu {
             let mut pass = encoder
                 .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
             let count = match stage.over {
-                Over::Taxels => (frames * slots).div_ceil(GROUP),
+                Over::Calibrated => (frames * calibrated).div_ceil(GROUP),
+                Over::CalibratedOnce => calibrated.div_ceil(GROUP),
+                Over::Changes => (frames * (slots - calibrated)).div_ceil(GROUP),
                 Over::Fields => (frames * fields).div_ceil(GROUP),
                 Over::WideFields => frames * self.wide,
                 Over::FieldsOnce => fields.div_ceil(GROUP),
@@ -274,6 +295,10 @@ impl Gpu {
             pass.set_pipeline(&stage.pipeline);
             pass.set_bind_group(0, &stage.bound, &[]);
             pass.dispatch_workgroups(wide, tall, 1);
+        }
+        if let Some(before) = &self.before {
+            let row = self.plan.channels() as u64 * 4;
+            encoder.copy_buffer_to_buffer(&self.raw, u64::from(frames - 1) * row, before, 0, row);
         }
         let length = |column: &Column| u64::from(frames) * column.bytes_a_frame(u64::from(slots), u64::from(fields));
         let mut end = 0;
@@ -342,6 +367,18 @@ impl Backend for Gpu {
             rest = later;
         }
         Ok(())
+    }
+}
+
+/// What a dispatch over `frames` frames is told of the plan.
+fn header(plan: &Plan, frames: u32, wide: u32) -> layout::Batch {
+    layout::Batch {
+        frames,
+        channels: plan.channels() as u32,
+        calibrated: plan.calibrated() as u32,
+        changes: (plan.slots() - plan.calibrated()) as u32,
+        fields: plan.fields.len() as u32,
+        wide,
     }
 }
 

@@ -22,6 +22,7 @@ macro_rules! stage {
 }
 
 pub(crate) const CALIBRATE: StageShader = stage!("calibrate");
+pub(crate) const CHANGE: StageShader = stage!("change");
 pub(crate) const CONTACT: StageShader = stage!("contact", "over_fields");
 pub(crate) const CENTROID: StageShader = stage!("centroid", "over_fields");
 pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line", "over_fields");
@@ -31,4 +32,4 @@ pub(crate) const MOTION: StageShader = stage!("motion", "angle");
 
 /// All of them, in the order they run.
 #[cfg(test)]
-pub(crate) const ALL: [StageShader; 7] = [CALIBRATE, CONTACT, CENTROID, ORIENTATION, AXIS, HYSTERESIS, MOTION];
+pub(crate) const ALL: [StageShader; 8] = [CALIBRATE, CHANGE, CONTACT, CENTROID, ORIENTATION, AXIS, HYSTERESIS, MOTION];

@@ -16,8 +16,12 @@ pub(super) struct Stage {
 /// What a dispatch counts up to, times the frames.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Over {
-    /// One invocation a taxel.
-    Taxels,
+    /// One invocation a slot that is calibrated.
+    Calibrated,
+    /// The same, whatever the frames.
+    CalibratedOnce,
+    /// One invocation a slot that is a change.
+    Changes,
     /// One invocation a field; wide ones return at once.
     Fields,
     /// One group a wide field.
@@ -47,17 +51,32 @@ impl Stage {
         over: Over,
         buffers: &[(u32, &wgpu::Buffer)],
     ) -> Self {
-        let pipeline = pipeline(device, shader, entry);
+        Self::with(pipeline(device, shader, entry), shader.name, device, over, buffers)
+    }
+
+    /// The same program on other buffers: the very same, so that it gives the same bits.
+    pub(super) fn again(&self, device: &Device, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
+        let numbered: Vec<(u32, &wgpu::Buffer)> = (0..).zip(buffers.iter().copied()).collect();
+        Self::with(self.pipeline.clone(), self.name, device, over, &numbered)
+    }
+
+    fn with(
+        pipeline: wgpu::ComputePipeline,
+        name: &'static str,
+        device: &Device,
+        over: Over,
+        buffers: &[(u32, &wgpu::Buffer)],
+    ) -> Self {
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
             .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
         let bound = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(shader.name),
+            label: Some(name),
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Self { name: shader.name, pipeline, bound, over }
+        Self { name, pipeline, bound, over }
     }
 }
 

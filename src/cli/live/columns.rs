@@ -41,7 +41,7 @@ struct Column {
     text: fn(&Percept, Scale) -> Option<String>,
 }
 
-const COLUMNS: [Column; 8] = [
+const COLUMNS: [Column; 9] = [
     Column {
         heading: "total",
         width: 8,
@@ -84,6 +84,13 @@ const COLUMNS: [Column; 8] = [
         outputs: Outputs::ORIENTATION,
         gives_way: 2,
         text: |p, _| p.orientation.map(line),
+    },
+    Column {
+        heading: "going",
+        width: 7,
+        outputs: Outputs::FILTERED_DIRECTION,
+        gives_way: 3,
+        text: |p, _| p.filtered_direction.map(arrow),
     },
     Column {
         heading: "aniso",
@@ -166,6 +173,13 @@ fn line(angle: f64) -> String {
     format!("{:.0}° {}", angle.to_degrees(), LINES[eighth])
 }
 
+/// Degrees, and which way that points where +u points right and +v up.
+fn arrow(direction: f64) -> String {
+    const ARROWS: [&str; 8] = ["→", "↗", "↑", "↖", "←", "↙", "↓", "↘"];
+    let eighth = (direction / (PI / 4.0)).round().rem_euclid(ARROWS.len() as f64) as usize;
+    format!("{:.0}° {}", direction.to_degrees(), ARROWS[eighth])
+}
+
 /// A bar of the total as a share of the largest seen.
 fn bar(percept: &Percept, scale: Scale) -> Option<String> {
     const EIGHTHS: [&str; 8] = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
@@ -184,6 +198,14 @@ mod tests {
     fn a_line_looks_the_way_it_runs() {
         let texts = [0.0, PI / 4.0, PI / 2.0, 3.0 * PI / 4.0, PI - 0.01].map(line);
         assert_eq!(texts, ["0° ─", "45° ╱", "90° │", "135° ╲", "179° ─"]);
+    }
+
+    #[test]
+    fn an_arrow_points_the_way_it_goes() {
+        let texts = [0.0, 0.4, PI / 2.0, PI, -PI + 0.01, -PI / 2.0, -0.4].map(arrow);
+        assert_eq!(texts, ["0° →", "23° ↗", "90° ↑", "180° ←", "-179° ←", "-90° ↓", "-23° ↘"]);
+        // The widest there is fits its column.
+        assert_eq!(arrow(-3.0).chars().count(), 7);
     }
 
     #[test]

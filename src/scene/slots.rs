@@ -1,0 +1,57 @@
+//! A plan's slots: what of which taxel a frame is made into. First every channel's pressure in each signal that a letter
+//! needs, signal by signal; then every channel's change in each letter that is one.
+
+use super::Plan;
+use crate::error::Result;
+use crate::signal::{Calibration, FsrSignal, Receptor, TaxelCalibration};
+use crate::stage::layout;
+
+impl Plan {
+    /// Makes the taxels, slot by slot, and gives each
+    /// letter's first slot.
+    pub(super) fn lay_out_slots(&mut self, calibration: &Calibration) -> Result<Vec<u32>> {
+        let mut signals: Vec<Option<FsrSignal>> = Vec::new();
+        for letter in &self.letters {
+            if !signals.contains(&letter.signal) {
+                signals.push(letter.signal);
+                for (of_taxel, &area) in self.calibrations.iter().zip(&self.areas) {
+                    let response = self.curves.response_of(calibration, of_taxel, letter.signal)?;
+                    self.taxels.push(taxel(of_taxel, area, response));
+                }
+            }
+        }
+        self.calibrated = self.taxels.len();
+        let mut first_slots = Vec::with_capacity(self.letters.len());
+        for letter in &self.letters {
+            let signal = signals.iter().position(|&signal| signal == letter.signal).unwrap_or_default();
+            let pressures = signal * self.areas.len();
+            if letter.receptor == Receptor::Sustained {
+                first_slots.push(pressures as u32);
+                continue;
+            }
+            first_slots.push(self.taxels.len() as u32);
+            let dead_band = calibration.change.dead_band;
+            self.taxels.extend((pressures as u32..).zip(&self.areas).map(|(response, &area)| layout::Taxel {
+                dead_band,
+                p_max: f32::MAX,
+                area: area as f32,
+                response,
+                ..layout::Taxel::default()
+            }));
+        }
+        Ok(first_slots)
+    }
+}
+
+fn taxel(calibration: &TaxelCalibration, area: f64, response: u32) -> layout::Taxel {
+    layout::Taxel {
+        baseline: calibration.baseline,
+        gain: calibration.gain,
+        dead_band: calibration.dead_band,
+        p_max: calibration.p_max,
+        raw_low: calibration.raw_range[0],
+        raw_high: calibration.raw_range[1],
+        area: area as f32,
+        response,
+    }
+}

@@ -1,0 +1,103 @@
+//! The part of a calibration that says when a field counts as touched, and which changes count at all: the tables
+//! `[contact]` and `[change]`.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{MOST, line_of};
+use crate::error::{Error, Result};
+
+/// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactThresholds {
+    /// Contact begins over this.
+    pub on: f32,
+    /// Contact ends at this or below; at most `on`.
+    pub off: f32,
+}
+
+/// What holds for the letter [`crate::signal::Receptor::Change`] of every taxel and field, in P per second.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ChangeCalibration {
+    /// Changes up to this one count as 0.
+    pub dead_band: f32,
+    /// When a field counts as touched by what changes in it.
+    pub contact: ContactThresholds,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ContactKeys {
+    on: Option<Spanned<f64>>,
+    off: Option<Spanned<f64>>,
+    #[serde(default)]
+    field: BTreeMap<String, FieldContactKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FieldContactKeys {
+    on: Spanned<f64>,
+    off: Option<Spanned<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ChangeKeys {
+    dead_band: Option<Spanned<f64>>,
+    on: Option<Spanned<f64>>,
+    off: Option<Spanned<f64>>,
+}
+
+/// What thresholds of contact are given in.
+const OF_SUMS: &str = "in the unit of S";
+const OF_CHANGES: &str = "in P per second";
+
+impl ContactKeys {
+    /// What holds for all fields, and what for single ones by name.
+    pub(super) fn read(self, text: &str) -> Result<(ContactThresholds, BTreeMap<String, ContactThresholds>)> {
+        let all = thresholds(self.on.as_ref(), self.off.as_ref(), OF_SUMS, text)?;
+        let one = |keys: FieldContactKeys| thresholds(Some(&keys.on), keys.off.as_ref(), OF_SUMS, text);
+        let fields = self.field.into_iter().map(|(name, keys)| Ok((name, one(keys)?)));
+        Ok((all, fields.collect::<Result<_>>()?))
+    }
+}
+
+impl ChangeKeys {
+    pub(super) fn read(&self, text: &str) -> Result<ChangeCalibration> {
+        let dead_band = self.dead_band.as_ref().map_or(0.0, |band| *band.get_ref());
+        match &self.dead_band {
+            Some(band) if !(0.0..=MOST).contains(&dead_band) => {
+                let line = line_of(text, band.span().start);
+                Err(Error::failed(format!("`dead_band` is {dead_band}; it must be 0 or more, {OF_CHANGES}"))
+                    .at(format!("line {line}")))
+            }
+            _ => Ok(ChangeCalibration {
+                dead_band: dead_band as f32,
+                contact: thresholds(self.on.as_ref(), self.off.as_ref(), OF_CHANGES, text)?,
+            }),
+        }
+    }
+}
+
+/// Thresholds of contact in `unit`; `off` is `on` where it is not given.
+fn thresholds(
+    on: Option<&Spanned<f64>>,
+    off: Option<&Spanned<f64>>,
+    unit: &str,
+    text: &str,
+) -> Result<ContactThresholds> {
+    let wrong = |key: &str, value: &Spanned<f64>, must: &str| {
+        let line = line_of(text, value.span().start);
+        Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref())).at(format!("line {line}")))
+    };
+    let on_value = on.map_or(0.0, |on| *on.get_ref());
+    let off_value = off.map_or(on_value, |off| *off.get_ref());
+    match (on, off) {
+        (Some(on), _) if !(0.0..=MOST).contains(&on_value) => wrong("on", on, &format!("0 or more, {unit}")),
+        (_, Some(off)) if !(0.0..=on_value).contains(&off_value) => wrong("off", off, "between 0 and `on`"),
+        _ => Ok(ContactThresholds { on: on_value as f32, off: off_value as f32 }),
+    }
+}

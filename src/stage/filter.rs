@@ -1,0 +1,483 @@
+//! **filter**: motion that counts, in space and in time; the window of eq. 7 and the "filtered direction" of Fig. 7.
+//!
+//! **In space.** A centroid counts when it has come far enough from the last one that counted, and not too far: when the
+//! measure of the step between the two lies in the window [low, high]. The measure is the step's length, or the paper's
+//! |ΔR| = |‖c‖ − ‖c′‖| (eq. 6–7), which is blind to motion around the chart's origin. A step short of the window is `held`
+//! back until it has added up, so that slow motion passes in the end while jitter does not. One beyond it is another
+//! touch rather than motion, `jumped`: filtering starts anew where it ends. What rounding may feign ([`super::motion`])
+//! never counts. The first centroid of a contact has `no_previous`.
+//!
+//! A step that counts has a displacement, from the last centroid that counted, and a speed: its length over the time
+//! since then. Frames that were dropped or held back so count with their time.
+//!
+//! **In time.** Each such step turns the filtered direction towards its own by the share 1 − exp(−Δt/τ), Δt being that
+//! same time; the first stands for itself, as all do with τ = 0. Unit vectors are averaged, not angles, so that nothing
+//! happens at the seam of ±π. Between steps that count the direction stays what it was. An average shorter than
+//! [`LEAST_HEADING`] is of steps that cancel out: no direction, `still`.
+//!
+//! **Clocks.** A frame at the very time of the one before adds nothing: it never counts, flagged `bad_dt`, and what was
+//! known stays. A clock that goes back, or by more than the scene's longest gap, says no longer how long anything took:
+//! filtering starts anew there, flagged `bad_dt` too. Time is summed from the steps between frames that can be used, so
+//! that no jump of the clock is ever in it.
+//!
+//! This stage is the host's, in f64, on every backend, from the backend's own centroid.
+//!
+//! **Bound.** With b the sum of both centroids' bounds, a step is off by δ = b and the rounding of f64 here, and so is
+//! either measure (each is 1-Lipschitz in both places). The choice is certain where the measure keeps δ from the ends of
+//! the window. A unit vector is off by asin(δ/‖Δ‖) at most, an average by e ← (1 − share)·e + share·asin(δ/‖Δ‖), its
+//! direction by asin(e/‖h‖), a speed by δ/Δt. After a choice in doubt nothing is comparable until filtering starts anew.
+
+use glam::DVec2;
+
+use super::motion::SHORTEST_STEP_S;
+use super::{SLACK, U};
+use crate::percept::{Flags, Outputs};
+
+/// The length under which an average of unit vectors has no direction, as steps cancel out.
+pub(crate) const LEAST_HEADING: f64 = 1e-3;
+
+/// What the window of the filter of motion measures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FilterBy {
+    /// How far the centroid has come.
+    #[default]
+    Distance,
+    /// The paper's ΔR (eq. 7), without its sign: how far it has come from or towards the chart's origin.
+    Radial,
+}
+
+/// The filter of one field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Settings {
+    /// Ends of the window, m.
+    pub(crate) window_m: [f64; 2],
+    pub(crate) by: FilterBy,
+    /// τ, s.
+    pub(crate) time_constant_s: f64,
+    /// The step up to which the centroid counts as still, m.
+    pub(crate) still_within_m: f64,
+}
+
+/// What becomes of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Choice {
+    Held,
+    Counts,
+    Jumped,
+}
+
+impl Settings {
+    /// What becomes of a step, and whether one that is off by `bound` (m) might fare otherwise.
+    fn judge(&self, from: DVec2, to: DVec2, bound: f64) -> (Choice, bool) {
+        let [low, high] = self.window_m;
+        let length = (to - from).length();
+        let measure = match self.by {
+            FilterBy::Distance => length,
+            FilterBy::Radial => (to.length() - from.length()).abs(),
+        };
+        let near = |value: f64, end: f64| (value - end).abs() <= bound;
+        let choice = match measure {
+            _ if length <= self.still_within_m => Choice::Held,
+            beyond if beyond > high => Choice::Jumped,
+            short if short < low => Choice::Held,
+            _ => Choice::Counts,
+        };
+        let moved = length > self.still_within_m;
+        let at_an_end = moved && ((low > 0.0 && near(measure, low)) || near(measure, high));
+        (choice, at_an_end || near(length, self.still_within_m))
+    }
+}
+
+/// The time since the frame before, as far as this stage goes by it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Clock {
+    /// s.
+    Runs(f64),
+    /// The frame has the time of the one before.
+    Stands,
+    /// Nobody knows how long it was.
+    Broken,
+}
+
+impl Clock {
+    /// Of a step of `dt_s`, with `flags` where it cannot be used.
+    pub(crate) fn new(dt_s: f64, flags: Flags) -> Self {
+        if flags.is_empty() {
+            Self::Runs(dt_s)
+        } else if dt_s.abs() <= SHORTEST_STEP_S {
+            Self::Stands
+        } else {
+            Self::Broken
+        }
+    }
+}
+
+/// What a field's filter remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Memory {
+    /// The last centroid that counted, m.
+    anchor: Option<DVec2>,
+    /// The time since then, s.
+    since_s: f64,
+    /// Average of the steps' unit vectors.
+    heading: Option<DVec2>,
+}
+
+/// What the filter says of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Filtered {
+    pub(crate) flags: Flags,
+    pub(crate) present: Outputs,
+    /// m.
+    pub(crate) displacement: DVec2,
+    /// rad in (−π, π].
+    pub(crate) direction: f64,
+    /// m/s.
+    pub(crate) speed: f64,
+}
+
+impl Memory {
+    /// Forgets the contact that has ended.
+    pub(crate) fn release(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Takes the next centroid of a contact, m.
+    pub(crate) fn follow(&mut self, settings: &Settings, clock: Clock, place: DVec2) -> Filtered {
+        let mut filtered = Filtered::default();
+        let fresh = Self { anchor: Some(place), ..Self::default() };
+        match (self.anchor, clock) {
+            (None, _) => {
+                *self = fresh;
+                filtered.flags |= Flags::NO_PREVIOUS;
+            }
+            (Some(_), Clock::Broken) => {
+                *self = fresh;
+                filtered.flags |= Flags::BAD_DT;
+            }
+            (Some(_), Clock::Stands) => filtered.flags |= Flags::BAD_DT,
+            (Some(from), Clock::Runs(dt_s)) => {
+                self.since_s += dt_s;
+                match settings.judge(from, place, 0.0).0 {
+                    Choice::Held => filtered.flags |= Flags::HELD,
+                    Choice::Jumped => {
+                        *self = fresh;
+                        filtered.flags |= Flags::JUMPED;
+                    }
+                    Choice::Counts => {
+                        filtered.displacement = place - from;
+                        filtered.speed = filtered.displacement.length() / self.since_s;
+                        filtered.present |= Outputs::FILTERED_DISPLACEMENT | Outputs::FILTERED_SPEED;
+                        let unit = filtered.displacement / filtered.displacement.length();
+                        let old = self.heading.unwrap_or_default();
+                        let heading = old + self.share(settings) * (unit - old);
+                        *self = Self { heading: Some(heading), ..fresh };
+                    }
+                }
+            }
+        }
+        match self.heading {
+            Some(heading) if heading.length() > LEAST_HEADING => {
+                // A zero below the axis would put π at −π.
+                filtered.direction = libm::atan2(heading.y + 0.0, heading.x + 0.0);
+                filtered.present |= Outputs::FILTERED_DIRECTION;
+            }
+            Some(_) => filtered.flags |= Flags::STILL,
+            None => {}
+        }
+        filtered
+    }
+
+    /// How much of the next step goes into the average.
+    fn share(&self, settings: &Settings) -> f64 {
+        match self.heading {
+            Some(_) if settings.time_constant_s > 0.0 => -libm::expm1(-self.since_s / settings.time_constant_s),
+            _ => 1.0,
+        }
+    }
+}
+
+/// How far a filter that is fed single-precision centroids may be off. `None`: not compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct FilterBound {
+    /// Flags that may differ.
+    pub(crate) in_doubt: Flags,
+    /// As a distance, m.
+    pub(crate) displacement: Option<f64>,
+    pub(crate) direction: Option<f64>,
+    pub(crate) speed: Option<f64>,
+}
+
+/// What the bound of a field's next frame hangs on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Doubt {
+    right: Memory,
+    /// How far the last centroid that counted may be off, m.
+    anchor: f64,
+    /// The same for the average.
+    heading: f64,
+    /// Whether the other filter may remember another centroid.
+    lost: bool,
+}
+
+impl Doubt {
+    /// Of a field of which not even contact is certain.
+    pub(crate) fn of_contact() -> Self {
+        Self { lost: true, ..Self::default() }
+    }
+
+    /// The bounds of the next frame of a contact, whose centroid is off by up to `place_bound` (m).
+    pub(crate) fn follow(&mut self, settings: &Settings, clock: Clock, place: DVec2, place_bound: f64) -> FilterBound {
+        let before = *self;
+        self.right.follow(settings, clock, place);
+        let fresh = Self { right: self.right, anchor: place_bound, heading: 0.0, lost: false };
+        let mut bound = FilterBound::default();
+        if before.lost {
+            if before.right.anchor.is_none() {
+                // Whether the other was in contact is not known either.
+                bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT;
+            }
+            if clock == Clock::Broken {
+                // Wherever the other was, it starts here too.
+                *self = fresh;
+            } else {
+                *self = Self { lost: true, ..fresh };
+                bound.in_doubt |= Flags::HELD | Flags::JUMPED | Flags::STILL;
+            }
+            return bound;
+        }
+        let from = match (before.right.anchor, clock) {
+            (None, _) | (Some(_), Clock::Broken) => {
+                *self = fresh;
+                return bound;
+            }
+            (Some(_), Clock::Stands) => return self.directed(bound),
+            (Some(from), Clock::Runs(_)) => from,
+        };
+        let step = place - from;
+        // Beside f32's error, a few roundings of f64 on both sides.
+        let moved = SLACK * (before.anchor + place_bound + U * U * (place.length() + from.length()));
+        let (choice, in_doubt) = settings.judge(from, place, moved);
+        if in_doubt {
+            *self = Self { lost: true, ..fresh };
+            bound.in_doubt |= Flags::HELD | Flags::JUMPED | Flags::STILL;
+            return bound;
+        }
+        match choice {
+            Choice::Held => {}
+            Choice::Jumped => *self = fresh,
+            Choice::Counts => {
+                let since_s = before.right.since_s + if let Clock::Runs(dt_s) = clock { dt_s } else { 0.0 };
+                let share = Memory { since_s, ..before.right }.share(settings);
+                let turned = (moved / step.length()).min(1.0).asin() + U * U;
+                *self = Self { heading: before.heading + share * (turned - before.heading), ..fresh };
+                bound.displacement = Some(moved);
+                bound.speed = Some((moved + U * U * step.length()) / since_s);
+            }
+        }
+        self.directed(bound)
+    }
+
+    /// Adds the bound of the direction of the average.
+    fn directed(&self, mut bound: FilterBound) -> FilterBound {
+        if let Some(length) = self.right.heading.map(DVec2::length) {
+            let near = (length - LEAST_HEADING).abs() <= self.heading;
+            if near {
+                bound.in_doubt |= Flags::STILL;
+            } else if length > LEAST_HEADING && self.heading < 0.5 * length {
+                bound.direction = Some((self.heading / length).asin() + U * U);
+            }
+        }
+        bound
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+
+    fn settings(window_m: [f64; 2], time_constant_s: f64) -> Settings {
+        Settings { window_m, by: FilterBy::Distance, time_constant_s, still_within_m: 1e-9 }
+    }
+
+    /// A filter being fed.
+    struct Fed {
+        settings: Settings,
+        memory: Memory,
+    }
+
+    impl Fed {
+        fn new(settings: Settings) -> Self {
+            Self { settings, memory: Memory::default() }
+        }
+
+        fn push(&mut self, dt_s: f64, u: f64, v: f64) -> Filtered {
+            self.memory.follow(&self.settings, Clock::Runs(dt_s), DVec2::new(u, v))
+        }
+    }
+
+    fn direction(filtered: &Filtered) -> Option<f64> {
+        filtered.present.contains(Outputs::FILTERED_DIRECTION).then_some(filtered.direction)
+    }
+
+    #[test]
+    fn slow_motion_passes_in_the_end_and_jitter_does_not() {
+        let mut fed = Fed::new(settings([1e-3, 5e-3], 0.0));
+        // 0.3 mm a frame: the fourth is the first that has come a millimetre from the start.
+        let seen: Vec<Filtered> = (0..6).map(|i| fed.push(0.1, 0.0, 0.3e-3 * f64::from(i))).collect();
+        assert_eq!(seen[0].flags, Flags::NO_PREVIOUS);
+        assert!(seen[..4].iter().all(|f| f.present.is_empty()));
+        assert!(seen[1..4].iter().all(|f| f.flags == Flags::HELD));
+        assert!(seen[4..].iter().all(|f| (direction(f).unwrap() - FRAC_PI_2).abs() < 1e-12));
+        // Its way is all of it, its speed over all of its time; the frame after is short again, and keeps the direction.
+        assert_eq!((seen[4].present, seen[4].flags), (Outputs::FILTERED, Flags::empty()));
+        assert!((seen[4].displacement.y - 1.2e-3).abs() < 1e-15 && (seen[4].speed - 3e-3).abs() < 1e-12);
+        assert_eq!((seen[5].present, seen[5].flags), (Outputs::FILTERED_DIRECTION, Flags::HELD));
+        let mut fed = Fed::new(settings([1e-3, 5e-3], 0.0));
+        assert!((0..50).all(|i| fed.push(0.1, 0.4e-3 * f64::from(i % 3), 0.0).present.is_empty()));
+    }
+
+    #[test]
+    fn a_jump_starts_anew_where_it_ends() {
+        let mut fed = Fed::new(settings([1e-3, 5e-3], 0.0));
+        fed.push(0.1, 0.0, 0.0);
+        assert_eq!(direction(&fed.push(0.1, 2e-3, 0.0)), Some(0.0));
+        let jump = fed.push(0.1, 2e-3, 9e-3);
+        assert_eq!((jump.present, jump.flags), (Outputs::empty(), Flags::JUMPED));
+        // From where it landed, not from where it left.
+        let after = fed.push(0.1, 2e-3, 7e-3);
+        assert!((direction(&after).unwrap() + FRAC_PI_2).abs() < 1e-12 && (after.speed - 0.02).abs() < 1e-12);
+        fed.memory.release();
+        assert_eq!(fed.push(0.1, 0.0, 7e-3).flags, Flags::NO_PREVIOUS, "a new contact has no past");
+    }
+
+    #[test]
+    fn the_papers_measure_is_blind_to_motion_around_the_origin() {
+        let around = |by| {
+            let mut fed = Fed::new(Settings { by, ..settings([1e-3, 0.1], 0.0) });
+            let turn =
+                |i: i32| fed.push(0.1, 0.02 * libm::cos(0.3 * f64::from(i)), 0.02 * libm::sin(0.3 * f64::from(i)));
+            (0..20).map(turn).filter(|f| f.present.contains(Outputs::FILTERED_DISPLACEMENT)).count()
+        };
+        assert_eq!((around(FilterBy::Distance), around(FilterBy::Radial)), (19, 0));
+        // Towards the origin counts as much as away from it.
+        let mut fed = Fed::new(Settings { by: FilterBy::Radial, ..settings([1e-3, 0.1], 0.0) });
+        fed.push(0.1, 0.02, 0.0);
+        assert_eq!(direction(&fed.push(0.1, 0.01, 0.0)), Some(PI));
+        assert_eq!(fed.push(0.1, -0.01, 0.0).flags, Flags::HELD, "to the other side, as far out");
+    }
+
+    #[test]
+    fn smoothing_takes_its_time_and_no_notice_of_the_seam() {
+        let mut fed = Fed::new(settings([0.0, 10.0], 0.2));
+        let mut place = [0.0_f64, 0.0];
+        fed.push(0.1, 0.0, 0.0);
+        let mut step = |dt_s: f64, angle: f64| {
+            place = [place[0] + libm::cos(angle), place[1] + libm::sin(angle)];
+            direction(&fed.push(dt_s, place[0], place[1])).unwrap()
+        };
+        assert_eq!(step(0.1, 0.0), 0.0);
+        let turned = step(0.1, FRAC_PI_2);
+        // The share of a step of τ/2 is 1 − e^(−1/2) = 0.3935: atan2(0.3935, 0.6065).
+        assert!((turned - 0.575_6).abs() < 1e-3, "{turned}");
+        for i in 0..40 {
+            let seam = step(1.0, if i % 2 == 0 { PI - 0.1 } else { -PI + 0.1 });
+            assert!(i == 0 || seam.abs() > PI - 0.2, "{seam}");
+        }
+    }
+
+    #[test]
+    fn steps_that_cancel_out_have_no_direction() {
+        // At Δt = τ ln 2 a step has half of the say.
+        let mut fed = Fed::new(settings([1e-3, 1.0], 0.1));
+        fed.push(0.1, 0.0, 0.0);
+        fed.push(0.1, 0.01, 0.0);
+        let back = fed.push(0.1 * std::f64::consts::LN_2, 0.0, 0.0);
+        assert_eq!((back.flags, direction(&back)), (Flags::STILL, None));
+        assert_eq!(back.present, Outputs::FILTERED_DISPLACEMENT | Outputs::FILTERED_SPEED);
+        assert_eq!(fed.push(0.1, 0.0, 0.0).flags, Flags::STILL | Flags::HELD);
+        assert!(direction(&fed.push(0.1, 0.0, 0.01)).is_some());
+    }
+
+    #[test]
+    fn no_jump_of_the_clock_is_in_a_speed_or_a_direction() {
+        let step = |dt_s, flags| Clock::new(dt_s, flags);
+        assert_eq!(step(0.1, Flags::empty()), Clock::Runs(0.1));
+        assert_eq!([0.0, 1e-13].map(|dt_s| step(dt_s, Flags::BAD_DT)), [Clock::Stands; 2]);
+        assert_eq!([-0.1, 3600.0].map(|dt_s| step(dt_s, Flags::BAD_DT)), [Clock::Broken; 2]);
+        let mut fed = Fed::new(settings([1e-3, 1.0], 0.1));
+        let at = |fed: &mut Fed, clock, u| fed.memory.follow(&fed.settings.clone(), clock, DVec2::new(u, 0.0));
+        fed.push(0.1, 0.0, 0.0);
+        fed.push(0.1, 0.01, 0.0);
+        // The same time again: what was known stays, and the next frame goes on from there.
+        let again = at(&mut fed, Clock::Stands, 0.02);
+        assert_eq!((again.flags, again.present), (Flags::BAD_DT, Outputs::FILTERED_DIRECTION));
+        let on = fed.push(0.1, 0.02, 0.0);
+        assert!(on.flags.is_empty() && (on.speed - 0.1).abs() < 1e-12, "{on:?}");
+        // A clock that was set: nothing is known, and the next step is measured by good time alone.
+        let set = at(&mut fed, Clock::Broken, 0.5);
+        assert_eq!((set.flags, set.present), (Flags::BAD_DT, Outputs::empty()));
+        let on = fed.push(0.1, 0.51, 0.0);
+        assert!((on.speed - 0.1).abs() < 1e-12 && direction(&on) == Some(0.0), "{on:?}");
+    }
+
+    /// Two filters over the same path, one fed places that are off by up to `off`, held to the bounds.
+    fn within_bounds(settings: Settings, off: f64, claimed: f64) -> Result<[u32; 2], String> {
+        let mut seed = 1_u32;
+        let mut random = move || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(seed >> 8) / f64::from(1 << 23) - 1.0
+        };
+        let (mut right, mut other, mut doubt) = (Memory::default(), Memory::default(), Doubt::default());
+        let mut place = DVec2::ZERO;
+        let [mut compared, mut doubted] = [0, 0];
+        for _ in 0..4000 {
+            place = (place + 2e-3 * DVec2::new(random(), random())).clamp(DVec2::splat(-0.05), DVec2::splat(0.05));
+            let clock = match random() {
+                x if x > 0.99 => Clock::Broken,
+                x if x > 0.95 => Clock::Stands,
+                x => Clock::Runs(0.02 + 0.01 * x),
+            };
+            let turn = PI * random();
+            let near = place + off * DVec2::new(turn.cos(), turn.sin());
+            if random() > 0.98 {
+                (right, other, doubt) = Default::default();
+            }
+            let (a, b) = (right.follow(&settings, clock, place), other.follow(&settings, clock, near));
+            let bound = doubt.follow(&settings, clock, place, claimed);
+            if !((a.flags ^ b.flags) - bound.in_doubt).is_empty() {
+                return Err(format!("{:?} {:?}", a.flags, b.flags));
+            }
+            doubted += u32::from(!bound.in_doubt.is_empty());
+            let apart = (a.displacement - b.displacement).length();
+            let turned = super::super::angle::between_directions(a.direction, b.direction);
+            let faster = (a.speed - b.speed).abs();
+            for (error, limit) in [(apart, bound.displacement), (turned, bound.direction), (faster, bound.speed)] {
+                let Some(limit) = limit else { continue };
+                if a.present != b.present || error > limit {
+                    return Err(format!("{error} over {limit}"));
+                }
+                compared += 1;
+            }
+        }
+        Ok([compared, doubted])
+    }
+
+    #[test]
+    fn centroids_that_are_off_stay_within_the_bounds() {
+        for by in [FilterBy::Distance, FilterBy::Radial] {
+            for time_constant_s in [0.0, 0.1] {
+                let settings = Settings { by, ..settings([1e-3, 4e-3], time_constant_s) };
+                for off in [1e-9, 1e-6, 1e-5] {
+                    let [compared, doubted] = within_bounds(settings, off, off).unwrap();
+                    assert!(compared > 1000, "{by:?} {off}: {compared} compared, {doubted} in doubt");
+                    assert!(off < 1e-7 || doubted > 0);
+                }
+                // Negative control: a bound that claims a third of the error does not hold.
+                assert!(within_bounds(settings, 1e-5, 3e-6).is_err());
+            }
+        }
+    }
+}
