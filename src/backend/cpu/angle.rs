@@ -37,9 +37,9 @@ fn atan2<S: Simd>(simd: S, y: F<S>, x: F<S>) -> F<S> {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
 
-    use super::super::simd::{LANES, Row, load, store, width};
+    use super::super::simd::{LANES, Row, load, store, width, with_widest};
     use super::*;
     use crate::stage::angle::of_line_f32;
 
@@ -65,7 +65,7 @@ mod tests {
             if step < 3 {
                 (x[3], y[3], x[5], y[5], x[6], y[6]) = (-1.0, 0.0, 0.0, 0.0, -1.0, -0.0);
             }
-            let angles = dispatch!(Level::new(), simd => row(simd, &x, &y));
+            let angles = with_widest!(Level::new(), simd => row(simd, &x, &y));
             for lane in 0..LANES {
                 assert_eq!(angles[lane].to_bits(), of_line_f32(x[lane], y[lane]).to_bits(), "{} {}", x[lane], y[lane]);
             }

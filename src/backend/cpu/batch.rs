@@ -1,16 +1,17 @@
 //! Many frames: sixteen frames of a field abreast.
 
 use bytemuck::cast_slice_mut;
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u};
-use super::touch::{Abreast, Cells, Members, OneKind, Part, strip, touch};
-use super::wide::{Values, Wide};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u, with_widest};
+use super::touch::{Abreast, Cells, Members, OneKind, Part, touch};
+use super::wide::{self, Values, Wide};
 use super::{calibrate, change};
 use crate::percept::{CellsMut, Flags, Outputs};
-use crate::scene::Plan;
+use crate::scene::{Plan, PlanField};
 use crate::stage::layout::{Member, Taxel};
 
 /// What a task needs to work in.
@@ -87,10 +88,9 @@ impl<S: Simd> Members<S> for OverFrames<'_> {
 
 /// All stages for the frames of `raw` from `first` on, as many as `cells` has, which is at most sixteen; the one before
 /// them is in `before`.
-#[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "what a plan is run with, and where")]
-pub(super) fn block<S: Simd>(
-    simd: S,
+pub(super) fn block(
+    level: Level,
     plan: &Plan,
     tables: &Tables,
     raw: &RawBatch<'_>,
@@ -100,10 +100,10 @@ pub(super) fn block<S: Simd>(
     cells: &mut CellsMut<'_>,
 ) {
     let frames = cells.frames();
-    let mut faults = read(simd, plan, tables, raw.rows, first, frames, scratch);
+    let mut faults = with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, scratch));
     if plan.has_changes() {
         let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
-        calibrate::frame(simd, plan, tables, before, was, said);
+        calibrate::frame(level, plan, tables, before, was, said);
         let before = (was.as_flattened(), said.as_flattened());
         faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
     }
@@ -117,29 +117,44 @@ pub(super) fn block<S: Simd>(
     }
     let Scratch { pressures, statuses, cells: answers, values, .. } = scratch;
     for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
+        with_widest!(level, simd => narrow(simd, plan, fields, pressures, statuses, faults, answers));
         for (field, answer) in fields.iter().zip(answers.iter_mut()) {
-            let kind = OneKind::new(field);
-            if let Some(table) = field.wide.map(|wide| &tables.wide[wide]) {
-                let mut one = Cells::EMPTY;
-                for frame in 0..frames {
-                    let at = |slot: usize| pressures[slot][frame];
-                    values.gather(table, faults, at, |slot| statuses[slot][frame]);
-                    let sweep = Wide { table, values };
-                    strip(simd, sweep, &kind, plan.stages(), plan.columns, faults, &mut one, 0);
-                    answer.take(frame, &one);
-                }
-            } else {
-                let members = OverFrames {
-                    members: plan.members_of(field),
-                    depths: &field.depths,
-                    taxels: &plan.taxels,
-                    pressures,
-                    statuses,
-                };
-                touch(simd, Abreast(members), &kind, plan.stages(), plan.columns, faults, answer);
+            let Some(table) = field.wide.map(|wide| &tables.wide[wide]) else { continue };
+            let mut one = Cells::EMPTY;
+            for frame in 0..frames {
+                values.gather(table, faults, |slot| pressures[slot][frame], |slot| statuses[slot][frame]);
+                wide::cell(level, plan, Wide { table, values }, &OneKind::new(field), faults, &mut one);
+                answer.take(frame, &one);
             }
         }
-        write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
+        with_widest!(level, simd => {
+            write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
+        });
+    }
+}
+
+/// The fields of `fields` that are not wide, over sixteen frames.
+#[inline(always)]
+fn narrow<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    fields: &[PlanField],
+    pressures: &[Row<f32>],
+    statuses: &[Row<u32>],
+    faults: bool,
+    answers: &mut [Cells; LANES],
+) {
+    for (field, answer) in fields.iter().zip(answers) {
+        if field.wide.is_none() {
+            let members = OverFrames {
+                members: plan.members_of(field),
+                depths: &field.depths,
+                taxels: &plan.taxels,
+                pressures,
+                statuses,
+            };
+            touch(simd, Abreast(members), &OneKind::new(field), plan.stages(), plan.columns, faults, answer);
+        }
     }
 }
 

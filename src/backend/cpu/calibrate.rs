@@ -1,10 +1,11 @@
 //! calibrate in lanes: sixteen taxels of one frame abreast; see [`crate::stage::calibrate`].
 
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::Rows;
 use super::Tables;
-use super::simd::{F, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width};
+use super::simd::{F, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width, with_widest};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -107,8 +108,19 @@ pub(super) fn tile<S: Simd>(
 }
 
 /// A frame's pressures and statuses, by slot; whether any status says anything.
+pub(super) fn frame(
+    level: Level,
+    plan: &Plan,
+    tables: &Tables,
+    raw: (Rows<'_>, usize),
+    pressures: &mut [Row<f32>],
+    statuses: &mut [Row<u32>],
+) -> bool {
+    with_widest!(level, simd => tiles(simd, plan, tables, raw, pressures, statuses))
+}
+
 #[inline(always)]
-pub(super) fn frame<S: Simd>(
+fn tiles<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,

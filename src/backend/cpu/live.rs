@@ -1,17 +1,17 @@
 //! One frame: sixteen fields abreast.
 
 use bytemuck::cast_slice_mut;
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
-use super::simd::{F, LANES, Row, U, load, load_u};
-use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part, strip, touch};
-use super::wide::{Table, Values, Wide};
+use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
+use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part, touch};
+use super::wide::{self, Table, Values, Wide};
 use super::{Tables, calibrate, change, the_one_before};
 use crate::percept::{CellsMut, Flags, Outputs};
-use crate::scene::{Plan, Stages};
+use crate::scene::Plan;
 use crate::signal::RawValue;
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
@@ -194,15 +194,15 @@ impl Live {
         cells: &mut CellsMut<'_>,
     ) {
         let Self { pressures, statuses, before: (was, said), .. } = self;
-        let mut faults =
-            dispatch!(level, simd => calibrate::frame(simd, plan, tables, moment.now, pressures, statuses));
+        let mut faults = calibrate::frame(level, plan, tables, moment.now, pressures, statuses);
         if plan.has_changes() {
-            dispatch!(level, simd => calibrate::frame(simd, plan, tables, moment.before, was, said));
+            calibrate::frame(level, plan, tables, moment.before, was, said);
             let before = (was.as_flattened(), said.as_flattened());
             let (pressures, statuses) = (pressures.as_flattened_mut(), statuses.as_flattened_mut());
             faults |= change::frame(plan, moment.step, before, pressures, statuses);
         }
         let frame = Frame {
+            level,
             plan,
             tables,
             pressures: self.pressures.as_flattened(),
@@ -210,15 +210,12 @@ impl Live {
             faults,
         };
         if self.shared {
-            self.groups.par_iter().zip(&mut self.answers).for_each_init(
-                Gathered::default,
-                |gathered, (group, answer)| {
-                    dispatch!(level, simd => frame.group(simd, group, gathered, answer));
-                },
-            );
+            let groups = self.groups.par_iter().zip(&mut self.answers);
+            groups.for_each_init(Gathered::default, |gathered, (group, answer)| frame.group(group, gathered, answer));
         } else {
-            let (groups, answers, gathered) = (&self.groups, &mut self.answers, &mut self.gathered);
-            dispatch!(level, simd => frame.groups(simd, groups, gathered, answers));
+            for (group, answer) in self.groups.iter().zip(&mut self.answers) {
+                frame.group(group, &mut self.gathered, answer);
+            }
         }
         if !cells.pressures.is_empty() {
             for (kept, &pressure) in cells.pressures.iter_mut().zip(frame.pressures) {
@@ -240,6 +237,7 @@ impl Live {
 /// A calibrated frame.
 #[derive(Clone, Copy)]
 struct Frame<'a> {
+    level: Level,
     plan: &'a Plan,
     tables: &'a Tables,
     pressures: &'a [f32],
@@ -248,16 +246,8 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    #[inline(always)]
-    fn groups<S: Simd>(&self, simd: S, groups: &[Group], gathered: &mut Gathered, answers: &mut [Cells]) {
-        for (group, answer) in groups.iter().zip(answers) {
-            self.group(simd, group, gathered, answer);
-        }
-    }
-
-    #[inline(always)]
-    fn group<S: Simd>(&self, simd: S, group: &Group, gathered: &mut Gathered, answer: &mut Cells) {
-        let (stages, columns): (Stages, Outputs) = (self.plan.stages(), self.plan.columns);
+    #[inline(never)]
+    fn group(&self, group: &Group, gathered: &mut Gathered, answer: &mut Cells) {
         match group {
             Group::Narrow(group) => {
                 gather(&group.slots, self.pressures, &mut gathered.pressures);
@@ -267,14 +257,16 @@ impl Frame<'_> {
                 }
                 let Gathered { pressures, statuses, .. } = &*gathered;
                 let members = OverFields { group, pressures, statuses };
-                touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
+                let (stages, columns) = (self.plan.stages(), self.plan.columns);
+                with_widest!(self.level, simd => {
+                    touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
+                });
             }
             Group::Wide { kind, table, .. } => {
                 let table: &Table = &self.tables.wide[*table];
                 let values = &mut gathered.values;
                 values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
-                let sweep = Wide { table, values };
-                strip(simd, sweep, kind, stages, columns, self.faults, answer, 0);
+                wide::cell(self.level, self.plan, Wide { table, values }, kind, self.faults, answer);
             }
         }
     }

@@ -21,7 +21,7 @@ mod wide;
 
 use std::sync::Mutex;
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 
 use self::live::Moment;
 use self::simd::LANES;
@@ -105,7 +105,7 @@ impl Cpu {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
             let (plan, tables, at) = (&self.plan, &self.tables, first + done);
             let before = the_one_before(raw.rows, at, &self.before);
-            dispatch!(self.level, simd => batch::block(simd, plan, tables, raw, at, before, &mut scratch, &mut cells));
+            batch::block(self.level, plan, tables, raw, at, before, &mut scratch, &mut cells);
             (rest, done) = (later, done + LANES);
         }
         self.scratches.lock().unwrap_or_else(|e| e.into_inner()).push(scratch);

@@ -1,13 +1,38 @@
 //! Sixteen lanes on whatever vectors the machine has.
 //!
 //! Lanes never mix, so that a lane's bits do not depend on how many of them one instruction takes. Everything that
-//! computes here is `inline(always)`, up to the `dispatch!` that chooses the instructions: only then can vectors stay in
-//! registers.
+//! computes here is `inline(always)`, up to the [`with_widest`] that chooses the instructions: only then can vectors stay
+//! in registers. What stands in one is compiled once for each set of instructions, so there are few, none in a loop over
+//! lanes.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x16, u8x64, u32x16};
 
 use super::super::Rows;
+
+/// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
+/// what every processor has: sets in between would cost their compilation and gain little.
+macro_rules! with_widest {
+    ($level:expr, $simd:ident => $run:expr) => {{
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        {
+            use fearless_simd::Simd as _;
+            let level = $level;
+            if let Some($simd) = level.as_avx512() {
+                $simd.vectorize(#[inline(always)] || $run)
+            } else if let Some($simd) = level.as_avx2() {
+                $simd.vectorize(#[inline(always)] || $run)
+            } else if let Some($simd) = level.as_sse2() {
+                $simd.vectorize(#[inline(always)] || $run)
+            } else {
+                unreachable!("a processor without SSE2 runs nothing that this was compiled to")
+            }
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        fearless_simd::dispatch!($level, $simd => $run)
+    }};
+}
+pub(super) use with_widest;
 
 /// Lanes side by side.
 pub(super) const LANES: usize = 16;

@@ -2,14 +2,16 @@
 //!
 //! Every sum is sixteen sums, added up in a fixed tree; a choice between equals still goes to the lower id.
 
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::axis::{self, Moments};
 use super::centroid;
 use super::contact::{self, Sums};
 use super::orientation::{Farthest, point};
-use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width};
-use super::touch::{Members, Part, Sweep, Touch};
+use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
+use super::touch::{Cells, Members, OneKind, Part, Sweep, Touch, strip};
+use crate::scene::Plan;
 use crate::stage::calibrate::UNUSABLE;
 
 /// A wide field's members in rows of [`LANES`], the last one filled up with unpressed ones.
@@ -58,7 +60,6 @@ pub(super) struct Values {
 
 impl Values {
     /// Reads the pressures and, where `faults` says so, statuses of `table`'s taxels.
-    #[inline(always)]
     pub(super) fn gather(
         &mut self,
         table: &Table,
@@ -123,6 +124,13 @@ impl<S: Simd> Members<S> for Wide<'_> {
     fn status(self, simd: S, member: usize, at: usize) -> U<S> {
         load_u(simd, &self.values.statuses[member], at)
     }
+}
+
+/// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
+#[inline(never)]
+pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, faults: bool, cells: &mut Cells) {
+    let (stages, columns) = (plan.stages(), plan.columns);
+    with_widest!(level, simd => strip(simd, field, kind, stages, columns, faults, cells, 0));
 }
 
 /// The sum of all lanes, as a tree.
