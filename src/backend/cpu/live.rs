@@ -1,9 +1,10 @@
 //! One frame: sixteen fields abreast.
 
+use std::ops::Range;
+
 use bytemuck::cast_slice_mut;
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
-use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
 use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
@@ -24,6 +25,16 @@ enum Group {
     Wide { field: usize, kind: OneKind, table: usize },
 }
 
+impl Group {
+    /// Rows that it gathers.
+    fn rows(&self) -> usize {
+        match self {
+            Self::Narrow(group) => group.members.len(),
+            Self::Wide { .. } => 0,
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Narrow {
     /// Per lane, which field; fewer at the end.
@@ -32,10 +43,43 @@ struct Narrow {
     together: Option<usize>,
     kinds: Kinds,
     /// By member; lanes that have no more go on with an unpressed one.
-    slots: Vec<Row<u32>>,
+    slots: Slots,
     members: Vec<MemberRow>,
     depths: Vec<Row<f32>>,
     areas: Vec<Row<f32>>,
+}
+
+/// A plan of fewer slots than this has them as 16-bit numbers, which need no check against a table of as many values.
+const NEAR: usize = 1 << 16;
+
+/// Slots, a row a member.
+#[derive(Clone, Debug)]
+enum Slots {
+    Near(Vec<Row<u16>>),
+    Far(Vec<Row<u32>>),
+}
+
+impl Slots {
+    /// Brings the values of all of them side by side.
+    fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
+        match (self, values.first_chunk::<NEAR>()) {
+            (Self::Near(slots), Some(values)) => {
+                for (row, slots) in rows.iter_mut().zip(slots) {
+                    *row = slots.map(|slot| values[usize::from(slot)]);
+                }
+            }
+            (Self::Near(slots), None) => {
+                for (row, slots) in rows.iter_mut().zip(slots) {
+                    *row = slots.map(|slot| values[usize::from(slot)]);
+                }
+            }
+            (Self::Far(slots), _) => {
+                for (row, slots) in rows.iter_mut().zip(slots) {
+                    *row = slots.map(|slot| values[slot as usize]);
+                }
+            }
+        }
+    }
 }
 
 /// A member of each field of a group.
@@ -50,11 +94,12 @@ impl Narrow {
     fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
         let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
         let blank = vec![[0.0; LANES]; rows];
+        let mut slots = vec![[unpressed as u32; LANES]; rows];
         let mut group = Self {
             fields: fields.to_vec(),
             together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
             kinds: Kinds::EMPTY,
-            slots: vec![[unpressed as u32; LANES]; rows],
+            slots: Slots::Far(Vec::new()),
             members: vec![MemberRow { weight: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] }; rows],
             depths: blank.clone(),
             areas: blank,
@@ -62,7 +107,7 @@ impl Narrow {
         for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
             group.kinds.set(lane, field);
             for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
-                group.slots[row][lane] = member.slot;
+                slots[row][lane] = member.slot;
                 group.members[row].weight[lane] = member.weight;
                 group.members[row].u[lane] = member.u;
                 group.members[row].v[lane] = member.v;
@@ -70,6 +115,11 @@ impl Narrow {
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
         }
+        group.slots = if unpressed < NEAR {
+            Slots::Near(slots.into_iter().map(|row| row.map(|slot| slot as u16)).collect())
+        } else {
+            Slots::Far(slots)
+        };
         group
     }
 }
@@ -85,7 +135,7 @@ struct OverFields<'a> {
 impl<S: Simd> Members<S> for OverFields<'_> {
     #[inline(always)]
     fn count(self) -> usize {
-        self.group.slots.len()
+        self.group.members.len()
     }
 
     #[inline(always)]
@@ -115,6 +165,10 @@ impl<S: Simd> Members<S> for OverFields<'_> {
     }
 }
 
+/// Rows that are gathered before anything is computed of them: what was stored piece by piece can be loaded as a whole
+/// only once it has reached the cache. They fill half of the smallest first-level cache.
+const GATHERED_ROWS: usize = 256;
+
 /// What one thread needs beside.
 #[derive(Clone, Debug, Default)]
 struct Gathered {
@@ -141,6 +195,8 @@ impl<'a> Moment<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Live {
     groups: Vec<Group>,
+    /// The groups that are computed together.
+    pieces: Vec<Range<usize>>,
     /// Per group.
     answers: Vec<Cells>,
     /// By slot, and a last row of taxels that nothing presses.
@@ -165,15 +221,28 @@ impl Live {
         }
         // Fields of one size stay in their order.
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
-        let mut groups = wide;
         let unpressed = tiles * LANES;
+        let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
         let narrow = narrow.chunks(LANES).map(|fields| Group::Narrow(Box::new(Narrow::new(plan, fields, unpressed))));
-        groups.extend(narrow);
+        let groups: Vec<Group> = wide.into_iter().chain(narrow).collect();
+        let mut pieces: Vec<Range<usize>> = Vec::new();
+        let mut rows = 0;
+        for (index, group) in groups.iter().enumerate() {
+            rows += group.rows();
+            match pieces.last_mut() {
+                Some(piece) if rows <= GATHERED_ROWS => piece.end = index + 1,
+                _ => {
+                    rows = group.rows();
+                    pieces.push(index..index + 1);
+                }
+            }
+        }
         Self {
             answers: vec![Cells::EMPTY; groups.len()],
             groups,
-            pressures: vec![[0.0; LANES]; tiles + 1],
-            statuses: vec![[0; LANES]; tiles + 1],
+            pieces,
+            pressures: vec![[0.0; LANES]; room],
+            statuses: vec![[0; LANES]; room],
             before: if plan.has_changes() {
                 (vec![[0.0; LANES]; tiles], vec![[0; LANES]; tiles])
             } else {
@@ -210,11 +279,11 @@ impl Live {
             faults,
         };
         if self.shared {
-            let groups = self.groups.par_iter().zip(&mut self.answers);
-            groups.for_each_init(Gathered::default, |gathered, (group, answer)| frame.group(group, gathered, answer));
+            frame.share(&self.groups, &self.pieces, &mut self.answers);
         } else {
-            for (group, answer) in self.groups.iter().zip(&mut self.answers) {
-                frame.group(group, &mut self.gathered, answer);
+            for piece in &self.pieces {
+                let (groups, answers) = (&self.groups[piece.clone()], &mut self.answers[piece.clone()]);
+                frame.piece(groups, &mut self.gathered, answers);
             }
         }
         if !cells.pressures.is_empty() {
@@ -246,27 +315,65 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    #[inline(never)]
-    fn group(&self, group: &Group, gathered: &mut Gathered, answer: &mut Cells) {
-        match group {
-            Group::Narrow(group) => {
-                gather(&group.slots, self.pressures, &mut gathered.pressures);
-                if self.faults {
-                    gather(&group.slots, self.statuses, &mut gathered.statuses);
-                    self.leave_out_what_is_not_there(group, &mut gathered.statuses);
-                }
-                let Gathered { pressures, statuses, .. } = &*gathered;
-                let members = OverFields { group, pressures, statuses };
-                let (stages, columns) = (self.plan.stages(), self.plan.columns);
-                with_widest!(self.level, simd => {
-                    touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
-                });
+    /// Halves the pieces until one remains, and does the halves in parallel; `answers` begin with the first piece's.
+    fn share(&self, groups: &[Group], pieces: &[Range<usize>], answers: &mut [Cells]) {
+        match pieces {
+            [] => {}
+            [piece] => self.piece(&groups[piece.clone()], &mut Gathered::default(), answers),
+            _ => {
+                let (left, right) = pieces.split_at(pieces.len() / 2);
+                let (mine, others) = answers.split_at_mut(right[0].start - left[0].start);
+                rayon::join(|| self.share(groups, left, mine), || self.share(groups, right, others));
             }
-            Group::Wide { kind, table, .. } => {
+        }
+    }
+
+    #[inline(never)]
+    fn piece(&self, groups: &[Group], gathered: &mut Gathered, answers: &mut [Cells]) {
+        let rows = groups.iter().map(Group::rows).sum();
+        if gathered.pressures.len() < rows {
+            gathered.pressures.resize(rows, [0.0; LANES]);
+            gathered.statuses.resize(rows, [0; LANES]);
+        }
+        let mut first = 0;
+        for group in groups {
+            if let Group::Narrow(group) = group {
+                let rows = first..first + group.members.len();
+                group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
+                if self.faults {
+                    group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
+                    self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
+                }
+                first = rows.end;
+            }
+        }
+        let Gathered { pressures, statuses, values } = gathered;
+        with_widest!(self.level, simd => self.narrow(simd, groups, pressures, statuses, answers));
+        for (group, answer) in groups.iter().zip(answers) {
+            if let Group::Wide { kind, table, .. } = group {
                 let table: &Table = &self.tables.wide[*table];
-                let values = &mut gathered.values;
                 values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
                 wide::cell(self.level, self.plan, Wide { table, values }, kind, self.faults, answer);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn narrow<S: Simd>(
+        &self,
+        simd: S,
+        groups: &[Group],
+        pressures: &[Row<f32>],
+        statuses: &[Row<u32>],
+        answers: &mut [Cells],
+    ) {
+        let mut first = 0;
+        for (group, answer) in groups.iter().zip(answers) {
+            if let Group::Narrow(group) = group {
+                let members = OverFields { group, pressures: &pressures[first..], statuses: &statuses[first..] };
+                let (stages, columns) = (self.plan.stages(), self.plan.columns);
+                touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
+                first += group.members.len();
             }
         }
     }
@@ -274,22 +381,9 @@ impl Frame<'_> {
     /// Lanes that have no more members do not keep the others from being all unusable.
     fn leave_out_what_is_not_there(&self, group: &Narrow, statuses: &mut [Row<u32>]) {
         for (lane, &field) in group.fields.iter().enumerate() {
-            for row in &mut statuses[self.plan.fields[field].count..group.slots.len()] {
+            for row in &mut statuses[self.plan.fields[field].count..group.members.len()] {
                 row[lane] = crate::stage::calibrate::UNUSABLE;
             }
-        }
-    }
-}
-
-/// Brings the values of `slots` side by side.
-#[inline(always)]
-fn gather<T: Copy + Default>(slots: &[Row<u32>], values: &[T], rows: &mut Vec<Row<T>>) {
-    if rows.len() < slots.len() {
-        rows.resize(slots.len(), [T::default(); LANES]);
-    }
-    for (row, slots) in rows.iter_mut().zip(slots) {
-        for (value, &slot) in row.iter_mut().zip(slots) {
-            *value = values[slot as usize];
         }
     }
 }
