@@ -28,7 +28,7 @@ impl<T: Clone + Default> Columns<T> {
     /// Makes room for `cells` cells of each wanted column. Those that every cell is written into keep what they held.
     fn resize(&mut self, wanted: Outputs, cells: usize) {
         let fit = |column: &mut Vec<T>, output| {
-            column.resize(if wanted.intersects(output) { cells } else { 0 }, T::default())
+            column.resize(if wanted.intersects(output) { cells } else { 0 }, T::default());
         };
         // Motion is made from the centroids' columns.
         let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::MOTION;
@@ -439,6 +439,7 @@ impl CellsMut<'_> {
     }
 
     /// Sets a cell's flags and the quantities it holds, by their bits.
+    #[cfg(feature = "gpu")]
     pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
         self.flags[cell] = Flags::from_bits_truncate(flags);
         self.present[cell] = Outputs::from_bits_truncate(present);

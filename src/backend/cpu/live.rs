@@ -410,9 +410,9 @@ struct Run {
 impl Places for Run {
     fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
         let column = &mut column[self.first..self.first + self.count];
-        match column.as_mut_array::<LANES>() {
-            Some(whole) => *whole = *row,
-            None => column.copy_from_slice(&row[..self.count]),
+        match <&mut Row<T>>::try_from(&mut *column) {
+            Ok(whole) => *whole = *row,
+            Err(_) => column.copy_from_slice(&row[..self.count]),
         }
     }
 }

@@ -16,10 +16,12 @@ mod live;
 mod motion;
 mod orientation;
 mod simd;
+#[cfg(test)]
+mod tests;
 mod touch;
 mod wide;
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use fearless_simd::Level;
 
@@ -98,7 +100,7 @@ impl Cpu {
             rayon::join(|| self.batch(raw, first, left_cells), || self.batch(raw, first + left, right_cells));
             return;
         }
-        let free = self.scratches.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan));
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
@@ -108,7 +110,7 @@ impl Cpu {
             batch::block(self.level, plan, tables, raw, at, before, &mut scratch, &mut cells);
             (rest, done) = (later, done + LANES);
         }
-        self.scratches.lock().unwrap_or_else(|e| e.into_inner()).push(scratch);
+        self.scratches.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
 }
 

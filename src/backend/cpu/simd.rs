@@ -101,14 +101,14 @@ pub(super) fn read<S: Simd>(
     shuffles: bool,
     bits: &mut Row<u32>,
 ) {
-    if let (Rows::Picked { frames, picks }, true) = (raw, shuffles) {
-        if let Some((from, bytes)) = &picks.near[tile] {
-            let values: &[u32] = bytemuck::cast_slice(&frames[frame].values[*from..from + 2 * LANES]);
-            let [low, high] = [&values[..LANES], &values[LANES..]];
-            let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
-            low.concat_swizzle_dyn(high, u8x64::from_slice(simd, bytes)).store_slice(bits);
-            return;
-        }
+    if let (Rows::Picked { frames, picks }, true) = (raw, shuffles)
+        && let Some((from, bytes)) = &picks.near[tile]
+    {
+        let values: &[u32] = bytemuck::cast_slice(&frames[frame].values[*from..from + 2 * LANES]);
+        let [low, high] = [&values[..LANES], &values[LANES..]];
+        let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
+        low.concat_swizzle_dyn(high, u8x64::from_slice(simd, bytes)).store_slice(bits);
+        return;
     }
     raw.read(frame, tile * LANES, calibrated, bits);
 }

@@ -1,0 +1,85 @@
+//! Percepts have the same bits on every set of instructions, in batches and frame by frame.
+
+use fearless_simd::Level;
+
+use super::*;
+use crate::backend::Step;
+use crate::body::Body;
+use crate::bundled;
+use crate::field::FieldSet;
+use crate::percept::{Flags, Outputs, Precision};
+use crate::scene::Scene;
+use crate::signal::{Calibration, Letter, Receptor};
+
+/// Every set of instructions that this machine has and that anything is compiled for.
+fn levels() -> Vec<Level> {
+    let widest = Level::new();
+    let mut levels = vec![widest];
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        levels.extend(widest.as_avx2().map(Level::Avx2));
+        levels.extend(widest.as_sse2().map(Level::Sse2));
+    }
+    levels
+}
+
+/// `frames` frames for `plan`: pressed here and there, with everything in between that a value can be.
+fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let odd = [f64::NAN, 1e30, 1e-30, -5.0, 1e18, 0.0, 1e-12];
+    (0..frames * plan.channels())
+        .map(|index| match (random(), index / plan.channels() % 16) {
+            // Whole stretches without a fault, and frames that nobody touches.
+            (_, 3) => RawValue::new(0.0),
+            (chance, 0..8) if chance < 0.01 => RawValue::MISSING,
+            (chance, 0..8) if chance < 0.03 => RawValue::new(odd[(chance * 1e4) as usize % odd.len()]),
+            (chance, _) if chance < 0.5 => RawValue::new(0.0),
+            (chance, _) => RawValue::new((chance * 2000.0).floor() / 2.0 - 450.0),
+        })
+        .collect()
+}
+
+fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
+    let mut cpu = Cpu::with_level(plan, level);
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
+        .with_columns(plan.columns, plan.kept_pressures())
+        .with_letters(plan.letters().len());
+    percepts.reset(frames);
+    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
+    let rows = Rows::Packed { values: raw, channels: plan.channels() };
+    for first in (0..frames).step_by(at_once) {
+        let count = at_once.min(frames - first);
+        let raw = RawBatch { first, frames: count, rows: rows.part(first..first + count), steps: &steps[..count] };
+        cpu.run(&raw, &mut percepts).unwrap();
+    }
+    percepts
+}
+
+#[test]
+fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
+    const FRAMES: usize = 53;
+    for (name, bytes) in [("hand", bundled::HAND), ("humanoid", bundled::HUMANOID)] {
+        let body = Body::from_bytes(name, bytes).unwrap();
+        let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
+        let scene = Scene { outputs: Outputs::all(), letters, ..Scene::default() };
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let calibration = Calibration::parse("[all]\nbaseline = 1\ngain = 0.7\np_max = 300", &ids).unwrap();
+        for calibration in [Calibration::identity(ids.len()), calibration] {
+            let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+            assert!(name == "hand" || plan.fields.iter().any(|field| field.wide.is_some()));
+            let raw = values(&plan, FRAMES);
+            let right = run(&plan, Level::new(), &raw, FRAMES, FRAMES);
+            assert!((0..FRAMES).any(|frame| right.touched(frame).next().is_some()));
+            for level in levels() {
+                for at_once in [1, 7, 16, FRAMES] {
+                    let also = run(&plan, level, &raw, FRAMES, at_once);
+                    assert!(right == also, "{name}, {level:?}, {at_once} at once");
+                }
+            }
+        }
+    }
+}

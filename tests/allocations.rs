@@ -1,0 +1,47 @@
+//! Once it runs, the `cpu` backend allocates nothing for a frame.
+
+use somatic::{BackendKind, Body, Calibration, Engine, Options, Outputs, RawValue, Scene, bundled};
+
+/// Allocations of 100 frames, one a call, after some that make room.
+fn allocations(body: &Body, outputs: Outputs, calibration: Option<&str>) -> u64 {
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = calibration.map(|text| Calibration::parse(text, &ids).unwrap());
+    let scene = Scene { outputs, ..Scene::default() };
+    let options = Options { scene, calibration, backend: BackendKind::Cpu, ..Options::default() };
+    let mut engine = Engine::new(body, options).unwrap();
+    let mut frame = engine.frame(0.0);
+    let mut touched = 0;
+    let mut process = |number: u32| {
+        frame.t_s = f64::from(number) * 0.01;
+        for (value, index) in frame.values.iter_mut().zip(0_u32..) {
+            // A touch that wanders.
+            *value = RawValue::new(f64::from((index + number) % 19).max(9.0) - 9.0);
+        }
+        let percepts = engine.process(std::slice::from_ref(&frame)).unwrap();
+        touched += percepts.touched(0).count();
+    };
+    (0..100).for_each(&mut process);
+    let made = allocation_counter::measure(|| (100..200).for_each(&mut process)).count_total;
+    assert!(touched > 100, "{touched}");
+    made
+}
+
+#[test]
+fn a_frame_on_the_cpu_allocates_nothing() {
+    let checks = "[all]\nbaseline = 2\np_max = 30\n[checks]\nisolated_ratio = 5\n[contact]\non = 3\noff = 1";
+    for bytes in [bundled::HAND, bundled::MAT, bundled::HUMANOID] {
+        let body = Body::from_bytes("body", bytes).unwrap();
+        for calibration in [None, Some(checks)] {
+            for outputs in [Outputs::CENTROID | Outputs::ORIENTATION, Outputs::USUAL] {
+                assert_eq!(allocations(&body, outputs, calibration), 0, "{outputs:?} {calibration:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn allocations_are_counted() {
+    let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+    let made = allocation_counter::measure(|| drop(Engine::new(&body, Options::default())));
+    assert!(made.count_total > 100, "{made:?}");
+}
