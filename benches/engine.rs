@@ -1,7 +1,7 @@
 //! The engine on made-up skins of four sizes, live (one frame a call) and over a recording, on every backend; and what
 //! each stage adds. `somatic bench` measures one of these by itself, and any other.
 //!
-//!     cargo bench                          everything, some two minutes after the build
+//!     cargo bench                          everything, a minute or two after the build
 //!     cargo bench --bench engine -- live   what has this in its name
 //!     cargo bench -- --max-time 5          longer, and so steadier
 
@@ -23,8 +23,8 @@ const SKINS: [(&str, usize, usize, usize); 4] =
 
 const RECORDING: usize = 9984;
 
-/// What the reference may have of the recordings: more takes it seconds a call.
-const MOST_FOR_REFERENCE: u128 = 20_000_000;
+/// What slow backends get of the recordings, in memberships: more takes them seconds a call.
+const MOST_FOR_SLOW: u128 = 20_000_000;
 
 /// A case as divan names it.
 struct Case {
@@ -45,23 +45,27 @@ fn paper() -> Outputs {
     Outputs::CENTROID | Outputs::ORIENTATION
 }
 
-fn has_gpu() -> bool {
+/// Whether there is an adapter, and whether it is hardware.
+fn gpu() -> (bool, bool) {
     #[cfg(feature = "gpu")]
-    let found = !somatic::backend::gpu::adapters().is_empty();
+    let kinds: Vec<&str> = somatic::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
     #[cfg(not(feature = "gpu"))]
-    let found = false;
-    found
+    let kinds: Vec<&str> = Vec::new();
+    (!kinds.is_empty(), kinds.iter().any(|kind| *kind != "software"))
 }
 
 /// Every skin on every backend that runs here, with `frames` a call.
 fn cases(frames: usize) -> Vec<Case> {
-    let has_gpu = has_gpu();
+    let (has_gpu, in_hardware) = gpu();
     let mut cases = Vec::new();
     for (skin, sensors, fields, members) in SKINS {
         let shape = Shape { sensors, fields, members, wide: 0, frames, seed: 1 };
         for (name, backend) in BACKENDS {
-            let too_slow = backend == BackendKind::Reference && shape.memberships() > MOST_FOR_REFERENCE;
-            if !too_slow && (has_gpu || backend != BackendKind::Gpu) {
+            let (runs, is_fast) = match backend {
+                BackendKind::Gpu => (has_gpu, in_hardware),
+                backend => (true, backend == BackendKind::Cpu),
+            };
+            if runs && (is_fast || shape.memberships() <= MOST_FOR_SLOW) {
                 cases.push(Case { name: format!("{skin} {name}"), shape, backend, outputs: paper() });
             }
         }
@@ -100,7 +104,7 @@ fn measure(bencher: Bencher<'_, '_>, case: &Case) {
     });
 }
 
-#[divan::bench(args = cases(1), max_time = 0.2)]
+#[divan::bench(args = cases(1), min_time = 0.1, max_time = 0.2)]
 fn live(bencher: Bencher<'_, '_>, case: &Case) {
     measure(bencher, case);
 }
@@ -110,7 +114,7 @@ fn recording(bencher: Bencher<'_, '_>, case: &Case) {
     measure(bencher, case);
 }
 
-#[divan::bench(args = stages(1), max_time = 0.2)]
+#[divan::bench(args = stages(1), min_time = 0.1, max_time = 0.2)]
 fn stages_live(bencher: Bencher<'_, '_>, case: &Case) {
     measure(bencher, case);
 }

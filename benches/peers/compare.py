@@ -156,7 +156,8 @@ def compare(name, shape, rounds, seconds):
 
 
 def table(found):
-    print(f"\n{found['name']}: {found['shape']}")
+    shape = found["shape"]
+    print(f"\n{found['name']}: {shape['fields']} fields of {shape['members']} out of {shape['sensors']} sensors")
     print(f"  {'':42} {'median':>12} {'rate':>10} {'× somatic':>10}  rounds")
     for contestant, result in found["results"].items():
         low, high = result["times_somatic_of_rounds"]

@@ -133,8 +133,26 @@ def check(csv, layout, ours, theirs):
                     turned = (a["orientation"] - b["orientation"]) % np.pi
                     off = min(turned, np.pi - turned)
                     assert off <= 2 * point / length + 8 * U * np.pi, f"{where}: {off} rad"
-    assert compared > in_doubt > -1
+    assert compared > in_doubt
     return compared, in_doubt
+
+
+def check_that_the_check_can_fail(csv, layout, ours, theirs):
+    for key, spoil in {"centroid": lambda uv: [1.01 * uv[0], uv[1]], "orientation": lambda angle: angle + 1e-2}.items():
+        spoiled = theirs.with_suffix(".spoiled")
+        with open(theirs) as file, open(spoiled, "w") as out:
+            for line in map(json.loads, file):
+                for percept in line["fields"]:
+                    if key in percept:
+                        percept[key] = spoil(percept[key])
+                out.write(json.dumps(line) + "\n")
+        try:
+            check(csv, layout, ours, spoiled)
+        except AssertionError:
+            continue
+        finally:
+            spoiled.unlink()
+        raise SystemExit(f"a spoiled {key} was not noticed: the comparison is worth nothing")
 
 
 def seconds(command):
@@ -148,6 +166,7 @@ def compare(body, rounds):
     seconds(run)
     seconds(script)
     compared, in_doubt = check(csv, layout, ours, theirs)
+    check_that_the_check_can_fail(csv, layout, ours, theirs)
     times = {"somatic run": [], "pandas + NumPy": []}
     for turn in range(rounds):
         both = [("somatic run", run), ("pandas + NumPy", script)]
