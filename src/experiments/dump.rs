@@ -153,6 +153,9 @@ fn numbers(percept: &Percept, output: Outputs) -> Option<[f64; 3]> {
         Outputs::RADIAL_DISTANCE => one(percept.radial_distance),
         Outputs::SPEED => one(percept.speed),
         Outputs::RADIAL_SPEED => one(percept.radial_speed),
+        Outputs::FILTERED_DISPLACEMENT => two(percept.filtered_displacement),
+        Outputs::FILTERED_DIRECTION => one(percept.filtered_direction),
+        Outputs::FILTERED_SPEED => one(percept.filtered_speed),
         _ => None,
     }
 }
@@ -162,8 +165,29 @@ fn unit_of(output: Outputs) -> &'static str {
         Outputs::TOTAL | Outputs::PEAK => "P",
         Outputs::AREA => "m²",
         Outputs::ACTIVE | Outputs::NORMAL | Outputs::ANISOTROPY => "1",
-        Outputs::ORIENTATION | Outputs::AXIS | Outputs::DIRECTION => "rad",
-        Outputs::SPEED | Outputs::RADIAL_SPEED => "m/s",
+        Outputs::ORIENTATION | Outputs::AXIS | Outputs::DIRECTION | Outputs::FILTERED_DIRECTION => "rad",
+        Outputs::SPEED | Outputs::RADIAL_SPEED | Outputs::FILTERED_SPEED => "m/s",
         _ => "m",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::BackendKind;
+
+    #[test]
+    fn every_output_but_touches_is_an_array() {
+        let outputs = Outputs::all().difference(Outputs::TOUCHES);
+        assert!(check(outputs).is_ok() && check(Outputs::all()).is_err());
+        let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, frames: 4, seed: 1 };
+        let mut engine = shape.engine(&shape.body(), BackendKind::Reference, outputs).unwrap();
+        let percepts = engine.process(&shape.frames()).unwrap();
+        let last: Vec<Percept> = percepts.frame(3).collect();
+        for output in outputs.iter() {
+            let pair = last.iter().map(|percept| numbers(percept, output).unwrap_or_else(|| panic!("{output:?}")));
+            let unused = pair.flat_map(|numbers| numbers.into_iter().skip(width(output)));
+            assert!(unused.sum::<f64>() == 0.0, "{output:?} has more numbers than are written");
+        }
     }
 }

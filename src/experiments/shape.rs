@@ -167,7 +167,7 @@ impl Shape {
 /// Numbers of one percept's `output`.
 pub(super) fn width(output: Outputs) -> usize {
     match output {
-        Outputs::CENTROID | Outputs::DISPLACEMENT => 2,
+        Outputs::CENTROID | Outputs::DISPLACEMENT | Outputs::FILTERED_DISPLACEMENT => 2,
         Outputs::POSITION | Outputs::NORMAL => 3,
         _ => 1,
     }
