@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
-const RUN_ELSEWHERE: [&str; 8] = [
+const RUN_ELSEWHERE: [&str; 12] = [
     "cargo run --release -- run",
     "cargo run --release --example embed",
     "cargo run --example bodies",
@@ -14,10 +14,21 @@ const RUN_ELSEWHERE: [&str; 8] = [
     "tests/run",
     "tests/run [arguments for cargo test]",
     ".ci/run",
+    // Measuring takes minutes, and is for release builds on a machine at rest.
+    "cargo bench",
+    "cargo bench --bench engine -- live",
+    "cargo bench -- --max-time 5",
+    "benches/peers/run",
 ];
 
-/// Commands that take a minute and more, and the shorter form that is run for them.
-const SHORTENED: [(&str, &str); 1] = [("somatic paper --out paper", "somatic paper --quick --out paper")];
+/// Commands that take long, and the shorter form that is run for them.
+const SHORTENED: [(&str, &str); 2] = [
+    ("somatic paper --out paper", "somatic paper --quick --out paper"),
+    (
+        "somatic bench --sensors 7560 --fields 600 --members 24 --frames 9984 --backend cpu",
+        "somatic bench --sensors 7560 --fields 600 --members 24 --frames 16 --backend cpu --calls 2",
+    ),
+];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

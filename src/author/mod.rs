@@ -18,7 +18,7 @@
 
 mod grow;
 mod place;
-mod random;
+pub(crate) mod random;
 
 use glam::DVec3;
 

@@ -1,5 +1,7 @@
 //! The command line: one file per subcommand, and what they share.
 
+mod bar;
+mod bench;
 mod completions;
 mod feed;
 mod inspect;
@@ -32,6 +34,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
+  somatic bench --sensors 1000 --fields 100     how fast this machine is
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
 
@@ -48,10 +51,11 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Run(run::Arguments),
+    Run(Box<run::Arguments>),
     Inspect(inspect::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
+    Bench(bench::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -62,6 +66,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
+        Command::Bench(arguments) => bench::bench(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }
 }

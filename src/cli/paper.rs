@@ -2,14 +2,12 @@
 
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use console::Term;
 use somatic::error::Result;
 use somatic::experiments;
 
-use super::screen::Screen;
+use super::bar::Bar;
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -19,11 +17,6 @@ Examples:
   jq '.over_all_angles[] | [.indenter, .signal, .centroid_mm]' paper/table.json
 
 docs/paper.md shows the results and says what they mean.";
-
-/// Before this long there is nothing to wait for.
-const PATIENCE: Duration = Duration::from_secs(1);
-const BETWEEN_DRAWINGS: Duration = Duration::from_millis(100);
-const BAR: usize = 40;
 
 /// Do the paper's experiments in simulation: its Figs. 3, 6 and 7, and a table of errors against the truth.
 ///
@@ -40,24 +33,12 @@ pub(super) struct Arguments {
     quick: bool,
 }
 
-/// What is drawn while somebody waits at a terminal.
-struct Bar {
-    screen: Option<Screen>,
-    next: Instant,
-}
-
 pub(super) fn paper(arguments: &Arguments) -> Result<u8> {
-    let bar = Mutex::new(Bar { screen: None, next: Instant::now() + PATIENCE });
+    let bar = Mutex::new(Bar::new("simulating"));
     let progress = |share: f64| {
-        let Ok(mut bar) = bar.lock() else { return };
-        let term = Term::stderr();
-        if Instant::now() < bar.next || !term.is_term() {
-            return;
+        if let Ok(mut bar) = bar.lock() {
+            bar.show(share);
         }
-        bar.next = Instant::now() + BETWEEN_DRAWINGS;
-        let full = (share * BAR as f64).round() as usize;
-        let line = format!("{:>3.0} %  {}{}  simulating", 100.0 * share, "█".repeat(full), "░".repeat(BAR - full));
-        bar.screen.get_or_insert_with(|| Screen::new(term)).draw(&[line]);
     };
     let written = experiments::write(&arguments.out, arguments.quick, &progress);
     drop(bar);

@@ -142,7 +142,7 @@ fn outputs_help() -> String {
     format!("Only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
 }
 
-fn output(name: &str) -> Result<Outputs> {
+pub(super) fn output(name: &str) -> Result<Outputs> {
     Outputs::named(name).ok_or_else(|| {
         let names: Vec<String> = Outputs::all().names().collect();
         let hint = match nearest(name, names.iter().map(String::as_str)) {
@@ -404,7 +404,7 @@ fn tell_unfit(engine: &Engine, told: &mut Vec<(u32, Unfit)>) {
 }
 
 /// A flag that the first Ctrl-C or termination signal sets; the second ends the process at once.
-fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+pub(super) fn stop_on_signal() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || {

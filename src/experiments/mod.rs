@@ -1,8 +1,12 @@
-//! The paper's own experiments, from simulation, and the table of errors that it lacks. `docs/paper.md` shows them.
+//! What the command measures: the paper's own experiments, from simulation, with the table of errors that it lacks
+//! (`docs/paper.md`); and speed, on made-up skins of any size (`docs/performance.md`).
 
+pub mod dump;
 mod figures;
 mod metric;
+mod npy;
 mod plot;
+pub mod shape;
 mod table;
 mod trial;
 

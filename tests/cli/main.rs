@@ -1,5 +1,6 @@
 //! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
 
+mod bench;
 mod inspect;
 mod live;
 mod paper;
@@ -89,7 +90,7 @@ fn files_in(folder: &Path) -> Vec<String> {
 #[test]
 fn help_teaches_and_names_everything() {
     let help = done(&["--help"]);
-    for word in ["run", "inspect", "paper", "completions", "Examples:", "Exit codes"] {
+    for word in ["run", "inspect", "paper", "bench", "completions", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "{word}: {help}");
     }
     let help = done(&["run", "--help"]);

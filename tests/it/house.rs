@@ -24,8 +24,8 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         (
             "experiments",
             vec![
-                "error", "percept", "signal", "body", "field", "scene", "backend", "engine", "source", "bundled",
-                "whole",
+                "error", "percept", "signal", "body", "field", "author", "scene", "backend", "engine", "source",
+                "bundled", "whole",
             ],
         ),
     ])

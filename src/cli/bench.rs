@@ -1,0 +1,282 @@
+//! `somatic bench`: how fast a backend is on a made-up skin of any size.
+
+use std::hint::black_box;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use serde_json::json;
+use somatic::experiments::dump;
+use somatic::experiments::shape::Shape;
+use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
+
+use super::bar::Bar;
+use super::run::{output, stop_on_signal};
+use super::words::count;
+use super::{DONE, print, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic bench                                               a whole robot, one frame a call
+  somatic bench --sensors 7560 --fields 600 --members 24 --frames 9984 --backend cpu
+  somatic bench --outputs total,centroid,axis --json
+  somatic bench --sensors 100000 --wide 100000 --dump arrays  with a field over all of them; check it with your own program
+
+docs/performance.md has figures and what they were compared with.";
+
+/// Nothing is measured before this long, and one call at least: memory is at hand then, and the clock has settled.
+const WARM_UP: Duration = Duration::from_millis(100);
+/// Unless calls are counted, no more are begun after this long or so many, but for the fewest.
+const LONG_ENOUGH: Duration = Duration::from_secs(2);
+const ENOUGH: usize = 20_000;
+const FEWEST: usize = 3;
+
+/// Measure how long a call takes, from frames in memory to percepts in memory.
+///
+/// Sensors lie at random on a flat sheet, every field has its own random ones, and in every frame every sensor is pressed.
+/// The same arguments make the same skin and the same values. Rates count memberships: a sensor in a field in a frame.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// Sensors of the skin.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    sensors: usize,
+
+    /// Fields beside each other.
+    #[arg(long, value_name = "F", default_value_t = 100)]
+    fields: usize,
+
+    /// Sensors of each field.
+    #[arg(long, value_name = "M", default_value_t = 16)]
+    members: usize,
+
+    /// One field more, over K sensors.
+    #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true)]
+    wide: usize,
+
+    /// Frames a call: 1 as on a live robot, more as in a recording.
+    #[arg(long, value_name = "T", default_value_t = 1)]
+    frames: usize,
+
+    /// What computes.
+    #[arg(long, default_value = "auto", value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
+        .try_map(|name| name.parse::<BackendKind>()))]
+    backend: BackendKind,
+
+    /// The quantities computed.
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output,
+        default_value = "centroid,orientation")]
+    outputs: Vec<Outputs>,
+
+    /// Measure so many calls [default: as many as fit into 2 s, at most 20000].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    calls: Option<u32>,
+
+    /// Of places, members and values.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+
+    /// Write what goes in and comes out into this folder, as .npy arrays that dump.json names.
+    #[arg(long, value_name = "DIR")]
+    dump: Option<PathBuf>,
+
+    /// Print JSON: times of a call in µs, rate in memberships/s.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
+    let shape = arguments.shape();
+    let outputs = arguments.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or_default();
+    shape.check()?;
+    check_memory(&shape, outputs)?;
+    if arguments.dump.is_some() {
+        dump::check(outputs)?;
+    }
+    let stop = stop_on_signal()?;
+    let body = shape.body();
+    let mut frames = shape.frames();
+    let mut engine = shape.engine(&body, arguments.backend, outputs)?;
+    if let Some(folder) = &arguments.dump {
+        write_first_call(folder, &shape, &body, &frames, &mut engine)?;
+    }
+    let times = measure(&mut engine, &shape, &mut frames, arguments.calls, &stop)?;
+    let (name, adapter, _) = engine.backend();
+    let rate = shape.memberships() as f64 / times.median_s;
+    print(&match arguments.json {
+        true => {
+            let us = |seconds: f64| (seconds * 1e9).round() / 1e3;
+            let (median, p99) = (us(times.median_s), us(times.p99_s));
+            let line = json!({
+                "backend": name, "adapter": adapter, "us_median": median, "us_p99": p99, "rate": rate.round(),
+            });
+            format!("{line}\n")
+        }
+        false => {
+            let calls = count(times.calls as u64, "call");
+            let (median, p99) = (time(times.median_s), time(times.p99_s));
+            let each_ns = 1e9 / rate;
+            format!(
+                "{}\n{name}: {adapter}\nmedian {median}, 99 % within {p99}, of {calls}\n{} memberships/s, {each_ns:.3} ns each\n",
+                words(&shape),
+                short(rate),
+            )
+        }
+    })?;
+    Ok(DONE)
+}
+
+impl Arguments {
+    fn shape(&self) -> Shape {
+        let Self { sensors, fields, members, wide, frames, seed, .. } = *self;
+        Shape { sensors, fields, members, wide, frames, seed }
+    }
+}
+
+/// Refuses what memory has no room for, before it is asked for.
+fn check_memory(shape: &Shape, outputs: Outputs) -> Result<()> {
+    let needed = shape.bytes(outputs);
+    let gib = |bytes: u128| bytes as f64 / (1_u64 << 30) as f64;
+    match available_bytes() {
+        Some(free) if needed > free => Err(Error::usage(format!(
+            "this takes about {:.1} GiB of memory, and {:.1} GiB are free; ask for fewer --frames or --sensors",
+            gib(needed),
+            gib(free)
+        ))),
+        // Where the system does not say, what no machine could address is still refused.
+        None if needed > isize::MAX as u128 => {
+            Err(Error::usage(format!("this takes about {:.1} GiB of memory; ask for less", gib(needed))))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Memory that is free or can be freed, where the system says so in Linux's way.
+fn available_bytes() -> Option<u128> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kib: u128 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// The first call of all: its percepts have no frame before, as those of whoever computes the same.
+fn write_first_call(
+    folder: &std::path::Path,
+    shape: &Shape,
+    body: &Body,
+    frames: &[Frame],
+    engine: &mut Engine,
+) -> Result<()> {
+    let backend = engine.backend().0;
+    let percepts = engine.process(frames)?;
+    dump::write(folder, shape, body, frames, percepts, backend)
+}
+
+/// How long calls took, s.
+struct Times {
+    calls: usize,
+    median_s: f64,
+    p99_s: f64,
+}
+
+impl Times {
+    /// By rank: the least time that so large a share of the calls kept within.
+    fn of(mut seconds: Vec<f64>) -> Self {
+        seconds.sort_by(f64::total_cmp);
+        let within = |share: f64| seconds[((share * seconds.len() as f64).ceil() as usize).max(1) - 1];
+        Self { calls: seconds.len(), median_s: within(0.5), p99_s: within(0.99) }
+    }
+}
+
+fn measure(
+    engine: &mut Engine,
+    shape: &Shape,
+    frames: &mut [Frame],
+    calls: Option<u32>,
+    stop: &AtomicBool,
+) -> Result<Times> {
+    let mut bar = Bar::new("measuring");
+    let start = Instant::now();
+    loop {
+        shape.advance(frames);
+        black_box(engine.process(black_box(frames))?);
+        if start.elapsed() >= WARM_UP || stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let most = calls.map_or(ENOUGH, |calls| calls as usize);
+    let start = Instant::now();
+    let mut seconds = Vec::with_capacity(most.min(ENOUGH));
+    while seconds.len() < most && !stop.load(Ordering::Relaxed) {
+        let so_far = start.elapsed();
+        if calls.is_none() && seconds.len() >= FEWEST && so_far >= LONG_ENOUGH {
+            break;
+        }
+        let by_count = seconds.len() as f64 / most as f64;
+        let by_time = so_far.as_secs_f64() / LONG_ENOUGH.as_secs_f64();
+        bar.show(if calls.is_some() { by_count } else { by_count.max(by_time) });
+        shape.advance(frames);
+        let call = Instant::now();
+        black_box(engine.process(black_box(frames))?);
+        seconds.push(call.elapsed().as_secs_f64());
+    }
+    drop(bar);
+    if seconds.is_empty() {
+        return Err(Error::failed("stopped before a call was measured"));
+    }
+    if stop.load(Ordering::Relaxed) {
+        say(&format!("stopped after {}", count(seconds.len() as u64, "call")));
+    }
+    Ok(Times::of(seconds))
+}
+
+fn words(shape: &Shape) -> String {
+    let wide = match shape.wide {
+        0 => String::new(),
+        wide => format!(" and one of {wide}"),
+    };
+    let (fields, members) = (count(shape.fields as u64, "field"), count(shape.members as u64, "sensor"));
+    let frames = count(shape.frames as u64, "frame");
+    format!("{fields} of {members}{wide}, out of {}; {frames} a call", shape.sensors)
+}
+
+/// A time in the unit that suits it.
+fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 1e-3 => format!("{:.2} µs", s * 1e6),
+        s if s < 1.0 => format!("{:.2} ms", s * 1e3),
+        s => format!("{s:.2} s"),
+    }
+}
+
+/// A rate with three digits and a letter.
+fn short(rate: f64) -> String {
+    match rate {
+        r if r < 1e6 => format!("{:.3} k", r / 1e3),
+        r if r < 1e9 => format!("{:.1} M", r / 1e6),
+        r => format!("{:.2} G", r / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_median_and_a_percentile_are_times_that_were_measured() {
+        let times = Times::of((1..=200).rev().map(f64::from).collect());
+        assert_eq!((times.calls, times.median_s, times.p99_s), (200, 100.0, 198.0));
+        let one = Times::of(vec![7.0]);
+        assert_eq!((one.median_s, one.p99_s), (7.0, 7.0));
+    }
+
+    #[test]
+    fn figures_read_well() {
+        assert_eq!([2.5e-6, 0.0125, 3.0].map(time), ["2.50 µs", "12.50 ms", "3.00 s"]);
+        assert_eq!([12_345.0, 4.2e7, 2.345e9].map(short), ["12.345 k", "42.0 M", "2.35 G"]);
+        let shape = Shape { sensors: 40, fields: 9, members: 1, wide: 40, frames: 1, seed: 1 };
+        assert_eq!(words(&shape), "9 fields of 1 sensor and one of 40, out of 40; 1 frame a call");
+    }
+}

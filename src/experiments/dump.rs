@@ -1,0 +1,196 @@
+//! A bench's inputs and outputs as arrays, so that anybody can check them with their own program.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+use super::npy;
+use super::shape::{Shape, width};
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::field::{Field, FieldSet};
+use crate::percept::{Flags, Outputs, Percept, Percepts, Precision};
+use crate::signal::Frame;
+use crate::whole;
+
+/// Writes what went in and came out of an engine's first call into `folder`, made where there is none: arrays as .npy,
+/// and `dump.json`, written last, which names them.
+///
+/// `values` (frames, sensors); `members`, sensors, and `weights` (fields, members), `uv` (fields, members, 2), m; the same
+/// of the wide field, if there is one, as `wide_...`; each output (frames, fields) or (frames, fields, 2 or 3), with the
+/// wide field last; `present` and `flags` (frames, fields), whose bits the JSON names. Where an output's bit is not set
+/// in `present`, it is absent, and its array has 0 there.
+///
+/// # Errors
+/// Touches were asked for, which are no array; or a file cannot be written.
+pub fn write(
+    folder: &Path,
+    shape: &Shape,
+    body: &Body,
+    frames: &[Frame],
+    percepts: &Percepts,
+    backend: &str,
+) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+    let mut dump = Dump { folder, arrays: Map::new() };
+    let fields = FieldSet::new(body)?.fields;
+    dump.input(shape, &fields, frames)?;
+    dump.output(percepts)?;
+    let present_bits: Map<_, _> =
+        percepts.outputs().iter().map(|output| (name_of(output), output.bits().into())).collect();
+    let flag_bits: Map<_, _> = Flags::all().iter().map(|flag| (flag.names().collect(), flag.bits().into())).collect();
+    let index = json!({
+        "shape": {
+            "sensors": shape.sensors, "fields": shape.fields, "members": shape.members, "wide": shape.wide,
+            "frames": shape.frames, "seed": shape.seed,
+        },
+        "backend": backend,
+        "arrays": dump.arrays,
+        "present_bits": present_bits,
+        "flag_bits": flag_bits,
+    });
+    let text = serde_json::to_string_pretty(&index).map_err(|e| Error::failed(e.to_string()))?;
+    whole::write(&folder.join("dump.json"), (text + "\n").as_bytes())
+}
+
+/// Whether `outputs` can be written.
+///
+/// # Errors
+/// A usage error where not.
+pub fn check(outputs: Outputs) -> Result<()> {
+    if outputs.contains(Outputs::TOUCHES) {
+        return Err(Error::usage("--dump writes arrays, and touches are none; leave `touches` out of --outputs"));
+    }
+    Ok(())
+}
+
+struct Dump<'a> {
+    folder: &'a Path,
+    arrays: Map<String, Value>,
+}
+
+impl Dump<'_> {
+    fn put<N: npy::Number>(
+        &mut self,
+        name: &str,
+        unit: &str,
+        shape: &[usize],
+        numbers: impl Iterator<Item = N>,
+    ) -> Result<()> {
+        let file = format!("{name}.npy");
+        npy::write(&self.folder.join(&file), shape, numbers)?;
+        self.arrays.insert(name.to_owned(), json!({ "file": file, "dtype": N::DTYPE, "shape": shape, "unit": unit }));
+        Ok(())
+    }
+
+    fn input(&mut self, shape: &Shape, fields: &[Field], frames: &[Frame]) -> Result<()> {
+        let values = frames.iter().flat_map(|frame| &frame.values).map(|value| f32::from_bits(value.to_bits()));
+        self.put("values", "P", &[shape.frames, shape.sensors], values)?;
+        let (alike, wide) = fields.split_at(shape.fields);
+        self.fields("", &[shape.fields, shape.members], alike)?;
+        if !wide.is_empty() {
+            self.fields("wide_", &[shape.wide], wide)?;
+        }
+        Ok(())
+    }
+
+    fn fields(&mut self, prefix: &str, shape: &[usize], fields: &[Field]) -> Result<()> {
+        let members = || fields.iter().flat_map(|field| &field.members);
+        self.put(&format!("{prefix}members"), "sensor", shape, members().map(|member| member.taxel as u32))?;
+        self.put(&format!("{prefix}weights"), "1", shape, members().map(|member| member.weight))?;
+        let uv = members().flat_map(|member| [member.place.x, member.place.y]);
+        self.put(&format!("{prefix}uv"), "m", &[shape, &[2]].concat(), uv)
+    }
+
+    fn output(&mut self, percepts: &Percepts) -> Result<()> {
+        let cells = [percepts.frames(), percepts.fields()];
+        let all = || (0..cells[0]).flat_map(|frame| percepts.frame(frame));
+        for output in percepts.outputs().iter() {
+            let (name, unit, width) = (name_of(output), unit_of(output), width(output));
+            let shape = if width == 1 { cells.to_vec() } else { vec![cells[0], cells[1], width] };
+            let numbers =
+                all().flat_map(|percept| numbers(&percept, output).unwrap_or_default().into_iter().take(width));
+            let single = percepts.precision() == Precision::F32
+                && (Outputs::POSITION | Outputs::NORMAL) & output == Outputs::empty();
+            if single {
+                self.put(&name, unit, &shape, numbers.map(|number| number as f32))?;
+            } else {
+                self.put(&name, unit, &shape, numbers)?;
+            }
+        }
+        let is_present = |percept: &Percept| {
+            let there = percepts.outputs().iter().filter(|&output| numbers(percept, output).is_some());
+            there.fold(Outputs::empty(), |sum, output| sum | output).bits()
+        };
+        self.put("present", "bits", &cells, all().map(|percept| is_present(&percept)))?;
+        self.put("flags", "bits", &cells, all().map(|percept| percept.flags.bits()))
+    }
+}
+
+fn name_of(output: Outputs) -> String {
+    output.names().collect()
+}
+
+/// The percept's `output`, filled up with 0.
+fn numbers(percept: &Percept, output: Outputs) -> Option<[f64; 3]> {
+    let one = |number: Option<f64>| number.map(|number| [number, 0.0, 0.0]);
+    let two = |pair: Option<[f64; 2]>| pair.map(|[a, b]| [a, b, 0.0]);
+    match output {
+        Outputs::TOTAL => one(percept.total),
+        Outputs::PEAK => one(percept.peak),
+        Outputs::ACTIVE => one(percept.active.map(f64::from)),
+        Outputs::AREA => one(percept.area),
+        Outputs::CENTROID => two(percept.centroid),
+        Outputs::POSITION => percept.position,
+        Outputs::NORMAL => percept.normal,
+        Outputs::ORIENTATION => one(percept.orientation),
+        Outputs::AXIS => one(percept.axis),
+        Outputs::ANISOTROPY => one(percept.anisotropy),
+        Outputs::DISPLACEMENT => two(percept.displacement),
+        Outputs::DIRECTION => one(percept.direction),
+        Outputs::DISTANCE => one(percept.distance),
+        Outputs::RADIAL_DISTANCE => one(percept.radial_distance),
+        Outputs::SPEED => one(percept.speed),
+        Outputs::RADIAL_SPEED => one(percept.radial_speed),
+        Outputs::FILTERED_DISPLACEMENT => two(percept.filtered_displacement),
+        Outputs::FILTERED_DIRECTION => one(percept.filtered_direction),
+        Outputs::FILTERED_SPEED => one(percept.filtered_speed),
+        _ => None,
+    }
+}
+
+fn unit_of(output: Outputs) -> &'static str {
+    match output {
+        Outputs::TOTAL | Outputs::PEAK => "P",
+        Outputs::AREA => "m²",
+        Outputs::ACTIVE | Outputs::NORMAL | Outputs::ANISOTROPY => "1",
+        Outputs::ORIENTATION | Outputs::AXIS | Outputs::DIRECTION | Outputs::FILTERED_DIRECTION => "rad",
+        Outputs::SPEED | Outputs::RADIAL_SPEED | Outputs::FILTERED_SPEED => "m/s",
+        _ => "m",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::BackendKind;
+
+    #[test]
+    fn every_output_but_touches_is_an_array() {
+        let outputs = Outputs::all().difference(Outputs::TOUCHES);
+        assert!(check(outputs).is_ok() && check(Outputs::all()).is_err());
+        let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, frames: 4, seed: 1 };
+        let mut engine = shape.engine(&shape.body(), BackendKind::Reference, outputs).unwrap();
+        let percepts = engine.process(&shape.frames()).unwrap();
+        let mut percept = percepts.get(3, 0);
+        // Random touches jump farther than the filter's window.
+        percept.filtered_displacement = percept.displacement;
+        percept.filtered_direction = percept.direction;
+        percept.filtered_speed = percept.speed;
+        for output in outputs.iter() {
+            let numbers = numbers(&percept, output).unwrap_or_else(|| panic!("{output:?}"));
+            assert_eq!(numbers[width(output)..].iter().sum::<f64>(), 0.0, "{output:?} has more than is written");
+        }
+    }
+}

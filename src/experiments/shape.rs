@@ -1,0 +1,230 @@
+//! A made-up skin of any size, to measure speed on: `somatic bench` and `benches/` share it.
+
+use glam::{DAffine3, DVec3};
+
+use crate::author::random::Random;
+use crate::backend::BackendKind;
+use crate::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Taxel};
+use crate::engine::{Engine, Options};
+use crate::error::{Error, Result};
+use crate::percept::Outputs;
+use crate::scene::Scene;
+use crate::signal::{Frame, RawValue};
+
+/// How many of what; the rest follows from it and the seed.
+///
+/// Sensors lie at random on a flat square sheet, 25 mm² each. Every field has its own distinct random ones of them, of
+/// weight 1: real fields are neighbours, which is kinder to caches. In every frame every sensor is pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Sensors of the sheet; their ids count up from 0.
+    pub sensors: usize,
+    /// Fields of [`Shape::members`] sensors each.
+    pub fields: usize,
+    /// Sensors of each field.
+    pub members: usize,
+    /// Sensors of one more field, the last; 0 for none.
+    pub wide: usize,
+    /// Frames a call.
+    pub frames: usize,
+    /// Of places, members and values.
+    pub seed: u64,
+}
+
+/// Side of the square that a sensor stands for, m.
+const PITCH_M: f64 = 0.005;
+/// Values lie in (0, this].
+const FULL: f64 = 1023.0;
+/// Time between frames, s.
+const STEP_S: f64 = 0.01;
+
+// About what a body, a plan and a backend's tables hold, bytes.
+const BYTES_A_SENSOR: u128 = 250;
+const BYTES_A_MEMBERSHIP: u128 = 350;
+const BYTES_A_FIELD: u128 = 1500;
+
+impl Shape {
+    /// Refuses what is no skin: nothing of something, or more members than sensors.
+    ///
+    /// # Errors
+    /// One usage error that names the argument of `somatic bench`.
+    pub fn check(&self) -> Result<()> {
+        let given = [
+            ("--sensors", self.sensors),
+            ("--fields", self.fields),
+            ("--members", self.members),
+            ("--frames", self.frames),
+        ];
+        if let Some((name, _)) = given.iter().find(|(_, count)| *count == 0) {
+            return Err(Error::usage(format!("{name} 0 leaves nothing to measure; give at least 1")));
+        }
+        if self.sensors > MAX_TAXEL_ID as usize + 1 {
+            let most = MAX_TAXEL_ID as usize + 1;
+            return Err(Error::usage(format!("--sensors {} is more than a body can have, {most}", self.sensors)));
+        }
+        for (name, count) in [("--members", self.members), ("--wide", self.wide)] {
+            if count > self.sensors {
+                let sensors = self.sensors;
+                return Err(Error::usage(format!(
+                    "{name} {count} is more than the {sensors} sensors there are; a field has each at most once"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Fields in all.
+    #[must_use]
+    pub fn all_fields(&self) -> usize {
+        self.fields + usize::from(self.wide > 0)
+    }
+
+    /// (field, sensor) pairs of a call, over all its frames.
+    #[must_use]
+    pub fn memberships(&self) -> u128 {
+        (self.fields as u128 * self.members as u128 + self.wide as u128) * self.frames as u128
+    }
+
+    /// About how much memory the body, an engine for `outputs` and a call's frames and percepts take, bytes.
+    #[must_use]
+    pub fn bytes(&self, outputs: Outputs) -> u128 {
+        // A cell's flags, what is present and whose frame it is in; and its numbers.
+        let cell: u128 = 9 + outputs.iter().map(bytes_a_cell).sum::<u128>();
+        let frames = self.frames as u128 * (self.sensors as u128 * 4 + self.all_fields() as u128 * cell + 64);
+        let tables = self.memberships() / (self.frames as u128).max(1) * BYTES_A_MEMBERSHIP;
+        frames + tables + self.sensors as u128 * BYTES_A_SENSOR + self.all_fields() as u128 * BYTES_A_FIELD
+    }
+
+    /// The sheet with its fields: `field 0` and on, and `wide`.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        let mut random = Random::new(self.seed);
+        let side_m = PITCH_M * (self.sensors as f64).sqrt();
+        let mut along = || (random.unit() - 0.5) * side_m;
+        let taxels = (0..self.sensors).map(|id| Taxel {
+            id: id as u32,
+            link: 0,
+            position_in_link: DVec3::new(along(), 0.0, along()),
+            normal_in_link: DVec3::Y,
+            area: PITCH_M * PITCH_M,
+            modality: Modality::Pressure,
+        });
+        let taxels = taxels.collect();
+        let mut order: Vec<u32> = (0..self.sensors as u32).collect();
+        let widths = std::iter::repeat_n(self.members, self.fields).chain((self.wide > 0).then_some(self.wide));
+        let fields = widths.enumerate().map(|(field, width)| {
+            // The first steps of a Fisher-Yates shuffle, from whatever order the field before left.
+            for place in 0..width {
+                let left = self.sensors - place;
+                order.swap(place, place + (random.unit() * left as f64) as usize);
+            }
+            FieldSpec {
+                name: if field < self.fields { format!("field {field}") } else { "wide".to_owned() },
+                members: order[..width].iter().map(|&id| (id, MemberSpec::default())).collect(),
+                ..FieldSpec::default()
+            }
+        });
+        Body {
+            name: "sheet".to_owned(),
+            fields: fields.collect(),
+            links: vec![Link {
+                name: "sheet".to_owned(),
+                parent: None,
+                world_from_link: DAffine3::IDENTITY,
+                link_from_node: DAffine3::IDENTITY,
+            }],
+            surfaces: Vec::new(),
+            taxels,
+            findings: Vec::new(),
+        }
+    }
+
+    /// A call's frames, every sensor pressed with its own value in (0, 1023], 10 ms apart from t = 0.
+    #[must_use]
+    pub fn frames(&self) -> Vec<Frame> {
+        // Another sequence than the body's.
+        let mut random = Random::new(!self.seed);
+        let mut value = || RawValue::new(FULL * (1.0 - random.unit()));
+        let frame = |index| (index as f64 * STEP_S, (0..self.sensors).map(|_| value()).collect());
+        (0..self.frames).map(frame).map(|(t_s, values)| Frame { t_s, values, pose: Vec::new() }).collect()
+    }
+
+    /// Moves `frames` on in time by a call, so that the next call goes on where the one before ended.
+    pub fn advance(&self, frames: &mut [Frame]) {
+        frames.iter_mut().for_each(|frame| frame.t_s += self.frames as f64 * STEP_S);
+    }
+
+    /// An engine on `body`, which is [`Shape::body`], for calls of so many frames.
+    ///
+    /// # Errors
+    /// The backend cannot run here.
+    pub fn engine(&self, body: &Body, backend: BackendKind, outputs: Outputs) -> Result<Engine> {
+        let scene = Scene { outputs, ..Scene::default() };
+        Engine::new(body, Options { scene, backend, batch: self.frames, ..Options::default() })
+    }
+}
+
+/// Numbers of one percept's `output`.
+pub(super) fn width(output: Outputs) -> usize {
+    match output {
+        Outputs::CENTROID | Outputs::DISPLACEMENT | Outputs::FILTERED_DISPLACEMENT => 2,
+        Outputs::POSITION | Outputs::NORMAL => 3,
+        _ => 1,
+    }
+}
+
+fn bytes_a_cell(output: Outputs) -> u128 {
+    let number = if (Outputs::POSITION | Outputs::NORMAL).contains(output) { 8 } else { 4 };
+    number * width(output) as u128
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    const SHAPE: Shape = Shape { sensors: 50, fields: 7, members: 5, wide: 50, frames: 3, seed: 9 };
+
+    #[test]
+    fn a_shape_is_what_it_says_and_the_same_again() {
+        let (body, frames) = (SHAPE.body(), SHAPE.frames());
+        let widths: Vec<usize> = body.fields.iter().map(|field| field.members.len()).collect();
+        assert_eq!(widths, [5, 5, 5, 5, 5, 5, 5, 50]);
+        assert_eq!(SHAPE.memberships(), 3 * (7 * 5 + 50));
+        let sets: BTreeSet<Vec<u32>> = body.fields.iter().map(|f| f.members.keys().copied().collect()).collect();
+        assert_eq!(sets.len(), 8, "fields differ");
+        let values = frames.iter().flat_map(|frame| &frame.values).map(|value| value.number().unwrap());
+        assert!(frames.len() == 3 && values.clone().all(|value| 0.0 < value && value <= 1023.0));
+        assert!(values.fold(0.0, f64::max) > 900.0);
+
+        assert_eq!((body.taxels, frames), (SHAPE.body().taxels, SHAPE.frames()));
+        let other = Shape { seed: 10, ..SHAPE };
+        assert!(other.body().fields != body.fields && other.frames() != SHAPE.frames());
+    }
+
+    #[test]
+    fn every_field_of_it_is_touched_and_has_all_that_is_usual() {
+        let mut engine = SHAPE.engine(&SHAPE.body(), BackendKind::Reference, Outputs::USUAL).unwrap();
+        let mut frames = SHAPE.frames();
+        engine.process(&frames).unwrap();
+        SHAPE.advance(&mut frames);
+        let percepts = engine.process(&frames).unwrap();
+        for percept in (0..3).flat_map(|frame| percepts.touched(frame)) {
+            assert!(
+                percept.orientation.is_some() && percept.normal.is_some() && percept.speed.is_some(),
+                "{percept:?}"
+            );
+        }
+        assert_eq!(percepts.touched(0).count(), SHAPE.all_fields());
+    }
+
+    #[test]
+    fn what_is_no_shape_is_told_by_its_argument() {
+        let why = |shape: Shape| shape.check().unwrap_err().to_string();
+        assert!(SHAPE.check().is_ok());
+        assert!(why(Shape { frames: 0, ..SHAPE }).contains("--frames 0"));
+        assert!(why(Shape { members: 51, ..SHAPE }).contains("--members 51"));
+        assert!(why(Shape { wide: 51, ..SHAPE }).contains("--wide 51"));
+        assert!(why(Shape { sensors: 1 << 25, ..SHAPE }).contains("16777217"));
+    }
+}
