@@ -100,7 +100,7 @@ fn measure(bencher: Bencher<'_, '_>, case: &Case) {
     };
     bencher.counter(ItemsCount::new(shape.memberships() as u64)).bench_local(|| {
         shape.advance(&mut frames);
-        engine.process(&frames).map(|percepts| percepts.frames())
+        engine.process(&frames).map(somatic::Percepts::frames)
     });
 }
 
