@@ -45,12 +45,11 @@ pub(crate) fn atan2_f32(y: f32, x: f32) -> f32 {
     let (low, high) = if tall > wide { (wide, tall) } else { (tall, wide) };
     let a = if high > 0.0 { low / high } else { 0.0 };
     let z = a * a;
-    let mut q = ATAN[8];
-    let mut k = 8;
-    while k > 0 {
-        k -= 1;
-        q = q * z + ATAN[k];
-    }
+    // By pairs rather than one after the other, so that less waits for what comes before.
+    let pair = |k: usize| ATAN[k] + ATAN[k + 1] * z;
+    let z2 = z * z;
+    let z4 = z2 * z2;
+    let q = (pair(0) + pair(2) * z2) + (pair(4) + pair(6) * z2) * z4 + ATAN[8] * (z4 * z4);
     let octant = a + (a * z) * q;
     let quadrant = if tall > wide { std::f32::consts::FRAC_PI_2 - octant } else { octant };
     if x < 0.0 { std::f32::consts::PI - quadrant } else { quadrant }

@@ -24,12 +24,10 @@ fn atan2<S: Simd>(simd: S, y: F<S>, x: F<S>) -> F<S> {
     let (low, high) = (steep.select(wide, y), steep.select(y, wide));
     let a = high.simd_gt(none).select(low / high, none);
     let z = a * a;
-    let mut q = splat(simd, ATAN[8]);
-    let mut k = 8;
-    while k > 0 {
-        k -= 1;
-        q = q * z + splat(simd, ATAN[k]);
-    }
+    let pair = |k: usize| splat(simd, ATAN[k]) + splat(simd, ATAN[k + 1]) * z;
+    let z2 = z * z;
+    let z4 = z2 * z2;
+    let q = (pair(0) + pair(2) * z2) + (pair(4) + pair(6) * z2) * z4 + splat(simd, ATAN[8]) * (z4 * z4);
     let octant = a + (a * z) * q;
     let quadrant = steep.select(splat(simd, std::f32::consts::FRAC_PI_2) - octant, octant);
     x.simd_lt(none).select(splat(simd, std::f32::consts::PI) - quadrant, quadrant)

@@ -295,6 +295,7 @@ impl Live {
             match group {
                 Group::Wide { field, .. } => write(&Run { first: *field, count: 1 }, answer, plan.outputs, cells),
                 Group::Narrow(group) => match group.together {
+                    Some(first) if group.fields.len() == LANES => write(&Sixteen(first), answer, plan.outputs, cells),
                     Some(first) => write(&Run { first, count: group.fields.len() }, answer, plan.outputs, cells),
                     None => write(&group.fields, answer, plan.outputs, cells),
                 },
@@ -409,11 +410,16 @@ struct Run {
 
 impl Places for Run {
     fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        let column = &mut column[self.first..self.first + self.count];
-        match <&mut Row<T>>::try_from(&mut *column) {
-            Ok(whole) => *whole = *row,
-            Err(_) => column.copy_from_slice(&row[..self.count]),
-        }
+        column[self.first..self.first + self.count].copy_from_slice(&row[..self.count]);
+    }
+}
+
+/// Sixteen fields one after the other: so many are copied without a call.
+struct Sixteen(usize);
+
+impl Places for Sixteen {
+    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
+        column[self.0..self.0 + LANES].copy_from_slice(row);
     }
 }
 
