@@ -85,8 +85,6 @@ pub(crate) struct PlanField {
     /// Whether another field of the plan has it as its parent.
     pub(crate) divided: bool,
     pub(crate) area_known: bool,
-    /// For a field of many members, its number among such fields.
-    pub(crate) wide: Option<usize>,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
     /// When it counts as touched.
@@ -110,6 +108,11 @@ pub(crate) struct PlanField {
 }
 
 impl PlanField {
+    /// Whether it has so many members that the CPU takes sixteen of them abreast.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.count >= layout::MANY
+    }
+
     /// As the stage that tells touches apart sees it.
     pub(crate) fn skin(&self) -> touches::Skin<'_> {
         touches::Skin { places: &self.places, beside: &self.beside, spacing: self.spacing }
@@ -193,8 +196,6 @@ impl Plan {
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
-                wide: (field.members.len() >= layout::MANY)
-                    .then(|| plan.fields.iter().filter(|field| field.wide.is_some()).count()),
                 lift: plan.stages().position.then(|| Lift::new(body, field)).flatten(),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),

@@ -213,3 +213,26 @@ fn letters_that_make_no_sense_are_refused() {
     assert!(why("[upkeep]\nstuck_s = 3", change.clone()).contains("ask for letter `sustained` too"));
     assert!(engine(&skin(), BackendKind::Cpu, "", change).is_ok());
 }
+
+#[test]
+fn fields_of_hundreds_of_taxels_have_their_own_changes() {
+    let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
+    // A hand's breadth of pressed taxels that goes over the body, harder and softer.
+    let frames: Vec<Frame> = (0..20_u32)
+        .map(|number| {
+            let mut frame = Frame::missing(f64::from(number) * 0.01, body.taxels.len());
+            for (value, index) in frame.values.iter_mut().zip(0_u32..) {
+                let pressed = (index + 37 * number) % 480 < 200;
+                *value = RawValue::new(if pressed { f64::from((index * 7 + number * 13) % 50) } else { 0.0 });
+            }
+            frame
+        })
+        .collect();
+    for kind in backends() {
+        let percepts = run(&body, kind, "", &Letter::all_of(&BOTH, &[]), &frames);
+        let most = |letter: usize| {
+            percepts[9].iter().filter(|p| p.letter == letter).filter_map(|p| p.total).fold(0.0, f64::max)
+        };
+        assert!(most(1) > 10.0 * most(0), "a change is per second, at a hundred frames a second");
+    }
+}

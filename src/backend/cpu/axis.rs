@@ -21,19 +21,32 @@ pub(super) struct Moments<S: Simd> {
 /// Sums them up.
 #[inline(always)]
 pub(super) fn moments<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Moments<S> {
-    let none = splat(simd, 0.0);
-    let mut sums = Moments::<S> { a: none, b: none, d: none };
+    let mut sums = [splat(simd, 0.0); 3];
     for member in 0..members.count() {
-        let part = members.part(simd, member, at);
-        let q = (part.weight * part.pressure) * touch.scale;
-        let x = part.u - touch.u;
-        let y = part.v - touch.v;
-        let qx = q * x;
-        sums.a += qx * x;
-        sums.b += qx * y;
-        sums.d += (q * y) * y;
+        add(simd, members, member, at, touch, &mut sums);
     }
-    sums
+    let [a, b, d] = sums;
+    Moments { a, b, d }
+}
+
+/// Adds a member's part to a, b and d.
+#[inline(always)]
+pub(super) fn add<S: Simd, P: Members<S>>(
+    simd: S,
+    members: P,
+    member: usize,
+    at: usize,
+    touch: &Touch<S>,
+    [a, b, d]: &mut [F<S>; 3],
+) {
+    let part = members.part(simd, member, at);
+    let q = (part.weight * part.pressure) * touch.scale;
+    let x = part.u - touch.u;
+    let y = part.v - touch.v;
+    let qx = q * x;
+    *a += qx * x;
+    *b += qx * y;
+    *d += (q * y) * y;
 }
 
 /// The principal axis where there is one, and the anisotropy.

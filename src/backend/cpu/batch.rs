@@ -8,7 +8,7 @@ use super::super::{RawBatch, Rows};
 use super::Tables;
 use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part, touch};
-use super::wide::{self, Values, Wide};
+use super::wide::ManyAbreast;
 use super::{calibrate, change};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::{Plan, PlanField};
@@ -23,7 +23,6 @@ pub(super) struct Scratch {
     faulty: Vec<usize>,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
-    values: Values,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Vec<Row<f32>>, Vec<Row<u32>>),
 }
@@ -37,7 +36,6 @@ impl Scratch {
             statuses: vec![[0; LANES]; padded],
             faulty: Vec::new(),
             cells: Box::new([Cells::EMPTY; LANES]),
-            values: Values::default(),
             before: (vec![[0.0; LANES]; before], vec![[0; LANES]; before]),
         }
     }
@@ -115,27 +113,18 @@ pub(super) fn block(
             }
         }
     }
-    let Scratch { pressures, statuses, cells: answers, values, .. } = scratch;
+    let Scratch { pressures, statuses, cells: answers, .. } = scratch;
     for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
-        with_widest!(level, simd => narrow(simd, plan, fields, pressures, statuses, faults, answers));
-        for (field, answer) in fields.iter().zip(answers.iter_mut()) {
-            let Some(table) = field.wide.map(|wide| &tables.wide[wide]) else { continue };
-            let mut one = Cells::EMPTY;
-            for frame in 0..frames {
-                values.gather(table, faults, |slot| pressures[slot][frame], |slot| statuses[slot][frame]);
-                wide::cell(level, plan, Wide { table, values }, &OneKind::new(field), faults, &mut one);
-                answer.take(frame, &one);
-            }
-        }
+        with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, answers));
         with_widest!(level, simd => {
             write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
         });
     }
 }
 
-/// The fields of `fields` that are not wide, over sixteen frames.
+/// All stages for `fields`, over sixteen frames.
 #[inline(always)]
-fn narrow<S: Simd>(
+fn answer<S: Simd>(
     simd: S,
     plan: &Plan,
     fields: &[PlanField],
@@ -145,15 +134,18 @@ fn narrow<S: Simd>(
     answers: &mut [Cells; LANES],
 ) {
     for (field, answer) in fields.iter().zip(answers) {
-        if field.wide.is_none() {
-            let members = OverFrames {
-                members: plan.members_of(field),
-                depths: &field.depths,
-                taxels: &plan.taxels,
-                pressures,
-                statuses,
-            };
-            touch(simd, Abreast(members), &OneKind::new(field), plan.stages(), plan.columns, faults, answer);
+        let members = OverFrames {
+            members: plan.members_of(field),
+            depths: &field.depths,
+            taxels: &plan.taxels,
+            pressures,
+            statuses,
+        };
+        let (kind, stages, columns) = (OneKind::new(field), plan.stages(), plan.columns);
+        if field.is_wide() {
+            touch(simd, ManyAbreast(members), &kind, stages, columns, faults, answer);
+        } else {
+            touch(simd, Abreast(members), &kind, stages, columns, faults, answer);
         }
     }
 }

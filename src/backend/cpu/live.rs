@@ -213,8 +213,8 @@ impl Live {
         let tiles = plan.slots().div_ceil(LANES);
         let (mut wide, mut narrow) = (Vec::new(), Vec::new());
         for (field, of) in plan.fields.iter().enumerate() {
-            if let Some(table) = of.wide {
-                wide.push(Group::Wide { field, kind: OneKind::new(of), table });
+            if of.is_wide() {
+                wide.push(Group::Wide { field, kind: OneKind::new(of), table: wide.len() });
             } else {
                 narrow.push(field);
             }

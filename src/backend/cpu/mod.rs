@@ -68,7 +68,7 @@ impl Cpu {
 
     /// With the instructions of `level`.
     fn with_level(plan: &Plan, level: Level) -> Self {
-        let wide = plan.fields.iter().filter(|field| field.wide.is_some()).map(|field| {
+        let wide = plan.fields.iter().filter(|field| field.is_wide()).map(|field| {
             let members = plan.members_of(field).iter().zip(&field.depths);
             wide::Table::new(members.map(|(member, &depth)| {
                 let area = plan.taxels[member.slot as usize].area;

@@ -5,11 +5,13 @@ use fearless_simd::Level;
 use super::*;
 use crate::backend::Step;
 use crate::body::Body;
-use crate::bundled;
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
-use crate::scene::Scene;
+use crate::scene::{PlanField, Scene};
 use crate::signal::{Calibration, Letter, Receptor};
+
+const HAND: &[u8] = include_bytes!("../../../bodies/hand.glb");
+const HUMANOID: &[u8] = include_bytes!("../../../bodies/humanoid.glb");
 
 /// Every set of instructions that this machine has and that anything is compiled for.
 fn levels() -> Vec<Level> {
@@ -62,7 +64,7 @@ fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usiz
 #[test]
 fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
     const FRAMES: usize = 53;
-    for (name, bytes) in [("hand", bundled::HAND), ("humanoid", bundled::HUMANOID)] {
+    for (name, bytes) in [("hand", HAND), ("humanoid", HUMANOID)] {
         let body = Body::from_bytes(name, bytes).unwrap();
         let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
         let scene = Scene { outputs: Outputs::all(), letters, ..Scene::default() };
@@ -70,13 +72,17 @@ fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
         let calibration = Calibration::parse("[all]\nbaseline = 1\ngain = 0.7\np_max = 300", &ids).unwrap();
         for calibration in [Calibration::identity(ids.len()), calibration] {
             let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
-            assert!(name == "hand" || plan.fields.iter().any(|field| field.wide.is_some()));
+            assert!(name == "hand" || plan.fields.iter().any(PlanField::is_wide));
             let raw = values(&plan, FRAMES);
             let right = run(&plan, Level::new(), &raw, FRAMES, FRAMES);
             assert!((0..FRAMES).any(|frame| right.touched(frame).next().is_some()));
             for level in levels() {
                 for at_once in [1, 7, 16, FRAMES] {
                     let also = run(&plan, level, &raw, FRAMES, at_once);
+                    for (frame, field) in (0..FRAMES).flat_map(|f| (0..plan.fields.len()).map(move |i| (f, i))) {
+                        let (one, other) = (right.get(frame, field), also.get(frame, field));
+                        assert!(one == other, "{name}, {level:?}, {at_once} at once, frame {frame}: {one:?} {other:?}");
+                    }
                     assert!(right == also, "{name}, {level:?}, {at_once} at once");
                 }
             }

@@ -255,22 +255,6 @@ impl Cells {
         axis: [0.0; LANES],
         anisotropy: [0.0; LANES],
     };
-
-    /// Makes `lane` what the first lane of `other` is.
-    pub(super) fn take(&mut self, lane: usize, other: &Self) {
-        self.flags[lane] = other.flags[0];
-        self.present[lane] = other.present[0];
-        self.total[lane] = other.total[0];
-        self.peak[lane] = other.peak[0];
-        self.area[lane] = other.area[0];
-        self.active[lane] = other.active[0];
-        self.u[lane] = other.u[0];
-        self.v[lane] = other.v[0];
-        self.depth[lane] = other.depth[0];
-        self.orientation[lane] = other.orientation[0];
-        self.axis[lane] = other.axis[0];
-        self.anisotropy[lane] = other.anisotropy[0];
-    }
 }
 
 /// What the lanes know of their touch so far.
