@@ -116,7 +116,9 @@ fn check_count(count: usize) -> Result<()> {
         return Err(Error::failed("no taxels were asked for; place at least one"));
     }
     if count as f64 > MOST_POINTS {
-        return Err(Error::failed(format!("{count} taxels are over the {MOST_POINTS:.0e} that can be placed at a time")));
+        return Err(Error::failed(format!(
+            "{count} taxels are over the {MOST_POINTS:.0e} that can be placed at a time"
+        )));
     }
     Ok(())
 }

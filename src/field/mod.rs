@@ -4,6 +4,7 @@
 //! taxels, every field an anchor, and a chart where one exists.
 
 mod chart;
+pub mod geodesic;
 mod lift;
 mod neighbours;
 
