@@ -107,11 +107,20 @@ pub struct Reached {
     pub uv: DVec2,
     /// Length of the way, m.
     pub distance_m: f64,
-    /// How much the way bends at most at one point, rad; over 0 behind a hole, around the surface's edge, or, by little, on a surface
-    /// that is bent like a saddle.
+    /// How much the way bends at most at one point, rad: over 0 behind a hole, around the surface's edge or, by little, on
+    /// a surface that is bent like a saddle.
     pub bend_rad: f64,
-    /// Another way that leaves over 20° apart, if there is one that was looked at: the shortest of those.
+    /// Another way that cannot be shortened and leaves over 20° apart, if one was met: the shortest of those.
     pub rival: Option<Rival>,
+}
+
+/// A way to a place that was looked at.
+struct Way {
+    distance_m: f64,
+    angle_rad: f64,
+    bend_rad: f64,
+    /// Whether it is straight where it passes its last window: one that is not can be shortened.
+    is_straight: bool,
 }
 
 /// A second way to a place.
@@ -191,10 +200,11 @@ impl<'a> LogMap<'a> {
     /// Where the shortest way to `place` leads; `None` beyond the limit, and on a part that the start is not on.
     #[must_use]
     pub fn reach(&self, place: &Place) -> Option<Reached> {
-        let mut ways: Vec<(f64, f64, f64)> = Vec::new();
+        let mut ways: Vec<Way> = Vec::new();
         for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
             let at = mix(wedge.corners, place.barycentric);
-            ways.push((at.length(), wedge.base_rad + at.y.atan2(at.x), 0.0));
+            let angle_rad = wedge.base_rad + at.y.atan2(at.x);
+            ways.push(Way { distance_m: at.length(), angle_rad, bend_rad: 0.0, is_straight: true });
         }
         let mut list = self.entering[place.triangle as usize];
         while let Some(window) = self.windows.get(list as usize) {
@@ -205,41 +215,45 @@ impl<'a> LogMap<'a> {
             ways.push(self.way(window, mix([p, q, third], weights)));
             list = window.before;
         }
-        let topology = self.topology;
-        for vertex in topology.triangles[place.triangle as usize] {
-            let arrival = &self.arrivals[vertex as usize];
-            let last = place.position(topology).distance(topology.positions[vertex as usize]);
-            if arrival.edge != NONE {
-                ways.push((arrival.distance_m + last, arrival.angle_rad, arrival.bend_rad));
+        let position = place.position(self.topology);
+        for vertex in self.topology.triangles[place.triangle as usize] {
+            let Arrival { distance_m, angle_rad, bend_rad, edge, .. } = self.arrivals[vertex as usize];
+            let distance_m = distance_m + position.distance(self.topology.positions[vertex as usize]);
+            if edge != NONE {
+                ways.push(Way { distance_m, angle_rad, bend_rad, is_straight: false });
             }
         }
-        let shortest = |a: &&(f64, f64, f64), b: &&(f64, f64, f64)| a.0.total_cmp(&b.0);
-        let &(distance_m, angle, bend_rad) = ways.iter().min_by(shortest)?;
-        let angle = self.start.in_plane(angle);
-        let apart = |other: f64| {
-            let apart = (self.start.in_plane(other) - angle).abs();
+        let shortest = |a: &&Way, b: &&Way| a.distance_m.total_cmp(&b.distance_m);
+        let &Way { distance_m, angle_rad, bend_rad, .. } = ways.iter().min_by(shortest)?;
+        let angle_rad = self.start.in_plane(angle_rad);
+        let apart = |other: &Way| {
+            let apart = (self.start.in_plane(other.angle_rad) - angle_rad).abs();
             apart.min(2.0 * PI - apart)
         };
-        let rival = ways.iter().filter(|way| apart(way.1) > APART).min_by(shortest);
-        let rival = rival.map(|&(distance_m, angle, _)| Rival { distance_m, apart_rad: apart(angle) });
-        Some(Reached { uv: DVec2::from_angle(angle) * distance_m, distance_m, bend_rad, rival })
+        let rival = ways.iter().filter(|way| way.is_straight && apart(way) > APART).min_by(shortest);
+        let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
+        Some(Reached { uv: DVec2::from_angle(angle_rad) * distance_m, distance_m, bend_rad, rival })
     }
 
-    /// Length, angle and bend of the way through `window` to the unfolded point `to`.
-    fn way(&self, window: &Window, to: DVec2) -> (f64, f64, f64) {
+    /// The way through `window` to the unfolded point `to`.
+    fn way(&self, window: &Window, to: DVec2) -> Way {
         let [a, b] = window.part.map(|t| window.at(t));
         // A point beside the lines through the window is reached around its end.
-        let (first, length) = if a.perp_dot(to) > 0.0 {
-            (a, a.length() + a.distance(to))
+        let (first, rest) = if a.perp_dot(to) > 0.0 {
+            (a, a.distance(to))
         } else if b.perp_dot(to) < 0.0 {
-            (b, b.length() + b.distance(to))
+            (b, b.distance(to))
         } else {
-            (to, to.length())
+            (to, 0.0)
         };
         let source = &self.sources[window.source as usize];
         let own = window.base_rad + first.y.atan2(first.x);
-        let angle = if source.bends { source.angle_rad } else { own };
-        (source.distance_m + length, angle, source.bend(own))
+        Way {
+            distance_m: source.distance_m + first.length() + rest,
+            angle_rad: if source.bends { source.angle_rad } else { own },
+            bend_rad: source.bend(own),
+            is_straight: rest == 0.0,
+        }
     }
 
     /// Where the third corner of the triangle beyond the window unfolds to.
