@@ -14,9 +14,12 @@ pub(super) struct Grid {
     cubes_per_m: f64,
     /// Numbers of the cubes that hold points, rising, each with where its points begin.
     cubes: Vec<(u64, u32)>,
-    /// Indices of the points, cube by cube, rising within each.
-    points: Vec<u32>,
+    /// The points with their indices, cube by cube, rising within each.
+    points: Vec<Spot>,
 }
+
+/// A point and its index.
+pub(super) type Spot = (DVec3, u32);
 
 impl Grid {
     /// The points of `which`, by their `positions`, in cubes of `side_m` or, where those would be too many, larger ones.
@@ -36,13 +39,13 @@ impl Grid {
             if grid.cubes.last().is_none_or(|&(last, _)| last != cube) {
                 grid.cubes.push((cube, place as u32));
             }
-            grid.points.push(point);
+            grid.points.push((at(point), point));
         }
         grid
     }
 
-    /// The indices of all points, those of a cube together.
-    pub(super) fn points(&self) -> &[u32] {
+    /// All points, those of a cube together.
+    pub(super) fn points(&self) -> &[Spot] {
         &self.points
     }
 
@@ -52,7 +55,7 @@ impl Grid {
     }
 
     /// The points in `cube` and the 26 around it, as nine stretches.
-    pub(super) fn around(&self, cube: [u64; 3]) -> [&[u32]; 9] {
+    pub(super) fn around(&self, cube: [u64; 3]) -> [&[Spot]; 9] {
         let [x, y, z] = cube;
         std::array::from_fn(|row| {
             let (dy, dz) = (row as u64 % 3, row as u64 / 3);
@@ -86,7 +89,7 @@ mod tests {
             let grid = Grid::new(&positions, 0..800, side);
             assert_eq!(grid.points().len(), 800);
             for &p in &positions {
-                let mut around: Vec<u32> = grid.around(grid.cube(p)).concat();
+                let mut around: Vec<u32> = grid.around(grid.cube(p)).concat().iter().map(|spot| spot.1).collect();
                 around.sort_unstable();
                 assert!(around.windows(2).all(|pair| pair[0] < pair[1]));
                 let near = (0..800).filter(|&i| positions[i as usize].distance(p) <= side);
@@ -100,6 +103,6 @@ mod tests {
         let positions = [DVec3::ZERO, DVec3::X * 1e6, DVec3::X * 1e6 + DVec3::Y * 1e-9];
         let grid = Grid::new(&positions, 0..3, 1e-9);
         let around = grid.around(grid.cube(positions[1])).concat();
-        assert_eq!(around, [1, 2]);
+        assert_eq!(around.iter().map(|spot| spot.1).collect::<Vec<_>>(), [1, 2]);
     }
 }

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 const OVERSAMPLING: usize = 5;
 
 /// Samples scattered for each disk of the densest packing, where a spacing is given.
-const PACKED_OVERSAMPLING: f64 = 12.0;
+const PACKED_OVERSAMPLING: f64 = 9.0;
 
 /// No more points than this are placed at a time.
 const MOST_POINTS: f64 = 4e6;
