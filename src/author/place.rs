@@ -84,8 +84,8 @@ pub fn place_by_density(
     Ok(eliminate(&samples, &reaches, count))
 }
 
-/// Places as many points as it finds room for with any two neighbours at least `spacing_m` apart: about 0.77 of what
-/// disks of that diameter could at most, in the plane.
+/// Places as many points as it finds room for with any two neighbours at least `spacing_m` apart: about two thirds of
+/// the disks of that diameter that a plane could hold.
 ///
 /// Order, sides and `seed` are as in [`place_evenly`].
 ///
@@ -265,6 +265,76 @@ mod tests {
             assert!((a * wa + b * wb + c * wc).distance(p.point.position) < 1e-15);
             assert_eq!(p.point.normal, DVec3::Z);
         }
+    }
+
+    #[test]
+    fn a_box_gets_its_edges_kept_clear_too() {
+        // Two sheets that meet at a right angle are one surface.
+        let (mut positions, mut triangles) = sheet(6, false);
+        let first = positions.len() as u32;
+        let (upright, others) = sheet(6, false);
+        positions.extend(upright.into_iter().map(|p| DVec3::new(0.0, p.y, -p.x)));
+        triangles.extend(others.into_iter().map(|[a, b, c]| [first + a, first + c, first + b]));
+        let placed = place_evenly(&positions, &triangles, 300, 2).unwrap();
+        let mut least = f64::INFINITY;
+        for (i, a) in placed.iter().enumerate() {
+            least = placed[..i].iter().map(|b| a.point.position.distance(b.point.position)).fold(least, f64::min);
+        }
+        assert!(least >= 0.65 * 2.0 * widest_radius(2.0, 300), "{least} m");
+    }
+
+    #[test]
+    fn a_density_sets_how_many_there_are_and_how_far_apart() {
+        // Nine times as dense on the right half, on triangles that are larger than the spacing there; none at the top.
+        let (positions, triangles) = sheet(4, false);
+        let density = |p: &SurfacePoint| match p.position {
+            p if p.y > 0.75 => 0.0,
+            p if p.x > 0.5 => 9.0,
+            _ => 1.0,
+        };
+        let placed = place_by_density(&positions, &triangles, 1000, 3, density).unwrap();
+        assert_eq!(placed.len(), 1000);
+        let (right, left): (Vec<Placed>, Vec<Placed>) = placed.iter().partition(|p| p.point.position.x > 0.5);
+        assert!(placed.iter().all(|p| p.point.position.y <= 0.75));
+        // As many to each side as there is density on it, but for what the edge between them takes.
+        assert!((860..=920).contains(&right.len()), "{}", right.len());
+        let spacing = |count: f64| 2.0 * widest_radius(0.375, 1) / count.sqrt();
+        assert!(least_spacing(&right) >= 0.65 * spacing(900.0), "{}", least_spacing(&right));
+        assert!(least_spacing(&left) >= 0.65 * spacing(100.0), "{}", least_spacing(&left));
+        let area: f64 = left.iter().map(|p| p.point.area).sum();
+        assert!((area - 0.375).abs() < 0.02, "{area} m²");
+
+        let why = |density: f64| place_by_density(&positions, &triangles, 9, 3, |_| density).unwrap_err().to_string();
+        assert!(why(-1.0).contains("density") && why(f64::NAN).contains("NaN") && why(0.0).contains("everywhere"));
+    }
+
+    #[test]
+    fn a_density_that_is_the_same_everywhere_is_no_density() {
+        let (positions, triangles) = sheet(4, false);
+        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5).unwrap();
+        assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(1.0, 300));
+        let area: f64 = placed.iter().map(|p| p.point.area).sum();
+        assert!((area - 1.0).abs() < 1e-9, "{area} m²");
+    }
+
+    #[test]
+    fn with_a_spacing_as_many_as_fit_keep_it() {
+        let (positions, triangles) = sheet(5, true);
+        for (spacing, seed) in [(0.05, 1), (0.05, 2), (0.3, 1), (3.0, 1)] {
+            let placed = place_apart(&positions, &triangles, spacing, seed).unwrap();
+            assert!(least_spacing(&placed) >= spacing, "{} m", least_spacing(&placed));
+            // Nobody fits in between: every place on the sheet has one within the spacing, but for the samples' own
+            // distance, of which there are nine for each disk of the densest packing.
+            let gap = spacing * (1.0 + 1.0 / 3.0);
+            for p in Pieces::whole(&positions, &triangles).unwrap().scatter(2000, 77) {
+                assert!(placed.iter().any(|q| same_side(&p, q) && p.point.position.distance(q.point.position) < gap));
+            }
+            // Random darts would take 0.547 of the plane, the densest packing 0.907.
+            let covered = placed.len() as f64 * std::f64::consts::PI * spacing * spacing / 4.0 / 2.0;
+            assert!(spacing > 0.1 || covered > 0.547, "{covered}");
+        }
+        let why = |spacing: f64| place_apart(&positions, &triangles, spacing, 1).unwrap_err().to_string();
+        assert!(why(0.0).contains("spacing") && why(f64::NAN).contains("spacing") && why(1e-6).contains("metres"));
     }
 
     #[test]

@@ -51,6 +51,8 @@ pub enum NoChart {
     ByChoice,
     /// It is to be geodesic, and so many members have no (u, v) in the layout.
     Unplaced(usize),
+    /// It has no taxels of its own to chart.
+    NoTaxels,
     /// There is no surface to measure ways on.
     NoSurface,
     /// A way to the taxel of this id cannot be found: it is on another part of the surface than the origin, as are so
@@ -85,6 +87,7 @@ impl fmt::Display for NoChart {
             Self::Unplaced(count) => {
                 write!(f, "it is to be geodesic, and {count} of its taxels have no (u, v); lay it again")
             }
+            Self::NoTaxels => f.write_str("it has no taxels of its own; list those that it is to chart"),
             Self::NoSurface => f.write_str("there is no surface to measure ways on; add the mesh"),
             Self::Unreachable(taxel, count) => write!(
                 f,

@@ -44,6 +44,9 @@ impl<'a> Unroller<'a> {
     pub fn unroll(&mut self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
         let body = self.body;
         let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
+        if taxels.is_empty() {
+            return Err(NoChart::NoTaxels);
+        }
         let mut links: Vec<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
         links.sort_unstable();
         links.dedup();

@@ -171,11 +171,13 @@ fn where_no_chart_can_be_the_reason_says_why() {
     let why = reason(&parted, &sides, Some([RADIUS * 0.6_f64.sin(), 0.06, RADIUS * 0.6_f64.cos()])).unwrap_err();
     assert_eq!(why, NoChart::Unreachable(0, 7));
 
-    // No surface at all, and a file whose chart lost its (u, v).
+    // No taxels, no surface, and a file whose chart lost its (u, v).
     assert_eq!(
         reason(&MeshData { triangles: vec![[0, 0, 0]], ..around.clone() }, &sides, front),
         Err(NoChart::NoSurface)
     );
+    let empty = FieldSpec { name: "arm".into(), ..FieldSpec::default() };
+    assert_eq!(Unroller::new(&written(&around, &sides, &[])).unroll(&empty), Err(NoChart::NoTaxels));
     let mut lost = reason(&around, &sides, front).unwrap();
     lost.members.get_mut(&3).unwrap().uv = None;
     let fields = FieldSet::new(&written(&around, &sides, &[lost])).unwrap();

@@ -210,7 +210,6 @@ fn on_a_sphere_lengths_are_those_of_great_circles() {
     assert_eq!((topology.triangles.len(), topology.parts()), (20_480, 1));
     let pole = topology.positions[0];
     let (_, place) = vertices(&topology).find(|&(v, _)| v == 0).unwrap();
-    let began = std::time::Instant::now();
     let map = LogMap::new(&topology, place, DVec3::X, 1.05).unwrap();
     let [_, u, v, normal] = map.frame();
     assert!(normal.distance(pole) < 1e-3);
@@ -227,13 +226,71 @@ fn on_a_sphere_lengths_are_those_of_great_circles() {
             count += 1;
         }
     }
-    eprintln!(
-        "{count} vertices, {} windows, {:?}: radial {radial:.2e}, angle {round:.2e} rad",
-        map.windows(),
-        began.elapsed()
-    );
     assert!(count > 2000);
     // Chords are shorter than arcs by the square of their angle over 24; the mesh's edges are 0.04 long at most.
     assert!(radial < 3e-4, "{radial}");
     assert!(round < 0.02, "{round}");
+}
+
+#[test]
+fn a_way_bends_around_a_slit_by_as_much_as_it_must() {
+    // A sheet of 20 × 20 squares without those of column 10, but for the topmost four.
+    let whole = sheet(20, 20, |p| DVec3::new(p.x, p.y, 0.0));
+    let cut: Vec<[u32; 3]> = whole
+        .triangles
+        .iter()
+        .copied()
+        .filter(|t| {
+            let middle = t.map(|v| whole.positions[v as usize]).into_iter().sum::<DVec3>() / 3.0;
+            !((0.5..0.55).contains(&middle.x) && middle.y < 0.8)
+        })
+        .collect();
+    let topology = Topology::new(&whole.positions, &cut);
+    let at = |x: f64, y: f64| find(&topology, DVec3::new(x, y, 0.0));
+    let map = LogMap::new(&topology, at(0.23, 0.31), DVec3::X, 3.0).unwrap();
+    let start = DVec2::new(0.23, 0.31);
+    let (first, second) = (DVec2::new(0.5, 0.8), DVec2::new(0.55, 0.8));
+    for (x, y) in [(0.83, 0.21), (0.61, 0.44), (0.97, 0.03)] {
+        let reached = map.reach(&at(x, y)).unwrap();
+        let to = DVec2::new(x, y);
+        let right = start.distance(first) + first.distance(second) + second.distance(to);
+        assert!((reached.distance_m - right).abs() < 1e-12, "{} {right}", reached.distance_m);
+        assert!((reached.uv.to_angle() - (first - start).to_angle()).abs() < 1e-12);
+        let bends = [(first - start).angle_to(second - first), (second - first).angle_to(to - second)];
+        let sharpest = bends.into_iter().map(f64::abs).fold(0.0, f64::max);
+        assert!((reached.bend_rad - sharpest).abs() < 1e-9, "{} {sharpest}", reached.bend_rad);
+    }
+    // What the slit does not hide is straight ahead.
+    let reached = map.reach(&at(0.6, 0.99)).unwrap();
+    assert_eq!(reached.bend_rad, 0.0);
+    assert!((reached.uv - (DVec2::new(0.6, 0.99) - start)).length() < 1e-12);
+}
+
+#[test]
+fn around_a_tube_two_ways_are_told() {
+    let topology = sheet(24, 12, |p| {
+        let (sin, cos) = (p.x * TAU).sin_cos();
+        DVec3::new(sin, 3.0 * p.y, cos)
+    });
+    let map = LogMap::new(&topology, find(&topology, DVec3::new(0.0, 1.4, 1.0)), DVec3::X, 4.0).unwrap();
+    // A little off the line opposite, the way round the other side is a little longer.
+    let back = map.reach(&find(&topology, DVec3::new(-0.02, 1.4, -0.98))).unwrap();
+    let rival = back.rival.unwrap();
+    assert!(rival.distance_m > back.distance_m && rival.distance_m < back.distance_m + 0.1);
+    assert!((rival.apart_rad - PI).abs() < 0.05, "{}", rival.apart_rad);
+    // All round, the two are as long as the polygon.
+    let round = 24.0 * 2.0 * (TAU / 48.0).sin();
+    assert!((rival.distance_m + back.distance_m - round).abs() < 0.02);
+    assert_eq!(map.reach(&find(&topology, DVec3::new(0.7, 1.4, 0.7))).unwrap().rival, None);
+}
+
+#[test]
+fn what_is_out_of_reach_is_told_apart() {
+    let topology = sheet(10, 10, |p| DVec3::new(p.x, p.y, 0.0));
+    let at = |x: f64, y: f64| find(&topology, DVec3::new(x, y, 0.0));
+    let map = LogMap::new(&topology, at(0.05, 0.05), DVec3::X, 0.2).unwrap();
+    assert!(map.reach(&at(0.95, 0.95)).is_none());
+    assert!(map.reach(&at(0.1, 0.1)).is_some());
+    let nowhere = Place { triangle: 900, barycentric: [1.0, 0.0, 0.0] };
+    assert!(LogMap::new(&topology, nowhere, DVec3::X, 1.0).is_err());
 }
