@@ -1,24 +1,27 @@
-//! Taxels spread evenly over triangles: blue noise by weighted sample elimination.
+//! Taxels spread over triangles: blue noise by weighted sample elimination.
 //!
 //! Yuksel, *Sample Elimination for Generating Poisson Disk Sample Sets* (2015): scatter several times as many samples
 //! as wanted, then remove the one with the most crowded neighbourhood until the wanted number is left.
-
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::SurfacePoint;
-use super::random::Random;
-use crate::body::Skinning;
+use super::crowd::{Crowd, pack, same_side, thin_out};
+use super::scatter::Pieces;
 use crate::error::{Error, Result};
 
 /// Samples scattered for each one kept.
 const OVERSAMPLING: usize = 5;
 
-/// A point that [`place_evenly`] chose, and where on the mesh it lies.
+/// Samples scattered for each disk of the densest packing, where a spacing is given.
+const PACKED_OVERSAMPLING: f64 = 9.0;
+
+/// No more points than this are placed at a time.
+const MOST_POINTS: f64 = 4e6;
+
+/// A point that was chosen, and where on the mesh it lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// The point; its normal is that of the triangle.
@@ -38,194 +41,140 @@ pub fn widest_radius(area: f64, count: usize) -> f64 {
 
 /// Places exactly `count` points on a mesh, as evenly as blue noise goes: irregular, but none close to another.
 ///
-/// `positions` are in metres and `triangles` counter-clockwise seen from outside. Two places whose normals are 90° or
-/// more apart are no neighbours however close they are, so that both sides of a thin part get their own. The points
-/// come in the order of the triangles; `seed` picks one of many equally good placements.
+/// `positions` are in metres and `triangles` counter-clockwise seen from outside. Two places whose normals are over 90°
+/// apart are no neighbours however close they are, so that both sides of a thin part get their own. The points come in
+/// the order of the triangles; `seed` picks one of many equally good placements.
 ///
 /// # Errors
-/// `count` is 0, a triangle names a vertex that is not there, or the triangles have no finite, positive area.
+/// `count` is 0 or over 4 million, a triangle names a vertex that is not there, or the triangles have no finite,
+/// positive area.
 pub fn place_evenly(positions: &[DVec3], triangles: &[[u32; 3]], count: usize, seed: u64) -> Result<Vec<Placed>> {
+    check_count(count)?;
+    let pieces = Pieces::whole(positions, triangles)?;
+    let samples = pieces.scatter(OVERSAMPLING * count, seed);
+    let reaches = vec![2.0 * widest_radius(pieces.weight(), count); samples.len()];
+    Ok(eliminate(&samples, &reaches, count))
+}
+
+/// Places exactly `count` points, as [`place_evenly`] does, more of them where `density` is higher: how many there are
+/// a square metre is in proportion to it. It may be 0, and only its ratios matter.
+///
+/// Where points are `density` times as dense, they keep 1/√density of the spacing.
+///
+/// # Errors
+/// As [`place_evenly`]; or `density` is negative or not finite somewhere, or 0 everywhere.
+pub fn place_by_density(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    seed: u64,
+    density: impl Fn(&SurfacePoint) -> f64,
+) -> Result<Vec<Placed>> {
+    check_count(count)?;
+    let area = Pieces::whole(positions, triangles)?.weight();
+    let pieces = Pieces::by_density(positions, triangles, OVERSAMPLING * count, &density)?;
+    let samples = pieces.scatter(OVERSAMPLING * count, seed);
+    // Beyond what one point on the whole surface would keep, thinner is no different.
+    let widest = 2.0 * widest_radius(area, 1);
+    let reach_at = |sample: &Placed| {
+        let density = density(&sample.point);
+        if density > 0.0 { (2.0 * widest_radius(pieces.weight() / density, count)).min(widest) } else { widest }
+    };
+    let reaches: Vec<f64> = samples.iter().map(reach_at).collect();
+    Ok(eliminate(&samples, &reaches, count))
+}
+
+/// Places as many points as it finds room for with any two neighbours at least `spacing_m` apart: about two thirds of
+/// the disks of that diameter that a plane could hold.
+///
+/// Order, sides and `seed` are as in [`place_evenly`].
+///
+/// # Errors
+/// `spacing_m` is not positive and finite, or so small that over 4 million points could fit; a triangle names a vertex
+/// that is not there, or the triangles have no finite, positive area.
+pub fn place_apart(positions: &[DVec3], triangles: &[[u32; 3]], spacing_m: f64, seed: u64) -> Result<Vec<Placed>> {
+    if !(spacing_m.is_finite() && spacing_m > 0.0) {
+        return Err(Error::failed(format!("taxels cannot lie {spacing_m} m apart; give a spacing over 0")));
+    }
+    let pieces = Pieces::whole(positions, triangles)?;
+    let most = pieces.weight() * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m);
+    if most > MOST_POINTS {
+        return Err(Error::failed(format!(
+            "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MOST_POINTS:.0e} that can be placed; is the \
+             spacing in metres?"
+        )));
+    }
+    let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
+    let reaches = vec![spacing_m; samples.len()];
+    let crowd = Crowd::new(&samples, &reaches, |_, _| ());
+    let kept = pack(&crowd, samples.len());
+    Ok(share_area(&samples, &kept, &crowd))
+}
+
+fn check_count(count: usize) -> Result<()> {
     if count == 0 {
         return Err(Error::failed("no taxels were asked for; place at least one"));
     }
-    let (mut samples, area) = scatter(positions, triangles, OVERSAMPLING * count, seed)?;
-    let kept = eliminate(&samples, count, widest_radius(area, count));
-    share_area(&mut samples, &kept, area);
-    Ok(kept.into_iter().map(|sample| samples[sample]).collect())
+    if count as f64 > MOST_POINTS {
+        return Err(Error::failed(format!(
+            "{count} taxels are over the {MOST_POINTS:.0e} that can be placed at a time"
+        )));
+    }
+    Ok(())
 }
 
-/// Scatters `count` samples uniformly by area, and says what the area is in m².
-fn scatter(positions: &[DVec3], triangles: &[[u32; 3]], count: usize, seed: u64) -> Result<(Vec<Placed>, f64)> {
-    let mut corners = Vec::with_capacity(triangles.len());
-    let mut area_up_to = Vec::with_capacity(triangles.len());
-    let mut area = 0.0;
-    for (index, triangle) in triangles.iter().enumerate() {
-        let corner = |k: usize| positions.get(triangle[k] as usize).copied();
-        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
-            return Err(Error::failed(format!("triangle {index} names a vertex that is not there")));
-        };
-        area += (b - a).cross(c - a).length() / 2.0;
-        corners.push([a, b, c]);
-        area_up_to.push(area);
-    }
-    if !(area.is_finite() && area > 0.0) {
-        return Err(Error::failed("the surface has no area to place taxels on"));
-    }
-    let mut random = Random::new(seed);
-    let samples = (0..count).map(|sample| {
-        // One sample in each of `count` equal shares of the area: as uniform, and with fewer gaps, than anywhere.
-        let at = area * (sample as f64 + random.unit()) / count as f64;
-        let triangle = area_up_to.partition_point(|&up_to| up_to <= at).min(corners.len() - 1);
-        let [a, b, c] = corners[triangle];
-        let (root, along) = (random.unit().sqrt(), random.unit());
-        let barycentric = [1.0 - root, root * (1.0 - along), root * along];
-        let position = a * barycentric[0] + b * barycentric[1] + c * barycentric[2];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        Placed { point: SurfacePoint { position, normal, area: 0.0 }, triangle, barycentric }
+/// The `count` samples that stay, each with the area that is its own.
+fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize) -> Vec<Placed> {
+    let ratio = count as f64 / samples.len() as f64;
+    // Samples much closer than the outcome's spacing all have to go: that one is closer still says nothing.
+    let closest = 1.0 - ratio * ratio.sqrt();
+    let crowd = Crowd::new(samples, reaches_m, |distance, reach| {
+        let share = (1.0 - distance.max(reach * closest * 0.65) / reach).max(0.0);
+        let squared = share * share;
+        let fourth = squared * squared;
+        fourth * fourth
     });
-    Ok((samples.collect(), area))
+    let kept = thin_out(&crowd, samples.len(), count);
+    share_area(samples, &kept, &crowd)
+}
+
+/// The samples that were kept, each with the area of those that are nearest to it on its own side.
+fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Crowd<T>) -> Vec<Placed> {
+    const GONE: u32 = u32::MAX;
+    let mut place_of = vec![GONE; samples.len()];
+    for (place, &sample) in kept.iter().enumerate() {
+        place_of[sample] = place as u32;
+    }
+    let mut placed: Vec<Placed> = kept.iter().map(|&sample| samples[sample]).collect();
+    placed.iter_mut().for_each(|placed| placed.point.area = 0.0);
+    let mut tree = None;
+    for (index, sample) in samples.iter().enumerate() {
+        let here = sample.point.position;
+        let beside = || crowd.of(index).iter().map(|&(j, _)| j as usize).filter(|&j| place_of[j] != GONE);
+        let distance = |j: &usize| here.distance_squared(samples[*j].point.position);
+        let own = match place_of[index] {
+            GONE => beside().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|j| place_of[j] as usize),
+            own => Some(own as usize),
+        };
+        let owner = own.or_else(|| {
+            // Nothing that was kept is within reach.
+            let tree = tree.get_or_insert_with(|| {
+                let spots = kept.iter().enumerate().map(|(k, &j)| Spot::new(samples[j].point.position.to_array(), k));
+                RTree::bulk_load(spots.collect())
+            });
+            let mut nearest = tree.nearest_neighbor_iter(here.to_array()).map(|spot| spot.data);
+            let own = nearest.find(|&k| same_side(sample, &samples[kept[k]]));
+            // On a part so thin that no kept sample shares the side, the nearest one stands for it.
+            own.or_else(|| tree.nearest_neighbor(here.to_array()).map(|spot| spot.data))
+        });
+        if let Some(owner) = owner {
+            placed[owner].point.area += sample.point.area;
+        }
+    }
+    placed
 }
 
 type Spot = GeomWithData<[f64; 3], usize>;
-
-fn tree(samples: &[Placed], which: impl Iterator<Item = usize>) -> RTree<Spot> {
-    RTree::bulk_load(which.map(|i| Spot::new(samples[i].point.position.to_array(), i)).collect())
-}
-
-fn same_side(a: &Placed, b: &Placed) -> bool {
-    a.point.normal.dot(b.point.normal) > 0.0
-}
-
-/// A sample and how crowded it was when it was put on the heap.
-struct Crowded {
-    weight: f64,
-    sample: usize,
-}
-
-impl Ord for Crowded {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.weight.total_cmp(&other.weight).then(other.sample.cmp(&self.sample))
-    }
-}
-
-impl PartialOrd for Crowded {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Crowded {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Crowded {}
-
-/// The indices, ascending, of the `count` samples that are left when the most crowded have gone one by one.
-fn eliminate(samples: &[Placed], count: usize, radius: f64) -> Vec<usize> {
-    let reach = 2.0 * radius;
-    let ratio = count as f64 / samples.len() as f64;
-    // Samples much closer than the outcome's spacing all have to go: that one is closer still says nothing.
-    let closest = 2.0 * radius * (1.0 - ratio * ratio.sqrt()) * 0.65;
-    let near = tree(samples, 0..samples.len());
-    let neighbours: Vec<Vec<(usize, f64)>> = samples
-        .iter()
-        .enumerate()
-        .map(|(i, sample)| {
-            let here = sample.point.position.to_array();
-            let mut list: Vec<(usize, f64)> = near
-                .locate_within_distance(here, reach * reach)
-                .map(|spot| spot.data)
-                .filter(|&j| j != i && same_side(sample, &samples[j]))
-                .map(|j| {
-                    let distance = sample.point.position.distance(samples[j].point.position);
-                    let share = (1.0 - distance.max(closest) / reach).max(0.0);
-                    let squared = share * share;
-                    let fourth = squared * squared;
-                    (j, fourth * fourth)
-                })
-                .collect();
-            // The order in which a tree yields must not reach the sums.
-            list.sort_by_key(|&(j, _)| j);
-            list
-        })
-        .collect();
-    let mut weights: Vec<f64> = neighbours.iter().map(|list| list.iter().map(|(_, w)| w).sum()).collect();
-    let mut alive = vec![true; samples.len()];
-    let mut heap: BinaryHeap<Crowded> =
-        weights.iter().enumerate().map(|(sample, &weight)| Crowded { weight, sample }).collect();
-    let mut left = samples.len();
-    while left > count {
-        let Some(top) = heap.pop() else { break };
-        // Weights only fall, so an entry that is out of date stands too high and comes up in time to be put right.
-        if top.weight > weights[top.sample] {
-            heap.push(Crowded { weight: weights[top.sample], sample: top.sample });
-            continue;
-        }
-        alive[top.sample] = false;
-        left -= 1;
-        for &(j, weight) in &neighbours[top.sample] {
-            weights[j] -= weight;
-        }
-    }
-    (0..samples.len()).filter(|&i| alive[i]).collect()
-}
-
-/// Gives each kept sample the part of `area` whose samples are nearest to it, on its own side.
-fn share_area(samples: &mut [Placed], kept: &[usize], area: f64) {
-    let near = tree(samples, kept.iter().copied());
-    let mut counts = vec![0_usize; samples.len()];
-    for sample in samples.iter() {
-        let here = sample.point.position.to_array();
-        let own = near.nearest_neighbor_iter(here).map(|spot| spot.data).find(|&k| same_side(sample, &samples[k]));
-        // On a part so thin that no kept sample shares the side, the nearest one stands for it.
-        if let Some(owner) = own.or_else(|| near.nearest_neighbor(here).map(|spot| spot.data)) {
-            counts[owner] += 1;
-        }
-    }
-    let share = area / samples.len() as f64;
-    for (sample, count) in samples.iter_mut().zip(counts) {
-        sample.point.area = share * count as f64;
-    }
-}
-
-/// What carries the point at `barycentric` of the triangle `corners`: its corners' joints and weights, blended, as
-/// [`heaviest_four`] gives them.
-///
-/// # Panics
-/// A corner is no vertex of `skinning`.
-#[must_use]
-pub fn blend_skinning(skinning: &Skinning, corners: [u32; 3], barycentric: [f64; 3]) -> ([u16; 4], [f32; 4]) {
-    let mut carriers: Vec<(u16, f64)> = Vec::new();
-    for (corner, part) in corners.into_iter().zip(barycentric) {
-        let vertex = corner as usize;
-        for (&joint, &weight) in skinning.joints[vertex].iter().zip(&skinning.weights[vertex]) {
-            let weight = part * f64::from(weight);
-            match carriers.iter_mut().find(|(known, _)| *known == joint) {
-                Some((_, sum)) => *sum += weight,
-                None => carriers.push((joint, weight)),
-            }
-        }
-    }
-    heaviest_four(carriers)
-}
-
-/// The four heaviest of `carriers` (joint, weight), heaviest first and made to sum to 1, as a row of [`Skinning`].
-/// Places left over hold joint 0 with weight 0.
-#[must_use]
-pub fn heaviest_four(mut carriers: Vec<(u16, f64)>) -> ([u16; 4], [f32; 4]) {
-    carriers.retain(|(_, weight)| *weight > 0.0);
-    carriers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    carriers.truncate(4);
-    let sum: f64 = carriers.iter().map(|(_, weight)| weight).sum();
-    let (mut joints, mut weights) = ([0; 4], [0.0; 4]);
-    for (slot, (joint, weight)) in carriers.into_iter().enumerate() {
-        joints[slot] = joint;
-        weights[slot] = (weight / sum) as f32;
-    }
-    (joints, weights)
-}
 
 #[cfg(test)]
 mod tests {
@@ -277,8 +226,9 @@ mod tests {
     #[test]
     fn the_distance_comes_from_elimination() {
         let (positions, triangles) = sheet(7, false);
-        let (samples, area) = scatter(&positions, &triangles, 600, 3).unwrap();
-        assert!((area - 1.0).abs() < 1e-12);
+        let pieces = Pieces::whole(&positions, &triangles).unwrap();
+        assert!((pieces.weight() - 1.0).abs() < 1e-12);
+        let samples = pieces.scatter(600, 3);
         assert!(least_spacing(&samples) < 0.65 * 2.0 * widest_radius(1.0, 600));
     }
 
@@ -318,23 +268,81 @@ mod tests {
     }
 
     #[test]
+    fn a_box_gets_its_edges_kept_clear_too() {
+        // Two sheets that meet at a right angle are one surface.
+        let (mut positions, mut triangles) = sheet(6, false);
+        let first = positions.len() as u32;
+        let (upright, others) = sheet(6, false);
+        positions.extend(upright.into_iter().map(|p| DVec3::new(0.0, p.y, -p.x)));
+        triangles.extend(others.into_iter().map(|[a, b, c]| [first + a, first + c, first + b]));
+        let placed = place_evenly(&positions, &triangles, 300, 2).unwrap();
+        let mut least = f64::INFINITY;
+        for (i, a) in placed.iter().enumerate() {
+            least = placed[..i].iter().map(|b| a.point.position.distance(b.point.position)).fold(least, f64::min);
+        }
+        assert!(least >= 0.65 * 2.0 * widest_radius(2.0, 300), "{least} m");
+    }
+
+    #[test]
+    fn a_density_sets_how_many_there_are_and_how_far_apart() {
+        // Nine times as dense on the right half, on triangles that are larger than the spacing there; none at the top.
+        let (positions, triangles) = sheet(4, false);
+        let density = |p: &SurfacePoint| match p.position {
+            p if p.y > 0.75 => 0.0,
+            p if p.x > 0.5 => 9.0,
+            _ => 1.0,
+        };
+        let placed = place_by_density(&positions, &triangles, 1000, 3, density).unwrap();
+        assert_eq!(placed.len(), 1000);
+        let (right, left): (Vec<Placed>, Vec<Placed>) = placed.iter().partition(|p| p.point.position.x > 0.5);
+        assert!(placed.iter().all(|p| p.point.position.y <= 0.75));
+        // As many to each side as there is density on it, but for what the edge between them takes.
+        assert!((860..=920).contains(&right.len()), "{}", right.len());
+        let spacing = |count: f64| 2.0 * widest_radius(0.375, 1) / count.sqrt();
+        assert!(least_spacing(&right) >= 0.65 * spacing(900.0), "{}", least_spacing(&right));
+        assert!(least_spacing(&left) >= 0.65 * spacing(100.0), "{}", least_spacing(&left));
+        let area: f64 = left.iter().map(|p| p.point.area).sum();
+        assert!((area - 0.375).abs() < 0.02, "{area} m²");
+
+        let why = |density: f64| place_by_density(&positions, &triangles, 9, 3, |_| density).unwrap_err().to_string();
+        assert!(why(-1.0).contains("density") && why(f64::NAN).contains("NaN") && why(0.0).contains("everywhere"));
+    }
+
+    #[test]
+    fn a_density_that_is_the_same_everywhere_is_no_density() {
+        let (positions, triangles) = sheet(4, false);
+        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5).unwrap();
+        assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(1.0, 300));
+        let area: f64 = placed.iter().map(|p| p.point.area).sum();
+        assert!((area - 1.0).abs() < 1e-9, "{area} m²");
+    }
+
+    #[test]
+    fn with_a_spacing_as_many_as_fit_keep_it() {
+        let (positions, triangles) = sheet(5, true);
+        for (spacing, seed) in [(0.05, 1), (0.05, 2), (0.3, 1), (3.0, 1)] {
+            let placed = place_apart(&positions, &triangles, spacing, seed).unwrap();
+            assert!(least_spacing(&placed) >= spacing, "{} m", least_spacing(&placed));
+            // Nobody fits in between: every place on the sheet has one within the spacing, but for the samples' own
+            // distance, of which there are nine for each disk of the densest packing.
+            let gap = spacing * (1.0 + 1.0 / 3.0);
+            for p in Pieces::whole(&positions, &triangles).unwrap().scatter(2000, 77) {
+                assert!(placed.iter().any(|q| same_side(&p, q) && p.point.position.distance(q.point.position) < gap));
+            }
+            // Random darts would take 0.547 of the plane, the densest packing 0.907.
+            let covered = placed.len() as f64 * std::f64::consts::PI * spacing * spacing / 4.0 / 2.0;
+            assert!(spacing > 0.1 || covered > 0.547, "{covered}");
+        }
+        let why = |spacing: f64| place_apart(&positions, &triangles, spacing, 1).unwrap_err().to_string();
+        assert!(why(0.0).contains("spacing") && why(f64::NAN).contains("spacing") && why(1e-6).contains("metres"));
+    }
+
+    #[test]
     fn what_has_no_surface_gets_no_taxels() {
         let (positions, triangles) = sheet(1, false);
         assert!(place_evenly(&positions, &triangles, 0, 1).is_err());
         assert!(place_evenly(&positions, &[], 5, 1).is_err());
         assert!(place_evenly(&positions, &[[0, 0, 1]], 5, 1).is_err());
         assert!(place_evenly(&positions, &[[0, 1, 9]], 5, 1).is_err());
-    }
-
-    #[test]
-    fn blended_weights_keep_the_heaviest_four_and_sum_to_one() {
-        let skinning = Skinning {
-            joints: vec![[0, 1, 2, 3], [1, 4, 0, 0], [5, 0, 0, 0]],
-            weights: vec![[0.4, 0.3, 0.2, 0.1], [0.5, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]],
-        };
-        let (joints, weights) = blend_skinning(&skinning, [0, 1, 2], [0.5, 0.3, 0.2]);
-        assert_eq!(joints, [1, 0, 5, 4]);
-        assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        assert!((f64::from(weights[0]) - 0.3 / 0.85).abs() < 1e-6);
     }
 }

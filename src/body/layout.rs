@@ -54,6 +54,8 @@ impl Default for MemberSpec {
 pub enum ChartKind {
     /// Orthogonal projection on the tangent plane at the origin.
     Plane,
+    /// Geodesic polar coordinates, as the layout has them: the shortest way on the surface from the origin.
+    Geodesic,
     /// No chart, by the author's wish.
     None,
 }
@@ -114,6 +116,12 @@ impl FieldSpec {
             && !(finite(chart.origin) && finite(chart.u))
         {
             return Err(bad("its chart has a number that is not finite".into()));
+        }
+        if let Some(chart) = &json.chart
+            && chart.kind == ChartKind::Geodesic
+            && (chart.origin.is_none() || chart.u.is_none())
+        {
+            return Err(bad("a geodesic chart needs its `origin` and `u`; lay it again".into()));
         }
         let mut members = BTreeMap::new();
         for (key, row) in json.members {
@@ -198,5 +206,6 @@ mod tests {
         assert!(why(r#"{"version":1,"name":"a","members":{"3":[1,2]}}"#).contains("member 3"));
         assert!(why(r#"{"version":2,"name":"a"}"#).contains("newer"));
         assert!(why(r#"{"version":1,"nam":"a"}"#).contains("nam"));
+        assert!(why(r#"{"version":1,"name":"a","chart":{"kind":"geodesic","u":[1,0,0]}}"#).contains("origin"));
     }
 }

@@ -13,6 +13,7 @@ mod layout;
 mod nodes;
 mod read;
 mod surface;
+mod topology;
 
 use std::path::Path;
 
@@ -21,6 +22,8 @@ use glam::{DAffine3, DMat3, DVec3};
 pub use glb::{Glb, MeshData, Skinning};
 pub use layout::{ChartKind, ChartSpec, FieldSpec, MemberSpec};
 pub use surface::{Hit, Home, Surface, SurfaceIndex};
+pub(crate) use topology::next;
+pub use topology::{Flaws, NONE, Topology};
 
 use crate::error::{Error, Result};
 

@@ -67,23 +67,24 @@ impl Body {
     /// The surface in the frame of `link`, searchable. With `reach`, only triangles that touch the ball (centre, radius).
     #[must_use]
     pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
-        let mut triangles = Vec::new();
-        for surface in &self.surfaces {
-            let Some(link_from_mesh) = surface.link_from_mesh(self, link) else { continue };
+        let near = |triangle: &Triangle| {
+            reach.is_none_or(|(centre, radius)| triangle.envelope().distance_2(&centre.to_array()) <= radius * radius)
+        };
+        let sound = |triangle: &Triangle| near(triangle) && triangle.unit_normal().is_some();
+        SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
+    }
+
+    /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
+    pub fn triangles_in_link(&self, link: usize) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        let seen = self.surfaces.iter().filter_map(move |surface| Some((surface, surface.link_from_mesh(self, link)?)));
+        seen.flat_map(|(surface, link_from_mesh)| {
             let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
             let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
-            for &[a, b, c] in &surface.triangles {
+            surface.triangles.iter().map(move |&[a, b, c]| {
                 let [a, b, c] = [points[a as usize], points[b as usize], points[c as usize]];
-                let triangle = Triangle(if mirrored { [a, c, b] } else { [a, b, c] });
-                let near = |(centre, radius): (DVec3, f64)| {
-                    triangle.envelope().distance_2(&centre.to_array()) <= radius * radius
-                };
-                if reach.is_none_or(near) && triangle.unit_normal().is_some() {
-                    triangles.push(triangle);
-                }
-            }
-        }
-        SurfaceIndex::new(triangles)
+                if mirrored { [a, c, b] } else { [a, b, c] }
+            })
+        })
     }
 }
 
@@ -174,19 +175,23 @@ pub struct Hit {
     pub position: DVec3,
     /// The outward unit normal of the triangle there.
     pub normal: DVec3,
+    /// The triangle, as a number among all those that the index was made of.
+    pub triangle: usize,
 }
 
 /// A surface's triangles in one frame, in a tree.
 #[derive(Debug)]
 pub struct SurfaceIndex {
-    tree: RTree<GeomWithData<Triangle, DVec3>>,
+    /// Each with its outward unit normal and its number.
+    tree: RTree<GeomWithData<Triangle, (DVec3, u32)>>,
 }
 
 impl SurfaceIndex {
     fn new(triangles: Vec<Triangle>) -> Self {
         let triangles = triangles
             .into_iter()
-            .filter_map(|triangle| Some(GeomWithData::new(triangle, triangle.unit_normal()?)))
+            .zip(0..)
+            .filter_map(|(triangle, number)| Some(GeomWithData::new(triangle, (triangle.unit_normal()?, number))))
             .collect();
         Self { tree: RTree::bulk_load(triangles) }
     }
@@ -207,7 +212,15 @@ impl SurfaceIndex {
     #[must_use]
     pub fn nearest(&self, p: DVec3) -> Option<Hit> {
         let triangle = self.tree.nearest_neighbor(p.to_array())?;
-        Some(Hit { position: triangle.geom().nearest(p), normal: triangle.data })
+        let (normal, number) = triangle.data;
+        Some(Hit { position: triangle.geom().nearest(p), normal, triangle: number as usize })
+    }
+
+    /// The mean outward unit normal of the triangles within `within_m` of `p`.
+    #[must_use]
+    pub fn normal_around(&self, p: DVec3, within_m: f64) -> Option<DVec3> {
+        let around = self.tree.locate_within_distance(p.to_array(), within_m * within_m);
+        around.map(|triangle| triangle.data.0).sum::<DVec3>().try_normalize()
     }
 
     /// Where the line through `p` along the unit vector `direction` meets the surface nearest to `p`, among places
@@ -217,10 +230,10 @@ impl SurfaceIndex {
         let ends = AABB::from_corners((p - direction * reach).to_array(), (p + direction * reach).to_array());
         self.tree
             .locate_in_envelope_intersecting(ends)
-            .filter(|triangle| triangle.data.dot(direction) > 0.0)
+            .filter(|triangle| triangle.data.0.dot(direction) > 0.0)
             .filter_map(|triangle| Some((triangle.geom().pierced(p, direction)?, triangle.data)))
             .filter(|(t, _)| t.abs() <= reach)
             .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
-            .map(|(t, normal)| Hit { position: p + direction * t, normal })
+            .map(|(t, (normal, number))| Hit { position: p + direction * t, normal, triangle: number as usize })
     }
 }

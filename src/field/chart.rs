@@ -3,14 +3,18 @@
 //! The tangent plane's chart is the orthogonal projection on the plane through the origin across the members' mean
 //! normal. It keeps lengths along the surface up to the cosine of the tilt, and it exists only where the surface is
 //! seen from one side: no member's normal more than 75° from the mean, all members on one link.
+//!
+//! A geodesic chart has each place where the shortest way over the surface leads: its length in the direction in which it
+//! leaves the origin. It unrolls a limb. The layout has it ready; [`super::Unroller`] makes it.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
+use super::distortion::Distortion;
 use super::{Field, Member, anchor_from_link};
-use crate::body::{Body, ChartKind, FieldSpec};
+use crate::body::{Body, ChartKind, FieldSpec, Hit};
 
 /// cos 75°: how far a member's normal may lie from the mean.
 const LEAST_COSINE: f64 = 0.258_819_045_102_520_76;
@@ -29,8 +33,11 @@ pub struct Chart {
     pub v_in_anchor: DVec3,
     /// Outward normal in the anchor's frame.
     pub normal_in_anchor: DVec3,
-    /// The largest shortening of a small step along the surface at any member: for a plane, 1 − cos(tilt).
+    /// How far it is from true to length: the largest relative error of the distance between neighbouring members, as
+    /// [`Distortion`] has it.
     pub distortion: f64,
+    /// The root mean square of the same.
+    pub distortion_rms: f64,
 }
 
 /// Why a field has no chart.
@@ -42,6 +49,31 @@ pub enum NoChart {
     Wraps(f64),
     /// The layout asks for none.
     ByChoice,
+    /// It is to be geodesic, and so many members have no (u, v) in the layout.
+    Unplaced(usize),
+    /// It has no taxels of its own to chart.
+    NoTaxels,
+    /// There is no surface to measure ways on.
+    NoSurface,
+    /// A way to the taxel of this id cannot be found: it is on another part of the surface than the origin, as are so
+    /// many members in all.
+    Unreachable(u32, usize),
+    /// Two ways to the taxel of this id are about as short as each other, and leave this far apart, rad: there the field
+    /// meets itself around a limb or a knob.
+    CutLocus {
+        /// Id of the taxel.
+        taxel: u32,
+        /// Length of the shorter way, m.
+        distance_m: f64,
+        /// The angle between the two, rad.
+        apart_rad: f64,
+    },
+    /// Neighbours of these ids are so many times as far apart in the chart as on the surface.
+    Torn(u32, u32, f64),
+    /// The way to the taxel of this id bends by this much around a hole, or the surface's edge, rad.
+    Bent(u32, f64),
+    /// Ways cannot be followed, for this reason.
+    TooRough(String),
 }
 
 impl fmt::Display for NoChart {
@@ -52,6 +84,33 @@ impl fmt::Display for NoChart {
                 write!(f, "it wraps around: a normal lies {:.0}° from the mean, over 75°; split it", angle.to_degrees())
             }
             Self::ByChoice => f.write_str("the layout asks for none"),
+            Self::Unplaced(count) => {
+                write!(f, "it is to be geodesic, and {count} of its taxels have no (u, v); lay it again")
+            }
+            Self::NoTaxels => f.write_str("it has no taxels of its own; list those that it is to chart"),
+            Self::NoSurface => f.write_str("there is no surface to measure ways on; add the mesh"),
+            Self::Unreachable(taxel, count) => write!(
+                f,
+                "no way over the surface leads from its origin to taxel {taxel}, nor to {} more; split it, or join the \
+                 parts of the mesh",
+                count - 1
+            ),
+            Self::CutLocus { taxel, distance_m, apart_rad } => write!(
+                f,
+                "it meets itself around a limb or a knob: to taxel {taxel}, {:.1} mm away, two ways lead that leave {:.0}° \
+                 apart; split it",
+                distance_m * 1e3,
+                apart_rad.to_degrees()
+            ),
+            Self::Torn(a, b, times) => {
+                write!(f, "it meets itself: taxels {a} and {b} would be {times:.1} times too far apart; split it")
+            }
+            Self::Bent(taxel, bend) => write!(
+                f,
+                "the way to taxel {taxel} bends by {:.0}° around a hole or the surface's edge; split it",
+                bend.to_degrees()
+            ),
+            Self::TooRough(why) => f.write_str(why),
         }
     }
 }
@@ -81,41 +140,56 @@ pub(super) fn complete(
     let mean_normal = in_anchor.iter().map(|(_, normal)| *normal).sum::<DVec3>().try_normalize();
     let least_cosine = mean_normal.map_or(-1.0, |mean| in_anchor.iter().map(|(_, n)| n.dot(mean)).fold(1.0, f64::min));
 
-    let refusal = if spec.chart.is_some_and(|chart| chart.kind == ChartKind::None) {
+    let kind = spec.chart.map_or(ChartKind::Plane, |chart| chart.kind);
+    let unplaced = taxels.iter().filter(|(.., uv)| uv.is_none()).count();
+    let refusal = if kind == ChartKind::None {
         Some(NoChart::ByChoice)
     } else if links.len() > 1 || anchor.is_none() {
         Some(NoChart::SeveralLinks(links.len()))
+    } else if kind == ChartKind::Geodesic {
+        (unplaced > 0).then_some(NoChart::Unplaced(unplaced))
     } else if least_cosine < LEAST_COSINE {
         Some(NoChart::Wraps(least_cosine.clamp(-1.0, 1.0).acos()))
     } else {
         None
     };
-    let (origin_in_anchor, chart) = match (refusal, mean_normal, anchor) {
+    let wanted_origin = spec.chart.and_then(|chart| chart.origin_in_anchor).map(DVec3::from_array);
+    let wanted_u = spec.chart.and_then(|chart| chart.u_in_anchor).map(DVec3::from_array);
+    let (origin_in_anchor, frame) = match (refusal, mean_normal, anchor) {
+        (None, _, Some(anchor)) if kind == ChartKind::Geodesic => {
+            let origin = wanted_origin.unwrap_or(mean_position);
+            let normal = normal_at(body, anchor, origin, &in_anchor);
+            (origin, Ok(frame(normal, wanted_u)))
+        }
         (None, Some(normal), Some(anchor)) => {
-            let origin = spec.chart.and_then(|chart| chart.origin_in_anchor).map(DVec3::from_array);
-            let origin = origin.unwrap_or_else(|| origin_on_surface(body, anchor, mean_position, &in_anchor));
-            let u = spec.chart.and_then(|chart| chart.u_in_anchor).map(DVec3::from_array);
-            (origin, Ok(plane(normal, u, least_cosine)))
+            let origin = wanted_origin.unwrap_or_else(|| origin_on_surface(body, anchor, mean_position, &in_anchor));
+            (origin, Ok(frame(normal, wanted_u)))
         }
         (refusal, ..) => (mean_position, Err(refusal.unwrap_or(NoChart::Wraps(std::f64::consts::PI)))),
     };
-    let members = taxels
+    let place_of = |uv: Option<[f64; 2]>, position: DVec3| {
+        let offset = position - origin_in_anchor;
+        match (&frame, kind, uv) {
+            (Ok(_), ChartKind::Geodesic, Some([u, v])) => DVec3::new(u, v, 0.0),
+            (Ok([u, v, normal]), ..) => DVec3::new(offset.dot(*u), offset.dot(*v), offset.dot(*normal)),
+            (Err(_), ..) => offset,
+        }
+    };
+    let members: Vec<Member> = taxels
         .iter()
         .zip(&in_anchor)
-        .map(|(&(taxel, weight, _), (position, _))| {
-            let offset = *position - origin_in_anchor;
-            let place = match &chart {
-                Ok(chart) => chart.project(offset),
-                Err(_) => offset,
-            };
-            Member { taxel, weight, place }
-        })
+        .map(|(&(taxel, weight, uv), (position, _))| Member { taxel, weight, place: place_of(uv, *position) })
         .collect();
+    let chart = frame.map(|[u_in_anchor, v_in_anchor, normal_in_anchor]| {
+        let places: Vec<DVec2> = members.iter().map(|member| member.place.truncate()).collect();
+        let Distortion { largest, rms, .. } = Distortion::of(&in_anchor, &places);
+        Chart { kind, u_in_anchor, v_in_anchor, normal_in_anchor, distortion: largest, distortion_rms: rms }
+    });
     Field { name: spec.name.clone(), parent, anchor, members, origin_in_anchor, chart }
 }
 
 /// The surface point nearest to `mean`; without a surface, `mean` itself.
-fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
+pub(super) fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
     let radius = members.iter().map(|(position, _)| position.distance(mean)).fold(0.0, f64::max);
     // The members lie on the surface, so that the nearest point is no farther than they are.
     let surface = body.surface_in_link(anchor, Some((mean, radius * 1.01 + 1e-6)));
@@ -123,17 +197,21 @@ fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3, members: &[(DVec3,
     surface.nearest(mean).map_or(mean, |hit| hit.position)
 }
 
-fn plane(normal: DVec3, wanted_u: Option<DVec3>, least_cosine: f64) -> Chart {
+/// The surface's normal at `origin`, or where there is none that of the nearest member.
+fn normal_at(body: &Body, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
+    let radius = members.iter().map(|(position, _)| position.distance(origin)).fold(0.0, f64::max);
+    let surface = body.surface_in_link(anchor, Some((origin, radius * 0.1 + 1e-6)));
+    let around = |hit: Hit| surface.normal_around(hit.position, radius * 1e-6 + 1e-9);
+    let nearest = members.iter().min_by(|a, b| a.0.distance(origin).total_cmp(&b.0.distance(origin)));
+    surface.nearest(origin).and_then(around).or(nearest.map(|(_, normal)| *normal)).unwrap_or(DVec3::Z)
+}
+
+/// (u, v, normal) with u along `wanted_u` as far as it is tangential, or along the default.
+pub(super) fn frame(normal: DVec3, wanted_u: Option<DVec3>) -> [DVec3; 3] {
     let across = |direction: DVec3| (direction - normal * direction.dot(normal)).try_normalize();
     let default = || if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X };
     let u = wanted_u.and_then(across).or_else(|| across(default())).unwrap_or(normal.any_orthonormal_vector());
-    Chart {
-        kind: ChartKind::Plane,
-        u_in_anchor: u,
-        v_in_anchor: normal.cross(u),
-        normal_in_anchor: normal,
-        distortion: (1.0 - least_cosine).max(0.0),
-    }
+    [u, normal.cross(u), normal]
 }
 
 impl Chart {

@@ -1,17 +1,18 @@
 //! From chart coordinates back to the surface.
 //!
 //! A centroid is a point (u, v) of a chart; where that is on the skin, and which way the skin looks there, is read from
-//! a grid over the chart that holds the surface's depth and normal at its nodes, bilinear in between. The grid is made
-//! once from the body's triangles, at half the members' spacing, so that a frame costs a few multiplications instead of
-//! a search through the mesh.
+//! a grid over the chart that holds the surface and its normal at its nodes, bilinear in between. The grid is made once
+//! from the body's triangles, at half the members' spacing, so that a frame costs a few multiplications instead of a
+//! search through the mesh.
 
 use glam::{DVec2, DVec3};
 
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::curved::Curved;
 use super::{Chart, Field, anchor_from_link};
-use crate::body::{Body, SurfaceIndex};
+use crate::body::{Body, ChartKind, SurfaceIndex};
 
 /// A field's grid has at most this many nodes a side.
 const MOST_NODES: f64 = 96.0;
@@ -23,8 +24,8 @@ pub struct Lift {
     cell_m: DVec2,
     columns: usize,
     rows: usize,
-    /// Depth along the chart's normal, m, and the normal in chart axes; row by row.
-    nodes: Vec<(f64, DVec3)>,
+    /// What the surface's point is in chart axes beyond (u, v, 0), m, and the normal in chart axes; row by row.
+    nodes: Vec<(DVec3, DVec3)>,
     steepest: (f64, f64),
 }
 
@@ -50,32 +51,45 @@ impl Lift {
         let (columns, rows) = (cells.x as usize + 1, cells.y as usize + 1);
 
         let reach = 2.0 * field.radius_m() + 1e-3;
-        let members = field.members.iter().enumerate();
-        let sampler = Sampler {
-            body,
-            field,
-            chart,
-            surface: body.surface_in_link(anchor, Some((field.origin_in_anchor, reach))),
-            reach,
-            members: RTree::bulk_load(
-                members.map(|(i, m)| GeomWithData::new(m.place.truncate().to_array(), i)).collect(),
-            ),
-        };
-        let mut nodes = Vec::with_capacity(columns * rows);
-        for row in 0..rows {
-            for column in 0..columns {
-                let uv = low + cell_m * DVec2::new(column as f64, row as f64);
-                nodes.push(sampler.at(uv));
+        let surface = body.surface_in_link(anchor, Some((field.origin_in_anchor, reach)));
+        let uvs = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+        let uvs = uvs.map(|(column, row)| low + cell_m * DVec2::new(column as f64, row as f64));
+        let nodes = match chart.kind {
+            ChartKind::Geodesic => {
+                let curved = Curved::new(body, field, chart.u_in_anchor, &surface);
+                let node = |uv: DVec2| {
+                    let (offset, normal) = curved.at(uv);
+                    (chart.project(offset) - uv.extend(0.0), chart.project(normal))
+                };
+                uvs.map(node).collect()
             }
-        }
+            ChartKind::Plane | ChartKind::None => {
+                let members = field.members.iter().enumerate();
+                let places = members.map(|(i, m)| GeomWithData::new(m.place.truncate().to_array(), i)).collect();
+                let sampler = Sampler { body, field, chart, surface, reach, members: RTree::bulk_load(places) };
+                uvs.map(|uv| sampler.at(uv)).map(|(depth, normal)| (DVec3::Z * depth, normal)).collect()
+            }
+        };
         let mut lift = Self { corner: low, cell_m, columns, rows, nodes, steepest: (0.0, 0.0) };
-        lift.steepest = lift.steepest_change();
+        lift.steepest = match chart.kind {
+            ChartKind::Geodesic => lift.steepest_anywhere(),
+            ChartKind::Plane | ChartKind::None => lift.steepest_over_plane(),
+        };
         Some(lift)
     }
 
-    /// Depth (m) and outward unit normal, in chart axes, of the surface over (u, v); beyond the grid, those of its rim.
+    /// Whether the members' box, and a cell around it, holds (u, v): elsewhere nothing is known of the surface.
     #[must_use]
-    pub fn at(&self, uv: DVec2) -> (f64, DVec3) {
+    pub fn covers(&self, uv: DVec2) -> bool {
+        let last = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64);
+        let at = (uv - self.corner) / self.cell_m;
+        at.cmpge(DVec2::NEG_ONE).all() && at.cmple(last + DVec2::ONE).all()
+    }
+
+    /// The surface's point at (u, v) and its outward unit normal, both in chart axes from the field's origin, m; beyond
+    /// the grid, those of its rim.
+    #[must_use]
+    pub fn at(&self, uv: DVec2) -> (DVec3, DVec3) {
         let last = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64);
         let at = ((uv - self.corner) / self.cell_m).clamp(DVec2::ZERO, last);
         let low = at.floor().min(last - DVec2::ONE).max(DVec2::ZERO);
@@ -84,43 +98,70 @@ impl Lift {
         let node = |dx: usize, dy: usize| {
             self.nodes[(row + dy).min(self.rows - 1) * self.columns + (column + dx).min(self.columns - 1)]
         };
-        let mix = |a: (f64, DVec3), b: (f64, DVec3), t: f64| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
-        let (depth, normal) = mix(mix(node(0, 0), node(1, 0), part.x), mix(node(0, 1), node(1, 1), part.x), part.y);
-        (depth, normal.normalize_or(DVec3::Z))
+        let mix = |a: (DVec3, DVec3), b: (DVec3, DVec3), t: f64| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
+        let (beyond, normal) = mix(mix(node(0, 0), node(1, 0), part.x), mix(node(0, 1), node(1, 1), part.x), part.y);
+        (uv.extend(0.0) + beyond, normal.normalize_or(DVec3::Z))
     }
 
-    /// How much depth and normal change at most per metre of (u, v): Lipschitz constants of [`Lift::at`].
+    /// How much point and normal change at most per metre of (u, v): Lipschitz constants of [`Lift::at`].
     ///
-    /// Along a cell's edges the interpolant is linear; inside, its gradient lies between those of opposite edges. A
-    /// normalised vector turns by at most twice the change over the shorter length, and no node's normal falls below
-    /// cos 75° along the chart's normal, hence the factor 2/0.2588.
+    /// Along a cell's edges the interpolant is linear; inside, its gradient lies between those of opposite edges. Over a
+    /// plane, a depth of slope L changes the point by √(1 + L²); else all three coordinates are taken together. A
+    /// normalised vector turns by at most twice the change over the shorter length. Over a plane no node's normal falls
+    /// below cos 75° along the chart's normal, hence the factor 2/0.2588; else the shortest that a cell's normals can make
+    /// is found, and where they may cancel out there is no bound.
     #[must_use]
     pub fn lipschitz(&self) -> (f64, f64) {
         self.steepest
     }
 
-    fn steepest_change(&self) -> (f64, f64) {
-        let (mut depth, mut normal) = (DVec2::ZERO, DVec2::ZERO);
+    fn steepest_over_plane(&self) -> (f64, f64) {
+        let (depth, normal) = self.slopes(|beyond, _| beyond);
+        ((1.0 + depth.length_squared()).sqrt(), normal.length() * 2.0 / 0.258_8)
+    }
+
+    fn steepest_anywhere(&self) -> (f64, f64) {
+        let (point, normal) = self.slopes(|beyond, step| beyond + step.extend(0.0));
+        let mut shortest: f64 = 1.0;
+        for row in 0..self.rows - 1 {
+            for column in 0..self.columns - 1 {
+                let at = |dx: usize, dy: usize| self.nodes[(row + dy) * self.columns + column + dx].1;
+                let corners = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+                // Any mean of them is at least as long as it is along their middle.
+                let middle = corners.iter().sum::<DVec3>().normalize_or_zero();
+                shortest = corners.iter().map(|corner| corner.dot(middle)).fold(shortest, f64::min);
+            }
+        }
+        (point.length(), if shortest > 0.0 { normal.length() * 2.0 / shortest } else { f64::INFINITY })
+    }
+
+    /// Per direction, how much a metre of it changes at most a node's point, as `of` takes it from what is beyond (u, v)
+    /// and the step in (u, v), and the normal.
+    fn slopes(&self, of: impl Fn(DVec3, DVec2) -> DVec3) -> (DVec2, DVec2) {
+        let (mut point, mut normal) = (DVec2::ZERO, DVec2::ZERO);
+        let between = |a: (DVec3, DVec3), b: (DVec3, DVec3), step: DVec2| {
+            (of(b.0 - a.0, step).length() / step.length(), b.1.distance(a.1) / step.length())
+        };
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let here = self.nodes[row * self.columns + column];
                 if column + 1 < self.columns {
                     let right = self.nodes[row * self.columns + column + 1];
-                    depth.x = depth.x.max((right.0 - here.0).abs() / self.cell_m.x);
-                    normal.x = normal.x.max(right.1.distance(here.1) / self.cell_m.x);
+                    let (p, n) = between(here, right, DVec2::X * self.cell_m.x);
+                    (point.x, normal.x) = (point.x.max(p), normal.x.max(n));
                 }
                 if row + 1 < self.rows {
                     let above = self.nodes[(row + 1) * self.columns + column];
-                    depth.y = depth.y.max((above.0 - here.0).abs() / self.cell_m.y);
-                    normal.y = normal.y.max(above.1.distance(here.1) / self.cell_m.y);
+                    let (p, n) = between(here, above, DVec2::Y * self.cell_m.y);
+                    (point.y, normal.y) = (point.y.max(p), normal.y.max(n));
                 }
             }
         }
-        (depth.length(), normal.length() * 2.0 / 0.258_8)
+        (point, normal)
     }
 }
 
-/// What a node's depth and normal are made from.
+/// What a node's depth and normal over a plane are made from.
 struct Sampler<'a> {
     body: &'a Body,
     field: &'a Field,

@@ -4,16 +4,22 @@
 //! taxels, every field an anchor, and a chart where one exists.
 
 mod chart;
+mod curved;
+mod distortion;
+pub mod geodesic;
 mod lift;
 mod neighbours;
+mod unroll;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DAffine3, DVec3};
 
 pub use chart::{Chart, NoChart};
+pub use distortion::Distortion;
 pub use lift::Lift;
 pub use neighbours::neighbours;
+pub use unroll::Unroller;
 
 use crate::body::Body;
 use crate::error::{Error, Result};
@@ -28,8 +34,8 @@ pub struct Member {
     pub taxel: usize,
     /// Weight w > 0.
     pub weight: f64,
-    /// (u, v, depth along the normal) in the field's chart, m; of a field without one, the offset from its origin along
-    /// its anchor's axes.
+    /// (u, v, depth along the normal) in the field's chart, m, where the depth of a geodesic one is 0; of a field without
+    /// a chart, the offset from its origin along its anchor's axes.
     pub place: DVec3,
 }
 

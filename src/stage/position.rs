@@ -6,21 +6,21 @@
 //! This stage is the host's, in f64, on every backend: a body ten kilometres from its origin keeps its millimetres, which
 //! single precision could not, and only percepts that are wanted and in contact pay for it.
 //!
-//! **Bound.** The lift is Lipschitz in (u, v): |δp| ≤ √(1 + L²)·‖δc‖ with L the grid's steepest slope.
+//! **Bound.** The lift is Lipschitz in (u, v): |δp| ≤ L·‖δc‖ with L the grid's steepest change.
 
 use glam::{DVec2, DVec3};
 
 use crate::field::{Chart, Lift};
 
-/// The surface point over `place` (m, in the chart), and the normal there, both in the anchor's frame.
+/// The surface point at `place` (m, in the chart), and the normal there, both in the anchor's frame.
 pub(crate) fn on_surface(chart: &Chart, lift: &Lift, origin_in_anchor: DVec3, place: DVec2) -> (DVec3, DVec3) {
-    let (depth, normal) = lift.at(place);
-    (origin_in_anchor + chart.unproject(place.extend(depth)), chart.unproject(normal))
+    let (point, normal) = lift.at(place);
+    (origin_in_anchor + chart.unproject(point), chart.unproject(normal))
 }
 
 /// How far position and normal may be off when (u, v) is off by `place` (m).
 pub(crate) fn bound(lift: &Lift, place: f64) -> (f64, f64) {
-    let (depth, normal) = lift.lipschitz();
+    let (point, normal) = lift.lipschitz();
     // The last term is the f64 arithmetic of the lift itself.
-    (place * (1.0 + depth * depth).sqrt() + 1e-12, place * normal + 1e-12)
+    (place * point + 1e-12, place * normal + 1e-12)
 }

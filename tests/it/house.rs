@@ -98,7 +98,7 @@ fn each_heavy_dependency_has_one_door() {
         ("clap", "cli"),
         ("comfy_table", "cli"),
         ("toml", "signal|source/simulated"),
-        ("rayon", "backend/cpu|experiments"),
+        ("rayon", "backend/cpu|experiments|author/crowd.rs"),
         ("globset", "scene"),
         ("plotters", "experiments/plot.rs"),
         ("png", "experiments/plot.rs"),

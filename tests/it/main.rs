@@ -7,6 +7,7 @@ mod common;
 mod draft;
 mod extremes;
 mod filter;
+mod geodesic;
 mod house;
 mod legal;
 mod letters;

@@ -49,6 +49,7 @@ fn field(body: &Body, fields: &[Field], field: &Field) -> Value {
             "v": chart.v_in_anchor.to_array(),
             "normal": chart.normal_in_anchor.to_array(),
             "distortion": chart.distortion,
+            "distortion_rms": chart.distortion_rms,
         })),
     });
     if let Err(reason) = &field.chart {

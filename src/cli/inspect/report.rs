@@ -104,6 +104,7 @@ fn tree(body: &Body, fields: &[Field]) -> Table {
 fn kind(kind: ChartKind) -> &'static str {
     match kind {
         ChartKind::Plane => "plane",
+        ChartKind::Geodesic => "geodesic",
         ChartKind::None => "none",
     }
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::body::SurfaceIndex;
-use crate::field::Chart;
+use crate::field::{Chart, Lift};
 
 /// A waypoint in a link's frame may lie so far off the surface, and a chart's surface so far beyond its members' depth.
 const REACH_M: f64 = 0.02;
@@ -21,6 +21,8 @@ const NEARLY_PARALLEL: f64 = 0.984_807_753_012_208;
 pub(super) enum Ground {
     /// (u, v, 0) in a field's chart, taken along its normal to the surface.
     Chart { chart: Chart, origin_in_link: DVec3, reach_m: f64 },
+    /// (u, v, 0) in a field's geodesic chart, taken to the surface as percepts' positions are.
+    Curved { chart: Chart, origin_in_link: DVec3, lift: Box<Lift> },
     /// Points in the link's frame, taken to the nearest point of the surface.
     Link,
 }
@@ -72,6 +74,12 @@ impl Path {
                 let uv = Some([waypoint.x, waypoint.y]);
                 Some(Place { position_in_link: hit.position, normal_in_link: hit.normal, uv })
             }
+            Ground::Curved { chart, origin_in_link, lift } => {
+                let (point, _) = lift.covers(waypoint.truncate()).then(|| lift.at(waypoint.truncate()))?;
+                let hit = self.surface.nearest(*origin_in_link + chart.unproject(point))?;
+                let uv = Some([waypoint.x, waypoint.y]);
+                Some(Place { position_in_link: hit.position, normal_in_link: hit.normal, uv })
+            }
             Ground::Link => {
                 let hit = self.surface.nearest(waypoint)?;
                 let near = hit.position.distance(waypoint) <= REACH_M;
@@ -81,12 +89,17 @@ impl Path {
     }
 
     /// In the tangent plane at `place`, the direction at `angle` from +u to +v: seen along the chart's normal it lies at
-    /// that angle in the chart. A link's +u is its +x, or +z where that is within 10° of the normal.
+    /// that angle in the chart; in a geodesic chart it leads where a small step at that angle does. A link's +u is its +x, or +z where that is within 10° of the normal.
     pub(super) fn direction(&self, place: &Place, angle: f64) -> DVec3 {
         let normal = place.normal_in_link;
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
         let (flat, upward) = match &self.ground {
             Ground::Chart { chart, .. } => (chart.u_in_anchor * cos + chart.v_in_anchor * sin, chart.normal_in_anchor),
+            Ground::Curved { chart, lift, .. } => {
+                let at = place.uv.map_or(DVec2::ZERO, DVec2::from_array);
+                let ahead = at + DVec2::new(cos, sin) * STEP_M;
+                (chart.unproject(lift.at(ahead).0 - lift.at(at).0), normal)
+            }
             Ground::Link => {
                 let u = if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X };
                 let u = (u - normal * u.dot(normal)).normalize();
@@ -127,6 +140,7 @@ mod tests {
             v_in_anchor: DVec3::NEG_X,
             normal_in_anchor: DVec3::Z,
             distortion: 0.0,
+            distortion_rms: 0.0,
         };
         let on_chart = path(Ground::of_field(chart.clone(), DVec3::ZERO, 0.0));
         let normal_in_link = DVec3::new(0.5, -0.3, 0.7).normalize();

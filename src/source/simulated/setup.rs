@@ -10,9 +10,9 @@ use super::contact::{Indenter, Skin};
 use super::file::{AngleKeys, IndenterName, SkinKeys, Text, TouchKeys};
 use super::path::{Ground, Path};
 use super::profile::Profile;
-use crate::body::{Body, SurfaceIndex};
+use crate::body::{Body, ChartKind, SurfaceIndex};
 use crate::error::Result;
-use crate::field::FieldSet;
+use crate::field::{FieldSet, Lift};
 
 /// One touch, ready to be asked where it is and how hard it presses.
 pub(super) struct Touch {
@@ -36,7 +36,7 @@ impl Touch {
     pub(super) fn leaves_surface(&self, t_s: f64) -> String {
         let place = self.path.waypoint(t_s);
         let at = match self.path.ground {
-            Ground::Chart { .. } => format!("(u, v) = ({:.4}, {:.4}) m", place.x, place.y),
+            Ground::Chart { .. } | Ground::Curved { .. } => format!("(u, v) = ({:.4}, {:.4}) m", place.x, place.y),
             Ground::Link => format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z),
         };
         format!("`path` leaves the surface at {t_s:.3} s, at {at}; keep it on the body, or the force at 0 there")
@@ -152,6 +152,11 @@ impl Setup<'_> {
             return Err(self.text.unknown(&keys.on, "there is no field", self.names()));
         };
         match (&field.chart, field.anchor) {
+            (Ok(chart), Some(link)) if chart.kind == ChartKind::Geodesic => {
+                let lift = Lift::new(self.body, field).expect("it has a chart");
+                let (chart, origin_in_link) = (chart.clone(), field.origin_in_anchor);
+                Ok((link, Some(on.clone()), Ground::Curved { chart, origin_in_link, lift: Box::new(lift) }))
+            }
             (Ok(chart), Some(link)) => {
                 let deepest_m = field.members.iter().map(|member| member.place.z.abs()).fold(0.0, f64::max);
                 let ground = Ground::of_field(chart.clone(), field.origin_in_anchor, deepest_m);

@@ -1,0 +1,57 @@
+//! What carries a point of a skinned surface.
+
+use crate::body::Skinning;
+
+/// What carries the point at `barycentric` of the triangle `corners`: its corners' joints and weights, blended, as
+/// [`heaviest_four`] gives them.
+///
+/// # Panics
+/// A corner is no vertex of `skinning`.
+#[must_use]
+pub fn blend_skinning(skinning: &Skinning, corners: [u32; 3], barycentric: [f64; 3]) -> ([u16; 4], [f32; 4]) {
+    let mut carriers: Vec<(u16, f64)> = Vec::new();
+    for (corner, part) in corners.into_iter().zip(barycentric) {
+        let vertex = corner as usize;
+        for (&joint, &weight) in skinning.joints[vertex].iter().zip(&skinning.weights[vertex]) {
+            let weight = part * f64::from(weight);
+            match carriers.iter_mut().find(|(known, _)| *known == joint) {
+                Some((_, sum)) => *sum += weight,
+                None => carriers.push((joint, weight)),
+            }
+        }
+    }
+    heaviest_four(carriers)
+}
+
+/// The four heaviest of `carriers` (joint, weight), heaviest first and made to sum to 1, as a row of [`Skinning`].
+/// Places left over hold joint 0 with weight 0.
+#[must_use]
+pub fn heaviest_four(mut carriers: Vec<(u16, f64)>) -> ([u16; 4], [f32; 4]) {
+    carriers.retain(|(_, weight)| *weight > 0.0);
+    carriers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    carriers.truncate(4);
+    let sum: f64 = carriers.iter().map(|(_, weight)| weight).sum();
+    let (mut joints, mut weights) = ([0; 4], [0.0; 4]);
+    for (slot, (joint, weight)) in carriers.into_iter().enumerate() {
+        joints[slot] = joint;
+        weights[slot] = (weight / sum) as f32;
+    }
+    (joints, weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blended_weights_keep_the_heaviest_four_and_sum_to_one() {
+        let skinning = Skinning {
+            joints: vec![[0, 1, 2, 3], [1, 4, 0, 0], [5, 0, 0, 0]],
+            weights: vec![[0.4, 0.3, 0.2, 0.1], [0.5, 0.5, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]],
+        };
+        let (joints, weights) = blend_skinning(&skinning, [0, 1, 2], [0.5, 0.3, 0.2]);
+        assert_eq!(joints, [1, 0, 5, 4]);
+        assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        assert!((f64::from(weights[0]) - 0.3 / 0.85).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,421 @@
+//! Windows, the queue that they wait in, and what they say of a place.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+
+use super::Place;
+use super::source::{Fan, Source, Start, Wedge};
+use crate::body::{NONE, Topology, next};
+use crate::error::{Error, Result};
+
+/// Windows after which a surface counts as too rough.
+const MOST_WINDOWS: usize = 2_000_000;
+
+/// A way is shorter than another only by more than this part of it: rounding along a row of unfolded triangles.
+const ROUNDING: f64 = 1e-12;
+
+/// Windows narrower than this part of their edge are rounding.
+const LEAST_WIDTH: f64 = 1e-12;
+
+/// Ways to one place that leave further apart than this are two ways, 20°.
+const APART: f64 = PI / 9.0;
+
+/// What straight lines from a source reach of an edge.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    /// The edge, as that of the triangle that is entered through it.
+    edge: u32,
+    /// Index of the source.
+    source: u32,
+    /// The edge's ends, unfolded with the source at the origin.
+    ends: [DVec2; 2],
+    /// The part of the edge that is reached, from 0 to 1.
+    part: [f64; 2],
+    /// The angle of the x-axis at the source, rad.
+    base_rad: f64,
+    /// The window before it in the list of those that enter its triangle.
+    before: u32,
+}
+
+impl Window {
+    fn at(&self, t: f64) -> DVec2 {
+        self.ends[0].lerp(self.ends[1], t)
+    }
+
+    /// The least distance from the source to what is reached.
+    fn nearest(&self) -> f64 {
+        let (a, b) = (self.at(self.part[0]), self.at(self.part[1]));
+        let along = b - a;
+        let t = (-a.dot(along) / along.length_squared()).clamp(0.0, 1.0);
+        if t.is_nan() { a.length() } else { a.lerp(b, t).length() }
+    }
+}
+
+enum Event {
+    Window(Window),
+    Vertex(u32),
+}
+
+struct Waiting {
+    distance_m: f64,
+    /// Makes the order total and the same on every machine.
+    turn: u64,
+    event: Event,
+}
+
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.distance_m.total_cmp(&self.distance_m).then(other.turn.cmp(&self.turn))
+    }
+}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Waiting {}
+
+/// The best way known to a vertex.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    distance_m: f64,
+    angle_rad: f64,
+    bend_rad: f64,
+    /// An edge that leaves the vertex, and the angle from it to where the way came from.
+    edge: u32,
+    back_rad: f64,
+}
+
+const UNKNOWN: Arrival =
+    Arrival { distance_m: f64::INFINITY, angle_rad: 0.0, bend_rad: 0.0, edge: NONE, back_rad: 0.0 };
+
+/// Where the shortest way to a place leads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reached {
+    /// (u, v), m: the way's length in the direction of its departure.
+    pub uv: DVec2,
+    /// Length of the way, m.
+    pub distance_m: f64,
+    /// How much the way bends at most at one point, rad: over 0 behind a hole, around the surface's edge or, by little, on
+    /// a surface that is bent like a saddle.
+    pub bend_rad: f64,
+    /// Another way that cannot be shortened and leaves over 20° apart, if one was met: the shortest of those.
+    pub rival: Option<Rival>,
+}
+
+/// A way to a place that was looked at.
+struct Way {
+    distance_m: f64,
+    angle_rad: f64,
+    bend_rad: f64,
+    /// Whether it is straight where it passes its last window: one that is not can be shortened.
+    is_straight: bool,
+}
+
+/// A second way to a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rival {
+    /// Its length, m.
+    pub distance_m: f64,
+    /// The angle between the two departures, rad.
+    pub apart_rad: f64,
+}
+
+/// Shortest ways from one point of a surface to all others up to some length.
+pub struct LogMap<'a> {
+    topology: &'a Topology,
+    start: Start,
+    limit_m: f64,
+    sources: Vec<Source>,
+    arrivals: Vec<Arrival>,
+    windows: Vec<Window>,
+    /// Per triangle the last of the windows that enter it.
+    entering: Vec<u32>,
+    queue: BinaryHeap<Waiting>,
+    turn: u64,
+}
+
+impl<'a> LogMap<'a> {
+    /// Follows all shortest ways from `place` up to the length `limit_m`; +u is along `u` as far as that is tangential,
+    /// and angles run counter-clockwise seen from outside. At a vertex they are evened out so that they go once round.
+    ///
+    /// # Errors
+    /// `place` is on no triangle, or the surface is so rough that the ways are too many to follow.
+    pub fn new(topology: &'a Topology, place: Place, u: DVec3, limit_m: f64) -> Result<Self> {
+        if place.triangle as usize >= topology.triangles.len() {
+            return Err(Error::failed("the chart's origin is on no triangle of the surface"));
+        }
+        let around_rad = f64::INFINITY;
+        let source = Source { distance_m: 0.0, angle_rad: 0.0, bend_rad: 0.0, around_rad, bends: false };
+        let mut map = Self {
+            topology,
+            start: Start::new(topology, place, u),
+            limit_m,
+            sources: vec![source],
+            arrivals: vec![UNKNOWN; topology.positions.len()],
+            windows: Vec::new(),
+            entering: vec![NONE; topology.triangles.len()],
+            queue: BinaryHeap::new(),
+            turn: 0,
+        };
+        if map.start.vertex != NONE {
+            map.arrivals[map.start.vertex as usize].distance_m = 0.0;
+        }
+        for wedge in map.start.wedges.clone() {
+            map.leave(&wedge, 0);
+        }
+        while let Some(waiting) = map.queue.pop() {
+            match waiting.event {
+                Event::Window(window) => map.enter(window)?,
+                Event::Vertex(vertex) => map.bend_at(vertex, waiting.distance_m),
+            }
+        }
+        Ok(map)
+    }
+
+    /// The start, and its tangent frame: (origin, u, v, normal).
+    #[must_use]
+    pub fn frame(&self) -> [DVec3; 4] {
+        let Start { position, u, normal, .. } = self.start;
+        [position, u, normal.cross(u), normal]
+    }
+
+    /// How many windows were followed.
+    #[must_use]
+    pub fn windows(&self) -> usize {
+        self.windows.len()
+    }
+
+    /// Where the shortest way to `place` leads; `None` beyond the limit, and on a part that the start is not on.
+    #[must_use]
+    pub fn reach(&self, place: &Place) -> Option<Reached> {
+        let mut ways: Vec<Way> = Vec::new();
+        for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
+            let at = mix(wedge.corners, place.barycentric);
+            let angle_rad = wedge.base_rad + at.y.atan2(at.x);
+            ways.push(Way { distance_m: at.length(), angle_rad, bend_rad: 0.0, is_straight: true });
+        }
+        let mut list = self.entering[place.triangle as usize];
+        while let Some(window) = self.windows.get(list as usize) {
+            let corner = window.edge as usize % 3;
+            let [p, q] = window.ends;
+            let third = self.third(window);
+            let weights = [0, 1, 2].map(|step| place.barycentric[(corner + step) % 3]);
+            ways.push(self.way(window, mix([p, q, third], weights)));
+            list = window.before;
+        }
+        let position = place.position(self.topology);
+        for vertex in self.topology.triangles[place.triangle as usize] {
+            let Arrival { distance_m, angle_rad, bend_rad, edge, .. } = self.arrivals[vertex as usize];
+            let distance_m = distance_m + position.distance(self.topology.positions[vertex as usize]);
+            if edge != NONE {
+                ways.push(Way { distance_m, angle_rad, bend_rad, is_straight: false });
+            }
+        }
+        let shortest = |a: &&Way, b: &&Way| a.distance_m.total_cmp(&b.distance_m);
+        let &Way { distance_m, angle_rad, bend_rad, .. } = ways.iter().min_by(shortest)?;
+        let angle_rad = self.start.in_plane(angle_rad);
+        let apart = |other: &Way| {
+            let apart = (self.start.in_plane(other.angle_rad) - angle_rad).abs();
+            apart.min(2.0 * PI - apart)
+        };
+        let rival = ways.iter().filter(|way| way.is_straight && apart(way) > APART).min_by(shortest);
+        let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
+        Some(Reached { uv: DVec2::from_angle(angle_rad) * distance_m, distance_m, bend_rad, rival })
+    }
+
+    /// The way through `window` to the unfolded point `to`.
+    fn way(&self, window: &Window, to: DVec2) -> Way {
+        let [a, b] = window.part.map(|t| window.at(t));
+        // A point beside the lines through the window is reached around its end.
+        let (first, rest) = if a.perp_dot(to) > 0.0 {
+            (a, a.distance(to))
+        } else if b.perp_dot(to) < 0.0 {
+            (b, b.distance(to))
+        } else {
+            (to, 0.0)
+        };
+        let source = &self.sources[window.source as usize];
+        let own = window.base_rad + first.y.atan2(first.x);
+        Way {
+            distance_m: source.distance_m + first.length() + rest,
+            angle_rad: if source.bends { source.angle_rad } else { own },
+            bend_rad: source.bend(own),
+            is_straight: rest == 0.0,
+        }
+    }
+
+    /// Where the third corner of the triangle beyond the window unfolds to.
+    fn third(&self, window: &Window) -> DVec2 {
+        let corner = |edge: u32| self.topology.positions[self.topology.ends(edge).0 as usize];
+        let (a, b, c) = (corner(window.edge), corner(next(window.edge)), corner(next(next(window.edge))));
+        let (edge, far) = (b - a, c - a);
+        let squared = edge.length_squared();
+        let [p, q] = window.ends;
+        let along = (q - p) * (far.dot(edge) / squared);
+        // The triangle is on the left of its own edges.
+        p + along + (q - p).perp() * (edge.cross(far).length() / squared)
+    }
+
+    fn wait(&mut self, distance_m: f64, event: Event) {
+        if distance_m <= self.limit_m {
+            self.turn += 1;
+            self.queue.push(Waiting { distance_m, turn: self.turn, event });
+        }
+    }
+
+    /// Lets lines start over `wedge` from source `source`.
+    fn leave(&mut self, wedge: &Wedge, source: u32) {
+        let sides = wedge.apex.map_or(0..3, |apex| (apex + 1) % 3..(apex + 1) % 3 + 1);
+        for side in sides {
+            let edge = 3 * wedge.triangle + side;
+            let [p, q] = [side as usize, (side as usize + 1) % 3].map(|corner| wedge.corners[corner]);
+            self.offer(edge, [q, p], [0.0, 1.0], source, wedge.base_rad);
+        }
+        for corner in (0..3).filter(|&corner| Some(corner) != wedge.apex) {
+            let at = wedge.corners[corner as usize];
+            let onward = wedge.corners[(corner as usize + 1) % 3] - at;
+            let own = wedge.base_rad + at.y.atan2(at.x);
+            self.arrive(3 * wedge.triangle + corner, at, onward, source, own);
+        }
+    }
+
+    /// Puts on the queue what lines from `source` reach of the other side of edge `edge`.
+    fn offer(&mut self, edge: u32, ends: [DVec2; 2], part: [f64; 2], source: u32, base_rad: f64) {
+        let beyond = self.topology.across[edge as usize];
+        if beyond == NONE || part[1] - part[0] <= LEAST_WIDTH {
+            return;
+        }
+        let window = Window { edge: beyond, source, ends, part, base_rad, before: NONE };
+        self.wait(self.sources[source as usize].distance_m + window.nearest(), Event::Window(window));
+    }
+
+    /// Notes the way from `source` to the vertex where `edge` starts, unfolded at `at`; `onward` is that edge, unfolded.
+    fn arrive(&mut self, edge: u32, at: DVec2, onward: DVec2, source: u32, own_rad: f64) {
+        let vertex = self.topology.ends(edge).0 as usize;
+        let from = &self.sources[source as usize];
+        let distance_m = from.distance_m + at.length();
+        if distance_m < self.arrivals[vertex].distance_m * (1.0 - ROUNDING) {
+            let angle_rad = if from.bends { from.angle_rad } else { own_rad };
+            let back_rad = onward.angle_to(-at);
+            self.arrivals[vertex] = Arrival { distance_m, angle_rad, bend_rad: from.bend(own_rad), edge, back_rad };
+            self.wait(distance_m, Event::Vertex(vertex as u32));
+        }
+    }
+
+    /// Whether a way through the end `t` of `window` is longer than one by way of the vertex where `edge` starts.
+    fn is_beaten(&self, window: &Window, t: f64, edge: u32, unfolded: DVec2) -> bool {
+        let known = self.arrivals[self.topology.ends(edge).0 as usize].distance_m;
+        let end = window.at(t);
+        let own = self.sources[window.source as usize].distance_m + end.length();
+        known + unfolded.distance(end) < own * (1.0 - ROUNDING)
+    }
+
+    /// Takes `window` into its triangle, and on to the two edges beyond.
+    fn enter(&mut self, mut window: Window) -> Result<()> {
+        let [p, q] = window.ends;
+        // Any way through it is longer than one by way of an end of its edge (Xin and Wang 2009).
+        if self.is_beaten(&window, window.part[1], window.edge, p)
+            || self.is_beaten(&window, window.part[0], next(window.edge), q)
+        {
+            return Ok(());
+        }
+        if self.windows.len() == MOST_WINDOWS {
+            return Err(Error::failed(format!(
+                "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
+                self.limit_m
+            )));
+        }
+        let list = &mut self.entering[window.edge as usize / 3];
+        window.before = std::mem::replace(list, self.windows.len() as u32);
+        self.windows.push(window);
+
+        let third = self.third(&window);
+        let [a, b] = window.part.map(|t| window.at(t));
+        let (right_of_a, left_of_b) = (a.perp_dot(third) <= 0.0, b.perp_dot(third) >= 0.0);
+        // Where the line through `ray` meets the edge from `from` to `to`.
+        let met = |ray: DVec2, from: DVec2, to: DVec2| {
+            let (before, after) = (ray.perp_dot(from), ray.perp_dot(to));
+            let t = before / (before - after);
+            if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
+        };
+        let (right, left) = (next(window.edge), next(next(window.edge)));
+        if right_of_a && left_of_b {
+            let onward = p - third;
+            let own = window.base_rad + third.y.atan2(third.x);
+            self.arrive(left, third, onward, window.source, own);
+        }
+        if left_of_b {
+            // The way to the right edge: from the third corner, or where the leftmost line meets it, to the rightmost.
+            let from = if right_of_a { 0.0 } else { met(a, third, q) };
+            let child = Window { ends: [third, q], part: [from, met(b, third, q)], ..window };
+            if !self.is_beaten(&child, child.part[1], window.edge, p) {
+                self.offer(right, child.ends, child.part, child.source, child.base_rad);
+            }
+        }
+        if right_of_a {
+            let to = if left_of_b { 1.0 } else { met(b, p, third) };
+            let child = Window { ends: [p, third], part: [met(a, p, third), to], ..window };
+            if !self.is_beaten(&child, child.part[0], right, q) {
+                self.offer(left, child.ends, child.part, child.source, child.base_rad);
+            }
+        }
+        Ok(())
+    }
+
+    /// Where straight lines past `vertex` leave a gap behind it, lets new ones start there.
+    fn bend_at(&mut self, vertex: u32, distance_m: f64) {
+        let arrival = self.arrivals[vertex as usize];
+        if arrival.distance_m < distance_m || arrival.edge == NONE {
+            return;
+        }
+        let fan = Fan::new(self.topology, arrival.edge);
+        // Angles are counted from the fan's first edge; those of the new source from where its way came.
+        let start =
+            fan.wedges.iter().find(|wedge| wedge.apex == Some(arrival.edge % 3) && wedge.triangle == arrival.edge / 3);
+        let Some(back_rad) = start.map(|wedge| wedge.base_rad + arrival.back_rad) else { return };
+        let around_rad = if fan.closed { fan.angle_rad } else { f64::INFINITY };
+        if fan.closed && fan.angle_rad <= 2.0 * PI * (1.0 + ROUNDING) {
+            return;
+        }
+        let Arrival { distance_m, angle_rad, bend_rad, .. } = arrival;
+        let source = self.sources.len() as u32;
+        let mut is_one = false;
+        for (index, wedge) in fan.wedges.iter().enumerate() {
+            let end = fan.wedges.get(index + 1).map_or(fan.angle_rad, |wedge| wedge.base_rad);
+            let (from, to) = (wedge.base_rad - back_rad, end - back_rad);
+            // In the gap, the way turns by π or more on both sides. All turns are within ±around.
+            let turned = |turn: f64| if fan.closed { turn.rem_euclid(fan.angle_rad) } else { turn };
+            let in_gap = match fan.closed {
+                true => {
+                    let (from, width) = (turned(from), to - from);
+                    from + width >= PI && from <= fan.angle_rad - PI
+                }
+                false => to >= PI || from <= -PI,
+            };
+            if !in_gap {
+                continue;
+            }
+            if !is_one {
+                is_one = true;
+                self.sources.push(Source { distance_m, angle_rad, bend_rad, around_rad, bends: true });
+            }
+            self.leave(&Wedge { base_rad: turned(from), ..*wedge }, source);
+        }
+    }
+}
+
+fn mix([a, b, c]: [DVec2; 3], weights: [f64; 3]) -> DVec2 {
+    a * weights[0] + b * weights[1] + c * weights[2]
+}

@@ -1,0 +1,38 @@
+//! Points of a triangulated surface.
+
+use glam::DVec3;
+
+use crate::body::Topology;
+
+/// A point of a [`Topology`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Weights of its three corners, from 0 up, summing to 1.
+    pub barycentric: [f64; 3],
+}
+
+impl Place {
+    /// The point of `triangle` that is nearest to `p`, m, which lies on it but for rounding.
+    #[must_use]
+    pub fn in_triangle(topology: &Topology, triangle: u32, p: DVec3) -> Self {
+        Self { triangle, barycentric: barycentric(topology.corners(triangle), p) }
+    }
+
+    /// Where it is, m.
+    #[must_use]
+    pub fn position(&self, topology: &Topology) -> DVec3 {
+        let [a, b, c] = topology.corners(self.triangle);
+        a * self.barycentric[0] + b * self.barycentric[1] + c * self.barycentric[2]
+    }
+}
+
+/// The barycentric coordinates of `p` in the triangle, none of them negative.
+fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let part = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)).max(0.0);
+    let parts = [part(b, c), part(c, a), part(a, b)];
+    let sum: f64 = parts.iter().sum();
+    if sum > 0.0 { parts.map(|part| part / sum) } else { [1.0, 0.0, 0.0] }
+}

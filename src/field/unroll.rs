@@ -1,0 +1,147 @@
+//! Laying geodesic charts: from a body's surface and a field's taxels to the (u, v) that the layout keeps.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::{DVec2, DVec3};
+
+use super::chart::{frame, origin_on_surface};
+use super::distortion::Distortion;
+use super::geodesic::{LogMap, Place};
+use super::{NoChart, anchor_from_link};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, SurfaceIndex, Topology};
+
+/// A way that bends by more than this at one point leads around something, 20°.
+const MOST_BEND: f64 = PI / 9.0;
+
+/// Neighbours that a chart takes further apart than so many times their distance are torn apart.
+const MOST_STRETCH: f64 = 3.0;
+
+/// The first ways followed are as long as around half a circle whose diameter is the straight distance, and a bit.
+const FIRST_REACH: f64 = 1.1 * FRAC_PI_2;
+
+/// How often ways are followed twice as far before a member counts as out of reach.
+const MOST_DOUBLINGS: u32 = 6;
+
+/// A body's surface as charts need it, link by link.
+pub struct Unroller<'a> {
+    body: &'a Body,
+    surfaces: BTreeMap<usize, (Topology, SurfaceIndex)>,
+}
+
+impl<'a> Unroller<'a> {
+    /// For `body`; surfaces are taken up as fields on them come.
+    #[must_use]
+    pub fn new(body: &'a Body) -> Self {
+        Self { body, surfaces: BTreeMap::new() }
+    }
+
+    /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those that
+    /// `spec`'s chart asks for, else the defaults of a plane chart.
+    ///
+    /// # Errors
+    /// Why there is no such chart.
+    pub fn unroll(&mut self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
+        let body = self.body;
+        let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
+        if taxels.is_empty() {
+            return Err(NoChart::NoTaxels);
+        }
+        let mut links: Vec<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
+        links.sort_unstable();
+        links.dedup();
+        let &[link] = &links[..] else { return Err(NoChart::SeveralLinks(links.len())) };
+        let anchor_from_taxel = anchor_from_link(body, Some(link), link);
+        let members: Vec<(DVec3, DVec3)> = taxels
+            .iter()
+            .map(|&taxel| &body.taxels[taxel])
+            .map(|taxel| {
+                let position = anchor_from_taxel.transform_point3(taxel.position_in_link);
+                (position, anchor_from_taxel.transform_vector3(taxel.normal_in_link))
+            })
+            .collect();
+        let (topology, index) = self.surfaces.entry(link).or_insert_with(|| take_up(body, link));
+        let locate = |p: DVec3| {
+            let hit = index.nearest(p).ok_or(NoChart::NoSurface)?;
+            Ok(Place::in_triangle(topology, hit.triangle as u32, hit.position))
+        };
+
+        let asked = |of: fn(&ChartSpec) -> Option<[f64; 3]>| spec.chart.as_ref().and_then(of).map(DVec3::from_array);
+        let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
+        let origin = asked(|chart| chart.origin_in_anchor);
+        let origin = locate(origin.unwrap_or_else(|| origin_on_surface(body, link, mean, &members)))?;
+        let [a, b, c] = topology.corners(origin.triangle);
+        let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
+        let [u, ..] = frame(normal, asked(|chart| chart.u_in_anchor));
+
+        let places: Vec<Place> = members.iter().map(|(position, _)| locate(*position)).collect::<Result<_, _>>()?;
+        let part = |place: &Place| topology.part[place.triangle as usize];
+        let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
+        let id = |i: usize| body.taxels[taxels[i]].id;
+        if let Some(&first) = beyond.first() {
+            return Err(NoChart::Unreachable(id(first), beyond.len()));
+        }
+        let from = origin.position(topology);
+        let farthest = members.iter().map(|(position, _)| position.distance(from)).fold(0.0, f64::max);
+        let mut limit = farthest * FIRST_REACH;
+        let mut doublings = 0;
+        let (map, reached) = loop {
+            let map = LogMap::new(topology, origin, u, limit).map_err(|why| NoChart::TooRough(why.to_string()))?;
+            let reached: Vec<_> = places.iter().map(|place| map.reach(place)).collect();
+            // A way that is longer than all that were followed may not be the shortest.
+            let out: Vec<usize> =
+                (0..reached.len()).filter(|&i| reached[i].is_none_or(|way| way.distance_m > limit)).collect();
+            match out[..] {
+                [] => break (map, reached),
+                [first, ..] if doublings == MOST_DOUBLINGS => return Err(NoChart::Unreachable(id(first), out.len())),
+                _ => (limit, doublings) = (2.0 * limit, doublings + 1),
+            }
+        };
+        let ways: Vec<_> = reached.into_iter().flatten().collect();
+        let uv: Vec<DVec2> = ways.iter().map(|way| way.uv).collect();
+        let distortion = Distortion::of(&members, &uv);
+        let nearest = |i: usize| {
+            let others = members.iter().map(|(position, _)| position.distance(members[i].0)).filter(|&d| d > 0.0);
+            others.fold(f64::INFINITY, f64::min)
+        };
+        for (i, way) in ways.iter().enumerate() {
+            if way.bend_rad > MOST_BEND {
+                return Err(NoChart::Bent(id(i), way.bend_rad));
+            }
+            // A taxel that could as well be elsewhere in the chart, further away than its neighbour is.
+            if let Some(rival) = way.rival
+                && rival.distance_m - way.distance_m < 0.5 * nearest(i)
+                && 2.0 * way.distance_m * (rival.apart_rad / 2.0).sin() > nearest(i)
+            {
+                let (distance_m, apart_rad) = (way.distance_m, rival.apart_rad);
+                return Err(NoChart::CutLocus { taxel: id(i), distance_m, apart_rad });
+            }
+        }
+        if let Some((a, b, factor)) = distortion.worst.filter(|&(.., factor)| factor > MOST_STRETCH) {
+            return Err(NoChart::Torn(id(a), id(b), factor));
+        }
+
+        let [origin, u, ..] = map.frame();
+        let mut spec = spec.clone();
+        spec.chart = Some(ChartSpec {
+            kind: ChartKind::Geodesic,
+            origin_in_anchor: Some(origin.to_array()),
+            u_in_anchor: Some(u.to_array()),
+        });
+        for (i, uv) in uv.iter().enumerate() {
+            if let Some(member) = spec.members.get_mut(&id(i)) {
+                member.uv = Some(uv.to_array());
+            }
+        }
+        Ok(spec)
+    }
+}
+
+/// The surface in the frame of `link`, and where on it a point is, by its triangles' numbers in the topology.
+fn take_up(body: &Body, link: usize) -> (Topology, SurfaceIndex) {
+    let corners: Vec<DVec3> = body.triangles_in_link(link).flatten().collect();
+    let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let topology = Topology::new(&corners, &triangles);
+    let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
+    (topology, index)
+}
