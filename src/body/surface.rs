@@ -1,7 +1,7 @@
 //! A body's triangles, and the two questions asked of them: what is nearest, and what does a ray hit.
 
 use glam::{DAffine3, DVec3};
-use rstar::primitives::GeomWithData;
+use rstar::primitives::{CachedEnvelope, GeomWithData};
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use super::Body;
@@ -68,10 +68,28 @@ impl Body {
     #[must_use]
     pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
         let near = |triangle: &Triangle| {
-            reach.is_none_or(|(centre, radius)| triangle.envelope().distance_2(&centre.to_array()) <= radius * radius)
+            reach.is_none_or(|(centre, radius)| triangle.box_distance_squared(centre) <= radius * radius)
         };
         let sound = |triangle: &Triangle| near(triangle) && triangle.unit_normal().is_some();
         SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
+    }
+
+    /// The surface point nearest to `p`, in the frame of `link`. It looks at every triangle: for many points of one link
+    /// make an index.
+    #[must_use]
+    pub fn nearest_in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
+        let mut nearest = None;
+        let mut least = f64::INFINITY;
+        for triangle in self.triangles_in_link(link).map(Triangle) {
+            if triangle.box_distance_squared(p) < least && triangle.unit_normal().is_some() {
+                let point = triangle.nearest(p);
+                let distance = p.distance_squared(point);
+                if distance < least {
+                    (nearest, least) = (Some(point), distance);
+                }
+            }
+        }
+        nearest
     }
 
     /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
@@ -97,6 +115,12 @@ impl Triangle {
     fn unit_normal(&self) -> Option<DVec3> {
         let [a, b, c] = self.0;
         (b - a).cross(c - a).try_normalize()
+    }
+
+    /// Squared distance of `p` from the box around it: at most that from the triangle.
+    fn box_distance_squared(&self, p: DVec3) -> f64 {
+        let [a, b, c] = self.0;
+        p.distance_squared(p.clamp(a.min(b).min(c), a.max(b).max(c)))
     }
 
     /// The point of the triangle that is nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
@@ -183,7 +207,7 @@ pub struct Hit {
 #[derive(Debug)]
 pub struct SurfaceIndex {
     /// Each with its outward unit normal and its number.
-    tree: RTree<GeomWithData<Triangle, (DVec3, u32)>>,
+    tree: RTree<GeomWithData<CachedEnvelope<Triangle>, (DVec3, u32)>>,
 }
 
 impl SurfaceIndex {
@@ -191,7 +215,9 @@ impl SurfaceIndex {
         let triangles = triangles
             .into_iter()
             .zip(0..)
-            .filter_map(|(triangle, number)| Some(GeomWithData::new(triangle, (triangle.unit_normal()?, number))))
+            .filter_map(|(triangle, number)| {
+                Some(GeomWithData::new(CachedEnvelope::new(triangle), (triangle.unit_normal()?, number)))
+            })
             .collect();
         Self { tree: RTree::bulk_load(triangles) }
     }

@@ -162,7 +162,7 @@ pub(super) fn complete(
             (origin, Ok(frame(normal, wanted_u)))
         }
         (None, Some(normal), Some(anchor)) => {
-            let origin = wanted_origin.unwrap_or_else(|| origin_on_surface(body, anchor, mean_position, &in_anchor));
+            let origin = wanted_origin.unwrap_or_else(|| origin_on_surface(body, anchor, mean_position));
             (origin, Ok(frame(normal, wanted_u)))
         }
         (refusal, ..) => (mean_position, Err(refusal.unwrap_or(NoChart::Wraps(std::f64::consts::PI)))),
@@ -189,12 +189,8 @@ pub(super) fn complete(
 }
 
 /// The surface point nearest to `mean`; without a surface, `mean` itself.
-pub(super) fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
-    let radius = members.iter().map(|(position, _)| position.distance(mean)).fold(0.0, f64::max);
-    // The members lie on the surface, so that the nearest point is no farther than they are.
-    let surface = body.surface_in_link(anchor, Some((mean, radius * 1.01 + 1e-6)));
-    let surface = if surface.is_empty() { body.surface_in_link(anchor, None) } else { surface };
-    surface.nearest(mean).map_or(mean, |hit| hit.position)
+pub(super) fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3) -> DVec3 {
+    body.nearest_in_link(anchor, mean).unwrap_or(mean)
 }
 
 /// The surface's normal at `origin`, or where there is none that of the nearest member.
