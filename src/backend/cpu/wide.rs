@@ -168,7 +168,8 @@ fn in_sixteen<S: Simd, const K: usize>(simd: S, count: usize, add: impl Fn(usize
         while lane < half {
             let mut k = 0;
             while k < K {
-                sums[lane][k] = sums[lane][k] + sums[lane + half][k];
+                let other = sums[lane + half][k];
+                sums[lane][k] += other;
                 k += 1;
             }
             lane += 1;
