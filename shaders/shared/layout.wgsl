@@ -7,6 +7,8 @@ struct Batch {
     changes: u32,
     fields: u32,
     wide: u32,
+    // Quads of a block, a power of two up to GROUP.
+    lanes: u32,
 }
 
 struct Taxel {
@@ -52,17 +54,6 @@ struct Step {
     flags: u32,
 }
 
-struct Motion {
-    displacement: vec2<f32>,
-    direction: f32,
-    distance: f32,
-    radial_distance: f32,
-    speed: f32,
-    radial_speed: f32,
-    // Flags below and quantities present above, for the host to add to the cell's: its neighbours read that meanwhile.
-    status: u32,
-}
-
 const NO_CONTACT = 1u << 0u;
 const ONE_TAXEL = 1u << 1u;
 const TIE = 1u << 2u;
@@ -97,8 +88,10 @@ const STRAIGHT = 0u;
 const MASKED = 1u;
 const FIRST_CURVE = 2u;
 
-// Bit of a taxel's status that leaves it out of every sum.
-const UNUSABLE = 1u << 31u;
+// A taxel's status is a byte: from this bit on the flags that it can have, and above them UNUSABLE, which leaves it out of
+// every sum.
+const STATUS = 6u;
+const UNUSABLE = 0x80u;
 
 // Invocations of a group.
 const GROUP = 64u;
@@ -114,4 +107,25 @@ fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
 
 fn invocation(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
     return group_number(group, groups) * GROUP + local;
+}
+
+// Frames are taken four at a time, as a quad: a vector of their pressures, and one word of their statuses, the first in
+// the lowest byte. On the device quads lie in blocks of `lanes`, in each block slot by slot: an invocation's neighbours
+// read its neighbours, and what a group reads lies together. A quad that is not full repeats the last frame.
+fn quads() -> u32 {
+    return (batch.frames + 3u) / 4u;
+}
+
+fn at(slot: u32, quad: u32) -> u32 {
+    let slots = batch.calibrated + batch.changes;
+    return (quad / batch.lanes * slots + slot) * batch.lanes + quad % batch.lanes;
+}
+
+// Four statuses in one word.
+fn packed(statuses: vec4<u32>) -> u32 {
+    return statuses.x | (statuses.y << 8u) | (statuses.z << 16u) | (statuses.w << 24u);
+}
+
+fn unpacked(statuses: u32) -> vec4<u32> {
+    return (vec4<u32>(statuses) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
 }

@@ -1,6 +1,6 @@
 //! Finding an adapter and opening the one device that all GPU backends of a process share.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
@@ -10,6 +10,29 @@ pub(crate) struct Device {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) info: wgpu::AdapterInfo,
+    /// The first thing that went wrong where nobody asked.
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+impl Device {
+    /// The device answers no more, because of `why`.
+    pub(crate) fn lost(&self, why: &dyn std::fmt::Display) -> Error {
+        let words = why.to_string();
+        let words: Vec<&str> = words.split_whitespace().collect();
+        Error::failed(format!(
+            "{} stopped answering: {}; start again, or use the cpu backend",
+            self.info.name,
+            words.join(" ")
+        ))
+    }
+
+    /// Says so if something went wrong that no call has told.
+    pub(crate) fn check(&self) -> Result<()> {
+        match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(why) => Err(self.lost(why)),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What there is to run on, for people.
@@ -30,8 +53,9 @@ static SHARED: Mutex<Option<Device>> = Mutex::new(None);
 
 /// The process's device; opened on the first call.
 pub(crate) fn shared() -> Result<Device> {
-    let mut shared = SHARED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let Some(device) = &*shared {
+    let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    // One that was lost does not come back; another may be had.
+    if let Some(device) = shared.as_ref().filter(|device| device.check().is_ok()) {
         return Ok(device.clone());
     }
     let device = open(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12)?;
@@ -62,7 +86,16 @@ pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
     };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
         .map_err(|e| Error::no_adapter(format!("{} cannot be used: {e}", info.name)))?;
-    Ok(Device { device, queue, info })
+    let trouble = Arc::new(Mutex::new(None));
+    let (of_errors, of_loss) = (trouble.clone(), trouble.clone());
+    let note = |trouble: &Mutex<Option<String>>, what: String| {
+        trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
+    };
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&of_errors, error.to_string())));
+    device.set_device_lost_callback(move |_, why| {
+        note(&of_loss, if why.is_empty() { "the device was lost".to_owned() } else { why });
+    });
+    Ok(Device { device, queue, info, trouble })
 }
 
 /// Every adapter that could run the GPU backend.
