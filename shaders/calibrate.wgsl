@@ -18,6 +18,9 @@ const TINY_BITS = 0x21800000u;
 // Quads that an invocation takes, where a block has as many: what it writes is a whole cache line then.
 const TURNS = 4u;
 
+// Slots that a channel is calibrated in: one for each signal.
+override SIGNALS: u32 = 1u;
+
 fn is_tiny(size: vec4<u32>) -> vec4<bool> {
     return (size != vec4<u32>()) & (size < vec4<u32>(TINY_BITS));
 }
@@ -59,11 +62,17 @@ struct Readings {
     status: vec4<u32>,
 }
 
-fn readings(slot: u32, quad: u32, taxel: Taxel) -> Readings {
-    let last = batch.frames - 1u;
-    let channel = slot % batch.channels;
-    let frames = min(vec4<u32>(quad * 4u) + vec4<u32>(0u, 1u, 2u, 3u), vec4<u32>(last)) * batch.channels + channel;
-    let bits = vec4<u32>(raw[frames.x], raw[frames.y], raw[frames.z], raw[frames.w]);
+fn channel_of(slot: u32) -> u32 {
+    if SIGNALS == 1u {
+        return slot;
+    }
+    return slot % batch.channels;
+}
+
+fn readings(channel: u32, quad: u32, taxel: Taxel) -> Readings {
+    let frames = min(vec4<u32>(quad * 4u) + vec4<u32>(0u, 1u, 2u, 3u), vec4<u32>(batch.frames - 1u));
+    let places = frames * batch.channels + channel;
+    let bits = vec4<u32>(raw[places.x], raw[places.y], raw[places.z], raw[places.w]);
     let size = bits & vec4<u32>(SIZE_BITS);
     let tiny = is_tiny(size);
     let missing = bits == vec4<u32>(MISSING);
@@ -100,16 +109,16 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let number = invocation(group, groups, local);
-    let slot = number % batch.calibrated;
-    let turns = min(TURNS, batch.lanes);
-    let first = number / batch.calibrated * turns;
-    if first >= quads() {
+    let slot = invocation(group, groups, local);
+    if slot >= batch.calibrated {
         return;
     }
     let taxel = taxels[slot];
+    let channel = channel_of(slot);
+    let turns = min(TURNS, lanes());
+    let first = group.y * turns;
     for (var quad = first; quad < first + turns; quad++) {
-        let seen = readings(slot, quad, taxel);
+        let seen = readings(channel, quad, taxel);
         write(slot, quad, taxel, seen, seen.above * taxel.gain);
     }
 }
@@ -121,16 +130,16 @@ fn curved(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let number = invocation(group, groups, local);
-    let slot = number % batch.calibrated;
-    let turns = min(TURNS, batch.lanes);
-    let first = number / batch.calibrated * turns;
-    if first >= quads() {
+    let slot = invocation(group, groups, local);
+    if slot >= batch.calibrated {
         return;
     }
     let taxel = taxels[slot];
+    let channel = channel_of(slot);
+    let turns = min(TURNS, lanes());
+    let first = group.y * turns;
     for (var quad = first; quad < first + turns; quad++) {
-        let seen = readings(slot, quad, taxel);
+        let seen = readings(channel, quad, taxel);
         if taxel.response >= FIRST_CURVE {
             let curve = curves[taxel.response - FIRST_CURVE];
             var p = vec4<f32>();

@@ -20,9 +20,8 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let number = invocation(group, groups, local);
-    let quad = number % quads();
-    let change = number / quads();
+    let change = invocation(group, groups, local);
+    let quad = group.y;
     if change >= batch.changes {
         return;
     }

@@ -7,8 +7,8 @@ struct Batch {
     changes: u32,
     fields: u32,
     wide: u32,
-    // Quads of a block, a power of two up to GROUP.
-    lanes: u32,
+    // Quads of a block: two to this power, up to GROUP. Divisions are dear where vectors have none.
+    lanes_log2: u32,
 }
 
 struct Taxel {
@@ -100,9 +100,10 @@ const GROUP = 64u;
 // must be so: lavapipe ends any shader's loops after 65,535 rounds in all, without a word.
 const WIDE = 4096u;
 
-// A dispatch is folded into rows, as one row may not be longer than 65,535 groups.
+// A dispatch counts groups along x, folded over z, as no side may be longer than 65,535; y counts blocks of frames where
+// an invocation has but one.
 fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return group.y * groups.x + group.x;
+    return group.z * groups.x + group.x;
 }
 
 fn invocation(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
@@ -116,9 +117,13 @@ fn quads() -> u32 {
     return (batch.frames + 3u) / 4u;
 }
 
+fn lanes() -> u32 {
+    return 1u << batch.lanes_log2;
+}
+
 fn at(slot: u32, quad: u32) -> u32 {
     let slots = batch.calibrated + batch.changes;
-    return (quad / batch.lanes * slots + slot) * batch.lanes + quad % batch.lanes;
+    return ((((quad >> batch.lanes_log2) * slots) + slot) << batch.lanes_log2) + (quad & (lanes() - 1u));
 }
 
 // Four statuses in one word.

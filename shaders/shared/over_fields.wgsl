@@ -119,11 +119,8 @@ fn main(
 ) {
     // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
     // same block, which so stays in the cache.
-    let beside = GROUP / batch.lanes;
-    let across = (batch.fields + beside - 1u) / beside;
-    let number = group_number(group, groups);
-    let index = number % across * beside + local / batch.lanes;
-    let quad = number / across * batch.lanes + local % batch.lanes;
+    let index = (group_number(group, groups) * GROUP + local) >> batch.lanes_log2;
+    let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
     if index >= batch.fields || quad >= quads() {
         return;
     }
@@ -138,7 +135,7 @@ fn main(
     var place = no_place();
     for (var m = field.first; m < end; m++) {
         let member = members[m];
-        let here = first + member.slot * batch.lanes;
+        let here = first + (member.slot << batch.lanes_log2);
         let pressure = pressures[here];
         let pull = member.weight * pressure;
         sums = add_sums(sums, member, pressure, pull, statuses[here]);
@@ -153,7 +150,7 @@ fn main(
     if (ORIENTED || AXED) && charted {
         for (var m = field.first; m < end; m++) {
             let member = members[m];
-            let pressure = pressures[first + member.slot * batch.lanes];
+            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
@@ -238,11 +235,11 @@ fn wide(
     @builtin(local_invocation_index) local: u32,
 ) {
     let number = group_number(group, groups);
-    if number >= quads() * batch.wide {
+    if number >= batch.wide {
         return;
     }
-    let index = wide_fields[number / quads()];
-    let quad = number % quads();
+    let index = wide_fields[number];
+    let quad = group.y;
     let field = fields[index];
     let end = field.first + field.count;
     let first = at(0u, quad);
@@ -251,7 +248,7 @@ fn wide(
     var place = no_place();
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
-        let here = first + member.slot * batch.lanes;
+        let here = first + (member.slot << batch.lanes_log2);
         let pressure = pressures[here];
         let pull = member.weight * pressure;
         sums = add_sums(sums, member, pressure, pull, statuses[here]);
@@ -279,7 +276,7 @@ fn wide(
     if ORIENTED || AXED {
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
-            let pressure = pressures[first + member.slot * batch.lanes];
+            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);

@@ -35,8 +35,8 @@ pub(crate) struct Batch {
     pub(crate) fields: u32,
     /// Fields of more than [`WIDE`] members.
     pub(crate) wide: u32,
-    /// Quads of a block, a power of two: how many quads of a field a group of invocations takes.
-    pub(crate) lanes: u32,
+    /// Quads of a block, how many of a field a group of invocations takes: two to this power.
+    pub(crate) lanes_log2: u32,
 }
 
 /// Quads of a block, for a batch of `frames` frames: as many as a group has invocations, or so few as there are.

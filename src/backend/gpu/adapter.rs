@@ -26,6 +26,11 @@ impl Device {
         ))
     }
 
+    /// Keeps what went wrong, if it is the first that did.
+    pub(crate) fn note(&self, what: &str) {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| what.to_owned());
+    }
+
     /// Says so if something went wrong that no call has told.
     pub(crate) fn check(&self) -> Result<()> {
         match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -65,6 +70,17 @@ pub(crate) fn shared() -> Result<Device> {
 
 /// Opens the best adapter of `backends` with the limits that every WebGPU device has.
 pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
+    open_with(backends, wgpu::Features::empty())
+}
+
+/// A device of its own whose clock may be read, where the adapter lets anybody.
+pub(super) fn with_clock() -> Result<Device> {
+    let _alone = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    open_with(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12, wgpu::Features::TIMESTAMP_QUERY)
+}
+
+/// Opens the best adapter with those of `features` that it has.
+fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Device> {
     let adapter = pollster::block_on(async {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
@@ -80,7 +96,7 @@ pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
     let info = adapter.get_info();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("somatic"),
-        required_features: wgpu::Features::empty(),
+        required_features: adapter.features() & features,
         required_limits: wgpu::Limits::default(),
         ..wgpu::DeviceDescriptor::default()
     };

@@ -8,6 +8,7 @@
 
 pub(crate) mod adapter;
 mod columns;
+mod report;
 mod ring;
 pub(crate) mod shaders;
 mod stage;
@@ -18,12 +19,13 @@ mod tests;
 
 pub use adapter::{AdapterSummary, adapters};
 use bytemuck::cast_slice;
+pub use report::{Bandwidth, DeviceTime, bandwidth, device_time};
 
 use self::adapter::Device;
 use self::columns::{Columns, NOTHING};
 use self::ring::{SETS, Set};
-use self::stage::{Over, Stage, groups, table, table_as};
-use super::{Backend, RawBatch};
+use self::stage::{Over, Stage, table, table_as};
+use super::{Backend, RawBatch, Rows};
 use crate::error::{Error, Result};
 use crate::percept::Percepts;
 use crate::scene::Plan;
@@ -39,6 +41,8 @@ const STEP: u64 = size_of::<layout::Step>() as u64;
 /// Bytes of raw values in a submission, about: enough for the device to be busy, little enough to stay in caches and to
 /// have several on their way.
 const ENOUGH: usize = 4 << 20;
+/// Frames of a submission at most: dispatches count quads along one side, of 65,535 groups.
+const MOST: usize = 1 << 17;
 /// Frames of a full block.
 const BLOCK: usize = 4 * GROUP as usize;
 
@@ -127,8 +131,9 @@ impl Gpu {
             (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
         let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
         let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
+        let signals = [("SIGNALS", (plan.calibrated() / plan.channels()) as f64)];
         let mut stages =
-            vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, NOTHING, &buffers[..used])];
+            vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &signals, &buffers[..used])];
         // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
         let before = plan.has_changes().then(|| working("raw before", channels * 4));
         if let Some(before) = &before {
@@ -208,10 +213,10 @@ impl Gpu {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
             let mut pass = encoder.begin_compute_pass(&descriptor);
             for stage in &self.stages {
-                let (wide, tall) = groups(stage.over.groups(&header));
+                let [wide, tall, deep] = stage.over.groups(&header);
                 pass.set_pipeline(&stage.pipeline);
                 pass.set_bind_group(0, &stage.bound, &[]);
-                pass.dispatch_workgroups(wide, tall, 1);
+                pass.dispatch_workgroups(wide, tall, deep);
             }
         }
         if let Some(before) = &self.before {
@@ -242,7 +247,16 @@ impl Gpu {
         mapped.slice(HEADER as usize..values).copy_from_slice(cast_slice(&self.packed_steps));
         for (frame, at) in (values..).step_by(row).take(raw.frames).enumerate() {
             self.packed_row.clear();
-            self.packed_row.extend(raw.rows.row(frame));
+            match raw.rows {
+                Rows::Picked { frames, picks } => {
+                    let values = &frames[frame].values[..];
+                    let places = &picks.places[..picks.channels];
+                    self.packed_row.extend(places.iter().map(|&place| values[place as usize]));
+                }
+                Rows::Packed { values, channels } => {
+                    self.packed_row.extend_from_slice(&values[frame * channels..][..channels]);
+                }
+            }
             mapped.slice(at..at + row).copy_from_slice(cast_slice(&self.packed_row));
         }
         Ok(())
@@ -293,7 +307,7 @@ fn capacity(device: &Device, plan: &Plan, columns: &Columns, batch: usize) -> Re
         // The largest power of two that is not more.
         _ => 1 << frames.max(1).ilog2(),
     };
-    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).max(BLOCK);
+    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(BLOCK, MOST);
     let held = in_blocks(limit / quad * 4);
     // What comes back, in one buffer.
     let back = cells + if plan.stages().touches { 2 * quad } else { 0 };
@@ -326,6 +340,14 @@ impl Backend for Gpu {
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         self.device.check()?;
+        // What is on its way when something goes wrong is never collected: the device is not to be used again.
+        self.stream(raw, percepts).inspect_err(|e| self.device.note(&e.to_string()))
+    }
+}
+
+impl Gpu {
+    /// All frames of `raw`, some sets of buffers on their way at any time.
+    fn stream(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
         let sets = self.ring.len();
         let mut parts = 0;
         for (part, steps) in raw.steps.chunks(self.capacity).enumerate() {
@@ -352,7 +374,7 @@ fn header(plan: &Plan, frames: u32, wide: u32) -> layout::Batch {
         changes: (plan.slots() - plan.calibrated()) as u32,
         fields: plan.fields.len() as u32,
         wide,
-        lanes: layout::lanes(frames as usize),
+        lanes_log2: layout::lanes(frames as usize).ilog2(),
     }
 }
 

@@ -41,18 +41,20 @@ pub(super) enum Over {
 }
 
 impl Over {
-    /// How many groups a batch takes.
-    pub(super) fn groups(self, batch: &layout::Batch) -> u32 {
-        let quads = batch.frames.div_ceil(4);
-        match self {
-            Self::Calibrated => (batch.calibrated * quads.div_ceil(batch.lanes.min(TURNS))).div_ceil(GROUP),
-            Self::CalibratedOnce => batch.calibrated.div_ceil(GROUP),
-            Self::Changes => (batch.changes * quads).div_ceil(GROUP),
-            Self::Quads => batch.fields.div_ceil(GROUP / batch.lanes) * quads.div_ceil(batch.lanes),
-            Self::WideFields => batch.wide * quads,
-            Self::Cells => (batch.fields * batch.frames).div_ceil(GROUP),
-            Self::Fields => batch.fields.div_ceil(GROUP),
-        }
+    /// How many groups a batch takes: along x and folded over z, and along y, which counts frames.
+    pub(super) fn groups(self, batch: &layout::Batch) -> [u32; 3] {
+        let (quads, lanes) = (batch.frames.div_ceil(4), 1 << batch.lanes_log2);
+        let (count, tall) = match self {
+            Self::Calibrated => (batch.calibrated.div_ceil(GROUP), quads.div_ceil(TURNS.min(lanes))),
+            Self::CalibratedOnce => (batch.calibrated.div_ceil(GROUP), 1),
+            Self::Changes => (batch.changes.div_ceil(GROUP), quads),
+            Self::Quads => (batch.fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
+            Self::WideFields => (batch.wide, quads),
+            Self::Cells => ((batch.fields * batch.frames).div_ceil(GROUP), 1),
+            Self::Fields => (batch.fields.div_ceil(GROUP), 1),
+        };
+        let (wide, deep) = folded(count);
+        [wide, tall, deep]
     }
 }
 
@@ -157,7 +159,7 @@ pub(super) fn table_as<T: Pod>(
 }
 
 /// Folds a row of groups into a rectangle, as no side may be longer than 65,535.
-pub(super) fn groups(count: u32) -> (u32, u32) {
+pub(super) fn folded(count: u32) -> (u32, u32) {
     const LONGEST: u32 = 65_535;
     let tall = count.div_ceil(LONGEST).max(1);
     (count.div_ceil(tall).max(1), tall)
