@@ -17,6 +17,7 @@ const RUN_ELSEWHERE: [&str; 12] = [
     // Measuring takes minutes, and is for release builds on a machine at rest.
     "cargo bench",
     "cargo bench --bench engine -- live",
+    "cargo bench --bench gpu > gpu.json",
     "cargo bench -- --max-time 5",
     "benches/peers/run",
 ];
