@@ -1,49 +1,42 @@
 // centroid: the pressure-weighted mean place (src/stage/centroid.rs).
 
-@group(0) @binding(0) var<uniform> batch: Batch;
-@group(0) @binding(1) var<storage, read> fields: array<Field>;
-@group(0) @binding(2) var<storage, read> members: array<Member>;
-// The members' third coordinate, for fields without a chart.
-@group(0) @binding(3) var<storage, read> depths: array<f32>;
-@group(0) @binding(4) var<storage, read> pressures: array<f32>;
-@group(0) @binding(5) var<storage, read> contacts: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read_write> cells: array<u32>;
-@group(0) @binding(7) var<storage, read_write> centroids: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
-
-// Σ wPx.
-alias Part = vec3<f32>;
-
-// Whether the field has a chart.
-alias Context = bool;
-
-fn context_of(cell: u32, field: Field) -> Context {
-    return field.charted != 0u;
+// Sums of wPx, then the means.
+struct Place {
+    u: vec4<f32>,
+    v: vec4<f32>,
+    depth: vec4<f32>,
 }
 
-fn nothing() -> vec3<f32> {
-    return vec3<f32>();
+fn no_place() -> Place {
+    return Place(vec4<f32>(), vec4<f32>(), vec4<f32>());
 }
 
-fn add(so_far: vec3<f32>, m: u32, frame: u32, charted: bool) -> vec3<f32> {
-    let member = members[m];
-    let pull = member.weight * pressures[member.slot * batch.frames + frame];
-    if charted {
-        return so_far + pull * vec3<f32>(member.u, member.v, 0.0);
+fn add_place(so_far: Place, m: u32, member: Member, pull: vec4<f32>, charted: bool) -> Place {
+    var place = so_far;
+    place.u += pull * member.u;
+    place.v += pull * member.v;
+    // The third coordinate is for fields without a chart.
+    if DEPTH_AT != NOWHERE && !charted {
+        place.depth += pull * depths[m];
     }
-    return so_far + pull * vec3<f32>(member.u, member.v, depths[m]);
+    return place;
 }
 
-fn join(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
-    return a + b;
+fn join_places(a: Place, b: Place) -> Place {
+    return Place(a.u + b.u, a.v + b.v, a.depth + b.depth);
 }
 
-fn finish(cell: u32, field: Field, sum: vec3<f32>) {
-    if (cells[cell] & NO_CONTACT) != 0u {
-        centroids[cell] = vec4<f32>();
-        return;
-    }
-    centroids[cell] = vec4<f32>(sum / contacts[cell].x, 0.0);
-    let present = select(POSITION, CENTROID | POSITION | NORMAL, field.charted != 0u);
-    cells[cell] |= present << PRESENT;
+fn mean_place(sum: Place, total: vec4<f32>, touched: vec4<bool>) -> Place {
+    let nowhere = vec4<f32>();
+    return Place(
+        select(nowhere, sum.u / total, touched),
+        select(nowhere, sum.v / total, touched),
+        select(nowhere, sum.depth / total, touched),
+    );
+}
+
+// What is present where a field is touched.
+fn present_places(field: Field, touched: vec4<bool>) -> vec4<u32> {
+    let present = select(POSITION, CENTROID | POSITION | NORMAL, field.charted != 0u) << PRESENT;
+    return select(vec4<u32>(), vec4<u32>(present), touched);
 }

@@ -1,13 +1,14 @@
-// change: how fast pressures change, one invocation a taxel and frame (src/stage/change.rs). It reads pressures that have
-// been written, never computes them: a product fused into the difference would make changes where there are none.
+// change: how fast pressures change, one invocation a taxel and quad of frames (src/stage/change.rs). It reads pressures
+// that have been written, never computes them: a product fused into the difference would make changes where there are
+// none.
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> taxels: array<Taxel>;
 @group(0) @binding(2) var<storage, read> steps: array<Step>;
-// The frame before the batch's first.
-@group(0) @binding(3) var<storage, read> pressures_before: array<f32>;
+// The frame before the batch's first, four times over.
+@group(0) @binding(3) var<storage, read> pressures_before: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> statuses_before: array<u32>;
-@group(0) @binding(5) var<storage, read_write> pressures: array<f32>;
+@group(0) @binding(5) var<storage, read_write> pressures: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read_write> statuses: array<u32>;
 
 const HUGE_BITS = 0x5d800000u;
@@ -19,37 +20,42 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let number = invocation(group, groups, local);
-    if number >= batch.frames * batch.changes {
+    let change = invocation(group, groups, local);
+    let quad = group.y;
+    if change >= batch.changes {
         return;
     }
-    let frame = number % batch.frames;
-    let index = batch.calibrated * batch.frames + number;
-    let taxel = taxels[index / batch.frames];
-    let now = taxel.response * batch.frames + frame;
-    let step = steps[frame];
-    var status = statuses[now] | step.flags;
-    pressures[index] = 0.0;
-    if step.flags != 0u {
-        statuses[index] = status | UNUSABLE;
-        return;
+    let slot = batch.calibrated + change;
+    let taxel = taxels[slot];
+    let now = pressures[at(taxel.response, quad)];
+    let heard = statuses[at(taxel.response, quad)];
+    var first_before = pressures_before[taxel.response].x;
+    var heard_before = statuses_before[taxel.response] & 0xffu;
+    if quad > 0u {
+        first_before = pressures[at(taxel.response, quad - 1u)].w;
+        heard_before = statuses[at(taxel.response, quad - 1u)] >> 24u;
     }
-    var before = 0.0;
-    if frame == 0u {
-        before = pressures_before[taxel.response];
-        status |= statuses_before[taxel.response];
-    } else {
-        before = pressures[now - 1u];
-        status |= statuses[now - 1u];
-    }
-    if (status & UNUSABLE) == 0u {
-        let change = abs(pressures[now] - before) / step.dt_s;
-        let size = bitcast<u32>(change);
-        if size > HUGE_BITS {
-            status = FAULTY_INPUT | UNUSABLE;
-        } else if size >= TINY_BITS && change > taxel.dead_band {
-            pressures[index] = change;
+    let before = vec4<f32>(first_before, now.xyz);
+    let known = unpacked(heard | (heard << 8u) | heard_before);
+    var changes = vec4<f32>();
+    var result = vec4<u32>();
+    for (var i = 0u; i < 4u; i++) {
+        let step = steps[min(quad * 4u + i, batch.frames - 1u)];
+        var status = known[i];
+        if step.flags != 0u {
+            status = (unpacked(heard)[i] | (step.flags >> STATUS)) | UNUSABLE;
         }
+        if (status & UNUSABLE) == 0u {
+            let rate = abs(now[i] - before[i]) / step.dt_s;
+            let size = bitcast<u32>(rate);
+            if size > HUGE_BITS {
+                status = (FAULTY_INPUT >> STATUS) | UNUSABLE;
+            } else if size >= TINY_BITS && rate > taxel.dead_band {
+                changes[i] = rate;
+            }
+        }
+        result[i] = status;
     }
-    statuses[index] = status;
+    pressures[at(slot, quad)] = changes;
+    statuses[at(slot, quad)] = packed(result);
 }

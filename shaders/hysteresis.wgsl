@@ -2,10 +2,12 @@
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> thresholds: array<vec2<f32>>;
-@group(0) @binding(2) var<storage, read> contacts: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read_write> cells: array<u32>;
+// As shaders/shared/over_fields.wgsl has them.
+@group(0) @binding(2) var<storage, read_write> results: array<u32>;
 // 1 where the frame before was in contact.
-@group(0) @binding(4) var<storage, read_write> touched: array<u32>;
+@group(0) @binding(3) var<storage, read_write> touched: array<u32>;
+
+override TOTAL_AT: u32 = 1u;
 
 // What a field says of its input, and of itself, whether it is touched or not. The last two are a
 // change's here: motion comes later.
@@ -24,12 +26,14 @@ fn main(
     }
     let on = thresholds[field].x;
     let off = thresholds[field].y;
+    let totals = TOTAL_AT * batch.frames * batch.fields;
     var before = touched[field] != 0u;
-    for (var cell = field * batch.frames; cell < (field + 1u) * batch.frames; cell++) {
-        let total = contacts[cell].x;
+    for (var frame = 0u; frame < batch.frames; frame++) {
+        let cell = frame * batch.fields + field;
+        let total = bitcast<f32>(results[totals + cell]);
         before = total > on || (before && total > off);
         if !before {
-            cells[cell] = (cells[cell] & (KEPT | (SUMS << PRESENT))) | NO_CONTACT;
+            results[cell] = (results[cell] & (KEPT | (SUMS << PRESENT))) | NO_CONTACT;
         }
     }
     touched[field] = select(0u, 1u, before);

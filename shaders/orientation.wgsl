@@ -1,86 +1,84 @@
 // orientation: the line through the two farthest points (src/stage/orientation.rs).
 
-@group(0) @binding(0) var<uniform> batch: Batch;
-@group(0) @binding(1) var<storage, read> fields: array<Field>;
-@group(0) @binding(2) var<storage, read> members: array<Member>;
-@group(0) @binding(3) var<storage, read> pressures: array<f32>;
-@group(0) @binding(4) var<storage, read> contacts: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read> centroids: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read_write> cells: array<u32>;
-@group(0) @binding(7) var<storage, read_write> orientations: array<f32>;
-@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
-
 const NEAR = 6.103515625e-5f;
 const NOBODY = 0xffffffffu;
 
 // The three largest squared distances, and the points and members of the two largest. Of equals the lower member is the
 // larger.
 struct Farthest {
-    r1: f32,
-    r2: f32,
-    r3: f32,
-    m1: u32,
-    m2: u32,
-    e1: vec2<f32>,
-    e2: vec2<f32>,
+    r1: vec4<f32>,
+    r2: vec4<f32>,
+    r3: vec4<f32>,
+    m1: vec4<u32>,
+    m2: vec4<u32>,
+    e1u: vec4<f32>,
+    e1v: vec4<f32>,
+    e2u: vec4<f32>,
+    e2v: vec4<f32>,
 }
 
-alias Part = Farthest;
-
-fn nothing() -> Farthest {
-    return Farthest(-1.0, -1.0, -1.0, NOBODY, NOBODY, vec2<f32>(), vec2<f32>());
+fn nobody_far() -> Farthest {
+    let nothing = vec4<f32>(-1.0);
+    let nobody = vec4<u32>(NOBODY);
+    return Farthest(nothing, nothing, nothing, nobody, nobody, vec4<f32>(), vec4<f32>(), vec4<f32>(), vec4<f32>());
 }
 
-fn put(so_far: Farthest, r: f32, m: u32, e: vec2<f32>) -> Farthest {
+// Takes in a point that is the farthest where `first`, and else the second farthest where `second`.
+fn put(
+    so_far: Farthest,
+    r: vec4<f32>,
+    m: vec4<u32>,
+    u: vec4<f32>,
+    v: vec4<f32>,
+    first: vec4<bool>,
+    second: vec4<bool>,
+) -> Farthest {
     var far = so_far;
-    if r > far.r1 || (r == far.r1 && m < far.m1) {
-        far.r3 = far.r2;
-        far.r2 = far.r1;
-        far.m2 = far.m1;
-        far.e2 = far.e1;
-        far.r1 = r;
-        far.m1 = m;
-        far.e1 = e;
-    } else if r > far.r2 || (r == far.r2 && m < far.m2) {
-        far.r3 = far.r2;
-        far.r2 = r;
-        far.m2 = m;
-        far.e2 = e;
-    } else {
-        far.r3 = max(far.r3, r);
-    }
+    far.r3 = select(max(far.r3, r), far.r2, first | second);
+    far.r2 = select(select(far.r2, r, second), far.r1, first);
+    far.m2 = select(select(far.m2, m, second), far.m1, first);
+    far.e2u = select(select(far.e2u, u, second), far.e1u, first);
+    far.e2v = select(select(far.e2v, v, second), far.e1v, first);
+    far.r1 = select(far.r1, r, first);
+    far.m1 = select(far.m1, m, first);
+    far.e1u = select(far.e1u, u, first);
+    far.e1v = select(far.e1v, v, first);
     return far;
 }
 
-fn add(so_far: Farthest, m: u32, frame: u32, context: Context) -> Farthest {
-    let member = members[m];
-    let pressure = pressures[member.slot * batch.frames + frame];
-    if pressure <= 0.0 {
-        return so_far;
-    }
-    let q = (member.weight * pressure) * context.scale;
-    let e = (vec2<f32>(member.u, member.v) - context.centroid) * q;
-    return put(so_far, e.x * e.x + e.y * e.y, m, e);
+// Members come in rising order: of equals the one that is there is the lower.
+fn add_far(so_far: Farthest, m: u32, member: Member, pressure: vec4<f32>, q: vec4<f32>, place: Place) -> Farthest {
+    let u = (member.u - place.u) * q;
+    let v = (member.v - place.v) * q;
+    let r = select(vec4<f32>(-1.0), u * u + v * v, pressure > vec4<f32>());
+    return put(so_far, r, vec4<u32>(m), u, v, r > so_far.r1, r > so_far.r2);
 }
 
-fn join(a: Farthest, b: Farthest) -> Farthest {
-    var far = put(put(a, b.r1, b.m1, b.e1), b.r2, b.m2, b.e2);
+fn put_any(far: Farthest, r: vec4<f32>, m: vec4<u32>, u: vec4<f32>, v: vec4<f32>) -> Farthest {
+    let first = (r > far.r1) | ((r == far.r1) & (m < far.m1));
+    let second = (r > far.r2) | ((r == far.r2) & (m < far.m2));
+    return put(far, r, m, u, v, first, second);
+}
+
+fn join_far(a: Farthest, b: Farthest) -> Farthest {
+    var far = put_any(put_any(a, b.r1, b.m1, b.e1u, b.e1v), b.r2, b.m2, b.e2u, b.e2v);
     far.r3 = max(far.r3, b.r3);
     return far;
 }
 
-fn finish(cell: u32, field: Field, far: Farthest) {
-    orientations[cell] = 0.0;
-    if !is_pressed(cell) {
-        return;
-    }
-    let along = far.e1 - far.e2;
+struct Line {
+    angle: vec4<f32>,
+    status: vec4<u32>,
+}
+
+// `lined` is where more than one taxel of a chart is pressed.
+fn orientation_of(far: Farthest, lined: vec4<bool>) -> Line {
+    let along_u = far.e1u - far.e2u;
+    let along_v = far.e1v - far.e2v;
     let near = NEAR * sqrt(far.r1);
-    if sqrt(along.x * along.x + along.y * along.y) <= near {
-        cells[cell] |= COINCIDENT;
-        return;
-    }
-    let tie = far.r3 >= 0.0 && sqrt(far.r2) - sqrt(max(far.r3, 0.0)) <= near;
-    orientations[cell] = line_angle(along.x, along.y);
-    cells[cell] |= select(0u, TIE, tie) | (ORIENTATION << PRESENT);
+    let together = sqrt(along_u * along_u + along_v * along_v) <= near;
+    let tie = (far.r3 >= vec4<f32>()) & (sqrt(far.r2) - sqrt(max(far.r3, vec4<f32>())) <= near);
+    let status = select(vec4<u32>(), vec4<u32>(TIE), tie) | vec4<u32>(ORIENTATION << PRESENT);
+    let angle = select(line_angle(along_u, along_v), vec4<f32>(), together | !lined);
+    return Line(angle, select(vec4<u32>(), select(status, vec4<u32>(COINCIDENT), together), lined));
 }

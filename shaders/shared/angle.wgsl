@@ -34,7 +34,7 @@ fn full_angle(x: f32, y: f32) -> f32 {
 }
 
 // The angle of the line along (x, y), in [0, pi).
-fn line_angle(x: f32, y: f32) -> f32 {
+fn angle_of_line(x: f32, y: f32) -> f32 {
     let flip = y < 0.0 || (y == 0.0 && x < 0.0);
     let turned = atan2_upper(abs(y), select(x, -x, flip));
     // This pi lies above the real one.

@@ -7,6 +7,8 @@ struct Batch {
     changes: u32,
     fields: u32,
     wide: u32,
+    // Quads of a block: two to this power, up to GROUP. Divisions are dear where vectors have none.
+    lanes_log2: u32,
 }
 
 struct Taxel {
@@ -52,17 +54,6 @@ struct Step {
     flags: u32,
 }
 
-struct Motion {
-    displacement: vec2<f32>,
-    direction: f32,
-    distance: f32,
-    radial_distance: f32,
-    speed: f32,
-    radial_speed: f32,
-    // Flags below and quantities present above, for the host to add to the cell's: its neighbours read that meanwhile.
-    status: u32,
-}
-
 const NO_CONTACT = 1u << 0u;
 const ONE_TAXEL = 1u << 1u;
 const TIE = 1u << 2u;
@@ -97,8 +88,10 @@ const STRAIGHT = 0u;
 const MASKED = 1u;
 const FIRST_CURVE = 2u;
 
-// Bit of a taxel's status that leaves it out of every sum.
-const UNUSABLE = 1u << 31u;
+// A taxel's status is a byte: from this bit on the flags that it can have, and above them UNUSABLE, which leaves it out of
+// every sum.
+const STATUS = 6u;
+const UNUSABLE = 0x80u;
 
 // Invocations of a group.
 const GROUP = 64u;
@@ -107,11 +100,37 @@ const GROUP = 64u;
 // must be so: lavapipe ends any shader's loops after 65,535 rounds in all, without a word.
 const WIDE = 4096u;
 
-// A dispatch is folded into rows, as one row may not be longer than 65,535 groups.
+// A dispatch counts groups along x, folded over z, as no side may be longer than 65,535; y counts blocks of frames where
+// an invocation has but one.
 fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return group.y * groups.x + group.x;
+    return group.z * groups.x + group.x;
 }
 
 fn invocation(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
     return group_number(group, groups) * GROUP + local;
+}
+
+// Frames are taken four at a time, as a quad: a vector of their pressures, and one word of their statuses, the first in
+// the lowest byte. On the device quads lie in blocks of `lanes`, in each block slot by slot: an invocation's neighbours
+// read its neighbours, and what a group reads lies together. A quad that is not full repeats the last frame.
+fn quads() -> u32 {
+    return (batch.frames + 3u) / 4u;
+}
+
+fn lanes() -> u32 {
+    return 1u << batch.lanes_log2;
+}
+
+fn at(slot: u32, quad: u32) -> u32 {
+    let slots = batch.calibrated + batch.changes;
+    return ((((quad >> batch.lanes_log2) * slots) + slot) << batch.lanes_log2) + (quad & (lanes() - 1u));
+}
+
+// Four statuses in one word.
+fn packed(statuses: vec4<u32>) -> u32 {
+    return statuses.x | (statuses.y << 8u) | (statuses.z << 16u) | (statuses.w << 24u);
+}
+
+fn unpacked(statuses: u32) -> vec4<u32> {
+    return (vec4<u32>(statuses) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
 }

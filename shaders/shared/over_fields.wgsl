@@ -1,8 +1,115 @@
-// How a stage goes over the fields: each field and frame by one invocation, or a wide field by a whole group.
-//
-// The stage declares `fields`, `cells` and `wide_fields`, and says what it adds up: a type `Part` with `nothing()`,
-// `add(part, member, frame, context)`, `join(part, part)` and `finish(cell, field, part)`; `context_of(cell, field)` is
-// what every member needs to be told.
+// How the stages from contact to axis go over the fields, all in one: each field and quad of frames by one invocation, or
+// a wide field by a whole group. A member's pressures are read once for the sums and the centroid, and once more for what
+// needs the centroid.
+
+@group(0) @binding(0) var<uniform> batch: Batch;
+@group(0) @binding(1) var<storage, read> fields: array<Field>;
+// 2: the members.
+// Their third coordinate, for fields without a chart.
+@group(0) @binding(3) var<storage, read> depths: array<f32>;
+@group(0) @binding(4) var<storage, read> taxels: array<Taxel>;
+@group(0) @binding(5) var<storage, read> pressures: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> statuses: array<u32>;
+// Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
+@group(0) @binding(7) var<storage, read_write> results: array<u32>;
+@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
+
+// Which column has what; what nobody wants is nowhere, and not computed.
+const NOWHERE = 0xffffffffu;
+override TOTAL_AT: u32 = NOWHERE;
+override PEAK_AT: u32 = NOWHERE;
+override ACTIVE_AT: u32 = NOWHERE;
+override AREA_AT: u32 = NOWHERE;
+// u; v is the next.
+override CENTROID_AT: u32 = NOWHERE;
+override DEPTH_AT: u32 = NOWHERE;
+override ORIENTATION_AT: u32 = NOWHERE;
+override AXIS_AT: u32 = NOWHERE;
+override ANISOTROPY_AT: u32 = NOWHERE;
+// Whether stages run: a later one may need what is not kept.
+override CENTRED: bool = false;
+override ORIENTED: bool = false;
+override AXED: bool = false;
+
+fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
+    if column == NOWHERE {
+        return;
+    }
+    let frame = quad * 4u;
+    let cell = (column * batch.frames + frame) * batch.fields + index;
+    results[cell] = values.x;
+    if frame + 1u < batch.frames {
+        results[cell + batch.fields] = values.y;
+    }
+    if frame + 2u < batch.frames {
+        results[cell + 2u * batch.fields] = values.z;
+    }
+    if frame + 3u < batch.frames {
+        results[cell + 3u * batch.fields] = values.w;
+    }
+}
+
+fn store_numbers(column: u32, index: u32, quad: u32, values: vec4<f32>) {
+    store(column, index, quad, bitcast<vec4<u32>>(values));
+}
+
+// What a field's later stages are told of its earlier ones.
+struct Found {
+    status: vec4<u32>,
+    total: vec4<f32>,
+    scale: vec4<f32>,
+    place: Place,
+    // More than one taxel of a chart is pressed.
+    lined: vec4<bool>,
+}
+
+fn found_of(field: Field, sums: Sums, place_sum: Place) -> Found {
+    var found: Found;
+    found.status = status_of(sums, field);
+    found.total = sums.total;
+    if CENTRED {
+        let touched = sums.pressed > vec4<u32>();
+        found.place = mean_place(place_sum, sums.total, touched);
+        found.status |= present_places(field, touched);
+    }
+    if ORIENTED || AXED {
+        let charted = vec4<bool>(field.charted != 0u);
+        found.scale = scale_of(sums.total);
+        found.lined = (sums.pressed > vec4<u32>(1u)) & charted;
+        let alone = (sums.pressed == vec4<u32>(1u)) & charted;
+        found.status |= select(vec4<u32>(), vec4<u32>(ONE_TAXEL), alone);
+    }
+    return found;
+}
+
+fn store_sums(index: u32, quad: u32, sums: Sums, place: Place) {
+    store_numbers(TOTAL_AT, index, quad, sums.total);
+    store_numbers(PEAK_AT, index, quad, sums.peak);
+    store_numbers(AREA_AT, index, quad, sums.area);
+    store(ACTIVE_AT, index, quad, sums.pressed);
+    if CENTROID_AT != NOWHERE {
+        store_numbers(CENTROID_AT, index, quad, place.u);
+        store_numbers(CENTROID_AT + 1u, index, quad, place.v);
+    }
+    store_numbers(DEPTH_AT, index, quad, place.depth);
+}
+
+// Stores lines, and the cells' statuses.
+fn finish_lines(index: u32, quad: u32, found: Found, far: Farthest, moments: Moments) {
+    var status = found.status;
+    if ORIENTED {
+        let line = orientation_of(far, found.lined);
+        status |= line.status;
+        store_numbers(ORIENTATION_AT, index, quad, line.angle);
+    }
+    if AXED {
+        let axis = axis_of(moments, found.total * found.scale, found.lined);
+        status |= axis.status;
+        store_numbers(AXIS_AT, index, quad, axis.angle);
+        store_numbers(ANISOTROPY_AT, index, quad, axis.anisotropy);
+    }
+    store(0u, index, quad, status);
+}
 
 @compute @workgroup_size(GROUP)
 fn main(
@@ -10,23 +117,116 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let cell = invocation(group, groups, local);
-    if cell >= batch.frames * batch.fields {
+    // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
+    // same block, which so stays in the cache.
+    let index = (group_number(group, groups) * GROUP + local) >> batch.lanes_log2;
+    let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
+    if index >= batch.fields || quad >= quads() {
         return;
     }
-    let field = fields[cell / batch.frames];
+    let field = fields[index];
     if field.count > WIDE {
         return;
     }
-    let context = context_of(cell, field);
-    var part = nothing();
-    for (var m = field.first; m < field.first + field.count; m++) {
-        part = add(part, m, cell % batch.frames, context);
+    let end = field.first + field.count;
+    let first = at(0u, quad);
+    let charted = field.charted != 0u;
+    var sums = no_sums();
+    var place = no_place();
+    for (var m = field.first; m < end; m++) {
+        let member = members[m];
+        let here = first + (member.slot << batch.lanes_log2);
+        let pressure = pressures[here];
+        let pull = member.weight * pressure;
+        sums = add_sums(sums, member, pressure, pull, statuses[here]);
+        if CENTRED {
+            place = add_place(place, m, member, pull, charted);
+        }
     }
-    finish(cell, field, part);
+    let found = found_of(field, sums, place);
+    store_sums(index, quad, sums, found.place);
+    var far = nobody_far();
+    var moments = no_moments();
+    if (ORIENTED || AXED) && charted {
+        for (var m = field.first; m < end; m++) {
+            let member = members[m];
+            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
+            let q = (member.weight * pressure) * found.scale;
+            if ORIENTED {
+                far = add_far(far, m, member, pressure, q, found.place);
+            }
+            if AXED {
+                moments = add_moments(moments, member, q, found.place);
+            }
+        }
+    }
+    finish_lines(index, quad, found, far, moments);
 }
 
-var<workgroup> parts: array<Part, GROUP>;
+// What an invocation has found so far, as bits: of one kind after the other, as there is no room for all.
+const WIDEST = 9u;
+var<workgroup> parts: array<array<vec4<u32>, WIDEST>, GROUP>;
+
+fn put_sums(local: u32, sums: Sums, place: Place) {
+    parts[local][0] = bitcast<vec4<u32>>(sums.total);
+    parts[local][1] = bitcast<vec4<u32>>(sums.peak);
+    parts[local][2] = bitcast<vec4<u32>>(sums.area);
+    parts[local][3] = sums.pressed;
+    parts[local][4] = vec4<u32>(sums.status, sums.unusable, 0u, 0u);
+    parts[local][5] = bitcast<vec4<u32>>(place.u);
+    parts[local][6] = bitcast<vec4<u32>>(place.v);
+    parts[local][7] = bitcast<vec4<u32>>(place.depth);
+}
+
+fn number_at(local: u32, part: u32) -> vec4<f32> {
+    return bitcast<vec4<f32>>(parts[local][part]);
+}
+
+fn sums_at(local: u32) -> Sums {
+    let statuses = parts[local][4];
+    let pressed = parts[local][3];
+    return Sums(number_at(local, 0u), number_at(local, 1u), number_at(local, 2u), pressed, statuses.x, statuses.y);
+}
+
+fn place_at(local: u32) -> Place {
+    return Place(number_at(local, 5u), number_at(local, 6u), number_at(local, 7u));
+}
+
+fn put_far(local: u32, far: Farthest) {
+    parts[local][0] = bitcast<vec4<u32>>(far.r1);
+    parts[local][1] = bitcast<vec4<u32>>(far.r2);
+    parts[local][2] = bitcast<vec4<u32>>(far.r3);
+    parts[local][3] = far.m1;
+    parts[local][4] = far.m2;
+    parts[local][5] = bitcast<vec4<u32>>(far.e1u);
+    parts[local][6] = bitcast<vec4<u32>>(far.e1v);
+    parts[local][7] = bitcast<vec4<u32>>(far.e2u);
+    parts[local][8] = bitcast<vec4<u32>>(far.e2v);
+}
+
+fn far_at(local: u32) -> Farthest {
+    return Farthest(
+        number_at(local, 0u),
+        number_at(local, 1u),
+        number_at(local, 2u),
+        parts[local][3],
+        parts[local][4],
+        number_at(local, 5u),
+        number_at(local, 6u),
+        number_at(local, 7u),
+        number_at(local, 8u),
+    );
+}
+
+fn put_moments(local: u32, moments: Moments) {
+    parts[local][0] = bitcast<vec4<u32>>(moments.a);
+    parts[local][1] = bitcast<vec4<u32>>(moments.b);
+    parts[local][2] = bitcast<vec4<u32>>(moments.d);
+}
+
+fn moments_at(local: u32) -> Moments {
+    return Moments(number_at(local, 0u), number_at(local, 1u), number_at(local, 2u));
+}
 
 @compute @workgroup_size(GROUP)
 fn wide(
@@ -35,25 +235,80 @@ fn wide(
     @builtin(local_invocation_index) local: u32,
 ) {
     let number = group_number(group, groups);
-    if number >= batch.frames * batch.wide {
+    if number >= batch.wide {
         return;
     }
-    let index = wide_fields[number / batch.frames];
-    let cell = index * batch.frames + number % batch.frames;
+    let index = wide_fields[number];
+    let quad = group.y;
     let field = fields[index];
-    let context = context_of(cell, field);
-    var part = nothing();
-    for (var m = field.first + local; m < field.first + field.count; m += GROUP) {
-        part = add(part, m, cell % batch.frames, context);
+    let end = field.first + field.count;
+    let first = at(0u, quad);
+    let charted = field.charted != 0u;
+    var sums = no_sums();
+    var place = no_place();
+    for (var m = field.first + local; m < end; m += GROUP) {
+        let member = members[m];
+        let here = first + (member.slot << batch.lanes_log2);
+        let pressure = pressures[here];
+        let pull = member.weight * pressure;
+        sums = add_sums(sums, member, pressure, pull, statuses[here]);
+        if CENTRED {
+            place = add_place(place, m, member, pull, charted);
+        }
     }
-    parts[local] = part;
+    put_sums(local, sums, place);
     for (var half = GROUP / 2u; half > 0u; half /= 2u) {
         workgroupBarrier();
         if local < half {
-            parts[local] = join(parts[local], parts[local + half]);
+            let joined = join_places(place_at(local), place_at(local + half));
+            put_sums(local, join_sums(sums_at(local), sums_at(local + half)), joined);
         }
     }
+    workgroupBarrier();
+    // Every invocation goes on with what all have found.
+    sums = sums_at(0u);
+    let found = found_of(field, sums, place_at(0u));
     if local == 0u {
-        finish(cell, field, parts[0]);
+        store_sums(index, quad, sums, found.place);
+    }
+    var far = nobody_far();
+    var moments = no_moments();
+    if ORIENTED || AXED {
+        for (var m = field.first + local; m < end; m += GROUP) {
+            let member = members[m];
+            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
+            let q = (member.weight * pressure) * found.scale;
+            if ORIENTED {
+                far = add_far(far, m, member, pressure, q, found.place);
+            }
+            if AXED {
+                moments = add_moments(moments, member, q, found.place);
+            }
+        }
+    }
+    if ORIENTED {
+        workgroupBarrier();
+        put_far(local, far);
+        for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+            workgroupBarrier();
+            if local < half {
+                put_far(local, join_far(far_at(local), far_at(local + half)));
+            }
+        }
+        far = far_at(0u);
+    }
+    if AXED {
+        workgroupBarrier();
+        put_moments(local, moments);
+        for (var half = GROUP / 2u; half > 0u; half /= 2u) {
+            workgroupBarrier();
+            if local < half {
+                put_moments(local, join_moments(moments_at(local), moments_at(local + half)));
+            }
+        }
+        moments = moments_at(0u);
+    }
+    if local == 0u {
+        finish_lines(index, quad, found, far, moments);
     }
 }

@@ -6,6 +6,15 @@ use bytemuck::{Pod, Zeroable};
 #[cfg(feature = "gpu")]
 pub(crate) const WIDE: usize = 4096;
 
+/// Memberships that a uniform binding holds, as `shaders/shared/few_members.wgsl` says: 64 KiB, which every device can bind.
+#[cfg(feature = "gpu")]
+pub(crate) const FEW: usize = 4096;
+
+/// Members of a field at most: lavapipe ends an invocation's loops after 65,535 rounds, and it has two passes over every
+/// 64th member.
+#[cfg(feature = "gpu")]
+pub(crate) const WIDEST: usize = 65_000 / 2 * 64;
+
 /// A field of as many members or more has sixteen of them abreast on the CPU: fewer do as well one after the other, with
 /// sixteen frames or fields abreast.
 pub(crate) const MANY: usize = 128;
@@ -26,6 +35,20 @@ pub(crate) struct Batch {
     pub(crate) fields: u32,
     /// Fields of more than [`WIDE`] members.
     pub(crate) wide: u32,
+    /// Quads of a block, how many of a field a group of invocations takes: two to this power.
+    pub(crate) lanes_log2: u32,
+}
+
+/// Quads of a block, for a batch of `frames` frames: as many as a group has invocations, or so few as there are.
+#[cfg(feature = "gpu")]
+pub(crate) fn lanes(frames: usize) -> u32 {
+    (frames.div_ceil(4).max(1)).next_power_of_two().min(64) as u32
+}
+
+/// Quads of a batch of `frames` frames with those that fill up its last block.
+#[cfg(feature = "gpu")]
+pub(crate) fn padded_quads(frames: usize) -> usize {
+    frames.div_ceil(4).max(1).next_multiple_of(lanes(frames) as usize)
 }
 
 /// A taxel as a letter reads it: its calibration, or what holds for its changes.
@@ -78,20 +101,6 @@ pub(crate) struct Step {
     pub(crate) dt_s: f32,
     /// Why it cannot be used, as [`crate::percept::Flags`], or 0.
     pub(crate) flags: u32,
-}
-
-/// How a field's centroid moved, in its unit.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Motion {
-    pub(crate) displacement: [f32; 2],
-    pub(crate) direction: f32,
-    pub(crate) distance: f32,
-    pub(crate) radial_distance: f32,
-    pub(crate) speed: f32,
-    pub(crate) radial_speed: f32,
-    /// Flags and quantities present, to be added to the cell's.
-    pub(crate) status: u32,
 }
 
 /// Where a field's members stand, and what it can answer.

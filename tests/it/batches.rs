@@ -74,6 +74,29 @@ fn percepts_do_not_depend_on_the_cut() {
     }
 }
 
+/// A call of so many frames goes through the GPU in several parts, some on their way while others are packed and read.
+#[test]
+fn percepts_do_not_depend_on_how_a_long_call_streams() {
+    let body = Body::from_bytes("mat", somatic::bundled::MAT).unwrap();
+    let frames = recording(&body, 2300);
+    let wanted = somatic::Outputs::TOTAL | somatic::Outputs::CENTROID | somatic::Outputs::ORIENTATION;
+    let run = |kind: BackendKind, cut: usize| {
+        let scene = somatic::Scene { outputs: wanted | somatic::Outputs::SPEED, ..somatic::Scene::default() };
+        let options = Options { backend: kind, batch: cut, scene, ..Options::default() };
+        let mut engine = Engine::new(&body, options).unwrap();
+        let mut seen = Vec::new();
+        for part in frames.chunks(cut) {
+            let percepts = engine.process(part).unwrap();
+            seen.extend((0..part.len()).map(|frame| bits(percepts, frame)));
+        }
+        seen
+    };
+    for kind in backends().into_iter().filter(|kind| *kind != BackendKind::Reference) {
+        let differs = run(kind, 2300).iter().zip(&run(kind, 230)).position(|(a, b)| a != b);
+        assert_eq!(differs, None, "{kind:?}");
+    }
+}
+
 #[test]
 fn percepts_do_not_depend_on_the_order_of_channels() {
     let body = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();

@@ -1,6 +1,6 @@
 //! Finding an adapter and opening the one device that all GPU backends of a process share.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
@@ -10,6 +10,34 @@ pub(crate) struct Device {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) info: wgpu::AdapterInfo,
+    /// The first thing that went wrong where nobody asked.
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+impl Device {
+    /// The device answers no more, because of `why`.
+    pub(crate) fn lost(&self, why: &dyn std::fmt::Display) -> Error {
+        let words = why.to_string();
+        let words: Vec<&str> = words.split_whitespace().collect();
+        Error::failed(format!(
+            "{} stopped answering: {}; start again, or use the cpu backend",
+            self.info.name,
+            words.join(" ")
+        ))
+    }
+
+    /// Keeps what went wrong, if it is the first that did.
+    pub(crate) fn note(&self, what: &str) {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| what.to_owned());
+    }
+
+    /// Says so if something went wrong that no call has told.
+    pub(crate) fn check(&self) -> Result<()> {
+        match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(why) => Err(self.lost(why)),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What there is to run on, for people.
@@ -30,8 +58,9 @@ static SHARED: Mutex<Option<Device>> = Mutex::new(None);
 
 /// The process's device; opened on the first call.
 pub(crate) fn shared() -> Result<Device> {
-    let mut shared = SHARED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let Some(device) = &*shared {
+    let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    // One that was lost does not come back; another may be had.
+    if let Some(device) = shared.as_ref().filter(|device| device.check().is_ok()) {
         return Ok(device.clone());
     }
     let device = open(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12)?;
@@ -41,6 +70,17 @@ pub(crate) fn shared() -> Result<Device> {
 
 /// Opens the best adapter of `backends` with the limits that every WebGPU device has.
 pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
+    open_with(backends, wgpu::Features::empty())
+}
+
+/// A device of its own whose clock may be read, where the adapter lets anybody.
+pub(super) fn with_clock() -> Result<Device> {
+    let _alone = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    open_with(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12, wgpu::Features::TIMESTAMP_QUERY)
+}
+
+/// Opens the best adapter with those of `features` that it has.
+fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Device> {
     let adapter = pollster::block_on(async {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
@@ -56,13 +96,22 @@ pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
     let info = adapter.get_info();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("somatic"),
-        required_features: wgpu::Features::empty(),
+        required_features: adapter.features() & features,
         required_limits: wgpu::Limits::default(),
         ..wgpu::DeviceDescriptor::default()
     };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
         .map_err(|e| Error::no_adapter(format!("{} cannot be used: {e}", info.name)))?;
-    Ok(Device { device, queue, info })
+    let trouble = Arc::new(Mutex::new(None));
+    let (of_errors, of_loss) = (trouble.clone(), trouble.clone());
+    let note = |trouble: &Mutex<Option<String>>, what: String| {
+        trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
+    };
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&of_errors, error.to_string())));
+    device.set_device_lost_callback(move |_, why| {
+        note(&of_loss, if why.is_empty() { "the device was lost".to_owned() } else { why });
+    });
+    Ok(Device { device, queue, info, trouble })
 }
 
 /// Every adapter that could run the GPU backend.

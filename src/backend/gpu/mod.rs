@@ -1,11 +1,15 @@
 //! Backend `gpu`: WGSL compute shaders through wgpu, the only place that knows wgpu.
 //!
-//! One submission takes a batch: the raw values go up, every stage runs over all fields and frames at once, and the
-//! columns that were asked for come back. Pipelines, buffers and bind groups are made once; a call allocates no device
-//! memory. On the device a taxel's frames, and a field's, lie side by side, so that neighbouring invocations read
-//! neighbouring words whether the batch is one frame or many.
+//! Frames stream through a few sets of buffers: while the device computes some, the next are packed and those before are
+//! read. Every stage runs over all fields and frames of a submission at once, and only the columns that were asked for
+//! come back, in the order that percepts have. Pipelines, buffers and bind groups are made once; a call allocates no
+//! device memory. On the device a taxel's frames lie side by side, four to a vector, so that neighbouring invocations
+//! read neighbouring words.
 
 pub(crate) mod adapter;
+mod columns;
+mod report;
+mod ring;
 pub(crate) mod shaders;
 mod stage;
 mod unpack;
@@ -13,17 +17,17 @@ mod unpack;
 #[cfg(test)]
 mod tests;
 
-use std::sync::mpsc;
-
 pub use adapter::{AdapterSummary, adapters};
 use bytemuck::cast_slice;
+pub use report::{Bandwidth, DeviceTime, bandwidth, device_time};
 
 use self::adapter::Device;
-use self::shaders::StageShader;
-use self::stage::{Over, Stage, groups, table};
-use super::{Backend, RawBatch};
+use self::columns::{Columns, NOTHING};
+use self::ring::{SETS, Set};
+use self::stage::{Over, Stage, table, table_as};
+use super::{Backend, RawBatch, Rows};
 use crate::error::{Error, Result};
-use crate::percept::{CellsMut, Outputs, Percepts};
+use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::layout;
@@ -34,6 +38,13 @@ const GROUP: u32 = 64;
 const HEADER: u64 = size_of::<layout::Batch>() as u64;
 /// Bytes of a frame's step, which follow.
 const STEP: u64 = size_of::<layout::Step>() as u64;
+/// Bytes of raw values in a submission, about: enough for the device to be busy, little enough to stay in caches and to
+/// have several on their way.
+const ENOUGH: usize = 4 << 20;
+/// Frames of a submission at most: dispatches count quads along one side, of 65,535 groups.
+const MOST: usize = 1 << 17;
+/// Frames of a full block.
+const BLOCK: usize = 4 * GROUP as usize;
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -41,7 +52,7 @@ pub(crate) struct Gpu {
     device: Device,
     /// Frames that one submission takes at most.
     capacity: usize,
-    upload: wgpu::Buffer,
+    ring: Vec<Set>,
     batch: wgpu::Buffer,
     steps: wgpu::Buffer,
     raw: wgpu::Buffer,
@@ -51,109 +62,66 @@ pub(crate) struct Gpu {
     stages: Vec<Stage>,
     /// Number of wide fields.
     wide: u32,
-    results: Vec<Column>,
-    readback: wgpu::Buffer,
-    /// The batch's steps as the device reads them; kept so that a call allocates nothing.
+    columns: Columns,
+    results: wgpu::Buffer,
+    /// Per taxel and frame, where they are read back.
+    pressures: Option<wgpu::Buffer>,
+    /// Per field, the power of two that its lengths are counted in, m.
+    units_m: Vec<f32>,
+    /// The batch's steps and a frame's values as the device reads them; kept so that a call allocates nothing.
     packed_steps: Vec<layout::Step>,
     packed_row: Vec<RawValue>,
     /// What a restart sets to zero.
     memory: [wgpu::Buffer; 2],
 }
 
-/// A result that is read back.
-struct Column {
-    what: What,
-    buffer: wgpu::Buffer,
-    /// Bytes a cell, or a taxel.
-    stride: u64,
-}
-
-impl Column {
-    fn bytes_a_frame(&self, slots: u64, fields: u64) -> u64 {
-        self.stride * if self.what == What::Pressures { slots } else { fields }
-    }
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum What {
-    Cells,
-    Contacts,
-    Centroids,
-    Orientations,
-    Axes,
-    Motions,
-    /// Per taxel and frame, where every other is per field and frame.
-    Pressures,
-}
-
 impl Gpu {
     /// The backend for `plan` on the process's device, for calls of about `batch` frames.
     ///
     /// # Errors
-    /// No adapter, or a plan whose tables are beyond what every WebGPU device can bind.
+    /// No adapter, a plan whose tables are beyond what every WebGPU device can bind, or a device without memory for it.
     pub(crate) fn new(plan: &Plan, batch: usize) -> Result<Self> {
         Self::on(adapter::shared()?, plan, batch)
     }
 
     pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
-        let limit = device.device.limits().max_storage_buffer_binding_size;
+        let columns = Columns::new(plan);
+        let capacity = capacity(&device, plan, &columns, batch)?;
         let (slots, channels, fields) = (plan.slots() as u64, plan.channels() as u64, plan.fields.len() as u64);
-        // The widest buffer that shaders bind, and the one that all results come back in.
-        let widest = (slots * 4).max(fields * size_of::<layout::Motion>() as u64);
-        let back = slots * 4 + fields * (4 + 16 + 16 + 4 + 8 + size_of::<layout::Motion>() as u64);
-        let tables = (plan.members.len() * size_of::<layout::Member>()) as u64;
-        let knots = (plan.curves.knots.len() * size_of::<layout::Knot>()) as u64;
-        if tables > limit || widest > limit || knots > limit {
-            return Err(Error::failed(format!(
-                "{} memberships and {channels} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
-                plan.members.len()
-            )));
-        }
-        let most = (limit / widest).min(device.device.limits().max_buffer_size / back).max(1);
-        let capacity = batch.clamp(1, most as usize);
         let frames = capacity as u64;
-
-        let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages, mapped: bool| {
+        let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages| {
             device.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(name),
                 size: size.max(16).next_multiple_of(16),
                 usage,
-                mapped_at_creation: mapped,
+                mapped_at_creation: false,
             })
         };
         let working = |name: &str, size: u64| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            buffer(name, size, usage, false)
+            buffer(name, size, usage)
         };
-        let upload = buffer(
-            "upload",
-            HEADER + frames * (STEP + channels * 4),
-            wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC,
-            true,
-        );
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let batch = buffer("batch", HEADER, uniform, false);
+        let batch = buffer("batch", HEADER, uniform);
         let steps = working("steps", frames * STEP);
         let raw = working("raw", frames * channels * 4);
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
-        let members = table(&device, "members", &plan.members);
+        let few = plan.members.len() <= layout::FEW;
+        let (shader, usage, least) = match few {
+            true => (&shaders::FEW_FIELDS, wgpu::BufferUsages::UNIFORM, layout::FEW * size_of::<layout::Member>()),
+            false => (&shaders::FIELDS, wgpu::BufferUsages::STORAGE, 0),
+        };
+        let members = table_as(&device, "members", &plan.members, usage, least as u64);
         let all_depths: Vec<f32> = plan.fields.iter().flat_map(|field| field.depths.iter().copied()).collect();
         let depths = table(&device, "depths", &all_depths);
-        let pressures = working("pressures", frames * slots * 4);
-        let statuses = working("statuses", frames * slots * 4);
-        let cells = working("cells", frames * fields * 4);
-        let contacts = working("contacts", frames * fields * 16);
-        let centroids = working("centroids", frames * fields * 16);
-        let orientations = working("orientations", frames * fields * 4);
-        let axes = working("axes", frames * fields * 8);
-        let motions = working("motions", frames * fields * size_of::<layout::Motion>() as u64);
-        let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| [f.thresholds.on, f.thresholds.off]).collect();
-        let still: Vec<f32> = plan.fields.iter().map(|field| field.still_within).collect();
+        let quads = layout::padded_quads(capacity) as u64;
+        let pressures = working("pressures", quads * slots * 16);
+        let statuses = working("statuses", quads * slots * 4);
+        let results = working("results", frames * fields * 4 * columns.count() as u64);
         // What the frame before left; buffers begin as zeros, and zero is no contact.
         let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
-
         let wide: Vec<u32> =
             (0..).zip(&plan.fields).filter(|(_, field)| field.count > layout::WIDE).map(|(index, _)| index).collect();
         let wide_fields = table(&device, "wide fields", &wide);
@@ -163,76 +131,55 @@ impl Gpu {
             (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
         let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
         let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
-        let calibrate = Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &buffers[..used]);
-        let mut stages = Vec::new();
+        let signals = [("SIGNALS", (plan.calibrated() / plan.channels()) as f64)];
+        let mut stages =
+            vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &signals, &buffers[..used])];
         // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
         let before = plan.has_changes().then(|| working("raw before", channels * 4));
         if let Some(before) = &before {
-            let one = buffer("one frame", HEADER, uniform, false);
+            let one = buffer("one frame", HEADER, uniform);
             device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1, wide.len() as u32)));
-            let calibrated = plan.calibrated() as u64 * 4;
-            let (pressed, heard) = (working("pressures before", calibrated), working("statuses before", calibrated));
+            let calibrated = plan.calibrated() as u64;
+            let pressed = working("pressures before", calibrated * 16);
+            let heard = working("statuses before", calibrated * 4);
             let buffers = [&one, &taxels, before, &pressed, &heard, &curves, &knots];
-            stages.push(calibrate.again(&device, Over::CalibratedOnce, &buffers[..used]));
+            stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
             let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
-            stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, &buffers));
+            stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
-        stages.insert(0, calibrate);
-        let mut over_fields = |shader: &StageShader, buffers: [&wgpu::Buffer; 8]| {
-            stages.push(Stage::new(&device, shader, "main", Over::Fields, &buffers));
-            if !wide.is_empty() {
-                let buffers = [&buffers[..], &[&wide_fields]].concat();
-                stages.push(Stage::new(&device, shader, "wide", Over::WideFields, &buffers));
-            }
-        };
-        let buffers = [&batch, &taxels, &field_table, &members, &pressures, &statuses, &cells, &contacts];
-        over_fields(&shaders::CONTACT, buffers);
-        if wanted.centroid {
-            let buffers = [&batch, &field_table, &members, &depths, &pressures, &contacts, &cells, &centroids];
-            over_fields(&shaders::CENTROID, buffers);
-        }
-        let line = |result| [&batch, &field_table, &members, &pressures, &contacts, &centroids, &cells, result];
-        if wanted.orientation {
-            over_fields(&shaders::ORIENTATION, line(&orientations));
-        }
-        if wanted.axis {
-            over_fields(&shaders::AXIS, line(&axes));
+        let told = columns.of_fields(plan);
+        let buffers = [&batch, &field_table, &members, &depths, &taxels, &pressures, &statuses, &results, &wide_fields];
+        stages.push(Stage::new(&device, shader, "main", Over::Quads, &told, &buffers[..8]));
+        if !wide.is_empty() {
+            stages.push(Stage::new(&device, shader, "wide", Over::WideFields, &told, &buffers));
         }
         if wanted.hysteresis {
-            let buffers = [&batch, &table(&device, "thresholds", &thresholds), &contacts, &cells, &touched];
-            stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::FieldsOnce, &buffers));
+            let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| [f.thresholds.on, f.thresholds.off]).collect();
+            let buffers = [&batch, &table(&device, "thresholds", &thresholds), &results, &touched];
+            let told = columns.of_hysteresis();
+            stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));
         }
         if wanted.motion {
+            let still: Vec<f32> = plan.fields.iter().map(|field| field.still_within).collect();
             let still = table(&device, "still", &still);
-            let main = [(0, &batch), (1, &steps), (2, &still), (3, &centroids), (4, &cells), (5, &last), (6, &motions)];
-            stages.push(Stage::bound(&device, &shaders::MOTION, "main", Over::Fields, &main));
-            let keep = [(0, &batch), (3, &centroids), (4, &cells), (5, &last)];
-            stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::FieldsOnce, &keep));
+            let told = columns.of_motion();
+            let main = [&batch, &steps, &still, &results, &last];
+            stages.push(Stage::new(&device, &shaders::MOTION, "main", Over::Cells, &told, &main));
+            let keep = [(0, &batch), (3, &results), (4, &last)];
+            stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
         }
 
-        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
-        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::FILTERED;
-        let results: Vec<Column> = [
-            (true, What::Cells, cells, 4),
-            (plan.outputs.intersects(sums), What::Contacts, contacts, 16),
-            (plan.outputs.intersects(place), What::Centroids, centroids, 16),
-            (wanted.orientation, What::Orientations, orientations, 4),
-            (wanted.axis, What::Axes, axes, 8),
-            (wanted.motion, What::Motions, motions, size_of::<layout::Motion>() as u64),
-            (wanted.touches, What::Pressures, pressures, 4),
-        ]
-        .into_iter()
-        .filter(|(read, ..)| *read)
-        .map(|(_, what, buffer, stride)| Column { what, buffer, stride })
-        .collect();
-        let bytes_back = frames * results.iter().map(|column| column.bytes_a_frame(slots, fields)).sum::<u64>();
-        let readback =
-            buffer("readback", bytes_back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false);
+        let back = frames * fields * 4 * columns.read().len() as u64;
+        let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
+        // Calls that fit into one submission never have another on its way.
+        let sets = if capacity < BLOCK { 1 } else { SETS };
+        let ring = (0..sets).map(|_| Set::new(&device, HEADER + frames * (STEP + channels * 4), back)).collect();
+        device.check()?;
         Ok(Self {
             plan: plan.clone(),
             device,
             capacity,
-            upload,
+            ring,
             batch,
             steps,
             raw,
@@ -240,98 +187,132 @@ impl Gpu {
             taxels,
             stages,
             wide: wide.len() as u32,
+            columns,
             results,
-            readback,
+            pressures: wanted.touches.then_some(pressures),
+            units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             packed_steps: Vec::with_capacity(capacity),
-            packed_row: Vec::with_capacity(plan.slots()),
+            packed_row: Vec::with_capacity(plan.channels()),
             memory: [touched, last],
         })
     }
 
-    /// One submission: `raw.frames` is at most the capacity.
-    fn submit(&mut self, raw: &RawBatch<'_>, cells: &mut CellsMut<'_>) -> Result<()> {
-        let (frames, slots, fields) = (raw.frames as u32, self.plan.slots() as u32, self.plan.fields.len() as u32);
-        let calibrated = self.plan.calibrated() as u32;
-        self.packed_steps.clear();
-        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let header = header(&self.plan, frames, self.wide);
-        let channels = self.plan.channels();
-        let size = u64::from(frames) * channels as u64 * 4;
-        let lost =
-            |e: &dyn std::fmt::Display| Error::failed(format!("{} stopped answering: {e}", self.device.info.name));
-        {
-            let from = HEADER + u64::from(frames) * STEP;
-            let end = from + size;
-            let mut mapped = self.upload.get_mapped_range_mut(0..end.next_multiple_of(4)).map_err(|e| lost(&e))?;
-            let mut mapped = mapped.slice(..);
-            mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(&header));
-            mapped.slice(HEADER as usize..from as usize).copy_from_slice(cast_slice(&self.packed_steps));
-            for frame in 0..raw.frames {
-                self.packed_row.clear();
-                self.packed_row.extend(raw.rows.row(frame));
-                let at = from as usize + frame * channels * 4;
-                mapped.slice(at..at + channels * 4).copy_from_slice(cast_slice(&self.packed_row));
-            }
-        }
-        self.upload.unmap();
-
+    /// Sends `raw`, which is at most the capacity and starts at frame `first` of a call, with set `set`, which is free.
+    fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
+        let header = header(&self.plan, raw.frames as u32, self.wide);
+        self.pack(set, raw, &header)?;
+        let set = &mut self.ring[set];
+        set.upload.unmap();
+        let frames = raw.frames as u64;
+        let (steps, row) = (frames * STEP, self.plan.channels() as u64 * 4);
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&self.upload, 0, &self.batch, 0, HEADER);
-        let steps = u64::from(frames) * STEP;
-        encoder.copy_buffer_to_buffer(&self.upload, HEADER, &self.steps, 0, steps);
-        encoder.copy_buffer_to_buffer(&self.upload, HEADER + steps, &self.raw, 0, size);
-        for stage in &self.stages {
-            let mut pass = encoder
-                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stage.name), timestamp_writes: None });
-            let count = match stage.over {
-                Over::Calibrated => (frames * calibrated).div_ceil(GROUP),
-                Over::CalibratedOnce => calibrated.div_ceil(GROUP),
-                Over::Changes => (frames * (slots - calibrated)).div_ceil(GROUP),
-                Over::Fields => (frames * fields).div_ceil(GROUP),
-                Over::WideFields => frames * self.wide,
-                Over::FieldsOnce => fields.div_ceil(GROUP),
-            };
-            let (wide, tall) = groups(count);
-            pass.set_pipeline(&stage.pipeline);
-            pass.set_bind_group(0, &stage.bound, &[]);
-            pass.dispatch_workgroups(wide, tall, 1);
+        encoder.copy_buffer_to_buffer(&set.upload, 0, &self.batch, 0, HEADER);
+        encoder.copy_buffer_to_buffer(&set.upload, HEADER, &self.steps, 0, steps);
+        encoder.copy_buffer_to_buffer(&set.upload, HEADER + steps, &self.raw, 0, frames * row);
+        {
+            let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
+            let mut pass = encoder.begin_compute_pass(&descriptor);
+            for stage in &self.stages {
+                let [wide, tall, deep] = stage.over.groups(&header);
+                pass.set_pipeline(&stage.pipeline);
+                pass.set_bind_group(0, &stage.bound, &[]);
+                pass.dispatch_workgroups(wide, tall, deep);
+            }
         }
         if let Some(before) = &self.before {
-            let row = self.plan.channels() as u64 * 4;
-            encoder.copy_buffer_to_buffer(&self.raw, u64::from(frames - 1) * row, before, 0, row);
+            encoder.copy_buffer_to_buffer(&self.raw, (frames - 1) * row, before, 0, row);
         }
-        let length = |column: &Column| u64::from(frames) * column.bytes_a_frame(u64::from(slots), u64::from(fields));
-        let mut end = 0;
-        for column in &self.results {
-            encoder.copy_buffer_to_buffer(&column.buffer, 0, &self.readback, end, length(column));
-            end += length(column);
+        let mut end = frames * self.plan.fields.len() as u64 * 4 * self.columns.read().len() as u64;
+        encoder.copy_buffer_to_buffer(&self.results, 0, &set.readback, 0, end);
+        if let Some(pressures) = &self.pressures {
+            let size = (layout::padded_quads(raw.frames) * self.plan.slots()) as u64 * 16;
+            encoder.copy_buffer_to_buffer(pressures, 0, &set.readback, end, size);
+            end += size;
         }
-        self.device.queue.submit([encoder.finish()]);
-
-        let (told, outcome) = mpsc::channel();
-        let told_too = told.clone();
-        self.readback.map_async(wgpu::MapMode::Read, 0..end, move |result| {
-            let _ = told.send(result);
-        });
-        self.upload.map_async(wgpu::MapMode::Write, .., move |result| {
-            let _ = told_too.send(result);
-        });
-        self.device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-        for _ in 0..2 {
-            outcome.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
-        }
-        {
-            let mapped = self.readback.get_mapped_range(0..end).map_err(|e| lost(&e))?;
-            let mut start = 0;
-            for column in &self.results {
-                let length = length(column) as usize;
-                self.unpack(column.what, &mapped[start..start + length], raw.frames, cells);
-                start += length;
-            }
-        }
-        self.readback.unmap();
+        set.submit(&self.device, encoder.finish(), (first, raw.frames), end);
         Ok(())
     }
+
+    /// Fills a set's upload buffer.
+    fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
+        self.packed_steps.clear();
+        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
+        let row = self.plan.channels() * 4;
+        let values = (HEADER + raw.frames as u64 * STEP) as usize;
+        let end = (values + raw.frames * row) as u64;
+        let mapped = self.ring[set].upload.get_mapped_range_mut(0..end);
+        let mut mapped = mapped.map_err(|e| self.device.lost(&e))?;
+        let mut mapped = mapped.slice(..);
+        mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(header));
+        mapped.slice(HEADER as usize..values).copy_from_slice(cast_slice(&self.packed_steps));
+        for (frame, at) in (values..).step_by(row).take(raw.frames).enumerate() {
+            self.packed_row.clear();
+            match raw.rows {
+                Rows::Picked { frames, picks } => {
+                    let values = &frames[frame].values[..];
+                    let places = &picks.places[..picks.channels];
+                    self.packed_row.extend(places.iter().map(|&place| values[place as usize]));
+                }
+                Rows::Packed { values, channels } => {
+                    self.packed_row.extend_from_slice(&values[frame * channels..][..channels]);
+                }
+            }
+            mapped.slice(at..at + row).copy_from_slice(cast_slice(&self.packed_row));
+        }
+        Ok(())
+    }
+
+    /// Waits for set `set`, if it is on its way, and takes what it brings into `percepts` from frame `first` on.
+    fn collect(&mut self, set: usize, first: usize, percepts: &mut Percepts) -> Result<()> {
+        let mut taken = std::mem::take(&mut self.ring);
+        let done = taken[set].collect(&self.device, |pending, bytes| {
+            let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+            let mut cells = all.split_at(first + pending.first).1.split_at(pending.frames).0;
+            self.unpack(bytes, pending.frames, &mut cells);
+        });
+        self.ring = taken;
+        done
+    }
+}
+
+/// Frames that a submission takes for calls of `batch`.
+fn capacity(device: &Device, plan: &Plan, columns: &Columns, batch: usize) -> Result<usize> {
+    let limits = device.device.limits();
+    let limit = limits.max_storage_buffer_binding_size as usize;
+    let tables = [
+        plan.members.len() * size_of::<layout::Member>(),
+        plan.taxels.len() * size_of::<layout::Taxel>(),
+        plan.fields.len() * size_of::<layout::Field>(),
+        plan.curves.knots.len() * size_of::<layout::Knot>(),
+    ];
+    // A frame of every column, and a quad of every slot.
+    let (cells, quad) = (plan.fields.len() * 4 * columns.count(), plan.slots() * 16);
+    if tables.into_iter().chain([cells, quad]).any(|bytes| bytes > limit) {
+        return Err(Error::failed(format!(
+            "{} memberships and {} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+            plan.members.len(),
+            plan.channels()
+        )));
+    }
+    if let Some(field) = plan.fields.iter().find(|field| field.count > layout::WIDEST) {
+        return Err(Error::failed(format!(
+            "field `{}` has {} taxels, and the GPU takes {} at most; use the cpu backend",
+            field.name,
+            field.count,
+            layout::WIDEST
+        )));
+    }
+    let in_blocks = |frames: usize| match frames {
+        BLOCK.. => frames / BLOCK * BLOCK,
+        // The largest power of two that is not more.
+        _ => 1 << frames.max(1).ilog2(),
+    };
+    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(BLOCK, MOST);
+    let held = in_blocks(limit / quad * 4);
+    // What comes back, in one buffer.
+    let back = cells + if plan.stages().touches { 2 * quad } else { 0 };
+    let most = held.min(limit / cells).min(limits.max_buffer_size as usize / back).max(1);
+    Ok(batch.clamp(1, enough.min(most)))
 }
 
 impl Backend for Gpu {
@@ -358,13 +339,27 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
-        let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
-        let mut rest = all.split_at(raw.first).1;
+        self.device.check()?;
+        // What is on its way when something goes wrong is never collected: the device is not to be used again.
+        self.stream(raw, percepts).inspect_err(|e| self.device.note(&e.to_string()))
+    }
+}
+
+impl Gpu {
+    /// All frames of `raw`, some sets of buffers on their way at any time.
+    fn stream(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
+        let sets = self.ring.len();
+        let mut parts = 0;
         for (part, steps) in raw.steps.chunks(self.capacity).enumerate() {
             let (first, frames) = (part * self.capacity, steps.len());
-            let (mut cells, later) = rest.split_at(frames);
-            self.submit(&RawBatch { first: 0, frames, rows: raw.rows.part(first..first + frames), steps }, &mut cells)?;
-            rest = later;
+            self.collect(part % sets, raw.first, percepts)?;
+            let rows = raw.rows.part(first..first + frames);
+            self.submit(part % sets, &RawBatch { first: 0, frames, rows, steps }, first)?;
+            parts = part + 1;
+        }
+        // The oldest first.
+        for part in parts..parts + sets {
+            self.collect(part % sets, raw.first, percepts)?;
         }
         Ok(())
     }
@@ -379,6 +374,7 @@ fn header(plan: &Plan, frames: u32, wide: u32) -> layout::Batch {
         changes: (plan.slots() - plan.calibrated()) as u32,
         fields: plan.fields.len() as u32,
         wide,
+        lanes_log2: layout::lanes(frames as usize).ilog2(),
     }
 }
 

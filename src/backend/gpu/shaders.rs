@@ -1,35 +1,40 @@
-//! The shaders' text: one file a stage, each after what they share.
+//! The shaders' text: one file a stage, after what they share. The stages from contact to axis are one program.
 
-/// A stage's name and its whole WGSL.
-pub(crate) struct StageShader {
-    /// The stage, as everywhere.
+/// A program's name, the stages that it computes, and its whole WGSL.
+pub(crate) struct Shader {
+    /// For people who look at the device's own log.
     pub(crate) name: &'static str,
+    /// The stages, as everywhere.
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests hold the files of the stages to it"))]
+    pub(crate) stages: &'static [&'static str],
     /// WGSL, ready to compile.
     pub(crate) source: &'static str,
 }
 
-macro_rules! stage {
-    ($name:literal $(, $shared:literal)*) => {
-        StageShader {
+macro_rules! shader {
+    ($name:literal: $($stage:literal),+; $($shared:literal),*) => {
+        Shader {
             name: $name,
+            stages: &[$($stage),+],
             source: concat!(
                 include_str!("../../../shaders/shared/layout.wgsl"),
                 $(include_str!(concat!("../../../shaders/shared/", $shared, ".wgsl")),)*
-                include_str!(concat!("../../../shaders/", $name, ".wgsl")),
+                $(include_str!(concat!("../../../shaders/", $stage, ".wgsl")),)+
             ),
         }
     };
 }
 
-pub(crate) const CALIBRATE: StageShader = stage!("calibrate");
-pub(crate) const CHANGE: StageShader = stage!("change");
-pub(crate) const CONTACT: StageShader = stage!("contact", "over_fields");
-pub(crate) const CENTROID: StageShader = stage!("centroid", "over_fields");
-pub(crate) const ORIENTATION: StageShader = stage!("orientation", "angle", "line", "over_fields");
-pub(crate) const AXIS: StageShader = stage!("axis", "angle", "line", "over_fields");
-pub(crate) const HYSTERESIS: StageShader = stage!("hysteresis");
-pub(crate) const MOTION: StageShader = stage!("motion", "angle");
+pub(crate) const CALIBRATE: Shader = shader!("calibrate": "calibrate";);
+pub(crate) const CHANGE: Shader = shader!("change": "change";);
+pub(crate) const FIELDS: Shader = shader!(
+    "fields": "contact", "centroid", "orientation", "axis"; "members", "angle", "line", "over_fields");
+/// The same for plans of at most [`crate::stage::layout::FEW`] memberships.
+pub(crate) const FEW_FIELDS: Shader = shader!(
+    "few fields": "contact", "centroid", "orientation", "axis"; "few_members", "angle", "line", "over_fields");
+pub(crate) const HYSTERESIS: Shader = shader!("hysteresis": "hysteresis";);
+pub(crate) const MOTION: Shader = shader!("motion": "motion"; "angle");
 
 /// All of them, in the order they run.
 #[cfg(test)]
-pub(crate) const ALL: [StageShader; 8] = [CALIBRATE, CHANGE, CONTACT, CENTROID, ORIENTATION, AXIS, HYSTERESIS, MOTION];
+pub(crate) const ALL: [Shader; 6] = [CALIBRATE, CHANGE, FIELDS, FEW_FIELDS, HYSTERESIS, MOTION];

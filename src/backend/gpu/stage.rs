@@ -2,8 +2,16 @@
 
 use bytemuck::{Pod, cast_slice};
 
+use super::GROUP;
 use super::adapter::Device;
-use super::shaders::StageShader;
+use super::shaders::Shader;
+use crate::stage::layout;
+
+/// Quads that an invocation of calibrate takes at most, as its shader says.
+pub(super) const TURNS: u32 = 4;
+
+/// Values of a program's overrides, by name.
+pub(super) type Constants<'a> = &'a [(&'a str, f64)];
 
 /// A stage's pipeline, with its buffers bound.
 pub(super) struct Stage {
@@ -13,45 +21,67 @@ pub(super) struct Stage {
     pub(super) over: Over,
 }
 
-/// What a dispatch counts up to, times the frames.
+/// What a dispatch counts.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Over {
-    /// One invocation a slot that is calibrated.
+    /// One invocation a slot that is calibrated and a few quads.
     Calibrated,
-    /// The same, whatever the frames.
+    /// One invocation a slot that is calibrated, for one frame.
     CalibratedOnce,
-    /// One invocation a slot that is a change.
+    /// One invocation a slot that is a change and a quad.
     Changes,
-    /// One invocation a field; wide ones return at once.
-    Fields,
-    /// One group a wide field.
+    /// One invocation a field and quad; those of wide fields return at once.
+    Quads,
+    /// One group a wide field and quad.
     WideFields,
-    /// One invocation a field, whatever the frames.
-    FieldsOnce,
+    /// One invocation a field and frame.
+    Cells,
+    /// One invocation a field.
+    Fields,
+}
+
+impl Over {
+    /// How many groups a batch takes: along x and folded over z, and along y, which counts frames.
+    pub(super) fn groups(self, batch: &layout::Batch) -> [u32; 3] {
+        let (quads, lanes) = (batch.frames.div_ceil(4), 1 << batch.lanes_log2);
+        let (count, tall) = match self {
+            Self::Calibrated => (batch.calibrated.div_ceil(GROUP), quads.div_ceil(TURNS.min(lanes))),
+            Self::CalibratedOnce => (batch.calibrated.div_ceil(GROUP), 1),
+            Self::Changes => (batch.changes.div_ceil(GROUP), quads),
+            Self::Quads => (batch.fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
+            Self::WideFields => (batch.wide, quads),
+            Self::Cells => ((batch.fields * batch.frames).div_ceil(GROUP), 1),
+            Self::Fields => (batch.fields.div_ceil(GROUP), 1),
+        };
+        let (wide, deep) = folded(count);
+        [wide, tall, deep]
+    }
 }
 
 impl Stage {
-    /// A stage whose entry point uses the bindings 0, 1, 2, … for `buffers`.
+    /// A program whose entry point uses the bindings 0, 1, 2, … for `buffers`.
     pub(super) fn new(
         device: &Device,
-        shader: &StageShader,
+        shader: &Shader,
         entry: &str,
         over: Over,
+        constants: Constants<'_>,
         buffers: &[&wgpu::Buffer],
     ) -> Self {
         let numbered: Vec<(u32, &wgpu::Buffer)> = (0..).zip(buffers.iter().copied()).collect();
-        Self::bound(device, shader, entry, over, &numbered)
+        Self::bound(device, shader, entry, over, constants, &numbered)
     }
 
     /// A stage whose entry point uses only some of its shader's bindings.
     pub(super) fn bound(
         device: &Device,
-        shader: &StageShader,
+        shader: &Shader,
         entry: &str,
         over: Over,
+        constants: Constants<'_>,
         buffers: &[(u32, &wgpu::Buffer)],
     ) -> Self {
-        Self::with(pipeline(device, shader, entry), shader.name, device, over, buffers)
+        Self::with(pipeline(device, shader, entry, constants), shader.name, device, over, buffers)
     }
 
     /// The same program on other buffers: the very same, so that it gives the same bits.
@@ -81,7 +111,12 @@ impl Stage {
 }
 
 /// The compute pipeline of one stage's entry point.
-pub(super) fn pipeline(device: &Device, shader: &StageShader, entry: &str) -> wgpu::ComputePipeline {
+pub(super) fn pipeline(
+    device: &Device,
+    shader: &Shader,
+    entry: &str,
+    constants: Constants<'_>,
+) -> wgpu::ComputePipeline {
     let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(shader.name),
         source: wgpu::ShaderSource::Wgsl(shader.source.into()),
@@ -91,18 +126,32 @@ pub(super) fn pipeline(device: &Device, shader: &StageShader, entry: &str) -> wg
         layout: None,
         module: &module,
         entry_point: Some(entry),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants,
+            ..wgpu::PipelineCompilationOptions::default()
+        },
         cache: None,
     })
 }
 
 /// A read-only table on the device.
 pub(super) fn table<T: Pod>(device: &Device, name: &str, rows: &[T]) -> wgpu::Buffer {
+    table_as(device, name, rows, wgpu::BufferUsages::STORAGE, 16)
+}
+
+/// The same, bound as `usage` says, with room for `least` bytes.
+pub(super) fn table_as<T: Pod>(
+    device: &Device,
+    name: &str,
+    rows: &[T],
+    usage: wgpu::BufferUsages,
+    least: u64,
+) -> wgpu::Buffer {
     let bytes: &[u8] = cast_slice(rows);
     let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(name),
-        size: (bytes.len() as u64).max(16).next_multiple_of(16),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        size: (bytes.len() as u64).max(least).next_multiple_of(16),
+        usage: usage | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
     device.queue.write_buffer(&buffer, 0, bytes);
@@ -110,7 +159,7 @@ pub(super) fn table<T: Pod>(device: &Device, name: &str, rows: &[T]) -> wgpu::Bu
 }
 
 /// Folds a row of groups into a rectangle, as no side may be longer than 65,535.
-pub(super) fn groups(count: u32) -> (u32, u32) {
+pub(super) fn folded(count: u32) -> (u32, u32) {
     const LONGEST: u32 = 65_535;
     let tall = count.div_ceil(LONGEST).max(1);
     (count.div_ceil(tall).max(1), tall)

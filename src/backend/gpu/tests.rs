@@ -5,14 +5,20 @@ use std::mem::{offset_of, size_of};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
-use super::shaders::{ALL, StageShader};
-use super::stage::{groups, pipeline};
+use super::columns::NOTHING;
+use super::shaders::{ALL, Shader};
+use super::stage::{folded, pipeline};
 use super::unpack::PRESENT;
-use super::{GROUP, adapter};
-use crate::percept::{Flags, Outputs};
+use super::{GROUP, Gpu, adapter};
+use crate::backend::{Backend, RawBatch, Rows, Step};
+use crate::body::Body;
+use crate::field::FieldSet;
+use crate::percept::{Flags, Outputs, Percepts, Precision};
+use crate::scene::{Plan, Scene};
+use crate::signal::{Calibration, RawValue};
 use crate::stage::{calibrate, layout};
 
-fn parse(shader: &StageShader) -> Module {
+fn parse(shader: &Shader) -> Module {
     naga::front::wgsl::parse_str(shader.source)
         .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(shader.source)))
 }
@@ -35,16 +41,14 @@ macro_rules! same_layout {
 
 #[test]
 fn structs_lie_as_naga_lays_them() {
-    let module = parse(&super::shaders::CONTACT);
-    same_layout!(&module, Batch { frames, channels, calibrated, changes, fields, wide });
+    let module = parse(&super::shaders::FIELDS);
+    same_layout!(&module, Batch { frames, channels, calibrated, changes, fields, wide, lanes_log2 });
     same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, response });
     same_layout!(&module, Curve { first, count });
     same_layout!(&module, Knot { raw, p, slope });
     same_layout!(&module, Field { first, count, charted, area_known });
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
-    let motion = parse(&super::shaders::MOTION);
-    same_layout!(&motion, Motion { displacement, direction, distance, radial_distance, speed, radial_speed, status });
 }
 
 /// The value of the integer constant `name`.
@@ -84,13 +88,18 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "STRAIGHT"), Some(layout::STRAIGHT));
     assert_eq!(constant(&module, "MASKED"), Some(layout::MASKED));
     assert_eq!(constant(&module, "FIRST_CURVE"), Some(layout::FIRST_CURVE));
-    assert_eq!(constant(&module, "UNUSABLE"), Some(calibrate::UNUSABLE));
+    assert_eq!(constant(&module, "STATUS"), Some(Flags::SATURATED.bits().trailing_zeros()));
+    // Every flag that a taxel can have lies in a byte from there on, and what leaves it out above them.
+    let of_taxels = Flags::SATURATED | Flags::FAULTY_INPUT | Flags::OUT_OF_RANGE | Flags::INCOMPLETE;
+    let of_taxels = of_taxels | Flags::NO_PREVIOUS | Flags::BAD_DT;
+    assert_eq!(constant(&module, "UNUSABLE"), Some(((of_taxels.bits() >> 6) + 1).next_power_of_two()));
+    assert_eq!(constant(&module, "TURNS"), Some(super::stage::TURNS));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
     let change = parse(&super::shaders::CHANGE);
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
-    assert_eq!(constant(&module, "MISSING"), Some(crate::signal::RawValue::MISSING.to_bits()));
+    assert_eq!(constant(&module, "MISSING"), Some(RawValue::MISSING.to_bits()));
 }
 
 #[test]
@@ -113,9 +122,10 @@ fn every_shader_is_the_file_of_its_stage() {
         .unwrap()
         .filter_map(|entry| Some(entry.unwrap().file_name().to_str()?.strip_suffix(".wgsl")?.to_owned()))
         .collect();
-    let mut stages: Vec<String> = ALL.iter().map(|shader| shader.name.to_owned()).collect();
+    let mut stages: Vec<String> = ALL.iter().flat_map(|shader| shader.stages).map(|&stage| stage.to_owned()).collect();
     files.sort();
     stages.sort();
+    stages.dedup();
     assert_eq!(files, stages);
     for stage in stages {
         assert!(folder.join(format!("src/stage/{stage}.rs")).is_file(), "{stage}");
@@ -128,7 +138,7 @@ fn pipelines_build_without_any_driver() {
     let device = adapter::open(wgpu::Backends::NOOP).expect("noop is always there");
     for shader in &ALL {
         for entry in parse(shader).entry_points {
-            let built = pipeline(&device, shader, &entry.name);
+            let built = pipeline(&device, shader, &entry.name, NOTHING);
             assert!(format!("{built:?}").contains("ComputePipeline"));
         }
     }
@@ -136,9 +146,8 @@ fn pipelines_build_without_any_driver() {
 
 #[test]
 fn a_shader_that_is_wrong_is_caught() {
-    let broken = super::shaders::CONTACT
-        .source
-        .replace("sums.total += member.weight * pressure;", "sums.total += member.weight * status;");
+    let broken = super::shaders::FIELDS.source.replace("sums.total += pull;", "sums.total += vec4<u32>(status);");
+    assert!(broken != super::shaders::FIELDS.source);
     assert!(
         naga::front::wgsl::parse_str(&broken).is_err() || {
             let module = naga::front::wgsl::parse_str(&broken).unwrap();
@@ -149,10 +158,63 @@ fn a_shader_that_is_wrong_is_caught() {
 
 #[test]
 fn a_long_dispatch_is_folded() {
-    assert_eq!(groups(1), (1, 1));
-    assert_eq!(groups(65_535), (65_535, 1));
+    assert_eq!(folded(1), (1, 1));
+    assert_eq!(folded(65_535), (65_535, 1));
     for count in [65_536, 1_000_003, u32::MAX / 64] {
-        let (wide, tall) = groups(count);
+        let (wide, tall) = folded(count);
         assert!(wide <= 65_535 && tall <= 65_535 && u64::from(wide) * u64::from(tall) >= u64::from(count));
     }
+}
+
+#[test]
+fn a_batch_is_cut_into_blocks_that_hold_it() {
+    for frames in [1, 2, 4, 5, 9, 64, 130, 255, 256, 257, 1000, 9984] {
+        let (lanes, quads) = (layout::lanes(frames), layout::padded_quads(frames));
+        assert!(lanes.is_power_of_two() && lanes <= GROUP);
+        assert!(quads * 4 >= frames && quads % lanes as usize == 0);
+        // A shorter batch never needs more than there is room for.
+        assert!((1..frames).all(|fewer| layout::padded_quads(fewer) <= quads));
+    }
+}
+
+/// A backend for the hand on a device that computes nothing.
+fn on_noop() -> Gpu {
+    let body = Body::from_bytes("hand", include_bytes!("../../../bodies/hand.glb")).unwrap();
+    let calibration = Calibration::identity(body.taxels.len());
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &Scene::default(), &calibration).unwrap();
+    Gpu::on(adapter::open(wgpu::Backends::NOOP).unwrap(), &plan, 4).unwrap()
+}
+
+fn run(gpu: &mut Gpu) -> crate::Result<()> {
+    let plan = gpu.plan.clone();
+    let values = vec![RawValue::new(1.0); plan.channels()];
+    let steps = [Step { dt_s: 0.01, flags: Flags::empty() }];
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
+        .with_columns(plan.columns, plan.kept_pressures());
+    percepts.reset(1);
+    let rows = Rows::Packed { values: &values, channels: plan.channels() };
+    gpu.run(&RawBatch { first: 0, frames: 1, rows, steps: &steps }, &mut percepts)
+}
+
+#[test]
+fn a_device_that_is_lost_is_an_error_in_one_line_and_stays_one() {
+    let mut gpu = on_noop();
+    run(&mut gpu).unwrap();
+    gpu.device.device.destroy();
+    for _ in 0..2 {
+        let error = run(&mut gpu).unwrap_err().to_string();
+        assert!(error.contains("stopped answering") && error.contains("cpu backend"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+#[test]
+fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
+    let mut gpu = on_noop();
+    // A copy beyond a buffer's end, which no call of the backend's own makes.
+    let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(&gpu.raw, 0, &gpu.steps, 0, 1 << 30);
+    gpu.device.queue.submit([encoder.finish()]);
+    let error = run(&mut gpu).unwrap_err().to_string();
+    assert!(error.contains("stopped answering") && error.lines().count() == 1, "{error}");
 }

@@ -1,101 +1,89 @@
-//! From the device's columns to the percepts'.
+//! From the device's columns to the percepts', which both go frame by frame, lengths in metres.
 
 use bytemuck::cast_slice;
 
-use super::{Gpu, What};
+use super::Gpu;
+use super::columns::Column;
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::stage::layout;
 
 /// The bit of a cell's status from which on it says which quantities are present.
 pub(super) const PRESENT: u32 = 16;
+const FLAG_BITS: u32 = (1 << PRESENT) - 1;
 
 impl Gpu {
-    /// From the device's order (field by field) to the percepts' (frame by frame), lengths in metres.
-    pub(super) fn unpack(&self, what: What, bytes: &[u8], frames: usize, cells: &mut CellsMut<'_>) {
+    /// Takes over what came back for `frames` frames: the columns that are read, then pressures if those are.
+    pub(super) fn unpack(&self, bytes: &[u8], frames: usize, cells: &mut CellsMut<'_>) {
         let fields = self.plan.fields.len();
-        let unit_of = |field: usize| self.plan.fields[field].unit_m;
-        let each = |f: &mut dyn FnMut(usize, usize, usize)| {
-            for field in 0..fields {
-                for frame in 0..frames {
-                    f(field, field * frames + frame, frame * fields + field);
+        let (columns, rest) = bytes.split_at(frames * fields * 4 * self.columns.read().len());
+        for (&column, bytes) in self.columns.read().iter().zip(columns.chunks_exact(frames * fields * 4)) {
+            self.unpack_column(column, bytes, cells);
+        }
+        if !rest.is_empty() {
+            self.unpack_pressures(cast_slice(rest), frames, cells.pressures);
+        }
+    }
+
+    fn unpack_column(&self, column: Column, bytes: &[u8], cells: &mut CellsMut<'_>) {
+        let numbers = |to: &mut [f32]| to.copy_from_slice(cast_slice(bytes));
+        let lengths = |to: &mut [f32]| {
+            let from: &[f32] = cast_slice(bytes);
+            let fields = self.units_m.len();
+            for (to, from) in to.chunks_exact_mut(fields).zip(from.chunks_exact(fields)) {
+                for ((to, from), unit_m) in to.iter_mut().zip(from).zip(&self.units_m) {
+                    *to = from * unit_m;
                 }
             }
         };
-        let wants = |output| self.plan.outputs.contains(output);
-        match what {
-            What::Cells => {
-                let statuses: &[u32] = cast_slice(bytes);
-                let (outputs, flag_bits) = (self.plan.outputs.bits(), (1 << PRESENT) - 1);
-                each(&mut |_, from, to| {
-                    cells.set_status(to, statuses[from] & flag_bits, (statuses[from] >> PRESENT) & outputs);
-                });
+        let displaced = |to: &mut [[f32; 2]], part: usize| {
+            let from: &[f32] = cast_slice(bytes);
+            for ((to, from), unit_m) in to.iter_mut().zip(from).zip(self.units_m.iter().cycle()) {
+                to[part] = from * unit_m;
             }
-            What::Contacts => {
-                let contacts: &[[f32; 4]] = cast_slice(bytes);
-                let scalar = |output, column: &mut [f32], part: usize| {
-                    if wants(output) {
-                        each(&mut |_, from, to| column[to] = contacts[from][part]);
-                    }
-                };
-                scalar(Outputs::TOTAL, cells.total, 0);
-                scalar(Outputs::PEAK, cells.peak, 1);
-                scalar(Outputs::AREA, cells.area, 2);
-                if wants(Outputs::ACTIVE) {
-                    each(&mut |_, from, to| cells.active[to] = contacts[from][3].to_bits());
+        };
+        let statuses: &[u32] = cast_slice(bytes);
+        match column {
+            Column::Status => {
+                let outputs = self.plan.outputs.bits();
+                for (cell, status) in statuses.iter().enumerate() {
+                    cells.set_status(cell, status & FLAG_BITS, (status >> PRESENT) & outputs);
                 }
             }
-            What::Centroids => {
-                let centroids: &[[f32; 4]] = cast_slice(bytes);
-                each(&mut |field, from, to| {
-                    let [u, v, depth, _] = centroids[from];
-                    let unit_m = unit_of(field);
-                    (cells.centroid_u[to], cells.centroid_v[to]) = (u * unit_m, v * unit_m);
-                    if let Some(kept) = cells.centroid_depth.get_mut(to) {
-                        *kept = depth * unit_m;
-                    }
-                });
-            }
-            What::Orientations => {
-                let angles: &[f32] = cast_slice(bytes);
-                each(&mut |_, from, to| cells.orientation[to] = angles[from]);
-            }
-            What::Motions => {
-                let motions: &[layout::Motion] = cast_slice(bytes);
-                each(&mut |field, from, to| {
-                    let (motion, unit_m) = (&motions[from], unit_of(field));
-                    cells.flags[to] |= Flags::from_bits_truncate(motion.status & ((1 << PRESENT) - 1));
-                    cells.present[to] |= motion_outputs(motion.status >> PRESENT) & self.plan.outputs;
-                    let write = |column: &mut [f32], value: f32| {
-                        if let Some(place) = column.get_mut(to) {
-                            *place = value;
-                        }
-                    };
-                    write(cells.direction, motion.direction);
-                    write(cells.distance, motion.distance * unit_m);
-                    write(cells.radial_distance, motion.radial_distance * unit_m);
-                    write(cells.speed, motion.speed * unit_m);
-                    write(cells.radial_speed, motion.radial_speed * unit_m);
-                    if let Some(displacement) = cells.displacement.get_mut(to) {
-                        *displacement = motion.displacement.map(|x| x * unit_m);
-                    }
-                });
-            }
-            What::Pressures => {
-                let pressures: &[f32] = cast_slice(bytes);
-                let slots = self.plan.slots();
-                for slot in 0..slots {
-                    for frame in 0..frames {
-                        cells.pressures[frame * slots + slot] = pressures[slot * frames + frame].into();
-                    }
+            Column::Motion => {
+                for ((flags, present), status) in cells.flags.iter_mut().zip(&mut *cells.present).zip(statuses) {
+                    *flags |= Flags::from_bits_truncate(status & FLAG_BITS);
+                    *present |= motion_outputs(status >> PRESENT) & self.plan.outputs;
                 }
             }
-            What::Axes => {
-                let axes: &[[f32; 2]] = cast_slice(bytes);
-                if wants(Outputs::AXIS) {
-                    each(&mut |_, from, to| cells.axis[to] = axes[from][0]);
-                }
-                if wants(Outputs::ANISOTROPY) {
-                    each(&mut |_, from, to| cells.anisotropy[to] = axes[from][1]);
+            Column::Active => cells.active.copy_from_slice(statuses),
+            Column::Total => numbers(cells.total),
+            Column::Peak => numbers(cells.peak),
+            Column::Area => numbers(cells.area),
+            Column::U => lengths(cells.centroid_u),
+            Column::V => lengths(cells.centroid_v),
+            Column::Depth => lengths(cells.centroid_depth),
+            Column::Orientation => numbers(cells.orientation),
+            Column::Axis => numbers(cells.axis),
+            Column::Anisotropy => numbers(cells.anisotropy),
+            Column::DisplacementU => displaced(cells.displacement, 0),
+            Column::DisplacementV => displaced(cells.displacement, 1),
+            Column::Direction => numbers(cells.direction),
+            Column::Distance => lengths(cells.distance),
+            Column::RadialDistance => lengths(cells.radial_distance),
+            Column::Speed => lengths(cells.speed),
+            Column::RadialSpeed => lengths(cells.radial_speed),
+        }
+    }
+
+    /// From blocks of quads, in each slot by slot, to frames.
+    fn unpack_pressures(&self, quads: &[[f32; 4]], frames: usize, pressures: &mut [f64]) {
+        let slots = self.plan.slots();
+        let lanes = layout::lanes(frames) as usize;
+        for (block, quads) in quads.chunks_exact(slots * lanes).enumerate() {
+            for (slot, quads) in quads.chunks_exact(lanes).enumerate() {
+                let frames = block * lanes * 4..frames.min((block + 1) * lanes * 4);
+                for (frame, &pressure) in frames.zip(quads.as_flattened()) {
+                    pressures[frame * slots + slot] = pressure.into();
                 }
             }
         }

@@ -1,0 +1,88 @@
+//! Sets of buffers that frames go up in and results come back in, taken in turns, so that packing, computing and reading
+//! back overlap.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use super::adapter::Device;
+use crate::error::Result;
+
+/// Sets: one that is packed, one that is computed, one that is read.
+pub(super) const SETS: usize = 3;
+
+/// The buffers of a submission.
+pub(super) struct Set {
+    /// Mapped, but for while a submission has it.
+    pub(super) upload: wgpu::Buffer,
+    pub(super) readback: wgpu::Buffer,
+    told: Sender<Result<(), wgpu::BufferAsyncError>>,
+    outcome: Receiver<Result<(), wgpu::BufferAsyncError>>,
+    pub(super) pending: Option<Pending>,
+}
+
+/// A submission whose results are still to be taken.
+pub(super) struct Pending {
+    /// Of a call.
+    pub(super) first: usize,
+    pub(super) frames: usize,
+    /// What comes back.
+    bytes: u64,
+    submission: wgpu::SubmissionIndex,
+}
+
+impl Set {
+    pub(super) fn new(device: &Device, up: u64, back: u64) -> Self {
+        let buffer = |name: &str, size: u64, usage, mapped| {
+            device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(name),
+                size: size.max(16).next_multiple_of(16),
+                usage,
+                mapped_at_creation: mapped,
+            })
+        };
+        let (told, outcome) = channel();
+        Self {
+            upload: buffer("upload", up, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, true),
+            readback: buffer("readback", back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false),
+            told,
+            outcome,
+            pending: None,
+        }
+    }
+
+    /// Submits `commands`, which fill the first `bytes` of the readback buffer with what `frames` frames give.
+    pub(super) fn submit(
+        &mut self,
+        device: &Device,
+        commands: wgpu::CommandBuffer,
+        (first, frames): (usize, usize),
+        bytes: u64,
+    ) {
+        let submission = device.queue.submit([commands]);
+        let (told, told_too) = (self.told.clone(), self.told.clone());
+        self.readback.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+            let _ = told.send(result);
+        });
+        self.upload.map_async(wgpu::MapMode::Write, .., move |result| {
+            let _ = told_too.send(result);
+        });
+        self.pending = Some(Pending { first, frames, bytes, submission });
+    }
+
+    /// Waits for a submission, and lets `take` read what came back.
+    pub(super) fn collect(&mut self, device: &Device, take: impl FnOnce(&Pending, &[u8])) -> Result<()> {
+        let Some(pending) = self.pending.take() else { return Ok(()) };
+        let until = wgpu::PollType::Wait { submission_index: Some(pending.submission.clone()), timeout: None };
+        device.device.poll(until).map_err(|e| device.lost(&e))?;
+        // Whatever went wrong before says more than that a buffer is not there.
+        device.check()?;
+        for _ in 0..2 {
+            self.outcome.recv().map_err(|e| device.lost(&e))?.map_err(|e| device.lost(&e))?;
+        }
+        {
+            let mapped = self.readback.get_mapped_range(0..pending.bytes).map_err(|e| device.lost(&e))?;
+            take(&pending, &mapped);
+        }
+        self.readback.unmap();
+        Ok(())
+    }
+}
