@@ -21,6 +21,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 pub use glb::{Glb, MeshData, Skinning};
 pub use layout::{ChartKind, ChartSpec, FieldSpec, MemberSpec};
+pub(crate) use surface::Nearest;
 pub use surface::{Hit, Home, Surface, SurfaceIndex};
 pub(crate) use topology::next;
 pub use topology::{Flaws, NONE, Topology};

@@ -74,24 +74,6 @@ impl Body {
         SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
     }
 
-    /// The surface point nearest to `p`, in the frame of `link`. It looks at every triangle: for many points of one link
-    /// make an index.
-    #[must_use]
-    pub fn nearest_in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
-        let mut nearest = None;
-        let mut least = f64::INFINITY;
-        for triangle in self.triangles_in_link(link).map(Triangle) {
-            if triangle.box_distance_squared(p) < least && triangle.unit_normal().is_some() {
-                let point = triangle.nearest(p);
-                let distance = p.distance_squared(point);
-                if distance < least {
-                    (nearest, least) = (Some(point), distance);
-                }
-            }
-        }
-        nearest
-    }
-
     /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
     pub fn triangles_in_link(&self, link: usize) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let seen = self.surfaces.iter().filter_map(move |surface| Some((surface, surface.link_from_mesh(self, link)?)));
@@ -103,6 +85,58 @@ impl Body {
                 if mirrored { [a, c, b] } else { [a, b, c] }
             })
         })
+    }
+}
+
+/// Finds the nearest points of a body's surface, in any link's frame, without an index of each.
+#[derive(Debug)]
+pub(crate) struct Nearest<'a> {
+    body: &'a Body,
+    /// Per surface its longest edge, in mesh coordinates.
+    longest: Vec<f64>,
+}
+
+impl<'a> Nearest<'a> {
+    pub(crate) fn new(body: &'a Body) -> Self {
+        let edges = |&[a, b, c]: &[u32; 3]| [(a, b), (b, c), (c, a)];
+        let longest = body.surfaces.iter().map(|surface| {
+            let at = |vertex: u32| surface.positions[vertex as usize];
+            let lengths = surface.triangles.iter().flat_map(edges).map(|(a, b)| at(a).distance_squared(at(b)));
+            lengths.fold(0.0, f64::max).sqrt()
+        });
+        Self { body, longest: longest.collect() }
+    }
+
+    /// The surface point nearest to `p`, in the frame of `link`.
+    pub(crate) fn in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
+        let (mut nearest, mut least) = (None, f64::INFINITY);
+        for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
+            let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
+            // A corner lies at most this much farther away than the triangle's nearest point.
+            let stretch = {
+                let [x, y, z] = [0, 1, 2].map(|axis| link_from_mesh.matrix3.col(axis).length_squared());
+                (x + y + z).sqrt()
+            };
+            let slack = stretch * longest * (1.0 + 1e-9);
+            let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
+            let mut within: f64 = (least.sqrt() + slack).powi(2);
+            for &[a, b, c] in &surface.triangles {
+                let corner = points[a as usize];
+                if corner.distance_squared(p) > within {
+                    continue;
+                }
+                let triangle = Triangle([corner, points[b as usize], points[c as usize]]);
+                if triangle.unit_normal().is_some() {
+                    let point = triangle.nearest(p);
+                    let distance = p.distance_squared(point);
+                    if distance < least {
+                        (nearest, least) = (Some(point), distance);
+                        within = (least.sqrt() + slack).powi(2);
+                    }
+                }
+            }
+        }
+        nearest
     }
 }
 

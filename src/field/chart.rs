@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use super::distortion::Distortion;
 use super::{Field, Member, anchor_from_link};
-use crate::body::{Body, ChartKind, FieldSpec, Hit};
+use crate::body::{Body, ChartKind, FieldSpec, Hit, Nearest};
 
 /// cos 75°: how far a member's normal may lie from the mean.
 const LEAST_COSINE: f64 = 0.258_819_045_102_520_76;
@@ -118,6 +118,7 @@ impl fmt::Display for NoChart {
 /// The field that `spec` outlines, with its anchor, origin, chart and its members' places.
 pub(super) fn complete(
     body: &Body,
+    nearest: &Nearest<'_>,
     spec: &FieldSpec,
     parent: Option<usize>,
     taxels: &[(usize, f64, Option<[f64; 2]>)],
@@ -162,7 +163,8 @@ pub(super) fn complete(
             (origin, Ok(frame(normal, wanted_u)))
         }
         (None, Some(normal), Some(anchor)) => {
-            let origin = wanted_origin.unwrap_or_else(|| origin_on_surface(body, anchor, mean_position));
+            let origin =
+                wanted_origin.unwrap_or_else(|| nearest.in_link(anchor, mean_position).unwrap_or(mean_position));
             (origin, Ok(frame(normal, wanted_u)))
         }
         (refusal, ..) => (mean_position, Err(refusal.unwrap_or(NoChart::Wraps(std::f64::consts::PI)))),
@@ -186,11 +188,6 @@ pub(super) fn complete(
         Chart { kind, u_in_anchor, v_in_anchor, normal_in_anchor, distortion: largest, distortion_rms: rms }
     });
     Field { name: spec.name.clone(), parent, anchor, members, origin_in_anchor, chart }
-}
-
-/// The surface point nearest to `mean`; without a surface, `mean` itself.
-pub(super) fn origin_on_surface(body: &Body, anchor: usize, mean: DVec3) -> DVec3 {
-    body.nearest_in_link(anchor, mean).unwrap_or(mean)
 }
 
 /// The surface's normal at `origin`, or where there is none that of the nearest member.

@@ -21,7 +21,7 @@ pub use lift::Lift;
 pub use neighbours::neighbours;
 pub use unroll::Unroller;
 
-use crate::body::Body;
+use crate::body::{Body, Nearest};
 use crate::error::{Error, Result};
 
 /// Name of the frame that fields are anchored in when their links share no ancestor, and of posed percepts.
@@ -103,6 +103,7 @@ impl FieldSet {
                 taxels[parent].extend(below);
             }
         }
+        let nearest = Nearest::new(body);
         let mut fields = Vec::with_capacity(body.fields.len());
         for (index, spec) in body.fields.iter().enumerate() {
             let members: Vec<(usize, f64, Option<[f64; 2]>)> = taxels[index]
@@ -119,7 +120,7 @@ impl FieldSet {
                 ))
                 .at(&body.name));
             }
-            fields.push(chart::complete(body, spec, parents[index], &members));
+            fields.push(chart::complete(body, &nearest, spec, parents[index], &members));
         }
         Ok(Self { fields })
     }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 
-use super::chart::{frame, origin_on_surface};
+use super::chart::frame;
 use super::distortion::Distortion;
 use super::geodesic::{LogMap, Place};
 use super::{NoChart, anchor_from_link};
@@ -69,7 +69,8 @@ impl<'a> Unroller<'a> {
         let asked = |of: fn(&ChartSpec) -> Option<[f64; 3]>| spec.chart.as_ref().and_then(of).map(DVec3::from_array);
         let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
         let origin = asked(|chart| chart.origin_in_anchor);
-        let origin = locate(origin.unwrap_or_else(|| origin_on_surface(body, link, mean)))?;
+        let nearest = || index.nearest(mean).map_or(mean, |hit| hit.position);
+        let origin = locate(origin.unwrap_or_else(nearest))?;
         let [a, b, c] = topology.corners(origin.triangle);
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
         let [u, ..] = frame(normal, asked(|chart| chart.u_in_anchor));
