@@ -185,7 +185,7 @@ fn on_noop() -> Gpu {
     Gpu::on(adapter::open(wgpu::Backends::NOOP).unwrap(), &plan, 4).unwrap()
 }
 
-fn run(gpu: &mut Gpu) -> crate::Result<()> {
+fn run(gpu: &mut Gpu) -> crate::error::Result<()> {
     let plan = gpu.plan.clone();
     let values = vec![RawValue::new(1.0); plan.channels()];
     let steps = [Step { dt_s: 0.01, flags: Flags::empty() }];
