@@ -12,7 +12,7 @@ use super::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic paper --out paper                 everything, in some 20 s on two cores
+  somatic paper --out paper                 everything, in some seconds
   somatic paper --out paper --quick         the figures, and one speed and noise of the table
   jq '.over_all_angles[] | [.indenter, .signal, .centroid_mm]' paper/table.json
 

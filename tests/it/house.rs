@@ -100,6 +100,7 @@ fn each_heavy_dependency_has_one_door() {
         ("toml", "signal|source/simulated"),
         ("rayon", "backend/cpu|experiments|author/crowd.rs"),
         ("globset", "scene"),
+        ("fearless_simd", "backend/cpu"),
         ("plotters", "experiments/plot.rs"),
         ("png", "experiments/plot.rs"),
     ];
