@@ -1,12 +1,12 @@
 //! Many frames: sixteen frames of a field abreast.
 
 use bytemuck::cast_slice_mut;
-use fearless_simd::Level;
 use fearless_simd::prelude::*;
+use fearless_simd::{Level, f32x16, u32x16};
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, transpose_u, with_widest};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part, touch};
 use super::wide::ManyAbreast;
 use super::{calibrate, change};
@@ -178,12 +178,12 @@ fn read<S: Simd>(
             let (pressures, statuses) = (&mut pressures[frame], &mut statuses[frame]);
             faults |= calibrate::tile(simd, plan, tile, slot, &bits[frame], pressures, statuses);
         }
-        let turned = transpose(simd, |frame| pressures[frame]);
+        let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
         for (lanes, turned) in scratch.pressures[slot..slot + LANES].iter_mut().zip(&turned) {
             turned.store_slice(lanes);
         }
         if faults {
-            let turned = transpose_u(simd, |frame| statuses[frame]);
+            let turned: [u32x16<S>; LANES] = transpose(simd, |frame| statuses[frame]);
             for (lanes, turned) in scratch.statuses[slot..slot + LANES].iter_mut().zip(&turned) {
                 turned.store_slice(lanes);
             }
@@ -210,7 +210,7 @@ fn write<S: Simd>(
         if column.is_empty() {
             return;
         }
-        let rows = transpose(simd, |field| *of(&answers[field]));
+        let rows: [f32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
         for (frame, row) in rows.iter().take(frames).enumerate() {
             let cells = &mut column[place(frame)];
             if cells.len() == LANES {
@@ -233,7 +233,7 @@ fn write<S: Simd>(
         if column.is_empty() {
             return;
         }
-        let rows = transpose_u(simd, |field| *of(&answers[field]));
+        let rows: [u32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
         for (frame, row) in rows.iter().take(frames).enumerate() {
             let (row, cells) = (*row & mask, &mut column[place(frame)]);
             if cells.len() == LANES {

@@ -1,7 +1,6 @@
 //! change in single precision; see [`crate::stage::change`].
 
 use super::super::Step;
-use super::simd::Row;
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, TINY_BITS, UNUSABLE};
@@ -9,35 +8,14 @@ use crate::stage::calibrate::{HUGE_BITS, TINY_BITS, UNUSABLE};
 /// A taxel's pressure and status.
 type Heard = (f32, u32);
 
-/// The changes of one frame, whose pressures stand before them; `before` are those of the frame before. Whether any status
-/// says anything.
-pub(super) fn frame(
-    plan: &Plan,
-    step: &Step,
-    before: (&[f32], &[u32]),
-    pressures: &mut [f32],
-    statuses: &mut [u32],
-) -> bool {
-    let (pressed, changes) = pressures.split_at_mut(plan.calibrated());
-    let (pressed_statuses, change_statuses) = statuses.split_at_mut(plan.calibrated());
-    let taxels = &plan.taxels[plan.calibrated()..];
-    let mut any = 0;
-    for (taxel, (change, status)) in taxels.iter().zip(changes.iter_mut().zip(change_statuses)) {
-        let slot = taxel.response as usize;
-        let (now, last) = ((pressed[slot], pressed_statuses[slot]), (before.0[slot], before.1[slot]));
-        (*change, *status) = one(now, last, step, taxel.dead_band);
-        any |= *status;
-    }
-    any != 0
-}
-
-/// The changes of `steps.len()` frames abreast, at most sixteen.
-pub(super) fn frames(
+/// The changes of `steps.len() ≤ L` frames abreast, whose pressures stand before them; `before` are those of the frame
+/// before. Whether any status says anything.
+pub(super) fn frames<const L: usize>(
     plan: &Plan,
     steps: &[Step],
     before: (&[f32], &[u32]),
-    pressures: &mut [Row<f32>],
-    statuses: &mut [Row<u32>],
+    pressures: &mut [[f32; L]],
+    statuses: &mut [[u32; L]],
 ) -> bool {
     let (pressed, changes) = pressures.split_at_mut(plan.calibrated());
     let (pressed_statuses, change_statuses) = statuses.split_at_mut(plan.calibrated());

@@ -268,7 +268,8 @@ impl Live {
             calibrate::frame(level, plan, tables, moment.before, was, said);
             let before = (was.as_flattened(), said.as_flattened());
             let (pressures, statuses) = (pressures.as_flattened_mut(), statuses.as_flattened_mut());
-            faults |= change::frame(plan, moment.step, before, pressures, statuses);
+            let (pressures, statuses) = (pressures.as_chunks_mut::<1>().0, statuses.as_chunks_mut::<1>().0);
+            faults |= change::frames(plan, std::slice::from_ref(moment.step), before, pressures, statuses);
         }
         let frame = Frame {
             level,

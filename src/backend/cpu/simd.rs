@@ -6,7 +6,7 @@
 //! lanes.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x16, u8x64, u32x16};
+use fearless_simd::{u8x64, u32x16};
 
 use super::super::Rows;
 
@@ -115,33 +115,11 @@ pub(super) fn read<S: Simd>(
 
 /// Rows turned into columns: lane j of row i becomes lane i of column j. Four perfect shuffles do it.
 #[inline(always)]
-pub(super) fn transpose<S: Simd>(simd: S, row: impl Fn(usize) -> Row<f32>) -> [f32x16<S>; LANES] {
-    let mut now = [f32x16::splat(simd, 0.0); LANES];
-    let mut i = 0;
+pub(super) fn transpose<S: Simd, V: SimdBase<S>>(simd: S, row: impl Fn(usize) -> Row<V::Element>) -> [V; LANES] {
+    let mut now = [V::from_slice(simd, &row(0)); LANES];
+    let mut i = 1;
     while i < LANES {
-        now[i] = f32x16::from_slice(simd, &row(i));
-        i += 1;
-    }
-    let mut round = 0;
-    while round < 4 {
-        let before = now;
-        let mut i = 0;
-        while i < LANES / 2 {
-            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
-            i += 1;
-        }
-        round += 1;
-    }
-    now
-}
-
-/// The same of integers.
-#[inline(always)]
-pub(super) fn transpose_u<S: Simd>(simd: S, row: impl Fn(usize) -> Row<u32>) -> [u32x16<S>; LANES] {
-    let mut now = [u32x16::splat(simd, 0); LANES];
-    let mut i = 0;
-    while i < LANES {
-        now[i] = u32x16::from_slice(simd, &row(i));
+        now[i] = V::from_slice(simd, &row(i));
         i += 1;
     }
     let mut round = 0;
