@@ -16,13 +16,11 @@ const HUMANOID: &[u8] = include_bytes!("../../../bodies/humanoid.glb");
 /// Every set of instructions that this machine has and that anything is compiled for.
 fn levels() -> Vec<Level> {
     let widest = Level::new();
-    let mut levels = vec![widest];
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    {
-        levels.extend(widest.as_avx2().map(Level::Avx2));
-        levels.extend(widest.as_sse2().map(Level::Sse2));
-    }
-    levels
+    let narrower = [widest.as_avx2().map(Level::Avx2), widest.as_sse2().map(Level::Sse2)];
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let narrower: [Option<Level>; 0] = [];
+    std::iter::once(widest).chain(narrower.into_iter().flatten()).collect()
 }
 
 /// `frames` frames for `plan`: pressed here and there, with everything in between that a value can be.
