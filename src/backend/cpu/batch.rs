@@ -7,7 +7,8 @@ use fearless_simd::{Level, f32x16, u32x16};
 use super::super::{RawBatch, Rows};
 use super::Tables;
 use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
-use super::touch::{Abreast, Cells, Members, OneKind, Part, touch};
+use super::lot::{Between, Wanted, touch};
+use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
 use super::{calibrate, change};
 use crate::percept::{CellsMut, Flags, Outputs};
@@ -23,6 +24,7 @@ pub(super) struct Scratch {
     faulty: Vec<usize>,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
+    between: Box<[Between; LANES]>,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Vec<Row<f32>>, Vec<Row<u32>>),
 }
@@ -36,6 +38,7 @@ impl Scratch {
             statuses: vec![[0; LANES]; padded],
             faulty: Vec::new(),
             cells: Box::new([Cells::EMPTY; LANES]),
+            between: Box::new([Between::EMPTY; LANES]),
             before: (vec![[0.0; LANES]; before], vec![[0; LANES]; before]),
         }
     }
@@ -49,6 +52,12 @@ struct OverFrames<'a> {
     taxels: &'a [Taxel],
     pressures: &'a [Row<f32>],
     statuses: &'a [Row<u32>],
+}
+
+impl<'a> OverFrames<'a> {
+    fn new(plan: &'a Plan, field: &'a PlanField, pressures: &'a [Row<f32>], statuses: &'a [Row<u32>]) -> Self {
+        Self { members: plan.members_of(field), depths: &field.depths, taxels: &plan.taxels, pressures, statuses }
+    }
 }
 
 impl<S: Simd> Members<S> for OverFrames<'_> {
@@ -113,9 +122,9 @@ pub(super) fn block(
             }
         }
     }
-    let Scratch { pressures, statuses, cells: answers, .. } = scratch;
+    let Scratch { pressures, statuses, cells: answers, between, .. } = scratch;
     for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
-        with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, answers));
+        with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, between, answers));
         with_widest!(level, simd => {
             write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
         });
@@ -124,6 +133,7 @@ pub(super) fn block(
 
 /// All stages for `fields`, over sixteen frames.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "as `block`")]
 fn answer<S: Simd>(
     simd: S,
     plan: &Plan,
@@ -131,22 +141,22 @@ fn answer<S: Simd>(
     pressures: &[Row<f32>],
     statuses: &[Row<u32>],
     faults: bool,
+    between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
-    for (field, answer) in fields.iter().zip(answers) {
-        let members = OverFrames {
-            members: plan.members_of(field),
-            depths: &field.depths,
-            taxels: &plan.taxels,
-            pressures,
-            statuses,
-        };
-        let (kind, stages, columns) = (OneKind::new(field), plan.stages(), plan.columns);
-        if field.is_wide() {
-            touch(simd, ManyAbreast(members), &kind, stages, columns, faults, answer);
+    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults };
+    let over = |field| OverFrames::new(plan, field, pressures, statuses);
+    let mut first = 0;
+    for run in fields.chunk_by(|a, b| a.is_wide() == b.is_wide()) {
+        let (between, answers) = (&mut between[first..][..run.len()], &mut answers[first..][..run.len()]);
+        if run[0].is_wide() {
+            let lot = |index: usize| (ManyAbreast(over(&run[index])), OneKind::new(&run[index]));
+            touch(simd, lot, LANES, wanted, between, answers);
         } else {
-            touch(simd, Abreast(members), &kind, stages, columns, faults, answer);
+            let lot = |index: usize| (Abreast(over(&run[index])), OneKind::new(&run[index]));
+            touch(simd, lot, LANES, wanted, between, answers);
         }
+        first += run.len();
     }
 }
 

@@ -2,17 +2,16 @@
 
 use fearless_simd::prelude::*;
 
-use super::contact::Sums;
 use super::simd::{F, M, splat};
 use super::touch::Members;
 
 /// (u, v) where `touched`, 0 elsewhere.
 #[inline(always)]
-pub(super) fn quotients<S: Simd>(simd: S, sums: &Sums<S>, touched: M<S>) -> (F<S>, F<S>) {
+pub(super) fn quotients<S: Simd>(simd: S, total: F<S>, (u, v): (F<S>, F<S>), touched: M<S>) -> (F<S>, F<S>) {
     let none = splat(simd, 0.0);
     // One division for both: a unit in the last place more, of the five that the bound allows.
-    let share = touched.select(splat(simd, 1.0) / sums.total, none);
-    (sums.u * share, sums.v * share)
+    let share = touched.select(splat(simd, 1.0) / total, none);
+    (u * share, v * share)
 }
 
 /// The numerator of the third coordinate, which only fields without a chart need.

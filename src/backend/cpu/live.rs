@@ -1,14 +1,14 @@
 //! One frame: sixteen fields abreast.
 
-use std::ops::Range;
-
 use bytemuck::cast_slice_mut;
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
+use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
 use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
-use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part, touch};
+use super::lot::{Between, Wanted, touch};
+use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Tables, calibrate, change, the_one_before};
 use crate::percept::{CellsMut, Flags, Outputs};
@@ -18,23 +18,14 @@ use crate::signal::RawValue;
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
 
-/// Sixteen narrow fields of about as many members, a lane each; or one wide field.
+/// A field that is computed by itself.
 #[derive(Clone, Debug)]
-enum Group {
-    Narrow(Box<Narrow>),
-    Wide { field: usize, kind: OneKind, table: usize },
+struct Alone {
+    field: usize,
+    kind: OneKind,
 }
 
-impl Group {
-    /// Rows that it gathers.
-    fn rows(&self) -> usize {
-        match self {
-            Self::Narrow(group) => group.members.len(),
-            Self::Wide { .. } => 0,
-        }
-    }
-}
-
+/// Sixteen narrow fields of about as many members, a lane each.
 #[derive(Clone, Debug)]
 struct Narrow {
     /// Per lane, which field; fewer at the end.
@@ -165,15 +156,16 @@ impl<S: Simd> Members<S> for OverFields<'_> {
     }
 }
 
-/// Rows that are gathered before anything is computed of them: what was stored piece by piece can be loaded as a whole
-/// only once it has reached the cache. They fill half of the smallest first-level cache.
-const GATHERED_ROWS: usize = 256;
+/// About how many rows are gathered before anything is computed of them: what was stored piece by piece can be loaded as
+/// a whole only once it has reached the cache. With their weights and places they are to stay in the nearest one.
+const GATHERED_ROWS: usize = 64;
 
 /// What one thread needs beside.
 #[derive(Clone, Debug, Default)]
 struct Gathered {
     pressures: Vec<Row<f32>>,
     statuses: Vec<Row<u32>>,
+    between: Vec<Between>,
     values: Values,
 }
 
@@ -194,10 +186,11 @@ impl<'a> Moment<'a> {
 /// The plan laid out for one frame, and the memory for it.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
-    groups: Vec<Group>,
-    /// The groups that are computed together.
-    pieces: Vec<Range<usize>>,
-    /// Per group.
+    wide: Vec<Alone>,
+    narrow: Vec<Narrow>,
+    /// How many of the narrow are computed together.
+    together: usize,
+    /// Per wide field, then per group of narrow ones.
     answers: Vec<Cells>,
     /// By slot, and a last row of taxels that nothing presses.
     pressures: Vec<Row<f32>>,
@@ -211,36 +204,20 @@ pub(super) struct Live {
 impl Live {
     pub(super) fn new(plan: &Plan) -> Self {
         let tiles = plan.slots().div_ceil(LANES);
-        let (mut wide, mut narrow) = (Vec::new(), Vec::new());
-        for (field, of) in plan.fields.iter().enumerate() {
-            if of.is_wide() {
-                wide.push(Group::Wide { field, kind: OneKind::new(of), table: wide.len() });
-            } else {
-                narrow.push(field);
-            }
-        }
+        let (wide, mut narrow): (Vec<usize>, Vec<usize>) =
+            (0..plan.fields.len()).partition(|&field| plan.fields[field].is_wide());
         // Fields of one size stay in their order.
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
         let unpressed = tiles * LANES;
         let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
-        let narrow = narrow.chunks(LANES).map(|fields| Group::Narrow(Box::new(Narrow::new(plan, fields, unpressed))));
-        let groups: Vec<Group> = wide.into_iter().chain(narrow).collect();
-        let mut pieces: Vec<Range<usize>> = Vec::new();
-        let mut rows = 0;
-        for (index, group) in groups.iter().enumerate() {
-            rows += group.rows();
-            match pieces.last_mut() {
-                Some(piece) if rows <= GATHERED_ROWS => piece.end = index + 1,
-                _ => {
-                    rows = group.rows();
-                    pieces.push(index..index + 1);
-                }
-            }
-        }
+        let narrow: Vec<Narrow> =
+            narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
+        let most_rows = narrow.first().map_or(0, |group| group.members.len());
         Self {
-            answers: vec![Cells::EMPTY; groups.len()],
-            groups,
-            pieces,
+            answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
+            wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
+            narrow,
+            together: (GATHERED_ROWS / most_rows.max(1)).max(1),
             pressures: vec![[0.0; LANES]; room],
             statuses: vec![[0; LANES]; room],
             before: if plan.has_changes() {
@@ -279,11 +256,22 @@ impl Live {
             statuses: self.statuses.as_flattened(),
             faults,
         };
+        let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
+        let together = self.together;
         if self.shared {
-            frame.share(&self.groups, &self.pieces, &mut self.answers);
+            let wide = self.wide.par_iter().zip(wide).enumerate();
+            let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
+            wide.for_each_init(Gathered::default, |gathered, (table, (field, answer))| {
+                frame.wide(table, field, gathered, answer);
+            });
+            narrow.for_each_init(Gathered::default, |gathered, (groups, answers)| {
+                frame.piece(groups, gathered, answers);
+            });
         } else {
-            for piece in &self.pieces {
-                let (groups, answers) = (&self.groups[piece.clone()], &mut self.answers[piece.clone()]);
+            for (table, (field, answer)) in self.wide.iter().zip(wide).enumerate() {
+                frame.wide(table, field, &mut self.gathered, answer);
+            }
+            for (groups, answers) in self.narrow.chunks(together).zip(narrow.chunks_mut(together)) {
                 frame.piece(groups, &mut self.gathered, answers);
             }
         }
@@ -292,14 +280,15 @@ impl Live {
                 *kept = pressure.into();
             }
         }
-        for (group, answer) in self.groups.iter().zip(&self.answers) {
-            match group {
-                Group::Wide { field, .. } => write(&Run { first: *field, count: 1 }, answer, plan.outputs, cells),
-                Group::Narrow(group) => match group.together {
-                    Some(first) if group.fields.len() == LANES => write(&Sixteen(first), answer, plan.outputs, cells),
-                    Some(first) => write(&Run { first, count: group.fields.len() }, answer, plan.outputs, cells),
-                    None => write(&group.fields, answer, plan.outputs, cells),
-                },
+        let (wide, narrow) = self.answers.split_at(self.wide.len());
+        for (of, answer) in self.wide.iter().zip(wide) {
+            write(&Run { first: of.field, count: 1 }, answer, plan.outputs, cells);
+        }
+        for (group, answer) in self.narrow.iter().zip(narrow) {
+            match group.together {
+                Some(first) if group.fields.len() == LANES => write(&Sixteen(first), answer, plan.outputs, cells),
+                Some(first) => write(&Run { first, count: group.fields.len() }, answer, plan.outputs, cells),
+                None => write(&group.fields, answer, plan.outputs, cells),
             }
         }
     }
@@ -317,67 +306,47 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    /// Halves the pieces until one remains, and does the halves in parallel; `answers` begin with the first piece's.
-    fn share(&self, groups: &[Group], pieces: &[Range<usize>], answers: &mut [Cells]) {
-        match pieces {
-            [] => {}
-            [piece] => self.piece(&groups[piece.clone()], &mut Gathered::default(), answers),
-            _ => {
-                let (left, right) = pieces.split_at(pieces.len() / 2);
-                let (mine, others) = answers.split_at_mut(right[0].start - left[0].start);
-                rayon::join(|| self.share(groups, left, mine), || self.share(groups, right, others));
-            }
-        }
+    /// A field alone.
+    fn wide(&self, table: usize, field: &Alone, gathered: &mut Gathered, answer: &mut Cells) {
+        let (table, values): (&Table, _) = (&self.tables.wide[table], &mut gathered.values);
+        values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
+        wide::cell(self.level, self.plan, Wide { table, values }, &field.kind, self.faults, answer);
     }
 
+    /// Groups together.
     #[inline(never)]
-    fn piece(&self, groups: &[Group], gathered: &mut Gathered, answers: &mut [Cells]) {
-        let rows = groups.iter().map(Group::rows).sum();
-        if gathered.pressures.len() < rows {
+    fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
+        let rows = groups.iter().map(|group| group.members.len()).sum();
+        if gathered.pressures.len() < rows || gathered.between.len() < groups.len() {
             gathered.pressures.resize(rows, [0.0; LANES]);
             gathered.statuses.resize(rows, [0; LANES]);
+            gathered.between.resize(groups.len(), Between::EMPTY);
         }
         let mut first = 0;
         for group in groups {
-            if let Group::Narrow(group) = group {
-                let rows = first..first + group.members.len();
-                group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
-                if self.faults {
-                    group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
-                    self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
-                }
-                first = rows.end;
+            let rows = first..first + group.members.len();
+            group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
+            if self.faults {
+                group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
+                self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
             }
+            first = rows.end;
         }
-        let Gathered { pressures, statuses, values } = gathered;
-        with_widest!(self.level, simd => self.narrow(simd, groups, pressures, statuses, answers));
-        for (group, answer) in groups.iter().zip(answers) {
-            if let Group::Wide { kind, table, .. } = group {
-                let table: &Table = &self.tables.wide[*table];
-                values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
-                wide::cell(self.level, self.plan, Wide { table, values }, kind, self.faults, answer);
-            }
-        }
+        with_widest!(self.level, simd => self.narrow(simd, groups, gathered, answers));
     }
 
     #[inline(always)]
-    fn narrow<S: Simd>(
-        &self,
-        simd: S,
-        groups: &[Group],
-        pressures: &[Row<f32>],
-        statuses: &[Row<u32>],
-        answers: &mut [Cells],
-    ) {
-        let mut first = 0;
-        for (group, answer) in groups.iter().zip(answers) {
-            if let Group::Narrow(group) = group {
-                let members = OverFields { group, pressures: &pressures[first..], statuses: &statuses[first..] };
-                let (stages, columns) = (self.plan.stages(), self.plan.columns);
-                touch(simd, Abreast(members), &group.kinds, stages, columns, self.faults, answer);
-                first += group.members.len();
-            }
-        }
+    fn narrow<S: Simd>(&self, simd: S, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
+        let wanted = Wanted { stages: self.plan.stages(), outputs: self.plan.columns, faults: self.faults };
+        let Gathered { pressures, statuses, between, .. } = gathered;
+        let lot = |index: usize| {
+            // Groups come by falling size, nearly all of one.
+            let first: usize = groups[..index].iter().map(|group| group.members.len()).sum();
+            let group = &groups[index];
+            let members = OverFields { group, pressures: &pressures[first..], statuses: &statuses[first..] };
+            (Abreast(members), &group.kinds)
+        };
+        touch(simd, lot, LANES, wanted, &mut between[..groups.len()], answers);
     }
 
     /// Lanes that have no more members do not keep the others from being all unusable.

@@ -13,6 +13,7 @@ mod change;
 mod contact;
 mod hysteresis;
 mod live;
+mod lot;
 mod motion;
 mod orientation;
 mod simd;

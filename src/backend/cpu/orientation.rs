@@ -17,6 +17,15 @@ pub(super) struct Farthest<S: Simd> {
     pub(super) y: [F<S>; 2],
 }
 
+/// How far they lie apart.
+pub(super) struct Apart<S: Simd> {
+    /// The three largest squared distances.
+    pub(super) r: [F<S>; 3],
+    /// From the second farthest point to the farthest.
+    pub(super) x: F<S>,
+    pub(super) y: F<S>,
+}
+
 /// Finds them.
 ///
 /// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
@@ -58,17 +67,16 @@ pub(super) fn point<S: Simd, P: Members<S>>(
 
 /// The line through the two farthest points, where there is one.
 #[inline(always)]
-pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, far: &Farthest<S>) -> Line<S> {
+pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> Line<S> {
     let (none, one, two) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, 2.0));
     let single = touch.touched & touch.active.simd_le(one);
     let several = touch.touched & touch.active.simd_gt(one);
-    let (x, y) = (far.x[0] - far.x[1], far.y[0] - far.y[1]);
     // Distances are compared by their squares, as roots are dear.
-    let near = far.r[0].max(none).sqrt() * NEAR;
-    let limit = far.r[2].max(none).sqrt() + near;
+    let near = r[0].max(none).sqrt() * NEAR;
+    let limit = r[2].max(none).sqrt() + near;
     let coincident = several & (x * x + y * y).simd_le(near * near);
     let found = several & !coincident;
-    let tie = found & touch.active.simd_gt(two) & far.r[1].simd_le(limit * limit);
+    let tie = found & touch.active.simd_gt(two) & r[1].simd_le(limit * limit);
     Line {
         angle: found.select(of_line(simd, x, y), none),
         flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())

@@ -9,9 +9,9 @@ use super::axis::{self, Moments};
 use super::centroid;
 use super::contact::{self, Sums};
 use super::orientation::{self, Farthest};
-use super::simd::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
+use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u};
 use crate::percept::{Flags, Outputs};
-use crate::scene::{PlanField, Stages};
+use crate::scene::PlanField;
 use crate::stage::calibrate::UNUSABLE;
 
 /// A taxel's part in a field, a lane each.
@@ -191,7 +191,7 @@ impl Kinds {
     }
 }
 
-impl<S: Simd> Kind<S> for Kinds {
+impl<S: Simd> Kind<S> for &Kinds {
     #[inline(always)]
     fn any_charted(&self) -> bool {
         self.any_charted
@@ -276,111 +276,4 @@ pub(super) struct Line<S: Simd> {
     pub(super) angle: F<S>,
     pub(super) flags: U<S>,
     pub(super) present: U<S>,
-}
-
-/// All stages for one set of lanes; `faults`: whether calibration said something of any value. Columns that no stage of
-/// `stages` or output of `outputs` fills are left as they are.
-#[inline(always)]
-pub(super) fn touch<S: Simd, P: Sweep<S>>(
-    simd: S,
-    members: P,
-    kind: &impl Kind<S>,
-    stages: Stages,
-    outputs: Outputs,
-    faults: bool,
-    cells: &mut Cells,
-) {
-    let mut at = 0;
-    while at < LANES {
-        strip(simd, members, kind, stages, outputs, faults, cells, at);
-        at += width::<S>();
-    }
-}
-
-/// [`touch`] for as many lanes as one instruction takes, from `at` on.
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "the same as `touch`, and where")]
-pub(super) fn strip<S: Simd, P: Sweep<S>>(
-    simd: S,
-    members: P,
-    kind: &impl Kind<S>,
-    stages: Stages,
-    outputs: Outputs,
-    faults: bool,
-    cells: &mut Cells,
-    at: usize,
-) {
-    let sums = members.sums(simd, at, stages.centroid);
-    let none = splat(simd, 0.0);
-    let touched = sums.total.simd_gt(none);
-    let mut flags = kind.always(simd, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
-    let mut present = kind.sums(simd, at);
-    if faults {
-        let (said, unusable) = members.statuses(simd, at);
-        flags |= said;
-        present = unusable.select(splat_u(simd, 0), present);
-    }
-    store(simd, sums.total, &mut cells.total, at);
-    if outputs.intersects(Outputs::PEAK | Outputs::AREA) {
-        let (peak, area) = members.peak_and_area(simd, at);
-        store(simd, peak, &mut cells.peak, at);
-        store(simd, area, &mut cells.area, at);
-    }
-    if outputs.contains(Outputs::ACTIVE) {
-        store_u(simd, sums.active.to_int::<U<S>>(), &mut cells.active, at);
-    }
-    if !(touched.any_true() && kind.any_charted()) {
-        for column in [&mut cells.orientation, &mut cells.axis, &mut cells.anisotropy] {
-            store(simd, none, column, at);
-        }
-    }
-    if !touched.any_true() {
-        for column in [&mut cells.u, &mut cells.v, &mut cells.depth] {
-            store(simd, none, column, at);
-        }
-        store_u(simd, flags, &mut cells.flags, at);
-        store_u(simd, present, &mut cells.present, at);
-        return;
-    }
-    if stages.centroid {
-        let found = kind.found(simd, at);
-        present |= touched.select(found, splat_u(simd, 0));
-        let unit = kind.unit_m(simd, at);
-        let (u, v) = centroid::quotients(simd, &sums, touched);
-        store(simd, u * unit, &mut cells.u, at);
-        store(simd, v * unit, &mut cells.v, at);
-        let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
-        let depth = if kind.any_uncharted() {
-            let depth = members.depth(simd, at) / sums.total;
-            (touched & !charted).select(depth, none) * unit
-        } else {
-            none
-        };
-        store(simd, depth, &mut cells.depth, at);
-        let touched = touched & charted;
-        let scale = scale_of(simd, sums.total);
-        let touch = Touch { active: sums.active, touched, total: sums.total, scale, u, v };
-        if stages.orientation && kind.any_charted() {
-            let line = orientation::line(simd, &touch, &members.farthest(simd, at, &touch));
-            store(simd, line.angle, &mut cells.orientation, at);
-            flags |= line.flags;
-            present |= line.present;
-        }
-        if stages.axis && kind.any_charted() {
-            let (line, anisotropy) = axis::line(simd, &touch, &members.moments(simd, at, &touch));
-            store(simd, line.angle, &mut cells.axis, at);
-            store(simd, anisotropy, &mut cells.anisotropy, at);
-            flags |= line.flags;
-            present |= line.present;
-        }
-    }
-    store_u(simd, flags, &mut cells.flags, at);
-    store_u(simd, present, &mut cells.present, at);
-}
-
-/// The power of two that brings `total` into [1, 2).
-#[inline(always)]
-fn scale_of<S: Simd>(simd: S, total: F<S>) -> F<S> {
-    let exponent = total.bitcast::<U<S>>() & 0x7F80_0000;
-    (splat_u(simd, 254 << 23) - exponent).bitcast()
 }

@@ -12,7 +12,8 @@ use super::centroid;
 use super::contact::{self, Sums};
 use super::orientation::{Farthest, point};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
-use super::touch::{Abreast, Cells, Members, OneKind, Part, Sweep, Touch, strip};
+use super::lot::{Between, Wanted, touch};
+use super::touch::{Abreast, Cells, Members, OneKind, Part, Sweep, Touch};
 use crate::scene::Plan;
 use crate::stage::calibrate::UNUSABLE;
 
@@ -131,8 +132,10 @@ impl<S: Simd> Members<S> for Wide<'_> {
 /// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
 #[inline(never)]
 pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, faults: bool, cells: &mut Cells) {
-    let (stages, columns) = (plan.stages(), plan.columns);
-    with_widest!(level, simd => strip(simd, field, kind, stages, columns, faults, cells, 0));
+    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults };
+    let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
+    let between = std::slice::from_mut(&mut between);
+    with_widest!(level, simd => touch(simd, |_| (field, *kind), 1, wanted, between, cells));
 }
 
 /// A wide field over sixteen frames: what [`Abreast`] is for others.
