@@ -123,7 +123,9 @@ pub(super) fn block(
         }
     }
     let Scratch { pressures, statuses, cells: answers, between, .. } = scratch;
-    for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
+    // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
+    // written finds its way to memory while the next ones are computed.
+    for (chunk, fields) in plan.fields.chunks(LANES).enumerate().rev() {
         with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, between, answers));
         with_widest!(level, simd => {
             write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
@@ -214,46 +216,73 @@ fn write<S: Simd>(
     outputs: Outputs,
     cells: &mut CellsMut<'_>,
 ) {
-    let fields = cells.fields();
-    let place = |frame: usize| frame * fields + first..frame * fields + first + count;
-    let floats = |column: &mut [f32], of: fn(&Cells) -> &Row<f32>| {
-        if column.is_empty() {
-            return;
+    let place = Place { fields: cells.fields(), first, count, frames };
+    floats(simd, answers, place, cells.total, |cells| &cells.total);
+    floats(simd, answers, place, cells.peak, |cells| &cells.peak);
+    floats(simd, answers, place, cells.area, |cells| &cells.area);
+    floats(simd, answers, place, cells.centroid_u, |cells| &cells.u);
+    floats(simd, answers, place, cells.centroid_v, |cells| &cells.v);
+    floats(simd, answers, place, cells.centroid_depth, |cells| &cells.depth);
+    floats(simd, answers, place, cells.orientation, |cells| &cells.orientation);
+    floats(simd, answers, place, cells.axis, |cells| &cells.axis);
+    floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
+    integers(simd, answers, place, cells.active, |cells| &cells.active, u32::MAX);
+    integers(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    let present = cast_slice_mut::<Outputs, u32>(cells.present);
+    integers(simd, answers, place, present, |cells| &cells.present, outputs.bits());
+}
+
+/// Where answers go in a column.
+#[derive(Clone, Copy)]
+struct Place {
+    /// A frame's cells.
+    fields: usize,
+    /// The first of them that is written, and how many.
+    first: usize,
+    count: usize,
+    frames: usize,
+}
+
+impl Place {
+    /// Writes a row for each frame.
+    #[inline(always)]
+    fn put<S: Simd, V: SimdBase<S>>(self, rows: &[V; LANES], column: &mut [V::Element]) {
+        for (frame, row) in rows.iter().take(self.frames).enumerate() {
+            let start = frame * self.fields + self.first;
+            // A whole row, though it may reach into the next frame: what belongs there is written later.
+            match column.get_mut(start..start + LANES) {
+                Some(cells) if self.fields >= LANES => row.store_slice(cells),
+                _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
+            }
         }
+    }
+}
+
+#[inline(always)]
+fn floats<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    column: &mut [f32],
+    of: impl Fn(&Cells) -> &Row<f32>,
+) {
+    if !column.is_empty() {
         let rows: [f32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
-        for (frame, row) in rows.iter().take(frames).enumerate() {
-            let cells = &mut column[place(frame)];
-            if cells.len() == LANES {
-                row.store_slice(cells);
-            } else {
-                cells.copy_from_slice(&row.as_slice()[..count]);
-            }
-        }
-    };
-    floats(cells.total, |cells| &cells.total);
-    floats(cells.peak, |cells| &cells.peak);
-    floats(cells.area, |cells| &cells.area);
-    floats(cells.centroid_u, |cells| &cells.u);
-    floats(cells.centroid_v, |cells| &cells.v);
-    floats(cells.centroid_depth, |cells| &cells.depth);
-    floats(cells.orientation, |cells| &cells.orientation);
-    floats(cells.axis, |cells| &cells.axis);
-    floats(cells.anisotropy, |cells| &cells.anisotropy);
-    let integers = |column: &mut [u32], of: fn(&Cells) -> &Row<u32>, mask: u32| {
-        if column.is_empty() {
-            return;
-        }
-        let rows: [u32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
-        for (frame, row) in rows.iter().take(frames).enumerate() {
-            let (row, cells) = (*row & mask, &mut column[place(frame)]);
-            if cells.len() == LANES {
-                row.store_slice(cells);
-            } else {
-                cells.copy_from_slice(&row.as_slice()[..count]);
-            }
-        }
-    };
-    integers(cells.active, |cells| &cells.active, u32::MAX);
-    integers(cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
-    integers(cast_slice_mut::<Outputs, u32>(cells.present), |cells| &cells.present, outputs.bits());
+        place.put(&rows, column);
+    }
+}
+
+#[inline(always)]
+fn integers<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    column: &mut [u32],
+    of: impl Fn(&Cells) -> &Row<u32>,
+    mask: u32,
+) {
+    if !column.is_empty() {
+        let rows: [u32x16<S>; LANES] = transpose(simd, |field| of(&answers[field]).map(|bits| bits & mask));
+        place.put(&rows, column);
+    }
 }
