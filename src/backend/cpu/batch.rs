@@ -126,10 +126,10 @@ pub(super) fn block(
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
     for (chunk, fields) in plan.fields.chunks(LANES).enumerate().rev() {
+        let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
+        place.announce(cells);
         with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, between, answers));
-        with_widest!(level, simd => {
-            write(simd, answers, chunk * LANES, fields.len(), frames, plan.outputs, cells);
-        });
+        with_widest!(level, simd => write(simd, answers, place, plan.outputs, cells));
     }
 }
 
@@ -205,18 +205,9 @@ fn read<S: Simd>(
     !scratch.faulty.is_empty()
 }
 
-/// Writes the answers of `count` fields from `first` on into `frames` frames' cells.
+/// Writes answers where they belong.
 #[inline(always)]
-fn write<S: Simd>(
-    simd: S,
-    answers: &[Cells; LANES],
-    first: usize,
-    count: usize,
-    frames: usize,
-    outputs: Outputs,
-    cells: &mut CellsMut<'_>,
-) {
-    let place = Place { fields: cells.fields(), first, count, frames };
+fn write<S: Simd>(simd: S, answers: &[Cells; LANES], place: Place, outputs: Outputs, cells: &mut CellsMut<'_>) {
     floats(simd, answers, place, cells.total, |cells| &cells.total);
     floats(simd, answers, place, cells.peak, |cells| &cells.peak);
     floats(simd, answers, place, cells.area, |cells| &cells.area);
@@ -244,6 +235,36 @@ struct Place {
 }
 
 impl Place {
+    /// Has the memory that is going to be written fetched meanwhile.
+    fn announce(self, cells: &CellsMut<'_>) {
+        let columns = [
+            &cells.total[..],
+            cells.peak,
+            cells.area,
+            cells.centroid_u,
+            cells.centroid_v,
+            cells.centroid_depth,
+            cells.orientation,
+            cells.axis,
+            cells.anisotropy,
+        ];
+        for column in columns {
+            self.announce_column(column);
+        }
+        self.announce_column(cells.active);
+        self.announce_column(cells.flags);
+        self.announce_column(cells.present);
+    }
+
+    /// Of a row, where it begins: its end is where the one that was written before began.
+    fn announce_column<T>(self, column: &[T]) {
+        for frame in 0..self.frames {
+            if let Some(cell) = column.get(frame * self.fields + self.first) {
+                simd::soon_written(cell);
+            }
+        }
+    }
+
     /// Writes a row for each frame.
     #[inline(always)]
     fn put<S: Simd, V: SimdBase<S>>(self, rows: &[V; LANES], column: &mut [V::Element]) {
