@@ -7,6 +7,7 @@ use fearless_simd::{Level, f32x16, u32x16};
 use super::super::{RawBatch, Rows};
 use super::Tables;
 use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, touch};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
@@ -18,15 +19,15 @@ use crate::stage::layout::{Member, Taxel};
 /// What a task needs to work in.
 pub(super) struct Scratch {
     /// By slot, a lane a frame.
-    pressures: Vec<Row<f32>>,
-    statuses: Vec<Row<u32>>,
+    pressures: Lines<f32>,
+    statuses: Lines<u32>,
     /// Tiles whose statuses say something.
     faulty: Vec<usize>,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     between: Box<[Between; LANES]>,
     /// Pressures and statuses of the frame before, where there are changes.
-    before: (Vec<Row<f32>>, Vec<Row<u32>>),
+    before: (Lines<f32>, Lines<u32>),
 }
 
 impl Scratch {
@@ -34,12 +35,12 @@ impl Scratch {
         let padded = plan.slots().next_multiple_of(LANES);
         let before = if plan.has_changes() { padded / LANES } else { 0 };
         Self {
-            pressures: vec![[0.0; LANES]; padded],
-            statuses: vec![[0; LANES]; padded],
+            pressures: Lines::new(padded, 0.0),
+            statuses: Lines::new(padded, 0),
             faulty: Vec::new(),
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
-            before: (vec![[0.0; LANES]; before], vec![[0; LANES]; before]),
+            before: (Lines::new(before, 0.0), Lines::new(before, 0)),
         }
     }
 }
@@ -177,8 +178,9 @@ fn read<S: Simd>(
     for tile in scratch.faulty.drain(..) {
         scratch.statuses[tile * LANES..][..LANES].fill([0; LANES]);
     }
-    let mut bits = [[0; LANES]; LANES];
-    let (mut pressures, mut statuses) = ([[0.0; LANES]; LANES], [[0; LANES]; LANES]);
+    let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
+    let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
+    let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     for (index, tile) in tables.tiles.iter().enumerate() {
         let slot = index * LANES;
         // All of them first: what was stored piece by piece is not yet to be had as a whole.

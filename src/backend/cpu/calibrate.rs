@@ -5,6 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::super::Rows;
 use super::Tables;
+use super::lines::Aligned;
 use super::simd::{F, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width, with_widest};
 use crate::percept::Flags;
 use crate::scene::Plan;
@@ -13,6 +14,7 @@ use crate::stage::layout::{FIRST_CURVE, Knot, MASKED, STRAIGHT, Taxel};
 
 /// Sixteen taxels' calibration, quantity by quantity.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Tile {
     baseline: Row<f32>,
     gain: Row<f32>,
@@ -131,9 +133,9 @@ fn tiles<S: Simd>(
     let mut faults = false;
     let rows = pressures.iter_mut().zip(statuses);
     for (index, (one, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
-        let mut bits = [0; LANES];
-        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, &mut bits);
-        faults |= tile(simd, plan, one, index * LANES, &bits, pressures, statuses);
+        let Aligned(bits) = &mut Aligned([0; LANES]);
+        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
+        faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
     }
     faults
 }

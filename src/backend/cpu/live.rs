@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
 use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
+use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
@@ -36,8 +37,8 @@ struct Narrow {
     /// By member; lanes that have no more go on with an unpressed one.
     slots: Slots,
     members: Vec<MemberRow>,
-    depths: Vec<Row<f32>>,
-    areas: Vec<Row<f32>>,
+    depths: Lines<f32>,
+    areas: Lines<f32>,
 }
 
 /// A plan of fewer slots than this has them as 16-bit numbers, which need no check against a table of as many values.
@@ -46,8 +47,8 @@ const NEAR: usize = 1 << 16;
 /// Slots, a row a member.
 #[derive(Clone, Debug)]
 enum Slots {
-    Near(Vec<Row<u16>>),
-    Far(Vec<Row<u32>>),
+    Near(Lines<u16>),
+    Far(Lines<u32>),
 }
 
 impl Slots {
@@ -55,17 +56,17 @@ impl Slots {
     fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
         match (self, values.first_chunk::<NEAR>()) {
             (Self::Near(slots), Some(values)) => {
-                for (row, slots) in rows.iter_mut().zip(slots) {
+                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
                     *row = slots.map(|slot| values[usize::from(slot)]);
                 }
             }
             (Self::Near(slots), None) => {
-                for (row, slots) in rows.iter_mut().zip(slots) {
+                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
                     *row = slots.map(|slot| values[usize::from(slot)]);
                 }
             }
             (Self::Far(slots), _) => {
-                for (row, slots) in rows.iter_mut().zip(slots) {
+                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
                     *row = slots.map(|slot| values[slot as usize]);
                 }
             }
@@ -75,6 +76,7 @@ impl Slots {
 
 /// A member of each field of a group.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct MemberRow {
     weight: Row<f32>,
     u: Row<f32>,
@@ -84,13 +86,13 @@ struct MemberRow {
 impl Narrow {
     fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
         let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
-        let blank = vec![[0.0; LANES]; rows];
-        let mut slots = vec![[unpressed as u32; LANES]; rows];
+        let blank = Lines::new(rows, 0.0);
+        let mut slots = Lines::new(rows, unpressed as u32);
         let mut group = Self {
             fields: fields.to_vec(),
             together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
             kinds: Kinds::EMPTY,
-            slots: Slots::Far(Vec::new()),
+            slots: Slots::Far(Lines::default()),
             members: vec![MemberRow { weight: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] }; rows],
             depths: blank.clone(),
             areas: blank,
@@ -107,7 +109,7 @@ impl Narrow {
             }
         }
         group.slots = if unpressed < NEAR {
-            Slots::Near(slots.into_iter().map(|row| row.map(|slot| slot as u16)).collect())
+            Slots::Near(slots.iter().map(|row| row.map(|slot| slot as u16)).collect())
         } else {
             Slots::Far(slots)
         };
@@ -163,8 +165,8 @@ const GATHERED_ROWS: usize = 64;
 /// What one thread needs beside.
 #[derive(Clone, Debug, Default)]
 struct Gathered {
-    pressures: Vec<Row<f32>>,
-    statuses: Vec<Row<u32>>,
+    pressures: Lines<f32>,
+    statuses: Lines<u32>,
     between: Vec<Between>,
     values: Values,
 }
@@ -193,10 +195,10 @@ pub(super) struct Live {
     /// Per wide field, then per group of narrow ones.
     answers: Vec<Cells>,
     /// By slot, and a last row of taxels that nothing presses.
-    pressures: Vec<Row<f32>>,
-    statuses: Vec<Row<u32>>,
+    pressures: Lines<f32>,
+    statuses: Lines<u32>,
     /// Those of the frame before, where there are changes.
-    before: (Vec<Row<f32>>, Vec<Row<u32>>),
+    before: (Lines<f32>, Lines<u32>),
     gathered: Gathered,
     shared: bool,
 }
@@ -218,12 +220,12 @@ impl Live {
             wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
             narrow,
             together: (GATHERED_ROWS / most_rows.max(1)).max(1),
-            pressures: vec![[0.0; LANES]; room],
-            statuses: vec![[0; LANES]; room],
+            pressures: Lines::new(room, 0.0),
+            statuses: Lines::new(room, 0),
             before: if plan.has_changes() {
-                (vec![[0.0; LANES]; tiles], vec![[0; LANES]; tiles])
+                (Lines::new(tiles, 0.0), Lines::new(tiles, 0))
             } else {
-                (Vec::new(), Vec::new())
+                (Lines::default(), Lines::default())
             },
             gathered: Gathered::default(),
             shared: plan.memberships() >= SHARED && rayon::current_num_threads() > 1,
@@ -318,8 +320,8 @@ impl Frame<'_> {
     fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
         let rows = groups.iter().map(|group| group.members.len()).sum();
         if gathered.pressures.len() < rows || gathered.between.len() < groups.len() {
-            gathered.pressures.resize(rows, [0.0; LANES]);
-            gathered.statuses.resize(rows, [0; LANES]);
+            gathered.pressures = Lines::new(rows, 0.0);
+            gathered.statuses = Lines::new(rows, 0);
             gathered.between.resize(groups.len(), Between::EMPTY);
         }
         let mut first = 0;

@@ -24,6 +24,7 @@ pub(super) struct Wanted {
 
 /// What a cell's stages leave for later ones, a row each.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Between {
     active: Row<f32>,
     /// The centroid's numerators, then the centroid, in the field's unit.

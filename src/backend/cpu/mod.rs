@@ -12,6 +12,7 @@ mod centroid;
 mod change;
 mod contact;
 mod hysteresis;
+mod lines;
 mod live;
 mod lot;
 mod motion;

@@ -160,6 +160,7 @@ impl<S: Simd> Kind<S> for OneKind {
 
 /// Every lane has a field of its own; lanes without one are charted and give nothing.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Kinds {
     any_charted: bool,
     any_uncharted: bool,
@@ -225,6 +226,7 @@ impl<S: Simd> Kind<S> for &Kinds {
 
 /// What the stages found, a row each; lengths in metres.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Cells {
     pub(super) flags: Row<u32>,
     pub(super) present: Row<u32>,

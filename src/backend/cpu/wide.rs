@@ -12,6 +12,7 @@ use super::centroid;
 use super::contact::{self, Sums};
 use super::orientation::{Farthest, point};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
+use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::touch::{Abreast, Cells, Members, OneKind, Part, Sweep, Touch};
 use crate::scene::Plan;
@@ -21,18 +22,18 @@ use crate::stage::calibrate::UNUSABLE;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Table {
     pub(super) slots: Vec<u32>,
-    weights: Vec<Row<f32>>,
-    u: Vec<Row<f32>>,
-    v: Vec<Row<f32>>,
-    depths: Vec<Row<f32>>,
-    areas: Vec<Row<f32>>,
+    weights: Lines<f32>,
+    u: Lines<f32>,
+    v: Lines<f32>,
+    depths: Lines<f32>,
+    areas: Lines<f32>,
 }
 
 impl Table {
     /// Of members with slot, weight, u, v, depth and area.
     pub(super) fn new(members: impl ExactSizeIterator<Item = (u32, [f32; 5])>) -> Self {
         let rows = members.len().div_ceil(LANES);
-        let blank = vec![[0.0; LANES]; rows];
+        let blank = Lines::new(rows, 0.0);
         let mut table = Self {
             slots: Vec::with_capacity(members.len()),
             weights: blank.clone(),
@@ -57,8 +58,8 @@ impl Table {
 /// Its values in one frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Values {
-    pressures: Vec<Row<f32>>,
-    statuses: Vec<Row<u32>>,
+    pressures: Lines<f32>,
+    statuses: Lines<u32>,
 }
 
 impl Values {
@@ -70,8 +71,8 @@ impl Values {
         pressure: impl Fn(usize) -> f32,
         status: impl Fn(usize) -> u32,
     ) {
-        self.pressures.resize(table.weights.len(), [0.0; LANES]);
-        self.statuses.resize(table.weights.len(), [0; LANES]);
+        self.pressures.make(table.weights.len(), 0.0);
+        self.statuses.make(table.weights.len(), 0);
         for (row, slots) in self.pressures.iter_mut().zip(table.slots.chunks(LANES)) {
             row[slots.len()..].fill(0.0);
             for (value, &slot) in row.iter_mut().zip(slots) {
