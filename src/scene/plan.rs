@@ -85,6 +85,8 @@ pub(crate) struct PlanField {
     /// Whether another field of the plan has it as its parent.
     pub(crate) divided: bool,
     pub(crate) area_known: bool,
+    /// Whether every member's weight is 1.
+    pub(crate) unweighted: bool,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
     /// When it counts as touched.
@@ -189,6 +191,7 @@ impl Plan {
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
+                unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
                 unit_m,
                 thresholds: Thresholds::default(),
                 still_within,

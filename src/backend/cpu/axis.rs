@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 
 use super::angle::of_line;
-use super::simd::{F, bits_where, splat};
+use super::simd::{F, bits_where, splat, splat_u};
 use super::touch::{Line, Members, Touch};
 use crate::percept::{Flags, Outputs};
 
@@ -40,7 +40,7 @@ pub(super) fn add<S: Simd, P: Members<S>>(
     [a, b, d]: &mut [F<S>; 3],
 ) {
     let part = members.part(simd, member, at);
-    let q = (part.weight * part.pressure) * touch.scale;
+    let q = part.pull * touch.scale;
     let x = part.u - touch.u;
     let y = part.v - touch.v;
     let qx = q * x;
@@ -53,8 +53,8 @@ pub(super) fn add<S: Simd, P: Members<S>>(
 #[inline(always)]
 pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Moments { a, b, d }: &Moments<S>) -> (Line<S>, F<S>) {
     let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
-    let single = touch.touched & touch.active.simd_le(one);
-    let several = touch.touched & touch.active.simd_gt(one);
+    let single = touch.touched & touch.active.simd_le(splat_u(simd, 1));
+    let several = touch.touched & touch.active.simd_gt(splat_u(simd, 1));
     let trace = a + d;
     let coincident = several & trace.simd_le((touch.total * touch.scale) * TOGETHER);
     let spread = several & !coincident;

@@ -45,9 +45,9 @@ impl Scratch {
     }
 }
 
-/// A field's members over sixteen frames.
+/// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
-struct OverFrames<'a> {
+struct OverFrames<'a, const WEIGHTED: bool> {
     members: &'a [Member],
     depths: &'a [f32],
     taxels: &'a [Taxel],
@@ -55,13 +55,13 @@ struct OverFrames<'a> {
     statuses: &'a [Row<u32>],
 }
 
-impl<'a> OverFrames<'a> {
+impl<'a, const WEIGHTED: bool> OverFrames<'a, WEIGHTED> {
     fn new(plan: &'a Plan, field: &'a PlanField, pressures: &'a [Row<f32>], statuses: &'a [Row<u32>]) -> Self {
         Self { members: plan.members_of(field), depths: &field.depths, taxels: &plan.taxels, pressures, statuses }
     }
 }
 
-impl<S: Simd> Members<S> for OverFrames<'_> {
+impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
     #[inline(always)]
     fn count(self) -> usize {
         self.members.len()
@@ -70,9 +70,10 @@ impl<S: Simd> Members<S> for OverFrames<'_> {
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
         let Member { slot, weight, u, v } = self.members[member];
+        let pressure = load(simd, &self.pressures[slot as usize], at);
         Part {
-            pressure: load(simd, &self.pressures[slot as usize], at),
-            weight: splat(simd, weight),
+            pressure,
+            pull: if WEIGHTED { splat(simd, weight) * pressure } else { pressure },
             u: splat(simd, u),
             v: splat(simd, v),
         }
@@ -148,16 +149,19 @@ fn answer<S: Simd>(
     answers: &mut [Cells; LANES],
 ) {
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults };
-    let over = |field| OverFrames::new(plan, field, pressures, statuses);
     let mut first = 0;
-    for run in fields.chunk_by(|a, b| a.is_wide() == b.is_wide()) {
+    for run in fields.chunk_by(|a, b| (a.is_wide(), a.unweighted) == (b.is_wide(), b.unweighted)) {
         let (between, answers) = (&mut between[first..][..run.len()], &mut answers[first..][..run.len()]);
+        let kind = |index: usize| OneKind::new(&run[index]);
         if run[0].is_wide() {
-            let lot = |index: usize| (ManyAbreast(over(&run[index])), OneKind::new(&run[index]));
-            touch(simd, lot, LANES, wanted, between, answers);
+            let over = |index| ManyAbreast(OverFrames::<true>::new(plan, &run[index], pressures, statuses));
+            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
+        } else if run[0].unweighted {
+            let over = |index| Abreast(OverFrames::<false>::new(plan, &run[index], pressures, statuses));
+            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
         } else {
-            let lot = |index: usize| (Abreast(over(&run[index])), OneKind::new(&run[index]));
-            touch(simd, lot, LANES, wanted, between, answers);
+            let over = |index| Abreast(OverFrames::<true>::new(plan, &run[index], pressures, statuses));
+            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
         }
         first += run.len();
     }

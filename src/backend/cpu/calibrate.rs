@@ -85,7 +85,9 @@ pub(super) fn tile<S: Simd>(
         let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
         let bits = U::<S>::from_slice(simd, &raw[lanes.clone()]);
         if tile.raw_is_pressure && fine(simd, bits).all_true() {
-            store(simd, bits.bitcast::<F<S>>().max(splat(simd, 0.0)), pressures, at);
+            let (value, none) = (bits.bitcast::<F<S>>(), splat(simd, 0.0));
+            // Not the larger of the two, which might be −0.
+            store(simd, value.simd_gt(none).select(value, none), pressures, at);
             store_u(simd, splat_u(simd, 0), statuses, at);
             at += width::<S>();
             continue;

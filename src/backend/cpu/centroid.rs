@@ -20,7 +20,7 @@ pub(super) fn depth<S: Simd, P: Members<S>>(simd: S, members: P, at: usize) -> F
     let mut sum = splat(simd, 0.0);
     for member in 0..members.count() {
         let part = members.part(simd, member, at);
-        sum += (part.weight * part.pressure) * members.depth(simd, member, at);
+        sum += part.pull * members.depth(simd, member, at);
     }
     sum
 }

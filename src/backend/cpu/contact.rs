@@ -3,13 +3,13 @@
 use fearless_simd::prelude::*;
 
 use super::simd::{F, U, splat, splat_u};
-use super::touch::Members;
+use super::touch::{Members, Part};
 use crate::stage::calibrate::UNUSABLE;
 
 /// S, how many taxels are pressed, and the numerators of the centroid.
 pub(super) struct Sums<S: Simd> {
     pub(super) total: F<S>,
-    pub(super) active: F<S>,
+    pub(super) active: U<S>,
     pub(super) u: F<S>,
     pub(super) v: F<S>,
 }
@@ -17,19 +17,31 @@ pub(super) struct Sums<S: Simd> {
 /// One pass over the members; the centroid's sums ride along where they are wanted.
 #[inline(always)]
 pub(super) fn sums<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, centroid: bool) -> Sums<S> {
-    let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
-    let (mut total, mut active, mut u, mut v) = (none, none, none, none);
-    for member in 0..members.count() {
-        let part = members.part(simd, member, at);
-        let pull = part.weight * part.pressure;
-        total += pull;
-        active += part.pressure.simd_gt(none).select(one, none);
-        if centroid {
-            u += pull * part.u;
-            v += pull * part.v;
+    let none = splat(simd, 0.0);
+    let (mut total, mut active, mut u, mut v) = (none, splat_u(simd, 0), none, none);
+    // Two loops, as the choice is not to be made for every member.
+    if centroid {
+        for member in 0..members.count() {
+            let part = members.part(simd, member, at);
+            total += part.pull;
+            active += pressed(simd, &part);
+            u += part.pull * part.u;
+            v += part.pull * part.v;
+        }
+    } else {
+        for member in 0..members.count() {
+            let part = members.part(simd, member, at);
+            total += part.pull;
+            active += pressed(simd, &part);
         }
     }
     Sums { total, active, u, v }
+}
+
+/// 1 where P > 0, else 0. No P is negative or −0, so that its bits tell.
+#[inline(always)]
+pub(super) fn pressed<S: Simd>(simd: S, part: &Part<S>) -> U<S> {
+    part.pressure.bitcast::<U<S>>().min(splat_u(simd, 1))
 }
 
 /// The largest P, and the area of the pressed taxels, m².

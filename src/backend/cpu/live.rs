@@ -36,7 +36,9 @@ struct Narrow {
     kinds: Kinds,
     /// By member; lanes that have no more go on with an unpressed one.
     slots: Slots,
-    members: Vec<MemberRow>,
+    places: Vec<PlaceRow>,
+    /// None where all are 1.
+    weights: Option<Lines<f32>>,
     depths: Lines<f32>,
     areas: Lines<f32>,
 }
@@ -74,11 +76,10 @@ impl Slots {
     }
 }
 
-/// A member of each field of a group.
+/// Where a member of each field of a group is.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct MemberRow {
-    weight: Row<f32>,
+struct PlaceRow {
     u: Row<f32>,
     v: Row<f32>,
 }
@@ -93,7 +94,8 @@ impl Narrow {
             together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
             kinds: Kinds::EMPTY,
             slots: Slots::Far(Lines::default()),
-            members: vec![MemberRow { weight: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
             depths: blank.clone(),
             areas: blank,
         };
@@ -101,9 +103,11 @@ impl Narrow {
             group.kinds.set(lane, field);
             for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
                 slots[row][lane] = member.slot;
-                group.members[row].weight[lane] = member.weight;
-                group.members[row].u[lane] = member.u;
-                group.members[row].v[lane] = member.v;
+                if let Some(weights) = &mut group.weights {
+                    weights[row][lane] = member.weight;
+                }
+                group.places[row].u[lane] = member.u;
+                group.places[row].v[lane] = member.v;
                 group.depths[row][lane] = *depth;
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
@@ -115,28 +119,40 @@ impl Narrow {
         };
         group
     }
+
+    fn is_weighted(&self) -> bool {
+        self.weights.is_some()
+    }
+
+    /// Has weights from now on, of 1 if it had none.
+    fn weigh(&mut self) {
+        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
+    }
 }
 
-/// A group's values in this frame.
+/// A group's values in this frame; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
-struct OverFields<'a> {
+struct OverFields<'a, const WEIGHTED: bool> {
     group: &'a Narrow,
+    /// Empty if not `WEIGHTED`.
+    weights: &'a [Row<f32>],
     pressures: &'a [Row<f32>],
     statuses: &'a [Row<u32>],
 }
 
-impl<S: Simd> Members<S> for OverFields<'_> {
+impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFields<'_, WEIGHTED> {
     #[inline(always)]
     fn count(self) -> usize {
-        self.group.members.len()
+        self.group.places.len()
     }
 
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
-        let MemberRow { weight, u, v } = &self.group.members[member];
+        let PlaceRow { u, v } = &self.group.places[member];
+        let pressure = load(simd, &self.pressures[member], at);
         Part {
-            pressure: load(simd, &self.pressures[member], at),
-            weight: load(simd, weight, at),
+            pressure,
+            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
             u: load(simd, u, at),
             v: load(simd, v, at),
         }
@@ -212,14 +228,18 @@ impl Live {
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
         let unpressed = tiles * LANES;
         let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
-        let narrow: Vec<Narrow> =
+        let mut narrow: Vec<Narrow> =
             narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
-        let most_rows = narrow.first().map_or(0, |group| group.members.len());
+        let most_rows = narrow.first().map_or(0, |group| group.places.len());
+        let together = (GATHERED_ROWS / most_rows.max(1)).max(1);
+        for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
+            groups.iter_mut().for_each(Narrow::weigh);
+        }
         Self {
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
             wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
             narrow,
-            together: (GATHERED_ROWS / most_rows.max(1)).max(1),
+            together,
             pressures: Lines::new(room, 0.0),
             statuses: Lines::new(room, 0),
             before: if plan.has_changes() {
@@ -318,7 +338,7 @@ impl Frame<'_> {
     /// Groups together.
     #[inline(never)]
     fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
-        let rows = groups.iter().map(|group| group.members.len()).sum();
+        let rows = groups.iter().map(|group| group.places.len()).sum();
         if gathered.pressures.len() < rows || gathered.between.len() < groups.len() {
             gathered.pressures = Lines::new(rows, 0.0);
             gathered.statuses = Lines::new(rows, 0);
@@ -326,7 +346,7 @@ impl Frame<'_> {
         }
         let mut first = 0;
         for group in groups {
-            let rows = first..first + group.members.len();
+            let rows = first..first + group.places.len();
             group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
             if self.faults {
                 group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
@@ -334,18 +354,32 @@ impl Frame<'_> {
             }
             first = rows.end;
         }
-        with_widest!(self.level, simd => self.narrow(simd, groups, gathered, answers));
+        if groups.iter().any(Narrow::is_weighted) {
+            with_widest!(self.level, simd => self.narrow::<_, true>(simd, groups, gathered, answers));
+        } else {
+            with_widest!(self.level, simd => self.narrow::<_, false>(simd, groups, gathered, answers));
+        }
     }
 
     #[inline(always)]
-    fn narrow<S: Simd>(&self, simd: S, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
+    fn narrow<S: Simd, const WEIGHTED: bool>(
+        &self,
+        simd: S,
+        groups: &[Narrow],
+        gathered: &mut Gathered,
+        answers: &mut [Cells],
+    ) {
         let wanted = Wanted { stages: self.plan.stages(), outputs: self.plan.columns, faults: self.faults };
         let Gathered { pressures, statuses, between, .. } = gathered;
         let lot = |index: usize| {
-            // Groups come by falling size, nearly all of one.
-            let first: usize = groups[..index].iter().map(|group| group.members.len()).sum();
+            let first: usize = groups[..index].iter().map(|group| group.places.len()).sum();
             let group = &groups[index];
-            let members = OverFields { group, pressures: &pressures[first..], statuses: &statuses[first..] };
+            let members = OverFields::<WEIGHTED> {
+                group,
+                weights: group.weights.as_deref().unwrap_or_default(),
+                pressures: &pressures[first..],
+                statuses: &statuses[first..],
+            };
             (Abreast(members), &group.kinds)
         };
         touch(simd, lot, LANES, wanted, &mut between[..groups.len()], answers);
@@ -354,7 +388,7 @@ impl Frame<'_> {
     /// Lanes that have no more members do not keep the others from being all unusable.
     fn leave_out_what_is_not_there(&self, group: &Narrow, statuses: &mut [Row<u32>]) {
         for (lane, &field) in group.fields.iter().enumerate() {
-            for row in &mut statuses[self.plan.fields[field].count..group.members.len()] {
+            for row in &mut statuses[self.plan.fields[field].count..group.places.len()] {
                 row[lane] = crate::stage::calibrate::UNUSABLE;
             }
         }

@@ -26,7 +26,7 @@ pub(super) struct Wanted {
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Between {
-    active: Row<f32>,
+    active: Row<u32>,
     /// The centroid's numerators, then the centroid, in the field's unit.
     u: Row<f32>,
     v: Row<f32>,
@@ -36,7 +36,7 @@ pub(super) struct Between {
 
 impl Between {
     pub(super) const EMPTY: Self =
-        Self { active: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], found: [[0.0; LANES]; 5] };
+        Self { active: [0; LANES], u: [0.0; LANES], v: [0.0; LANES], found: [[0.0; LANES]; 5] };
 }
 
 /// All stages for as many sets of cells as `cells` and `between` have, up to lane `lanes` of each; `lot` says where a
@@ -139,7 +139,7 @@ fn sums<S: Simd, P: Sweep<S>>(
     store_u(simd, flags, &mut cells.flags, at);
     store_u(simd, present, &mut cells.present, at);
     store(simd, sums.total, &mut cells.total, at);
-    store(simd, sums.active, &mut between.active, at);
+    store_u(simd, sums.active, &mut between.active, at);
     store(simd, sums.u, &mut between.u, at);
     store(simd, sums.v, &mut between.v, at);
     if outputs.intersects(Outputs::PEAK | Outputs::AREA) {
@@ -148,7 +148,7 @@ fn sums<S: Simd, P: Sweep<S>>(
         store(simd, area, &mut cells.area, at);
     }
     if outputs.contains(Outputs::ACTIVE) {
-        store_u(simd, sums.active.to_int::<U<S>>(), &mut cells.active, at);
+        store_u(simd, sums.active, &mut cells.active, at);
     }
     if !(touched.any_true() && kind.any_charted()) {
         for column in [&mut cells.orientation, &mut cells.axis, &mut cells.anisotropy] {
@@ -208,7 +208,7 @@ fn so_far<S: Simd>(simd: S, kind: &impl Kind<S>, at: usize, between: &Between, c
     }
     let charted = (kind.found(simd, at) & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
     Some(Touch {
-        active: load(simd, &between.active, at),
+        active: load_u(simd, &between.active, at),
         touched: touched & charted,
         total,
         scale: scale_of(simd, total),

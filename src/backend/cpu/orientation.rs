@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 
 use super::angle::of_line;
-use super::simd::{F, bits_where, splat};
+use super::simd::{F, bits_where, splat, splat_u};
 use super::touch::{Line, Members, Touch};
 use crate::percept::{Flags, Outputs};
 
@@ -59,7 +59,7 @@ pub(super) fn point<S: Simd, P: Members<S>>(
     touch: &Touch<S>,
 ) -> (F<S>, F<S>, F<S>) {
     let part = members.part(simd, member, at);
-    let q = (part.weight * part.pressure) * touch.scale;
+    let q = part.pull * touch.scale;
     let x = (part.u - touch.u) * q;
     let y = (part.v - touch.v) * q;
     (x * x + y * y, x, y)
@@ -68,7 +68,7 @@ pub(super) fn point<S: Simd, P: Members<S>>(
 /// The line through the two farthest points, where there is one.
 #[inline(always)]
 pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> Line<S> {
-    let (none, one, two) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, 2.0));
+    let (none, one, two) = (splat(simd, 0.0), splat_u(simd, 1), splat_u(simd, 2));
     let single = touch.touched & touch.active.simd_le(one);
     let several = touch.touched & touch.active.simd_gt(one);
     // Distances are compared by their squares, as roots are dear.

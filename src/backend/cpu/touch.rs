@@ -17,7 +17,8 @@ use crate::stage::calibrate::UNUSABLE;
 /// A taxel's part in a field, a lane each.
 pub(super) struct Part<S: Simd> {
     pub(super) pressure: F<S>,
-    pub(super) weight: F<S>,
+    /// wP.
+    pub(super) pull: F<S>,
     pub(super) u: F<S>,
     pub(super) v: F<S>,
 }
@@ -262,8 +263,8 @@ impl Cells {
 /// What the lanes know of their touch so far.
 #[derive(Clone, Copy)]
 pub(super) struct Touch<S: Simd> {
-    /// Number of pressed taxels: whole numbers, exact in single precision as no field has 2²⁴ members.
-    pub(super) active: F<S>,
+    /// Number of pressed taxels.
+    pub(super) active: U<S>,
     pub(super) touched: M<S>,
     pub(super) total: F<S>,
     /// The power of two that brings the total into [1, 2).

@@ -106,9 +106,10 @@ impl<S: Simd> Members<S> for Wide<'_> {
 
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+        let pressure = load(simd, &self.values.pressures[member], at);
         Part {
-            pressure: load(simd, &self.values.pressures[member], at),
-            weight: load(simd, &self.table.weights[member], at),
+            pressure,
+            pull: load(simd, &self.table.weights[member], at) * pressure,
             u: load(simd, &self.table.u[member], at),
             v: load(simd, &self.table.v[member], at),
         }
@@ -193,16 +194,15 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
             #[inline(always)]
             |member, [total, active, u, v]| {
                 let part = self.0.part(simd, member, at);
-                let pull = part.weight * part.pressure;
-                *total += pull;
+                *total += part.pull;
                 *active += part.pressure.simd_gt(none).select(one, none);
                 if centroid {
-                    *u += pull * part.u;
-                    *v += pull * part.v;
+                    *u += part.pull * part.u;
+                    *v += part.pull * part.v;
                 }
             },
         );
-        Sums { total, active, u, v }
+        Sums { total, active: active.to_int::<U<S>>(), u, v }
     }
 
     #[inline(always)]
@@ -234,7 +234,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
             #[inline(always)]
             |member, [sum]| {
                 let part = self.0.part(simd, member, at);
-                *sum += (part.weight * part.pressure) * self.0.depth(simd, member, at);
+                *sum += part.pull * self.0.depth(simd, member, at);
             },
         );
         sum
@@ -274,18 +274,19 @@ fn add_up(mut row: Row<f32>) -> f32 {
 impl<S: Simd> Sweep<S> for Wide<'_> {
     #[inline(always)]
     fn sums(self, simd: S, _: usize, centroid: bool) -> Sums<S> {
-        let mut rows = [[0.0; LANES]; 4];
+        let (mut rows, mut active) = ([[0.0; LANES]; 3], [0; LANES]);
         let mut at = 0;
         while at < LANES {
             let sums = contact::sums(simd, self, at, centroid);
             store(simd, sums.total, &mut rows[0], at);
-            store(simd, sums.active, &mut rows[1], at);
-            store(simd, sums.u, &mut rows[2], at);
-            store(simd, sums.v, &mut rows[3], at);
+            store_u(simd, sums.active, &mut active, at);
+            store(simd, sums.u, &mut rows[1], at);
+            store(simd, sums.v, &mut rows[2], at);
             at += width::<S>();
         }
         let all = |row: Row<f32>| splat(simd, add_up(row));
-        Sums { total: all(rows[0]), active: all(rows[1]), u: all(rows[2]), v: all(rows[3]) }
+        let active = splat_u(simd, active.iter().sum());
+        Sums { total: all(rows[0]), active, u: all(rows[1]), v: all(rows[2]) }
     }
 
     #[inline(always)]
