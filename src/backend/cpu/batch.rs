@@ -6,9 +6,9 @@ use fearless_simd::{Level, f32x16, u32x16};
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, touch};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
 use super::{calibrate, change};
@@ -266,7 +266,7 @@ impl Place {
     fn announce_column<T>(self, column: &[T]) {
         for frame in 0..self.frames {
             if let Some(cell) = column.get(frame * self.fields + self.first) {
-                simd::soon_written(cell);
+                simd::soon_needed(cell);
             }
         }
     }

@@ -6,9 +6,9 @@ use fearless_simd::prelude::*;
 use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
-use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
+use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Tables, calibrate, change, the_one_before};
@@ -56,18 +56,16 @@ enum Slots {
 impl Slots {
     /// Brings the values of all of them side by side.
     fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
-        match (self, values.first_chunk::<NEAR>()) {
-            (Self::Near(slots), Some(values)) => {
+        match self {
+            Self::Near(slots) => {
+                let Some(values) = values.first_chunk::<NEAR>() else {
+                    unreachable!("they have room for any such slot")
+                };
                 for (row, slots) in rows.iter_mut().zip(&slots[..]) {
                     *row = slots.map(|slot| values[usize::from(slot)]);
                 }
             }
-            (Self::Near(slots), None) => {
-                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
-                    *row = slots.map(|slot| values[usize::from(slot)]);
-                }
-            }
-            (Self::Far(slots), _) => {
+            Self::Far(slots) => {
                 for (row, slots) in rows.iter_mut().zip(&slots[..]) {
                     *row = slots.map(|slot| values[slot as usize]);
                 }
@@ -228,8 +226,7 @@ impl Live {
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
         let unpressed = tiles * LANES;
         let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
-        let mut narrow: Vec<Narrow> =
-            narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
+        let mut narrow: Vec<Narrow> = narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
         let most_rows = narrow.first().map_or(0, |group| group.places.len());
         let together = (GATHERED_ROWS / most_rows.max(1)).max(1);
         for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {

@@ -35,8 +35,8 @@ use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
 use crate::signal::RawValue;
 
-/// Frames that one task takes; a multiple of [`LANES`].
-const TASK: usize = 8 * LANES;
+/// Memberships that one task takes at least, if it can: some ten microseconds.
+const TASK: usize = 1 << 14;
 
 /// The backend, with the memory it needs from frame to frame.
 pub(crate) struct Cpu {
@@ -96,8 +96,8 @@ impl Cpu {
     /// Halves the batch until a task remains, and runs the halves in parallel.
     fn batch(&self, raw: &RawBatch<'_>, first: usize, cells: CellsMut<'_>) {
         let frames = cells.frames();
-        if frames > TASK {
-            let left = (frames / TASK).div_ceil(2) * TASK;
+        if frames > LANES && frames * self.plan.memberships() > TASK {
+            let left = frames.div_ceil(2 * LANES) * LANES;
             let (left_cells, right_cells) = cells.split_at(left);
             rayon::join(|| self.batch(raw, first, left_cells), || self.batch(raw, first + left, right_cells));
             return;

@@ -113,16 +113,16 @@ pub(super) fn read<S: Simd>(
     raw.read(frame, tile * LANES, calibrated, bits);
 }
 
-/// Has the cache fetch the line that `value` begins in. A core that writes to memory it has not read waits for it all the
-/// same: a tenth of a batch's time.
+/// Has the cache fetch the line that `value` begins in, to be read or written soon. A core that writes to memory waits for
+/// what was there before, too: a tenth of a batch's time.
 #[inline(always)]
 #[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
-pub(super) fn soon_written<T>(value: &T) {
+pub(super) fn soon_needed<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a hint reads and writes nothing, and the address is that of a living value.
     unsafe {
-        use core::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_ET0>(std::ptr::from_ref(value).cast());
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast());
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
