@@ -1,6 +1,5 @@
 //! One frame: sixteen fields abreast.
 
-use bytemuck::cast_slice_mut;
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 use rayon::prelude::*;
@@ -8,11 +7,12 @@ use rayon::prelude::*;
 use super::super::{RawBatch, Rows, Step};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
+use super::put::{Run, Sixteen, write};
 use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Tables, calibrate, change, the_one_before};
-use crate::percept::{CellsMut, Flags, Outputs};
+use crate::percept::CellsMut;
 use crate::scene::Plan;
 use crate::signal::RawValue;
 
@@ -390,62 +390,4 @@ impl Frame<'_> {
             }
         }
     }
-}
-
-/// Where lanes belong.
-trait Places {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]);
-}
-
-impl Places for Vec<usize> {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        for (&field, &value) in self.iter().zip(row) {
-            column[field] = value;
-        }
-    }
-}
-
-/// Fields one after the other.
-struct Run {
-    first: usize,
-    count: usize,
-}
-
-impl Places for Run {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        column[self.first..self.first + self.count].copy_from_slice(&row[..self.count]);
-    }
-}
-
-/// Sixteen fields one after the other: so many are copied without a call.
-struct Sixteen(usize);
-
-impl Places for Sixteen {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        column[self.0..self.0 + LANES].copy_from_slice(row);
-    }
-}
-
-/// Puts a group's lanes where their fields belong.
-fn write(places: &impl Places, answer: &Cells, outputs: Outputs, cells: &mut CellsMut<'_>) {
-    let floats = |row: &Row<f32>, column: &mut [f32]| {
-        if !column.is_empty() {
-            places.put(row, column);
-        }
-    };
-    floats(&answer.total, cells.total);
-    floats(&answer.peak, cells.peak);
-    floats(&answer.area, cells.area);
-    floats(&answer.u, cells.centroid_u);
-    floats(&answer.v, cells.centroid_v);
-    floats(&answer.depth, cells.centroid_depth);
-    floats(&answer.orientation, cells.orientation);
-    floats(&answer.axis, cells.axis);
-    floats(&answer.anisotropy, cells.anisotropy);
-    if !cells.active.is_empty() {
-        places.put(&answer.active, cells.active);
-    }
-    places.put(&answer.flags, cast_slice_mut::<Flags, u32>(cells.flags));
-    let present = answer.present.map(|present| present & outputs.bits());
-    places.put(&present, cast_slice_mut::<Outputs, u32>(cells.present));
 }

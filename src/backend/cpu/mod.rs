@@ -17,6 +17,7 @@ mod live;
 mod lot;
 mod motion;
 mod orientation;
+mod put;
 mod simd;
 #[cfg(test)]
 mod tests;
