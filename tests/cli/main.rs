@@ -1,5 +1,6 @@
 //! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
 
+mod author;
 mod bench;
 mod inspect;
 mod live;
