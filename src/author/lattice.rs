@@ -121,7 +121,7 @@ impl Lattice {
             }
             limit *= 2.0;
         }
-        LogMap::new(topology, start, u, limit)
+        Err(Error::failed("the region winds too far away from the grid's origin; split it"))
     }
 
     /// The grid's places within `extent` of its origin, row by row.

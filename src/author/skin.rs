@@ -233,7 +233,8 @@ fn report(canvas: &Canvas<'_>, place: &Place, ids: Vec<u32>, filled: &[Filled], 
     }
 }
 
-/// The taxels as nodes: one for all that share a mesh's coordinates, below the node of that mesh, or on a skin beside it.
+/// The taxels as nodes: one for all that share a mesh's coordinates, below the node of that mesh; on a skin at the root, as
+/// no transform above counts there.
 fn written(file: &Original, canvas: &Canvas<'_>, seated: Vec<Seated>) -> Glb {
     let mut by_node: BTreeMap<usize, Vec<Seated>> = BTreeMap::new();
     for one in seated {
@@ -250,7 +251,7 @@ fn written(file: &Original, canvas: &Canvas<'_>, seated: Vec<Seated>) -> Glb {
             (Some(skin), Some(carriers)) => {
                 let (joints, weights) = carriers.into_iter().unzip();
                 let skinning = Skinning { joints, weights };
-                addition.taxels(&name, canvas.details.parts[part].parent_node, &taxels, Some((skin, &skinning)));
+                addition.taxels(&name, None, &taxels, Some((skin, &skinning)));
             }
             _ => {
                 addition.taxels(&name, Some(node), &taxels, None);

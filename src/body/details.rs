@@ -28,8 +28,6 @@ pub struct Details {
 pub struct Part {
     /// Index of the glTF node that shows it.
     pub node: usize,
-    /// Index of that node's parent.
-    pub parent_node: Option<usize>,
     /// Name of the mesh.
     pub mesh: Option<String>,
     /// Name of the material.
@@ -98,7 +96,6 @@ fn part(document: &Document, nodes: &Nodes<'_>, node: usize, primitive: usize, v
     let skin = raw.skin.map(|skin| skin.value());
     Ok(Part {
         node,
-        parent_node: nodes.parent[node],
         mesh: mesh.name.clone(),
         material,
         skin,

@@ -40,7 +40,7 @@ fn sheet(draft: &mut Draft, across: u32, scale: f32) -> Value {
 }
 
 /// A file with one such sheet on a node `sheet`, which `node` says more of.
-fn drafted(scale: f32, node: Value) -> Original {
+fn drafted(scale: f32, node: &Value) -> Original {
     let mut draft = Draft::default();
     let primitive = sheet(&mut draft, 20, scale);
     let material = json!([{"name": "skin"}]);
@@ -153,11 +153,11 @@ fn meshes_of_other_tools_are_covered_through_their_transforms() {
 fn scales_and_mirrors_leave_places_in_metres_and_normals_outside() {
     let turned = DQuat::from_rotation_x(0.3).as_quat().to_array();
     for scale in [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [-1.0, 1.0, 1.0], [3.0, -0.5, 0.25]] {
-        let file = drafted(1.0, json!({"scale": scale, "rotation": turned, "translation": [1.0, 2.0, 3.0]}));
+        let file = drafted(1.0, &json!({"scale": scale, "rotation": turned, "translation": [1.0, 2.0, 3.0]}));
         let made = made(&file, "[[place]]\ntaxels = 120\n");
         lies_on_its_surface(&made.body);
         let area: f64 = made.body.taxels.iter().map(|taxel| taxel.area).sum();
-        let stretched = 0.02 * f64::from(scale[0] * scale[1]).abs();
+        let stretched = 0.02 * f64::abs(scale[0] * scale[1]);
         // Areas are stored in single precision: each within 2⁻²⁴ of itself, and so their sum.
         assert!((area / stretched - 1.0).abs() < 1e-6, "{scale:?}: {area} m²");
     }
@@ -165,7 +165,7 @@ fn scales_and_mirrors_leave_places_in_metres_and_normals_outside() {
 
 #[test]
 fn a_file_in_millimetres_becomes_metres_once() {
-    let file = drafted(1000.0, json!({}));
+    let file = drafted(1000.0, &json!({}));
     let in_mm = "unit = \"mm\"\n[[place]]\nspacing = \"8 mm\"\n";
     let made = made(&file, in_mm);
     let area: f64 = made.body.taxels.iter().map(|taxel| taxel.area).sum();
@@ -181,7 +181,7 @@ fn a_file_in_millimetres_becomes_metres_once() {
 
 #[test]
 fn another_place_or_region_changes_no_id_and_no_position() {
-    let file = drafted(1.0, json!({}));
+    let file = drafted(1.0, &json!({}));
     let first = "seed = 5\n[regions.left]\nbox = [[0, 0, -1], [0.1, 1, 1]]\n[[place]]\nregion = \"left\"\nfirst_id = 0\ntaxels = 60\n";
     let more =
         "[regions.right]\nexcept = \"left\"\n[[place]]\nregion = \"right\"\nfirst_id = 1000\nspacing = \"9 mm\"\n";
@@ -291,7 +291,7 @@ fn the_layout_of_a_bundled_body_is_replaced_or_kept() {
 
 #[test]
 fn regions_choose_by_name_material_paint_and_box() {
-    let file = drafted(1.0, json!({}));
+    let file = drafted(1.0, &json!({}));
     let mean = |region: &str| {
         let made = made(&file, &format!("[regions.r]\n{region}\n[[place]]\nregion = \"r\"\ntaxels = 200\n"));
         made.body.taxels.iter().map(|taxel| taxel.position_in_link).sum::<DVec3>() / 200.0
@@ -312,7 +312,7 @@ fn regions_choose_by_name_material_paint_and_box() {
 
 #[test]
 fn density_spacing_and_number_hold_together() {
-    let file = drafted(1.0, json!({}));
+    let file = drafted(1.0, &json!({}));
     let dense = made(&file, "[[place]]\ntaxels = 300\ndensity = \"_DENSITY\"\n").body;
     assert!(dense.taxels.len() == 300 && dense.taxels.iter().all(|taxel| taxel.position_in_link.x >= 0.1));
     // More than blue noise of that number would keep, less than what fits.
@@ -326,7 +326,7 @@ fn density_spacing_and_number_hold_together() {
 
 #[test]
 fn a_grid_is_regular_on_what_unrolls() {
-    let file = drafted(1.0, json!({}));
+    let file = drafted(1.0, &json!({}));
     let hexagonal = made(&file, "[[place]]\ngrid = \"hexagonal\"\npitch = \"10 mm\"\n");
     let report = &hexagonal.places[0];
     // In the plane it is exact: all neighbours are one pitch apart, but for single precision at 0.2 m.
@@ -383,7 +383,7 @@ fn places_that_are_given_are_taken_to_the_surface() {
     let folder = tempfile::tempdir().unwrap();
     let parse = |text: &str| Recipe::parse("recipe.toml", text, folder.path());
     let csv = |text: &str| std::fs::write(folder.path().join("taxels.csv"), text).unwrap();
-    let file = drafted(1.0, json!({"translation": [1.0, 0.0, 0.0]}));
+    let file = drafted(1.0, &json!({"translation": [1.0, 0.0, 0.0]}));
     let table = "[[place]]\nwithin = \"3 mm\"\ncsv = \"taxels.csv\"\n";
     csv("id,x,y,z,link\n7,1.05,0.02,0.002,\n3,0.1,0.05,-0.001,sheet\n");
     let made = author(file.clone(), &parse(table).unwrap(), |_| {}).unwrap();
@@ -437,7 +437,7 @@ fn empties_and_points_become_taxels() {
 
 #[test]
 fn what_a_recipe_may_not_say_is_named_with_its_line() {
-    let file = drafted(1.0, json!({}));
+    let file = drafted(1.0, &json!({}));
     let palm = "[regions.palm]\nnode = \"sheet\"\n";
     for (text, line, word) in [
         ("[[place]]\ntaxels = 0\n".to_owned(), 2, "0 taxels"),
@@ -497,6 +497,44 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         assert!(told.starts_with(&format!("recipe.toml: line {line}: ")) && told.contains(word), "{text}\n{told}");
     }
     assert!(why(&file, "").contains("no taxels"));
+}
+
+#[test]
+fn buffers_and_images_of_their_own_are_taken_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut draft = Draft::default();
+    let primitive = sheet(&mut draft, 8, 1.0);
+    draft.push("meshes", json!({"primitives": [primitive]}));
+    draft.node(json!({"name": "sheet", "mesh": 0}));
+    // Each view in a buffer of its own, the last of which is longer than it says.
+    let views = draft.json["bufferViews"].as_array().unwrap().clone();
+    draft.json["buffers"] = json!([]);
+    for (index, view) in views.iter().enumerate() {
+        let (start, length) =
+            (view["byteOffset"].as_u64().unwrap() as usize, view["byteLength"].as_u64().unwrap() as usize);
+        let (name, bytes) = (format!("part {index}.bin"), &draft.bytes[start..start + length]);
+        std::fs::write(folder.path().join(&name), [bytes, &[7; 5]].concat()).unwrap();
+        draft.push("buffers", json!({"byteLength": length, "uri": name.replace(' ', "%20")}));
+        draft.json["bufferViews"][index] = json!({"buffer": index, "byteLength": length});
+    }
+    let png = b"\x89PNG not really";
+    std::fs::write(folder.path().join("skin.png"), png).unwrap();
+    draft.json["images"] = json!([{"uri": "skin.png"}, {"name": "gone", "uri": "gone.png"}]);
+    std::fs::write(folder.path().join("sheet.gltf"), draft.json.to_string()).unwrap();
+
+    let file = Original::open(folder.path().join("sheet.gltf")).unwrap();
+    let made = made(&file, "[[place]]\ntaxels = 20\n");
+    assert!(made.notes.len() == 1 && made.notes[0].contains("gone.png"), "{:?}", made.notes);
+    lies_on_its_surface(&made.body);
+    let glb = made.file.to_glb().unwrap();
+    assert_eq!(Body::from_bytes("alone", &glb).unwrap().taxels, made.body.taxels);
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json: Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    assert_eq!(json["buffers"].as_array().unwrap().len(), 1);
+    assert_eq!((&json["images"][0]["mimeType"], &json["images"][1]["uri"]), (&"image/png".into(), &"gone.png".into()));
+    let view = &json["bufferViews"][json["images"][0]["bufferView"].as_u64().unwrap() as usize];
+    let start = 28 + length + view["byteOffset"].as_u64().unwrap() as usize;
+    assert_eq!(&glb[start..start + view["byteLength"].as_u64().unwrap() as usize], png);
 }
 
 #[test]
