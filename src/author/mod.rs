@@ -1,5 +1,7 @@
 //! Authoring: placing taxels on a surface and growing fields over them.
 //!
+//! [`author`] does all of it to a file, as a [`Recipe`] says; the pieces are here too:
+//!
 //! ```
 //! use glam::DVec3;
 //! use somatic::author::{PatchRules, SurfacePoint, place_evenly, split_into_patches};

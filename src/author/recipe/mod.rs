@@ -41,6 +41,55 @@ impl Origin {
 }
 
 /// What is to be placed on a body, and how it is grouped.
+///
+/// In a file it is TOML; a length is a number of metres or a text like `"8 mm"`.
+///
+/// ```
+/// use somatic::author::{Recipe, author};
+/// use somatic::body::Original;
+/// use somatic::bundled;
+///
+/// # fn main() -> somatic::Result<()> {
+/// let text = r#"
+///     seed = 1                     # which of many equally good placements
+///     bare = ["face"]              # regions that nothing is sampled on
+///
+///     [regions.head]               # what a triangle must have; all of it has to hold
+///     node = "head"                # a node with a mesh, the mesh, or the link that carries the triangle
+///
+///     [regions.face]
+///     node = ["head", "neck"]      # any of several, as globs; `material` likewise
+///     box = [[-1, 0, 0.05], [1, 2, 1]]     # where its middle is, in the world at rest, m
+///
+///     [regions.rest]
+///     except = "head"              # names of other regions; `attribute = "_PALM"` or "COLOR_0.r" is a painted one
+///
+///     [[place]]                    # so many, as blue noise
+///     region = "head"
+///     first_id = 0                 # ids count up from here, and so never depend on another place
+///     taxels = 60                  # with `density = "_DENSITY"` as it is painted, with `spacing` no closer
+///
+///     [[place]]                    # as many as fit
+///     region = "rest"
+///     first_id = 1000
+///     spacing = "40 mm"
+///     modality = "temperature"
+/// "#;
+/// let recipe = Recipe::parse("recipe.toml", text, "".as_ref())?;
+/// let file = Original::from_bytes("humanoid", bundled::HUMANOID, None)?;
+/// let authored = author(file, &recipe, |_share| {})?;
+/// assert_eq!(authored.places[0].ids, Vec::from_iter(0..60));
+/// authored.file.to_glb()?; // or `save`
+/// # Ok(())
+/// # }
+/// ```
+///
+/// The other ways to fill a place: `grid = "hexagonal"` or `"rectangular"` with `pitch`, and where wanted `origin` and `u`
+/// (the direction of its rows), in a geodesic chart; `points = "tip*"`, empties and points of the file by their names;
+/// `csv = "taxels.csv"`, a table `id,x,y,z` in metres in the world at rest, or in the frame of a fifth column `link`. The
+/// last two are taken to the nearest surface, if that is not beyond `within` (10 mm unless it is given). `seed` and `name`
+/// may be a place's own: it samples with a seed made of both. `unit = "mm"` says what the file's numbers are, `existing =
+/// "keep"` that the taxels it has stay.
 #[derive(Clone, Debug)]
 pub struct Recipe {
     /// The unit of the mesh file's numbers, and its metres.
