@@ -17,18 +17,25 @@
 //! go to the lower index.
 
 mod carry;
+mod coverage;
 mod crowd;
 mod grid;
 mod grow;
+mod lint;
 mod place;
 pub(crate) mod random;
+mod refresh;
 mod scatter;
+mod skin;
 
 use glam::DVec3;
 
 pub use carry::{blend_skinning, heaviest_four};
+pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use grow::{PatchRules, mean_normal, split_into_patches};
+pub use lint::{Finding, FindingKind, lint};
 pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
+pub use refresh::refresh;
 
 /// A point of a surface that a taxel sits on, or could. Coordinates are those of the mesh it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]

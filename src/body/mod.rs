@@ -10,6 +10,7 @@
 mod document;
 mod glb;
 mod layout;
+mod mend;
 mod nodes;
 mod read;
 mod surface;

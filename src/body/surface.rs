@@ -283,6 +283,11 @@ impl SurfaceIndex {
         around.map(|triangle| triangle.data.0).sum::<DVec3>().try_normalize()
     }
 
+    /// The outward unit normals of the triangles within `within_m` of `p`: on an edge, of both sides.
+    pub fn normals_within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = DVec3> + '_ {
+        self.tree.locate_within_distance(p.to_array(), within_m * within_m).map(|triangle| triangle.data.0)
+    }
+
     /// Where the line through `p` along the unit vector `direction` meets the surface nearest to `p`, among places
     /// within `reach` of `p` whose outward normal does not look away from `direction`.
     #[must_use]
