@@ -57,7 +57,11 @@ pub mod error;
 #[doc(hidden)]
 pub mod experiments;
 pub mod field;
+#[cfg(feature = "cli")]
+mod ink;
 pub mod percept;
+#[cfg(all(feature = "cli", feature = "gpu"))]
+pub mod picture;
 pub mod scene;
 pub mod signal;
 pub mod sink;

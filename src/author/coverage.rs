@@ -4,8 +4,7 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::skin::corners_in_world;
-use crate::body::{Body, Home, Taxel};
+use crate::body::{Body, Taxel};
 
 /// Places on the surface that are looked at, at least; and for each taxel.
 const LEAST_SAMPLES: usize = 20_000;
@@ -82,7 +81,7 @@ struct Sample {
 #[must_use]
 pub fn coverage(body: &Body) -> Coverage {
     let taxels = Taxels::of(body);
-    let corners: Vec<(usize, [DVec3; 3])> = triangles(body);
+    let corners: Vec<(usize, [DVec3; 3])> = body.triangles_at_rest();
     let area_of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).length() / 2.0;
     let mut links: Vec<LinkCoverage> =
         (0..body.links.len()).map(|link| LinkCoverage { link, area: 0.0, seen: 0.0 }).collect();
@@ -151,31 +150,6 @@ impl Taxels {
         let near = near.map(|(taxel, squared)| (taxel.data, squared.sqrt()));
         near.filter(move |&(taxel, _)| self.normals[taxel].dot(normal) > 0.0)
     }
-}
-
-/// Triangles with area in the world at rest, each with the link that carries it. Of a skinned one, every corner goes
-/// with the joint that carries it most.
-fn triangles(body: &Body) -> Vec<(usize, [DVec3; 3])> {
-    let mut triangles = Vec::new();
-    for surface in &body.surfaces {
-        match &surface.home {
-            Home::Rigid { link, link_from_mesh } => {
-                let world_from_mesh = body.links[*link].world_from_link * *link_from_mesh;
-                triangles.extend(corners_in_world(surface, world_from_mesh).map(|corners| (*link, corners)));
-            }
-            Home::Skinned { joints, heaviest } => {
-                let ways: Vec<_> =
-                    joints.iter().map(|&(link, way)| (link, body.links[link].world_from_link * way)).collect();
-                let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);
-                let at = |v: u32| ways[heaviest[v as usize]].1.transform_point3(surface.positions[v as usize]);
-                triangles.extend(surface.triangles.iter().map(|&[a, b, c]| {
-                    let [a, b, c] = if mirrored { [a, c, b] } else { [a, b, c] };
-                    (ways[heaviest[a as usize]].0, [at(a), at(b), at(c)])
-                }));
-            }
-        }
-    }
-    triangles
 }
 
 /// Where in its triangle sample `index` lies: weights of the second and third corner, spread evenly over many samples

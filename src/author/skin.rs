@@ -25,24 +25,11 @@ pub(super) struct Skin<'a> {
     tolerance_m: f64,
 }
 
-/// The corners of `surface`'s triangles, taken through `world_from_mesh`, each counter-clockwise seen from outside.
-pub(super) fn corners_in_world(
-    surface: &Surface,
-    world_from_mesh: DAffine3,
-) -> impl Iterator<Item = [DVec3; 3]> + use<'_> {
-    let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
-    let points: Vec<DVec3> = surface.positions.iter().map(|&p| world_from_mesh.transform_point3(p)).collect();
-    surface.triangles.iter().map(move |triangle| {
-        let [a, b, c] = triangle.map(|v| points[v as usize]);
-        if mirrored { [a, c, b] } else { [a, b, c] }
-    })
-}
-
 impl<'a> Skin<'a> {
     pub(super) fn of(body: &'a Body) -> Self {
         let in_world = |surface: &'a Surface| match &surface.home {
             Home::Rigid { link, link_from_mesh } => {
-                Some(corners_in_world(surface, body.links[*link].world_from_link * *link_from_mesh))
+                Some(surface.corners_through(body.links[*link].world_from_link * *link_from_mesh))
             }
             Home::Skinned { .. } => None,
         };
@@ -75,7 +62,7 @@ impl<'a> Skin<'a> {
         for (surface, ways) in &mut self.skinned {
             let Some(way) = world_from_skinned(self.body, surface, link) else { continue };
             if !ways.iter().any(|(known, _)| known.abs_diff_eq(way, SAME_WAY)) {
-                ways.push((way, SurfaceIndex::of_triangles(corners_in_world(surface, way))));
+                ways.push((way, SurfaceIndex::of_triangles(surface.corners_through(way))));
             }
         }
     }

@@ -7,6 +7,8 @@ mod feed;
 mod inspect;
 mod live;
 mod paper;
+#[cfg(feature = "gpu")]
+mod render;
 mod run;
 mod screen;
 mod simulate;
@@ -33,6 +35,7 @@ Examples:
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic inspect robot.glb                     what taxels and fields a body has
+  somatic render robot.glb -o robot.png         where they are
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
@@ -53,6 +56,8 @@ pub(crate) struct Arguments {
 enum Command {
     Run(Box<run::Arguments>),
     Inspect(inspect::Arguments),
+    #[cfg(feature = "gpu")]
+    Render(render::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
@@ -64,6 +69,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     match &arguments.command {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
+        #[cfg(feature = "gpu")]
+        Command::Render(arguments) => render::render(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
