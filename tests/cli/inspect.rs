@@ -22,6 +22,13 @@ fn json_has_the_keys_that_others_lean_on() {
         assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality"]);
         assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
     }
+    assert_eq!(keys(&body)[3..], ["findings", "lint", "coverage"]);
+    let [small] = &body["lint"].as_array().unwrap()[..] else { panic!("{}", body["lint"]) };
+    assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "what"]);
+    assert_eq!((&small["kind"], &small["fields"]), (&json!("small_field"), &json!(["hand/side"])));
+    assert_eq!(body["findings"], json!([small["what"]]));
+    assert_eq!(body["coverage"]["links"].as_array().unwrap().len(), 5);
+    assert_eq!(keys(&body["coverage"]["holes"][0]), ["link", "position", "area"]);
     let (mut charted, mut chartless) = (0, 0);
     for field in body["fields"].as_array().unwrap() {
         assert_eq!(keys(field)[..5], ["name", "parent", "anchor", "members", "chart"]);
@@ -44,7 +51,9 @@ fn json_has_the_keys_that_others_lean_on() {
 #[test]
 fn a_report_names_links_fields_and_why_a_chart_is_missing() {
     let text = done(&["inspect", "humanoid"]);
-    for words in ["960", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"] {
+    for words in
+        ["960", "coverage  99.", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"]
+    {
         assert!(text.contains(words), "{words}: {text}");
     }
     assert!(!text.contains('\x1b'));

@@ -4,6 +4,8 @@ mod bench;
 mod inspect;
 mod live;
 mod paper;
+#[cfg(feature = "gpu")]
+mod render;
 mod run;
 mod simulate;
 
@@ -90,7 +92,7 @@ fn files_in(folder: &Path) -> Vec<String> {
 #[test]
 fn help_teaches_and_names_everything() {
     let help = done(&["--help"]);
-    for word in ["run", "inspect", "paper", "bench", "completions", "Examples:", "Exit codes"] {
+    for word in ["run", "inspect", "render", "paper", "bench", "completions", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "{word}: {help}");
     }
     let help = done(&["run", "--help"]);

@@ -267,3 +267,56 @@ fn pipeline(device: &Device, of: Of) -> wgpu::RenderPipeline {
         cache: None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+
+    #[test]
+    fn the_shader_validates_and_its_pipelines_build_without_any_driver() {
+        let module = naga::front::wgsl::parse_str(SOURCE).unwrap();
+        let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+        assert!(validated.is_ok(), "{:?}", validated.err());
+        let device = adapter::open(wgpu::Backends::NOOP).expect("noop is always there");
+        for of in [Of::Surface, Of::Slices { triangles: 9 }] {
+            assert!(format!("{:?}", pipeline(&device, of)).contains("RenderPipeline"));
+        }
+        device.check().unwrap();
+    }
+
+    #[test]
+    fn what_is_drawn_lies_where_the_eye_sees_it() {
+        let Ok(_) = adapter::shared() else {
+            assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
+            return;
+        };
+        // A white slice of the upper half of a disc in the right half of the picture, and nothing else.
+        let slice = Slice {
+            middle: [0.5, 0.0, 0.0],
+            radius: 0.4,
+            normal: [0.0, 0.0, 1.0],
+            lift: 0.0,
+            colour: [1.0; 4],
+            span: [0.0, std::f32::consts::PI, 0.0, 0.0],
+        };
+        let eye = Eye {
+            clip_from_world: Mat4::from_diagonal(glam::Vec4::new(1.0, 1.0, -0.25, 1.0))
+                + Mat4::from_cols(glam::Vec4::ZERO, glam::Vec4::ZERO, glam::Vec4::ZERO, glam::Vec4::Z * 0.5),
+            axes: [Vec3::X, Vec3::Y, Vec3::Z],
+            part: [0, 0, 100, 100],
+        };
+        let away = Slice { normal: [0.0, 0.0, -1.0], middle: [-0.5, 0.0, 0.0], ..slice };
+        let drawing =
+            Drawing { size: [100, 100], slices: vec![slice, away], fan: 24, eyes: vec![eye], ..Drawing::default() };
+        let pixels = draw(&drawing).unwrap();
+        let lit = |x: usize, y: usize| pixels[3 * (100 * y + x)] > 100;
+        assert!(lit(75, 40) && lit(60, 45) && lit(90, 45));
+        assert!(!lit(75, 60) && !lit(25, 40) && !lit(75, 20) && !lit(50, 45));
+        let count = pixels.chunks_exact(3).filter(|pixel| pixel[0] > 100).count() as f64;
+        // Half a disc of 20 pixels' radius, less what 24 chords cut off, and half a pixel around it.
+        assert!((count - std::f64::consts::PI * 200.0).abs() < 0.5 * 103.0, "{count}");
+        assert!(draw(&Drawing { size: [0, 9], ..Drawing::default() }).unwrap_err().is_usage());
+    }
+}
