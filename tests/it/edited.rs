@@ -67,9 +67,13 @@ fn options_that_were_off_in_blender_are_named() {
     };
     let bare = |points: bool| {
         let mut draft = Draft::default();
-        let mesh = draft.points(&[[0.0; 3]]);
-        let mesh = draft.mesh(&json!({"mode": 0, "attributes": {"POSITION": mesh}}));
-        draft.node(if points { json!({"name": "arm", "mesh": mesh}) } else { json!({"name": "arm"}) });
+        if points {
+            let place = draft.points(&[[0.0; 3]]);
+            let mesh = draft.mesh(&json!({"mode": 0, "attributes": {"POSITION": place}}));
+            draft.node(json!({"name": "arm", "mesh": mesh}));
+        } else {
+            draft.node(json!({"name": "arm"}));
+        }
         draft
     };
     let names =

@@ -1,5 +1,7 @@
 //! What a layout's lint finds, one defect at a time on a sound plate, and how much of it is covered.
 
+use std::path::Path;
+
 use glam::DVec3;
 use somatic::Body;
 use somatic::author::{FindingKind, coverage, lint};
@@ -70,6 +72,14 @@ impl Plate {
     }
 
     pub(crate) fn body(&self) -> Body {
+        Body::from_bytes("plate", &self.glb().to_bytes().unwrap()).unwrap()
+    }
+
+    pub(crate) fn save(&self, path: &Path) {
+        self.glb().save(path).unwrap();
+    }
+
+    fn glb(&self) -> Glb {
         let mut glb = Glb::new();
         let link = glb.node("arm", None, DVec3::ZERO);
         glb.mesh(link, "skin", &self.mesh, None, None);
@@ -77,7 +87,7 @@ impl Plate {
         for field in &self.fields {
             glb.field(field, Some(link), DVec3::ZERO);
         }
-        Body::from_bytes("plate", &glb.to_bytes().unwrap()).unwrap()
+        glb
     }
 
     fn add(&mut self, id: u32, x: f64, y: f64, z: f64) {

@@ -1,6 +1,7 @@
 //! Everything that is tested from outside, in one binary, so that all tests share one device.
 
 mod batches;
+mod blender;
 mod bodies;
 mod change;
 mod common;
@@ -21,3 +22,4 @@ mod recordings;
 mod simulated;
 mod touch;
 mod upkeep;
+mod validator;
