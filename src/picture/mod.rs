@@ -15,7 +15,7 @@ pub use view::View;
 use self::colour::{PALETTE, PAPER, linear};
 use self::shape::Dots;
 use self::view::{Arrangement, CAPTION};
-use self::words::{Words, legend_height};
+use self::words::Words;
 use crate::backend::gpu::raster::{self, Drawing};
 use crate::body::Body;
 use crate::error::{Error, Result};
@@ -59,8 +59,7 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
 
     let mut words = Words::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")));
-    words.key(&shown.key(fields));
-    let below = legend_height(&words, width);
+    let below = words.key(shown.key(fields), [width, height]);
     let taken = TITLE + below;
     if height <= taken + 40 {
         return Err(Error::usage(format!("no room is left for the body; make it higher than {} pixels", taken + 40)));
@@ -134,8 +133,7 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
         counted(field.members.len(), "taxel"),
         100.0 * chart.distortion
     ));
-    words.key(&shown.key(&within));
-    let below = legend_height(&words, width);
+    let below = words.key(shown.key(&within), [width, height]);
     let points: Vec<DVec3> =
         dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - r, p + r]).chain([DVec3::ZERO]).collect();
     let taken = TITLE + below;
@@ -169,7 +167,7 @@ pub fn write(path: &Path, picture: &[u8], force: bool) -> Result<()> {
     crate::whole::write(path, picture)
 }
 
-/// Whether [`write`] would write at `path`, to be asked before any work is done.
+/// Whether [`write()`] would write at `path`, to be asked before any work is done.
 ///
 /// # Errors
 /// Something is there, and `force` does not say that it may go.

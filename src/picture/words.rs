@@ -32,18 +32,24 @@ pub(super) struct Words {
     axes: Option<[f64; 2]>,
 }
 
-/// Pixels that the legend of `words` takes in a picture of `width`.
-pub(super) fn legend_height(words: &Words, width: u32) -> u32 {
-    ROW * (words.rows(width).last().map_or(0, |(_, row)| row + 1)).max(1) + 12
-}
-
 impl Words {
     pub(super) fn new(title: &str) -> Self {
         Self { title: title.to_owned(), key: Vec::new(), captions: Vec::new(), scale: None, axes: None }
     }
 
-    pub(super) fn key(&mut self, key: &[(Option<[u8; 3]>, String)]) {
-        self.key = key.to_vec();
+    /// Sets what the legend has, colours and names, and gives the pixels that it takes. One that would take over a third
+    /// of a picture of `size` only says how many there are.
+    pub(super) fn key(&mut self, key: Vec<(Option<[u8; 3]>, String)>, size: [u32; 2]) -> u32 {
+        let named = key.len();
+        self.key = key;
+        if 3 * self.legend_height(size[0]) > size[1] {
+            self.key = vec![(None, format!("{named} fields"))];
+        }
+        self.legend_height(size[0])
+    }
+
+    fn legend_height(&self, width: u32) -> u32 {
+        ROW * self.rows(width).last().map_or(1, |(_, row)| row + 1) + 12
     }
 
     /// `text` with its middle at `at`.
@@ -89,7 +95,7 @@ impl Words {
         for (caption, [x, y]) in &self.captions {
             area.draw_text(caption, &text(SIZE, FAINT, HPos::Center), place(*x, *y)).map_err(cannot)?;
         }
-        let top = height.saturating_sub(legend_height(self, width)) + ROW / 2;
+        let top = height.saturating_sub(self.legend_height(width)) + ROW / 2;
         let style = text(SIZE, INK, HPos::Left);
         for ((colour, name), (x, row)) in self.key.iter().zip(self.rows(width)) {
             let middle = top + ROW * row;
@@ -153,9 +159,13 @@ mod tests {
     #[test]
     fn a_legend_breaks_its_rows_before_the_bar() {
         let mut words = Words::new("x");
-        words.key(&vec![(None, "a field of some name".to_owned()); 9]);
+        let key = vec![(None, "a field of some name".to_owned()); 9];
+        let below = words.key(key.clone(), [800, 800]);
         let rows = words.rows(800);
         assert!(rows.iter().all(|&(x, _)| x < 800 - BAR));
-        assert_eq!(rows.last().unwrap().1, 4);
+        assert_eq!((rows.last().unwrap().1, below), (4, 5 * ROW + 12));
+        // No room: they are counted.
+        assert_eq!(words.key(key, [800, 400]), ROW + 12);
+        assert_eq!(words.key[0].1, "9 fields");
     }
 }
