@@ -19,12 +19,20 @@ pub(crate) fn font() -> Result<()> {
     if known { Ok(()) } else { Err(Error::failed("cannot draw: the font that comes with it is broken")) }
 }
 
+/// How wide `text` is in letters of `size`, pixels.
+#[cfg(feature = "gpu")]
+pub(crate) fn width(text: &str, size: u32) -> Result<u32> {
+    font()?;
+    (FAMILY, size).into_font().box_size(text).map(|(width, _)| width).map_err(cannot)
+}
+
 /// A PNG of `pixels`, three bytes each, row by row; width and height are `size`.
 pub(crate) fn png(pixels: &[u8], size: [u32; 2]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
     let written = encoder.write_header().and_then(|mut writer| {
         writer.write_image_data(pixels)?;
         writer.finish()

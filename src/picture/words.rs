@@ -13,8 +13,6 @@ const ROW: u32 = 26;
 const SIZE: u32 = 16;
 /// Left and right of the words.
 const SIDE: u32 = 20;
-/// A letter's width at most, as a part of its height, on average.
-const LETTER: f64 = 0.62;
 /// Pixels of a swatch with the gap behind it, and of the gap between two entries.
 const SWATCH: u32 = 22;
 const GAP: u32 = 24;
@@ -71,8 +69,8 @@ impl Words {
         let (mut x, mut row) = (SIDE, 0);
         let mut places = Vec::with_capacity(self.key.len());
         for (_, name) in &self.key {
-            let letters = name.chars().count() as f64;
-            let wide = SWATCH + (LETTER * f64::from(SIZE) * letters) as u32;
+            // What cannot be measured cannot be written either, and that is told there.
+            let wide = SWATCH + ink::width(name, SIZE).unwrap_or_default();
             if x > SIDE && x + wide > end {
                 (x, row) = (SIDE, row + 1);
             }

@@ -1,10 +1,11 @@
 //! What a layout's lint finds, one defect at a time on a sound plate, and how much of it is covered.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use somatic::Body;
-use somatic::author::{FindingKind, coverage, lint};
+use somatic::author::{FindingKind, Placed, coverage, lint, place_evenly};
 use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
 use somatic::field::{FieldSet, Unroller};
 
@@ -235,4 +236,22 @@ fn the_far_side_of_a_sheet_is_not_seen() {
     assert!((area - 0.02).abs() < 1e-8 && (seen - 0.01).abs() < 1e-6, "{area} {seen}");
     let [hole] = &both.holes[..] else { panic!("{:?}", both.holes) };
     assert!((hole.position_in_link.z + 0.001).abs() < 1e-9 && (hole.area - 0.01).abs() < 1e-6);
+}
+
+#[test]
+fn twenty_thousand_taxels_are_looked_at_in_time() {
+    let mut plate = Plate::flat();
+    let positions: Vec<DVec3> = plate.mesh.positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect();
+    let placed = place_evenly(&positions, &plate.mesh.triangles, 20_000, 1).unwrap();
+    let model = plate.taxels[0].clone();
+    let taxel = |(id, placed): (u32, &Placed)| Taxel { id, position_in_link: placed.point.position, ..model.clone() };
+    plate.taxels = (0..).zip(&placed).map(taxel).collect();
+    plate.fields[0].members = (0..20_000).map(|id| (id, MemberSpec::default())).collect();
+    let body = plate.body();
+    let start = Instant::now();
+    assert_eq!(kinds(&body), []);
+    let (area, seen) = coverage(&body).of_skin();
+    assert!(seen > 0.99 * area, "{seen} of {area}");
+    // Seconds without optimisation, on a busy machine; a quadratic way takes minutes.
+    assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
 }
