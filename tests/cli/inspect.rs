@@ -1,6 +1,8 @@
 //! `somatic inspect`.
 
+use glam::DVec3;
 use serde_json::{Value, json};
+use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
 
 use super::{done, fails, file, output, text_of};
 
@@ -81,4 +83,37 @@ fn a_file_goes_before_a_bundled_body_of_its_name() {
     let output = super::somatic(&["inspect", "hand", "--json"]).current_dir(folder.path()).output().unwrap();
     let body: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(body["links"], json!(["arm"]));
+}
+
+#[test]
+fn what_was_put_right_on_reading_is_said_by_inspect_and_by_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twice.glb");
+    let taxel = |id: u32, x: f64| Taxel {
+        id,
+        link: 0,
+        position_in_link: DVec3::X * x,
+        normal_in_link: DVec3::Z,
+        area: 1e-5,
+        modality: Modality::Pressure,
+    };
+    let mut glb = Glb::new();
+    let arm = glb.node("arm", None, DVec3::ZERO);
+    glb.taxels("taxels", Some(arm), &[taxel(1, 0.0), taxel(2, 0.01), taxel(2, 0.02)], None);
+    let members = [1, 2, 7].map(|id| (id, MemberSpec::default())).into();
+    glb.field(&FieldSpec { name: "arm".into(), members, ..FieldSpec::default() }, Some(arm), DVec3::ZERO);
+    glb.save(&path).unwrap();
+    let told = ["2 on link `arm` is now 3", "field `arm` names taxel 7"];
+
+    let strict = output(&["inspect", text_of(&path), "--strict"]);
+    assert_eq!(strict.status.code(), Some(1));
+    let text = String::from_utf8(strict.stdout).unwrap();
+    assert!(told.iter().all(|words| text.contains(words)), "{text}");
+
+    let (_recording, recording) = file("touch.csv", "t,1,2,3\n0,5,6,7\n");
+    let run = output(&["run", "--body", text_of(&path), "--source", text_of(&recording), "--sink", "-"]);
+    assert_eq!(run.status.code(), Some(0), "{}", super::stderr(&run));
+    assert!(told.iter().all(|words| super::stderr(&run).contains(words)), "{}", super::stderr(&run));
+    let frame: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(frame["fields"][0]["total"], 11.0, "taxel 3 is in no field");
 }
