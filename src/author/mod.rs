@@ -20,13 +20,13 @@ mod carry;
 mod coverage;
 mod crowd;
 mod grid;
+mod ground;
 mod grow;
 mod lint;
 mod place;
 pub(crate) mod random;
 mod refresh;
 mod scatter;
-mod skin;
 
 use glam::DVec3;
 

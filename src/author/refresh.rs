@@ -1,8 +1,8 @@
 //! What is derived from the surface, derived again.
 
+use super::ground::Ground;
 use super::lint::checks::{Footing, drift};
 use super::lint::listed;
-use super::skin::Skin;
 use crate::body::{Body, ChartKind};
 use crate::field::Unroller;
 
@@ -14,17 +14,17 @@ use crate::field::Unroller;
 /// stay too.
 pub fn refresh(body: &mut Body) -> Vec<String> {
     let mut notes = Vec::new();
-    let skin = Skin::of(body);
+    let ground = Ground::of(body);
     let stale: Vec<_> = body
         .taxels
         .iter()
         .enumerate()
         .filter_map(|(index, taxel)| {
-            let footing = Footing::of(body, &skin, taxel).filter(Footing::is_stale)?;
+            let footing = Footing::of(body, &ground, taxel).filter(Footing::is_stale)?;
             Some((index, footing.normal_in_link))
         })
         .collect();
-    drop(skin);
+    drop(ground);
     if !stale.is_empty() {
         let ids: Vec<u32> = stale.iter().map(|&(index, _)| body.taxels[index].id).collect();
         notes.push(format!(

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::super::skin::Skin;
+use super::super::ground::Ground;
 use super::{Finding, FindingKind, listed};
 use crate::body::{Body, ChartKind, FieldSpec, Taxel};
 use crate::field::{Field, Unroller};
@@ -150,13 +150,13 @@ pub(in super::super) struct Footing {
 }
 
 impl Footing {
-    pub(in super::super) fn of(body: &Body, skin: &Skin<'_>, taxel: &Taxel) -> Option<Self> {
+    pub(in super::super) fn of(body: &Body, ground: &Ground<'_>, taxel: &Taxel) -> Option<Self> {
         let world_from_link = body.links[taxel.link].world_from_link;
         let p = world_from_link.transform_point3(taxel.position_in_link);
         let normal = world_from_link.transform_vector3(taxel.normal_in_link);
-        let hit = skin.nearest(taxel.link, p)?;
+        let hit = ground.nearest(taxel.link, p)?;
         // On an edge both sides are right.
-        let around = skin.normals_at(taxel.link, hit.position).map(|normal_there| angle(normal, normal_there));
+        let around = ground.normals_at(taxel.link, hit.position).map(|normal_there| angle(normal, normal_there));
         let tilt_rad = around.fold(angle(normal, hit.normal), f64::min);
         let normal_in_link = world_from_link.inverse().transform_vector3(hit.normal);
         Some(Self { off_m: hit.position.distance(p), tilt_rad, normal_in_link })
@@ -175,14 +175,14 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
 
 /// Taxels off the surface, with normals that point inward, and with normals that are not the surface's.
 pub(super) fn against_surface(body: &Body) -> Vec<Finding> {
-    let skin = Skin::of(body);
-    if skin.is_empty() {
+    let ground = Ground::of(body);
+    if ground.is_empty() {
         return Vec::new();
     }
     let (mut off, mut inward, mut stale) = (Worst::default(), Worst::default(), Worst::default());
     for taxel in &body.taxels {
-        let Some(footing) = Footing::of(body, &skin, taxel) else { continue };
-        if footing.off_m > skin.tolerance_m() {
+        let Some(footing) = Footing::of(body, &ground, taxel) else { continue };
+        if footing.off_m > ground.tolerance_m() {
             off.take(taxel, footing.off_m);
         }
         if footing.tilt_rad > std::f64::consts::FRAC_PI_2 {

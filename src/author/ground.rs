@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 
 /// Indices of a body's surfaces in the world at rest. A skinned mesh is brought there as the link that asks sees it: by
 /// that link's own joint, at bind.
-pub(super) struct Skin<'a> {
+pub(super) struct Ground<'a> {
     body: &'a Body,
     rigid: SurfaceIndex,
     /// Per skinned surface the ways it was brought into the world, each with what came of it.
@@ -25,7 +25,7 @@ pub(super) struct Skin<'a> {
     tolerance_m: f64,
 }
 
-impl<'a> Skin<'a> {
+impl<'a> Ground<'a> {
     pub(super) fn of(body: &'a Body) -> Self {
         let in_world = |surface: &'a Surface| match &surface.home {
             Home::Rigid { link, link_from_mesh } => {
@@ -47,14 +47,14 @@ impl<'a> Skin<'a> {
         });
         let tolerance_m = ON_SURFACE_M + ROUNDING * largest.fold(0.0, f64::max);
         let skinned = body.surfaces.iter().filter(|surface| matches!(surface.home, Home::Skinned { .. }));
-        let mut skin = Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
-        skin.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
+        let mut ground = Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
+        ground.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
         for link in 0..body.links.len() {
             if body.taxels.iter().any(|taxel| taxel.link == link) {
-                skin.bring(link);
+                ground.bring(link);
             }
         }
-        skin
+        ground
     }
 
     /// Brings skinned surfaces into the world as `link` sees them.
