@@ -57,9 +57,13 @@ pub mod error;
 #[doc(hidden)]
 pub mod experiments;
 pub mod field;
+#[cfg(feature = "cli")]
+mod ink;
 mod keys;
 mod length;
 pub mod percept;
+#[cfg(all(feature = "cli", feature = "gpu"))]
+pub mod picture;
 pub mod scene;
 pub mod signal;
 pub mod sink;

@@ -118,6 +118,11 @@ fn every_command_that_is_shown_runs() {
                 .env("PATH", &paths)
                 .output()
                 .unwrap();
+            let no_driver = String::from_utf8_lossy(&output.stderr).contains("no GPU driver answers");
+            if no_driver && std::env::var_os("SOMATIC_REQUIRE_GPU").is_none() {
+                eprintln!("SKIPPED: `{command}` draws, and there is no GPU driver");
+                continue;
+            }
             assert!(
                 output.status.success(),
                 "{}: `{command}` ended with {}\n{}",

@@ -20,15 +20,19 @@
 
 mod canvas;
 mod carry;
+mod coverage;
 mod crowd;
 mod glob;
 mod grid;
+mod ground;
 mod grow;
 mod lattice;
+mod lint;
 mod place;
 mod points;
 pub(crate) mod random;
 mod recipe;
+mod refresh;
 mod region;
 mod scatter;
 mod skin;
@@ -36,9 +40,12 @@ mod skin;
 use glam::DVec3;
 
 pub use carry::{blend_skinning, heaviest_four};
+pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use grow::{PatchRules, mean_normal, split_into_patches};
+pub use lint::{Finding, FindingKind, lint};
 pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
 pub use recipe::Recipe;
+pub use refresh::refresh;
 pub use skin::{Authored, PlaceReport, author};
 
 /// A point of a surface that a taxel sits on, or could. Coordinates are those of the mesh it was made from.

@@ -11,6 +11,7 @@ mod details;
 mod document;
 mod glb;
 mod layout;
+mod mend;
 mod nodes;
 mod original;
 mod read;

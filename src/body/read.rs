@@ -11,7 +11,7 @@ use json::validation::Checked;
 use super::document::Document;
 use super::layout::{AREA, MODALITY, NORMAL, TAXEL_ID};
 use super::nodes::{FARTHEST, Nodes, is_near};
-use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
+use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, mend};
 use crate::error::{Error, Result};
 
 /// Where in the file what was read comes from, for those who write to it.
@@ -49,21 +49,9 @@ pub(super) fn from_document(
         read_meshes(document, nodes, node, &mut body, sources.as_deref_mut())?;
     }
     complete_normals(&mut body)?;
-    body.taxels.sort_by_key(|taxel| taxel.id);
-    if let Some(pair) = body.taxels.windows(2).find(|pair| pair[0].id == pair[1].id) {
-        return Err(Error::failed(format!(
-            "taxel id {} is there twice, on links `{}` and `{}`; give each taxel an id of its own",
-            pair[0].id, body.links[pair[0].link].name, body.links[pair[1].link].name
-        )));
-    }
-    body.fields = read_fields(document, nodes, &body)?;
-    if body.taxels.is_empty() && !body.fields.is_empty() {
-        body.findings.push(
-            "it has fields and no taxels: if it comes from Blender, export again with `Attributes`, `Loose Points` \
-             (use_mesh_vertices) and `Custom Properties` on"
-                .into(),
-        );
-    }
+    mend::renumber(&mut body)?;
+    body.fields = read_fields(document, nodes, &mut body)?;
+    mend::name_what_was_not_exported(document, &mut body);
     Ok(body)
 }
 
@@ -357,7 +345,7 @@ fn complete_normals(body: &mut Body) -> Result<()> {
     Ok(())
 }
 
-fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &Body) -> Result<Vec<FieldSpec>> {
+fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &mut Body) -> Result<Vec<FieldSpec>> {
     let mut fields: Vec<FieldSpec> = Vec::new();
     for &node in &nodes.in_order {
         let Some(text) = &nodes.field[node] else { continue };
@@ -368,16 +356,7 @@ fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &Body) -> Result<Ve
     if let Some(pair) = fields.windows(2).find(|pair| pair[0].name == pair[1].name) {
         return Err(Error::failed(format!("two fields are called `{}`; rename one", pair[0].name)));
     }
-    for field in &fields {
-        if let Some(id) = field.members.keys().find(|&&id| body.taxel_index(id).is_none())
-            && !body.taxels.is_empty()
-        {
-            return Err(Error::failed(format!(
-                "field `{}` names taxel {id}, which the body does not have; remove it from the field or add the taxel",
-                field.name
-            )));
-        }
-    }
+    mend::forget_absent(body, &mut fields);
     parents_first(fields)
 }
 

@@ -53,6 +53,16 @@ impl Surface {
         }
     }
 
+    /// The corners of its triangles, taken through `way`, each counter-clockwise seen from outside.
+    pub(crate) fn corners_through(&self, way: DAffine3) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        let mirrored = way.matrix3.determinant() < 0.0;
+        let points: Vec<DVec3> = self.positions.iter().map(|&p| way.transform_point3(p)).collect();
+        self.triangles.iter().map(move |triangle| {
+            let [a, b, c] = triangle.map(|v| points[v as usize]);
+            if mirrored { [a, c, b] } else { [a, b, c] }
+        })
+    }
+
     /// The link that carries vertex `vertex` most.
     #[must_use]
     pub fn carrier(&self, vertex: usize) -> usize {
@@ -77,14 +87,34 @@ impl Body {
     /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
     pub fn triangles_in_link(&self, link: usize) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let seen = self.surfaces.iter().filter_map(move |surface| Some((surface, surface.link_from_mesh(self, link)?)));
-        seen.flat_map(|(surface, link_from_mesh)| {
-            let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
-            let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
-            surface.triangles.iter().map(move |&[a, b, c]| {
-                let [a, b, c] = [points[a as usize], points[b as usize], points[c as usize]];
-                if mirrored { [a, c, b] } else { [a, b, c] }
-            })
-        })
+        seen.flat_map(|(surface, link_from_mesh)| surface.corners_through(link_from_mesh))
+    }
+
+    /// All triangles in the world at rest, counter-clockwise seen from outside, each with the link that carries it. Of a
+    /// skinned one every corner goes with the joint that carries it most.
+    #[must_use]
+    pub fn triangles_at_rest(&self) -> Vec<(usize, [DVec3; 3])> {
+        let mut triangles = Vec::new();
+        for surface in &self.surfaces {
+            match &surface.home {
+                Home::Rigid { link, link_from_mesh } => {
+                    let world_from_mesh = self.links[*link].world_from_link * *link_from_mesh;
+                    triangles.extend(surface.corners_through(world_from_mesh).map(|corners| (*link, corners)));
+                }
+                Home::Skinned { joints, heaviest } => {
+                    let way = |&(link, way): &(usize, DAffine3)| (link, self.links[link].world_from_link * way);
+                    let ways: Vec<(usize, DAffine3)> = joints.iter().map(way).collect();
+                    let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);
+                    let of = |v: u32| ways[heaviest[v as usize]];
+                    let at = |v: u32| of(v).1.transform_point3(surface.positions[v as usize]);
+                    triangles.extend(surface.triangles.iter().map(|&[a, b, c]| {
+                        let [a, b, c] = if mirrored { [a, c, b] } else { [a, b, c] };
+                        (of(a).0, [at(a), at(b), at(c)])
+                    }));
+                }
+            }
+        }
+        triangles
     }
 }
 
@@ -281,6 +311,11 @@ impl SurfaceIndex {
     pub fn normal_around(&self, p: DVec3, within_m: f64) -> Option<DVec3> {
         let around = self.tree.locate_within_distance(p.to_array(), within_m * within_m);
         around.map(|triangle| triangle.data.0).sum::<DVec3>().try_normalize()
+    }
+
+    /// The outward unit normals of the triangles within `within_m` of `p`: on an edge, of both sides.
+    pub fn normals_within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = DVec3> + '_ {
+        self.tree.locate_within_distance(p.to_array(), within_m * within_m).map(|triangle| triangle.data.0)
     }
 
     /// Where the line through `p` along the unit vector `direction` meets the surface nearest to `p`, among places

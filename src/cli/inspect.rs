@@ -4,11 +4,11 @@ mod json;
 mod report;
 
 use clap::Args;
+use somatic::author::{Coverage, Finding, coverage, lint};
 use somatic::body::Body;
 use somatic::error::Result;
 use somatic::field::{Field, FieldSet};
 
-use super::words::count;
 use super::{DONE, FAILED, load_body, print};
 
 const EXAMPLES: &str = "\
@@ -16,11 +16,6 @@ Examples:
   somatic inspect robot.glb
   somatic inspect humanoid --json | jq '.fields[].name'
   somatic inspect robot.glb --strict > /dev/null || echo 'look at the findings'";
-
-/// Fewer taxels than this leave orientation and axis little to say.
-const FEW: usize = 3;
-/// Names and ids that a finding lists.
-const MOST_LISTED: usize = 8;
 
 /// Say what links, taxels and fields a body has, and what is odd about it.
 #[derive(Args)]
@@ -48,48 +43,24 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
             Vec::new()
         }
     };
-    findings.extend(odd(&body, &fields));
+    let odd = lint(&body, &fields);
+    findings.extend(odd.iter().map(ToString::to_string));
+    let coverage = coverage(&body);
+    let seen = Seen { body, fields, coverage, findings, odd };
     print(&match arguments.json {
-        true => json::text(&body, &fields, &findings),
-        false => report::text(&body, &fields, &findings),
+        true => json::text(&seen),
+        false => report::text(&seen),
     })?;
-    Ok(if arguments.strict && !findings.is_empty() { FAILED } else { DONE })
+    Ok(if arguments.strict && !seen.findings.is_empty() { FAILED } else { DONE })
 }
 
-/// What is odd about a layout that can be read.
-fn odd(body: &Body, fields: &[Field]) -> Vec<String> {
-    let mut findings = Vec::new();
-    if body.taxels.is_empty() {
-        findings.push("the body has no taxels, so that it cannot be run; add a layout, see docs/layout.md".to_owned());
-    }
-    if body.fields.is_empty() {
-        findings.push("the body has no fields, so that it cannot be run; add some, see docs/layout.md".to_owned());
-    }
-    let small: Vec<&str> =
-        fields.iter().filter(|field| field.members.len() < FEW).map(|field| field.name.as_str()).collect();
-    if !small.is_empty() {
-        let fields = count(small.len() as u64, "field");
-        findings.push(format!("{fields} with under {FEW} taxels, too few for orientation: {}", listed(&small)));
-    }
-    if !fields.is_empty() {
-        let mut held = vec![false; body.taxels.len()];
-        fields.iter().flat_map(|field| &field.members).for_each(|member| held[member.taxel] = true);
-        let loose: Vec<String> =
-            body.taxels.iter().zip(held).filter(|(_, held)| !held).map(|(taxel, _)| taxel.id.to_string()).collect();
-        if !loose.is_empty() {
-            let taxels = count(loose.len() as u64, "taxel");
-            findings.push(format!("{taxels} in no field, so that nothing is felt there: {}", listed(&loose)));
-        }
-    }
-    findings
-}
-
-fn listed<T: AsRef<str>>(names: &[T]) -> String {
-    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
-    match names.get(..MOST_LISTED) {
-        Some(first) if names.len() > MOST_LISTED => {
-            format!("{} and {} more", first.join(", "), names.len() - MOST_LISTED)
-        }
-        _ => names.join(", "),
-    }
+/// Everything that is looked at.
+struct Seen {
+    body: Body,
+    fields: Vec<Field>,
+    coverage: Coverage,
+    /// A line each, those of reading first.
+    findings: Vec<String>,
+    /// Those of the lint, with what they count.
+    odd: Vec<Finding>,
 }

@@ -8,6 +8,8 @@ mod feed;
 mod inspect;
 mod live;
 mod paper;
+#[cfg(feature = "gpu")]
+mod render;
 mod run;
 mod screen;
 mod simulate;
@@ -35,6 +37,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
+  somatic render robot.glb -o robot.png         where they are
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
@@ -56,6 +59,8 @@ enum Command {
     Run(Box<run::Arguments>),
     Inspect(inspect::Arguments),
     Author(Box<author::Arguments>),
+    #[cfg(feature = "gpu")]
+    Render(render::Arguments),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
@@ -68,6 +73,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Author(arguments) => author::run(arguments),
+        #[cfg(feature = "gpu")]
+        Command::Render(arguments) => render::render(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),

@@ -177,6 +177,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         (None, Some(SourceSpec::Sim(path))) => SimulatedSource::open(path)?.body().clone(),
         (None, _) => load_body("hand")?,
     };
+    for finding in body.findings.iter().filter(|_| !arguments.quiet) {
+        say(&format!("{}: {finding}", body.name));
+    }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let source = input.open(&ids, arguments.rate)?;
 

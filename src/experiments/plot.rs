@@ -1,19 +1,15 @@
 //! Draws figures as SVG and PNG. The only user of plotters; no font of the system is needed.
 
 use std::ops::Range;
-use std::sync::OnceLock;
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::prelude::*;
-use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::ink::{self, FAMILY, cannot};
 
-/// DejaVu Sans, cut down to the letters that figures use; its licence lies beside it.
-static FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
-const FAMILY: &str = "sans-serif";
 /// Dots drawn for each pixel of a size below: plotters has whole dots only, and small figures would show it.
 const SCALE: u32 = 2;
 
@@ -154,20 +150,11 @@ impl Figure {
         let (width, height) = (SCALE * width, SCALE * height);
         let mut pixels = vec![0; (3 * width * height) as usize];
         self.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area())?;
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let written = encoder.write_header().and_then(|mut writer| {
-            writer.write_image_data(&pixels)?;
-            writer.finish()
-        });
-        written.map_err(cannot)?;
-        Ok(bytes)
+        ink::png(&pixels, [width, height])
     }
 
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
-        font()?;
+        ink::font()?;
         area.fill(&WHITE).map_err(cannot)?;
         let (width, height) = self.size();
         let title = text(16, HPos::Center);
@@ -319,17 +306,6 @@ fn stroke(colour: Colour, width: f64) -> ShapeStyle {
 fn tick(value: f64) -> String {
     let text = format!("{value:.1}");
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
-}
-
-/// Makes the font known to plotters, once.
-fn font() -> Result<()> {
-    static KNOWN: OnceLock<bool> = OnceLock::new();
-    let known = *KNOWN.get_or_init(|| register_font(FAMILY, FontStyle::Normal, FONT).is_ok());
-    if known { Ok(()) } else { Err(Error::failed("cannot draw: the font that comes with it is broken")) }
-}
-
-fn cannot(error: impl std::fmt::Display) -> Error {
-    Error::failed(format!("cannot draw: {error}"))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ mod plan;
 mod slots;
 
 pub use filter::MotionFilter;
-pub use plan::Plan;
+pub use plan::{Plan, choose_fields};
 pub(crate) use plan::{PlanField, Stages};
 
 use crate::percept::Outputs;

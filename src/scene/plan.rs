@@ -154,7 +154,7 @@ impl Plan {
             ))
             .at(&body.name));
         }
-        let chosen = choose(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
+        let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let read: BTreeSet<usize> =
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
@@ -353,8 +353,11 @@ impl Plan {
     }
 }
 
-/// Indices of the fields that `globs` name, in order.
-fn choose(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> {
+/// Indices of the fields that `globs` name, in order; of all where there are no globs.
+///
+/// # Errors
+/// A glob is malformed or matches nothing.
+pub fn choose_fields(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> {
     let mut set = GlobSetBuilder::new();
     for glob in globs {
         let glob = GlobBuilder::new(glob)

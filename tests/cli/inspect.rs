@@ -1,6 +1,8 @@
 //! `somatic inspect`.
 
+use glam::DVec3;
 use serde_json::{Value, json};
+use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
 
 use super::{done, fails, file, output, text_of};
 
@@ -22,6 +24,13 @@ fn json_has_the_keys_that_others_lean_on() {
         assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality"]);
         assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
     }
+    assert_eq!(keys(&body)[3..], ["findings", "lint", "coverage"]);
+    let [small] = &body["lint"].as_array().unwrap()[..] else { panic!("{}", body["lint"]) };
+    assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "what"]);
+    assert_eq!((&small["kind"], &small["fields"]), (&json!("small_field"), &json!(["hand/side"])));
+    assert_eq!(body["findings"], json!([small["what"]]));
+    assert_eq!(body["coverage"]["links"].as_array().unwrap().len(), 5);
+    assert_eq!(keys(&body["coverage"]["holes"][0]), ["link", "position", "area"]);
     let (mut charted, mut chartless) = (0, 0);
     for field in body["fields"].as_array().unwrap() {
         assert_eq!(keys(field)[..5], ["name", "parent", "anchor", "members", "chart"]);
@@ -44,7 +53,9 @@ fn json_has_the_keys_that_others_lean_on() {
 #[test]
 fn a_report_names_links_fields_and_why_a_chart_is_missing() {
     let text = done(&["inspect", "humanoid"]);
-    for words in ["960", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"] {
+    for words in
+        ["960", "coverage  99.", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"]
+    {
         assert!(text.contains(words), "{words}: {text}");
     }
     assert!(!text.contains('\x1b'));
@@ -72,4 +83,37 @@ fn a_file_goes_before_a_bundled_body_of_its_name() {
     let output = super::somatic(&["inspect", "hand", "--json"]).current_dir(folder.path()).output().unwrap();
     let body: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(body["links"], json!(["arm"]));
+}
+
+#[test]
+fn what_was_put_right_on_reading_is_said_by_inspect_and_by_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twice.glb");
+    let taxel = |id: u32, x: f64| Taxel {
+        id,
+        link: 0,
+        position_in_link: DVec3::X * x,
+        normal_in_link: DVec3::Z,
+        area: 1e-5,
+        modality: Modality::Pressure,
+    };
+    let mut glb = Glb::new();
+    let arm = glb.node("arm", None, DVec3::ZERO);
+    glb.taxels("taxels", Some(arm), &[taxel(1, 0.0), taxel(2, 0.01), taxel(2, 0.02)], None);
+    let members = [1, 2, 7].map(|id| (id, MemberSpec::default())).into();
+    glb.field(&FieldSpec { name: "arm".into(), members, ..FieldSpec::default() }, Some(arm), DVec3::ZERO);
+    glb.save(&path).unwrap();
+    let told = ["2 on link `arm` is now 3", "field `arm` names taxel 7"];
+
+    let strict = output(&["inspect", text_of(&path), "--strict"]);
+    assert_eq!(strict.status.code(), Some(1));
+    let text = String::from_utf8(strict.stdout).unwrap();
+    assert!(told.iter().all(|words| text.contains(words)), "{text}");
+
+    let (_recording, recording) = file("touch.csv", "t,1,2,3\n0,5,6,7\n");
+    let run = output(&["run", "--body", text_of(&path), "--source", text_of(&recording), "--sink", "-"]);
+    assert_eq!(run.status.code(), Some(0), "{}", super::stderr(&run));
+    assert!(told.iter().all(|words| super::stderr(&run).contains(words)), "{}", super::stderr(&run));
+    let frame: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(frame["fields"][0]["total"], 11.0, "taxel 3 is in no field");
 }

@@ -5,6 +5,8 @@ mod bench;
 mod inspect;
 mod live;
 mod paper;
+#[cfg(feature = "gpu")]
+mod render;
 mod run;
 mod simulate;
 
@@ -91,7 +93,7 @@ fn files_in(folder: &Path) -> Vec<String> {
 #[test]
 fn help_teaches_and_names_everything() {
     let help = done(&["--help"]);
-    for word in ["run", "inspect", "author", "paper", "bench", "completions", "Examples:", "Exit codes"] {
+    for word in ["run", "inspect", "author", "render", "paper", "bench", "completions", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "{word}: {help}");
     }
     let help = done(&["run", "--help"]);

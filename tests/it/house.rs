@@ -23,11 +23,13 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("engine", [&below_backend[..], &["backend"]].concat()),
         ("source", vec!["error", "keys", "signal", "body", "field", "bundled", "whole"]),
         ("sink", vec!["error", "percept"]),
+        ("ink", vec!["error"]),
+        ("picture", vec!["error", "body", "field", "backend", "ink", "whole"]),
         (
             "experiments",
             vec![
                 "error", "percept", "signal", "body", "field", "author", "scene", "backend", "engine", "source",
-                "bundled", "whole",
+                "bundled", "whole", "ink",
             ],
         ),
     ])
@@ -103,8 +105,8 @@ fn each_heavy_dependency_has_one_door() {
         ("rayon", "backend/cpu|experiments|author/crowd.rs"),
         ("globset", "scene|author/glob.rs"),
         ("fearless_simd", "backend/cpu"),
-        ("plotters", "experiments/plot.rs"),
-        ("png", "experiments/plot.rs"),
+        ("plotters", "ink|experiments/plot.rs|picture/words.rs"),
+        ("png", "ink"),
     ];
     for (dependency, door) in doors {
         let mut seen = false;

@@ -2,16 +2,19 @@
 
 mod author;
 mod batches;
+mod blender;
 mod bodies;
 mod change;
 mod common;
 mod draft;
+mod edited;
 mod extremes;
 mod filter;
 mod geodesic;
 mod house;
 mod legal;
 mod letters;
+mod lint;
 mod meshes;
 mod motion;
 mod properties;
@@ -20,3 +23,4 @@ mod recordings;
 mod simulated;
 mod touch;
 mod upkeep;
+mod validator;

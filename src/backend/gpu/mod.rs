@@ -8,6 +8,8 @@
 
 pub(crate) mod adapter;
 mod columns;
+#[cfg(feature = "cli")]
+pub(crate) mod raster;
 mod report;
 mod ring;
 pub(crate) mod shaders;

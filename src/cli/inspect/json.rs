@@ -1,11 +1,15 @@
 //! A body as JSON.
 
 use serde_json::{Map, Value, json};
+use somatic::author::Finding;
 use somatic::body::Body;
 use somatic::field::{Field, WORLD};
 
+use super::Seen;
+
 /// One object and a newline.
-pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String {
+pub(super) fn text(seen: &Seen) -> String {
+    let Seen { body, fields, .. } = seen;
     let link = |index: usize| body.links[index].name.as_str();
     let taxel = |index: usize| {
         let taxel = &body.taxels[index];
@@ -22,7 +26,16 @@ pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String
         "links": body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(),
         "taxels": (0..body.taxels.len()).map(taxel).collect::<Vec<_>>(),
         "fields": fields.iter().map(|f| field(body, fields, f)).collect::<Vec<_>>(),
-        "findings": findings,
+        "findings": seen.findings,
+        "lint": seen.odd.iter().map(finding).collect::<Vec<_>>(),
+        "coverage": {
+            "links": seen.coverage.links.iter().map(|of| json!({
+                "link": link(of.link), "area": of.area, "seen": of.seen,
+            })).collect::<Vec<_>>(),
+            "holes": seen.coverage.holes.iter().map(|hole| json!({
+                "link": link(hole.link), "position": hole.position_in_link.to_array(), "area": hole.area,
+            })).collect::<Vec<_>>(),
+        },
     });
     format!("{whole}\n")
 }
@@ -56,4 +69,16 @@ fn field(body: &Body, fields: &[Field], field: &Field) -> Value {
         object["no_chart"] = reason.to_string().into();
     }
     object
+}
+
+fn finding(finding: &Finding) -> Value {
+    json!({
+        "kind": finding.kind.name(),
+        "taxels": finding.taxels,
+        "fields": finding.fields,
+        "worst": finding.worst,
+        "unit": finding.kind.unit(),
+        "place": finding.place,
+        "what": finding.to_string(),
+    })
 }

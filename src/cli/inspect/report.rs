@@ -3,13 +3,16 @@
 use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Table};
 use console::{Term, style};
 use rstar::RTree;
+use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, WORLD};
 
+use super::Seen;
 use crate::cli::words::{count, millimetres};
 
 /// All there is to say, the oddest last, where it is read.
-pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String {
+pub(super) fn text(seen: &Seen) -> String {
+    let Seen { body, fields, findings, .. } = seen;
     let mut text = format!("{}\n", style(&body.name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<10}{value}\n");
     let triangles: usize = body.surfaces.iter().map(|surface| surface.triangles.len()).sum();
@@ -17,10 +20,13 @@ pub(super) fn text(body: &Body, fields: &[Field], findings: &[String]) -> String
     let surfaces = count(triangles as u64, "triangle");
     line("surfaces", format!("{} with {surfaces}", body.surfaces.len()));
     line("taxels", taxels(body));
+    for (what, value) in coverage(body, &seen.coverage) {
+        line(what, value);
+    }
     let charts = fields.iter().filter(|field| field.chart.is_ok()).count();
     line("fields", format!("{}, {charts} with a chart", fields.len()));
     if !body.links.is_empty() {
-        text += &format!("\n{}", shown(&links(body)));
+        text += &format!("\n{}", shown(&links(body, &seen.coverage)));
     }
     if !fields.is_empty() {
         text += &format!("\n{}", shown(&tree(body, fields)));
@@ -63,13 +69,37 @@ fn taxels(body: &Body) -> String {
     text
 }
 
-fn links(body: &Body) -> Table {
-    let mut table = plain(["link", "taxels"]);
-    right(&mut table, 1);
+/// How much of the skin is seen, and its bare spots, under the names of their lines.
+fn coverage(body: &Body, coverage: &Coverage) -> Vec<(&'static str, String)> {
+    let (area, seen) = coverage.of_skin();
+    if seen == 0.0 {
+        return Vec::new();
+    }
+    let share = 100.0 * seen / area;
+    let mut lines =
+        vec![("coverage", format!("{share:.1} % of {:.1} cm² lies within the spacing of a taxel", area * 1e4))];
+    for (number, hole) in coverage.holes.iter().enumerate() {
+        let [x, y, z] = hole.position_in_link.to_array().map(millimetres);
+        let (link, area) = (&body.links[hole.link].name, hole.area * 1e4);
+        let what = if number == 0 { "bare" } else { "" };
+        lines.push((what, format!("{area:.1} cm² around ({x}, {y}, {z}) mm of `{link}`")));
+    }
+    lines
+}
+
+fn links(body: &Body, coverage: &Coverage) -> Table {
+    let mut table = plain(["link", "taxels", "cm²", "seen"]);
+    for column in 1..4 {
+        right(&mut table, column);
+    }
     let parents: Vec<Option<usize>> = body.links.iter().map(|link| link.parent).collect();
     for (link, branch) in branches(&parents) {
         let taxels = body.taxels.iter().filter(|taxel| taxel.link == link).count();
-        table.add_row([format!("{branch}{}", body.links[link].name), some(taxels)]);
+        let surface = coverage.links.iter().find(|of| of.link == link);
+        let area = surface.map_or(String::new(), |of| format!("{:.1}", of.area * 1e4));
+        let seen = surface.filter(|of| of.seen > 0.0);
+        let seen = seen.map_or(String::new(), |of| format!("{:.0} %", 100.0 * of.seen / of.area));
+        table.add_row([format!("{branch}{}", body.links[link].name), some(taxels), area, seen]);
     }
     table
 }

@@ -1,0 +1,106 @@
+//! A whole body's surface at rest, searchable from each of its links.
+
+use glam::{DAffine3, DVec3};
+
+use crate::body::{Body, Hit, Home, Surface, SurfaceIndex};
+
+/// Two ways to bring a skinned mesh into the world are one where no number in them differs by more, m: the rounding of
+/// inverse bind matrices.
+const SAME_WAY: f64 = 2e-7;
+
+/// Taxels lie on a surface that is this near beside what single precision loses, m; `docs/layout.md` has it.
+const ON_SURFACE_M: f64 = 1e-6;
+
+/// What two roundings to single precision lose of the largest coordinate, as `Topology` welds.
+const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+
+/// Indices of a body's surfaces in the world at rest. A skinned mesh is brought there as the link that asks sees it: by
+/// that link's own joint, at bind.
+pub(super) struct Ground<'a> {
+    body: &'a Body,
+    rigid: SurfaceIndex,
+    /// Per skinned surface the ways it was brought into the world, each with what came of it.
+    skinned: Vec<(&'a Surface, Vec<(DAffine3, SurfaceIndex)>)>,
+    /// How far from a surface a point that is on it may be found, m.
+    tolerance_m: f64,
+}
+
+impl<'a> Ground<'a> {
+    pub(super) fn of(body: &'a Body) -> Self {
+        let in_world = |surface: &'a Surface| match &surface.home {
+            Home::Rigid { link, link_from_mesh } => {
+                Some(surface.corners_through(body.links[*link].world_from_link * *link_from_mesh))
+            }
+            Home::Skinned { .. } => None,
+        };
+        let rigid: Vec<[DVec3; 3]> = body.surfaces.iter().filter_map(in_world).flatten().collect();
+        let largest = body.surfaces.iter().map(|surface| {
+            let of_points = |way: DAffine3| {
+                let places = surface.positions.iter().map(|&p| way.transform_point3(p).abs().max_element());
+                places.fold(0.0, f64::max)
+            };
+            match &surface.home {
+                // Coordinates are rounded where they are stored: in the mesh, and in the taxels' node.
+                Home::Rigid { link_from_mesh, .. } => of_points(*link_from_mesh),
+                Home::Skinned { joints, .. } => joints.iter().map(|&(_, way)| of_points(way)).fold(0.0, f64::max),
+            }
+        });
+        let tolerance_m = ON_SURFACE_M + ROUNDING * largest.fold(0.0, f64::max);
+        let skinned = body.surfaces.iter().filter(|surface| matches!(surface.home, Home::Skinned { .. }));
+        let mut ground = Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
+        ground.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
+        for link in 0..body.links.len() {
+            if body.taxels.iter().any(|taxel| taxel.link == link) {
+                ground.bring(link);
+            }
+        }
+        ground
+    }
+
+    /// Brings skinned surfaces into the world as `link` sees them.
+    fn bring(&mut self, link: usize) {
+        for (surface, ways) in &mut self.skinned {
+            let Some(way) = world_from_skinned(self.body, surface, link) else { continue };
+            if !ways.iter().any(|(known, _)| known.abs_diff_eq(way, SAME_WAY)) {
+                ways.push((way, SurfaceIndex::of_triangles(surface.corners_through(way))));
+            }
+        }
+    }
+
+    /// The indices in which `link` finds its surroundings.
+    fn seen_from(&self, link: usize) -> impl Iterator<Item = &SurfaceIndex> {
+        let skinned = self.skinned.iter().filter_map(move |(surface, ways)| {
+            let way = world_from_skinned(self.body, surface, link)?;
+            ways.iter().find(|(known, _)| known.abs_diff_eq(way, SAME_WAY)).map(|(_, index)| index)
+        });
+        std::iter::once(&self.rigid).chain(skinned).filter(|index| !index.is_empty())
+    }
+
+    /// Whether there is no surface at all.
+    pub(super) fn is_empty(&self) -> bool {
+        self.body.surfaces.is_empty()
+    }
+
+    /// How far from a surface a point on it may be found, m.
+    pub(super) fn tolerance_m(&self) -> f64 {
+        self.tolerance_m
+    }
+
+    /// The surface point nearest to `p`, both in the world, as `link` sees it.
+    pub(super) fn nearest(&self, link: usize, p: DVec3) -> Option<Hit> {
+        let hits = self.seen_from(link).filter_map(|index| index.nearest(p));
+        hits.min_by(|a, b| a.position.distance_squared(p).total_cmp(&b.position.distance_squared(p)))
+    }
+
+    /// The outward normals of the triangles at the surface point `p`, in the world, as `link` sees it.
+    pub(super) fn normals_at(&self, link: usize, p: DVec3) -> impl Iterator<Item = DVec3> {
+        self.seen_from(link).flat_map(move |index| index.normals_within(p, self.tolerance_m))
+    }
+}
+
+/// Takes the coordinates of a skinned mesh to the world at rest, by the joint that `link` is, else by its first.
+fn world_from_skinned(body: &Body, surface: &Surface, link: usize) -> Option<DAffine3> {
+    let Home::Skinned { joints, .. } = &surface.home else { return None };
+    let own = joints.iter().find(|(joint, _)| *joint == link).or(joints.first());
+    own.map(|&(joint, link_from_mesh)| body.links[joint].world_from_link * link_from_mesh)
+}

@@ -1,0 +1,108 @@
+//! What an editor does to a layout that its author did not mean: ids copied with their points, members deleted under
+//! their fields, attributes not exported. It is put right where there is one way to, and said.
+
+use std::collections::BTreeSet;
+
+use gltf::json;
+use json::mesh::Mode;
+use json::validation::Checked;
+
+use super::document::Document;
+use super::read::is_taxels;
+use super::{Body, FieldSpec, MAX_TAXEL_ID};
+use crate::error::{Error, Result};
+
+/// Ids and names that a finding lists.
+const MOST_LISTED: usize = 8;
+
+/// Sorts taxels by id, and gives new ids to those whose id an earlier one in the file has.
+///
+/// New ids count up from the highest in use, in the order of the old ones; where that would pass [`MAX_TAXEL_ID`] the
+/// lowest free ones are taken. The new taxels are in no field: what was made by duplicating a point lies elsewhere.
+pub(super) fn renumber(body: &mut Body) -> Result<()> {
+    // Stable: of two the first in the file keeps its id, and editors append what they copy.
+    body.taxels.sort_by_key(|taxel| taxel.id);
+    let later: Vec<usize> =
+        (1..body.taxels.len()).filter(|&index| body.taxels[index].id == body.taxels[index - 1].id).collect();
+    let Some(highest) = body.taxels.last().filter(|_| !later.is_empty()).map(|taxel| taxel.id) else { return Ok(()) };
+    let used: BTreeSet<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let above = later.len() as u64 + u64::from(highest) <= u64::from(MAX_TAXEL_ID);
+    let mut free = (if above { highest + 1 } else { 0 }..=MAX_TAXEL_ID).filter(|id| !used.contains(id));
+    let mut renumbered = Vec::with_capacity(later.len());
+    for index in later {
+        let Some(id) = free.next() else {
+            return Err(Error::failed(format!("there are more taxels than the {MAX_TAXEL_ID} ids; remove some")));
+        };
+        let taxel = &mut body.taxels[index];
+        renumbered.push(format!("{} on link `{}` is now {id}", taxel.id, body.links[taxel.link].name));
+        taxel.id = id;
+    }
+    body.taxels.sort_by_key(|taxel| taxel.id);
+    let (are, later) = match renumbered.len() {
+        1 => ("1 taxel has the id".to_owned(), "the later in the file"),
+        several => (format!("{several} taxels have the ids"), "those later in the file"),
+    };
+    body.findings.push(format!("{are} of another; {later} renumbered, and in no field: {}", listed(&renumbered)));
+    Ok(())
+}
+
+/// Takes members that the body does not have out of `fields`, as when somebody deleted their taxels in an editor.
+pub(super) fn forget_absent(body: &mut Body, fields: &mut [FieldSpec]) {
+    if body.taxels.is_empty() {
+        return;
+    }
+    for field in fields {
+        let absent: Vec<u32> = field.members.keys().copied().filter(|&id| body.taxel_index(id).is_none()).collect();
+        if absent.is_empty() {
+            continue;
+        }
+        field.members.retain(|id, _| !absent.contains(id));
+        let names: Vec<String> = absent.iter().map(u32::to_string).collect();
+        let taxels = if absent.len() == 1 { "taxel" } else { "taxels" };
+        body.findings.push(format!(
+            "field `{}` names {taxels} {}, which the body does not have; left out",
+            field.name,
+            listed(&names)
+        ));
+    }
+}
+
+/// Says which of Blender's export options were off, where that shows.
+pub(super) fn name_what_was_not_exported(document: &Document, body: &mut Body) {
+    let generator = document.root.asset.generator.as_deref().unwrap_or_default();
+    let from_blender = generator.contains("Blender");
+    let primitives = || document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let bare_points = primitives().any(|p| matches!(p.mode, Checked::Valid(Mode::Points)) && !is_taxels(p));
+    let attributes = "`Data ▸ Mesh ▸ Attributes` (export_attributes)";
+    let points = "`Data ▸ Mesh ▸ Loose Points` (use_mesh_vertices)";
+    let extras = "`Include ▸ Custom Properties` (export_extras)";
+    let (taxels, fields) = (!body.taxels.is_empty(), !body.fields.is_empty());
+    let finding = match (taxels, fields) {
+        (true, true) => return,
+        (false, true) if bare_points => {
+            format!("it has fields and points, and no point is a taxel: export it again with {attributes} on")
+        }
+        (false, true) => format!(
+            "it has fields and no taxels: if it comes from Blender, export it again with {attributes} and {points} on"
+        ),
+        (true, false) if from_blender => {
+            format!("it has taxels and no fields; if it had some in Blender, export it again with {extras} on")
+        }
+        (false, false) if from_blender => format!(
+            "it comes from Blender without taxels and fields; if it had some there, export it again with {attributes}, \
+             {points} and {extras} on"
+        ),
+        _ => return,
+    };
+    // It is the cause of most else that is odd.
+    body.findings.insert(0, finding);
+}
+
+fn listed(words: &[String]) -> String {
+    match words.get(..MOST_LISTED) {
+        Some(first) if words.len() > MOST_LISTED => {
+            format!("{} and {} more", first.join(", "), words.len() - MOST_LISTED)
+        }
+        _ => words.join(", "),
+    }
+}

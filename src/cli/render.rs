@@ -1,0 +1,104 @@
+//! `somatic render`: a picture of a body and its fields.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use somatic::Error;
+use somatic::error::Result;
+use somatic::field::FieldSet;
+use somatic::picture::{self, Options, View};
+use somatic::scene::choose_fields;
+
+use super::{DONE, load_body};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic render robot.glb -o robot.png
+  somatic render hand -o palm.png --field 'hand/palm*' --view top,bottom
+  somatic render humanoid -o chart.png --uv head/skull/patch_14
+
+A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those side by side differ in
+colour.";
+
+/// Draw a body from four sides, its taxels coloured by field.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    body: String,
+
+    /// The picture to write, PNG.
+    #[arg(short, long, value_name = "FILE.png")]
+    output: PathBuf,
+
+    /// Sides to show: front, back, left, right, top, bottom, three-quarter, all [default: the four that show most].
+    #[arg(long = "view", value_name = "VIEW", value_delimiter = ',')]
+    views: Vec<String>,
+
+    /// Colour only the fields whose names match; globs, may be repeated [default: all that have no children].
+    #[arg(long = "field", value_name = "GLOB")]
+    fields: Vec<String>,
+
+    /// Draw the chart of this field, laid flat, instead of the body.
+    #[arg(long, value_name = "FIELD", conflicts_with = "views")]
+    uv: Option<String>,
+
+    /// Width in pixels, or WIDTHxHEIGHT where the height is the most it may take.
+    #[arg(long, default_value = "1600", value_name = "PIXELS")]
+    size: Size,
+
+    /// Replace the picture if it is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Width, and height at most, pixels.
+#[derive(Clone, Copy)]
+struct Size([u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (width, height) = text.split_once('x').unwrap_or((text, text));
+        let side = |side: &str| side.trim().parse::<u32>().ok().filter(|&side| side > 0);
+        match (side(width), side(height)) {
+            (Some(width), Some(height)) => Ok(Self([width, height])),
+            _ => Err("give a width, or width and height, as 1600 or 1600x900".to_owned()),
+        }
+    }
+}
+
+pub(super) fn render(arguments: &Arguments) -> Result<u8> {
+    let path = &arguments.output;
+    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
+        return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
+    }
+    picture::may_write(path, arguments.force)?;
+    let mut views = Vec::new();
+    for name in &arguments.views {
+        match name.as_str() {
+            "all" => views.extend(View::ALL),
+            name => views.push(name.parse()?),
+        }
+    }
+    let body = load_body(&arguments.body)?;
+    let set = FieldSet::new(&body)?;
+    let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
+    let fields = if arguments.fields.is_empty() { Vec::new() } else { named(&arguments.fields)? };
+    let options = Options { size: arguments.size.0, views, fields };
+    let picture = match &arguments.uv {
+        None => picture::of_body(&body, &set.fields, &options)?,
+        Some(name) => {
+            let charted = match set.fields.iter().position(|field| field.name == *name) {
+                Some(index) => index,
+                // A glob will do where it names one, and what is wrong with it is said the same way.
+                None => named(std::slice::from_ref(name))?[0],
+            };
+            picture::of_chart(&body, &set.fields, charted, &options)?
+        }
+    };
+    picture::write(path, &picture, arguments.force)?;
+    Ok(DONE)
+}

@@ -1,0 +1,247 @@
+//! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on the GPU, or what
+//! stands in for one, without a window.
+
+mod colour;
+mod shape;
+mod view;
+mod words;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+pub use view::View;
+
+use self::colour::{PALETTE, PAPER, linear};
+use self::shape::Dots;
+use self::view::{Arrangement, CAPTION};
+use self::words::Words;
+use crate::backend::gpu::raster::{self, Drawing};
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::field::Field;
+use crate::ink;
+
+/// Pixels above the views, for the title.
+const TITLE: u32 = 44;
+/// The narrowest picture, pixels: a title must fit.
+const NARROWEST: u32 = 240;
+
+/// How a picture is to be.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Width, and height at most, pixels.
+    pub size: [u32; 2],
+    /// The sides shown; none for the four that show most.
+    pub views: Vec<View>,
+    /// Indices of the fields to colour; none for those that have no children.
+    pub fields: Vec<usize>,
+}
+
+/// A PNG of `body` and its `fields`, which may be none.
+///
+/// A taxel in several of the fields shown has a slice of each one's colour; one in none is pale. Up to twelve fields have
+/// a colour of their own and are named; beyond, fields beside each other differ.
+///
+/// # Errors
+/// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
+pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
+    let [width, height] = checked(options.size)?;
+    let triangles = body.triangles_at_rest();
+    let dots = Dots::of(body);
+    let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
+    let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    if !(low.is_finite() && high.is_finite()) {
+        return Err(Error::failed("it has neither surface nor taxels to draw").at(&body.name));
+    }
+    let middle = (low + high) / 2.0;
+    let shown = Shown::of(fields, &options.fields, &dots);
+    let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
+
+    let mut words = Words::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")));
+    let below = words.key(shown.key(fields), [width, height]);
+    let taken = TITLE + below;
+    if height <= taken + 40 {
+        return Err(Error::usage(format!("no room is left for the body; make it higher than {} pixels", taken + 40)));
+    }
+    let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
+    // Discs reach beyond their middles.
+    let reach = dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - middle - r, p - middle + r]);
+    let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(reach).collect();
+    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], TITLE);
+    let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
+
+    let (corners, faces) = shape::surface(&triangles, middle);
+    let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
+    let drawing = Drawing {
+        size: [width, TITLE + arrangement.height + below],
+        background: linear(PAPER),
+        corners,
+        triangles: faces,
+        slices: dots.slices(&shown.coloured(fields), middle, usual > 2.0),
+        fan: fan(usual),
+        eyes: arrangement.eyes(radius_m),
+    };
+    let mut pixels = raster::draw(&drawing)?;
+    for (view, placed) in views.iter().zip(&arrangement.views) {
+        let [left, top, width, _] = placed.part;
+        words.caption(view.name(), [left + width / 2, top.saturating_sub(CAPTION as u32 / 2)]);
+    }
+    words.bar(arrangement.scale);
+    words.draw(&mut pixels, drawing.size)?;
+    ink::png(&pixels, drawing.size)
+}
+
+/// A PNG of the chart of field `index` of `fields`, laid flat: members where (u, v) has them, +u to the right.
+///
+/// Those of its children that `options` does not rule out give the colours.
+///
+/// # Errors
+/// As [`of_body`]; or the field has no chart.
+pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) -> Result<Vec<u8>> {
+    let [width, height] = checked(options.size)?;
+    let field = &fields[index];
+    let chart = field
+        .chart
+        .as_ref()
+        .map_err(|why| Error::failed(format!("field `{}` has no chart to draw: {why}", field.name)).at(&body.name))?;
+    let mut places = vec![DVec3::NAN; body.taxels.len()];
+    field.members.iter().for_each(|member| places[member.taxel] = member.place.with_z(0.0));
+    let held: Vec<usize> = field.members.iter().map(|member| member.taxel).collect();
+    let dots =
+        Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], field.radius_m());
+    // The fields as the chart numbers its members.
+    let within: Vec<Field> = fields
+        .iter()
+        .map(|field| {
+            let mut field = field.clone();
+            field.members.retain_mut(|member| match held.binary_search(&member.taxel) {
+                Ok(place) => {
+                    member.taxel = place;
+                    true
+                }
+                Err(_) => false,
+            });
+            field
+        })
+        .collect();
+    let shown = Shown::of(&within, &options.fields, &dots);
+    let kind = format!("{:?}", chart.kind).to_lowercase();
+    let mut words = Words::new(&format!(
+        "{} · {}, {kind} chart, distortion {:.1} %",
+        field.name,
+        counted(field.members.len(), "taxel"),
+        100.0 * chart.distortion
+    ));
+    let below = words.key(shown.key(&within), [width, height]);
+    let points: Vec<DVec3> =
+        dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - r, p + r]).chain([DVec3::ZERO]).collect();
+    let taken = TITLE + below;
+    if height <= taken + 40 {
+        return Err(Error::usage(format!("no room is left for the chart; make it higher than {} pixels", taken + 40)));
+    }
+    let arrangement = Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], TITLE);
+    let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
+    let drawing = Drawing {
+        size: [width, TITLE + arrangement.height + below],
+        background: linear(PAPER),
+        slices: dots.slices(&shown.coloured(&within), DVec3::ZERO, usual > 2.0),
+        fan: fan(usual),
+        eyes: arrangement.eyes(1.1 * points.iter().map(|p| p.length()).fold(1e-9, f64::max)),
+        ..Drawing::default()
+    };
+    let mut pixels = raster::draw(&drawing)?;
+    let origin = arrangement.pixel(0, DVec3::ZERO);
+    words.axes(origin);
+    words.bar(arrangement.scale);
+    words.draw(&mut pixels, drawing.size)?;
+    ink::png(&pixels, drawing.size)
+}
+
+/// Writes a picture at `path`, whole or not at all; over what is there only where `force` says so.
+///
+/// # Errors
+/// Something is there, or the folder cannot be written to.
+pub fn write(path: &Path, picture: &[u8], force: bool) -> Result<()> {
+    may_write(path, force)?;
+    crate::whole::write(path, picture)
+}
+
+/// Whether [`write()`] would write at `path`, to be asked before any work is done.
+///
+/// # Errors
+/// Something is there, and `force` does not say that it may go.
+pub fn may_write(path: &Path, force: bool) -> Result<()> {
+    match path.try_exists() {
+        Ok(true) if !force => Err(Error::failed("it is there already; --force replaces it").at(path.display())),
+        _ => Ok(()),
+    }
+}
+
+fn checked(size: [u32; 2]) -> Result<[u32; 2]> {
+    if size[0] < NARROWEST || size.iter().any(|&side| side > raster::LONGEST_SIDE) {
+        return Err(Error::usage(format!(
+            "a picture of {} × {} pixels cannot be drawn; give a width of {NARROWEST} at least, and sides up to {}",
+            size[0],
+            size[1],
+            raster::LONGEST_SIDE
+        )));
+    }
+    Ok(size)
+}
+
+/// The fields that are coloured.
+struct Shown {
+    /// Their indices.
+    fields: Vec<usize>,
+    /// Their colours' numbers in the palette.
+    colours: Vec<usize>,
+    /// Whether each has a colour of its own.
+    own: bool,
+}
+
+impl Shown {
+    /// The fields `chosen`, or those of `fields` without children.
+    fn of(fields: &[Field], chosen: &[usize], dots: &Dots) -> Self {
+        let leaf = |index: &usize| fields.iter().all(|field| field.parent != Some(*index));
+        let fields_shown: Vec<usize> = match chosen {
+            [] => (0..fields.len()).filter(leaf).collect(),
+            chosen => chosen.to_vec(),
+        };
+        let fields_shown: Vec<usize> =
+            fields_shown.into_iter().filter(|&index| !fields[index].members.is_empty()).collect();
+        let of: Vec<&Field> = fields_shown.iter().map(|&index| &fields[index]).collect();
+        let beside = if of.len() > PALETTE.len() { dots.beside(&of) } else { Default::default() };
+        let (colours, own) = colour::assign(of.len(), &beside);
+        Self { fields: fields_shown, colours, own }
+    }
+
+    fn coloured<'a>(&self, fields: &'a [Field]) -> Vec<(&'a Field, [u8; 3])> {
+        self.fields.iter().zip(&self.colours).map(|(&index, &colour)| (&fields[index], PALETTE[colour])).collect()
+    }
+
+    /// What the legend says.
+    fn key(&self, fields: &[Field]) -> Vec<(Option<[u8; 3]>, String)> {
+        if self.own {
+            let named = self.coloured(fields);
+            return named.into_iter().map(|(field, colour)| (Some(colour), field.name.clone())).collect();
+        }
+        let text =
+            format!("{} fields in {} colours; fields beside each other differ", self.fields.len(), PALETTE.len());
+        vec![(None, text)]
+    }
+}
+
+/// Triangles that make a disc of `radius` pixels look round.
+fn fan(radius: f64) -> u32 {
+    (2.5 * radius.max(0.0).sqrt() + 6.0).min(48.0) as u32
+}
+
+/// The file's name without folder and ending.
+fn stem(name: &str) -> &str {
+    Path::new(name).file_stem().and_then(|stem| stem.to_str()).unwrap_or(name)
+}
+
+fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}

@@ -1,0 +1,167 @@
+//! What is drawn of a body: its surface with normals that light can follow, and a disc for each taxel.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::colour::{self, linear};
+use crate::backend::gpu::raster::{Corner, Slice};
+use crate::body::{Body, Topology};
+use crate::field::Field;
+
+/// Faces that meet at less than 45° are shaded as one smooth surface.
+const SMOOTH_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// A disc's radius as a part of the distance to the nearest other.
+const RADIUS: f64 = 0.40;
+/// No disc is larger than so many times the usual one.
+const LARGEST: f64 = 2.0;
+/// The dark disc under each, as a part of its radius.
+const RIM: f64 = 1.16;
+/// How far discs are moved towards the eye, in radii, so that a curved surface does not swallow them.
+const LIFT: f64 = 0.6;
+/// Fields whose taxels are nearer than so many times the usual distance lie beside each other.
+const BESIDE: f64 = 1.6;
+/// Slices of one disc at most.
+const MOST_SLICES: usize = 8;
+/// Taxels nearer than this are at one place, m.
+const ONE_PLACE_M: f64 = 1e-6;
+
+/// The taxels as they are drawn.
+pub(super) struct Dots {
+    /// In the world, m.
+    pub(super) places: Vec<DVec3>,
+    pub(super) normals: Vec<DVec3>,
+    /// m.
+    pub(super) radii: Vec<f64>,
+    /// The usual distance of neighbours, m.
+    spacing_m: f64,
+}
+
+impl Dots {
+    /// Of `body`'s taxels, at rest, none larger than the area it stands for.
+    pub(super) fn of(body: &Body) -> Self {
+        let world = |link: usize| body.links[link].world_from_link;
+        let places = body.taxels.iter().map(|t| world(t.link).transform_point3(t.position_in_link)).collect();
+        let normals = body.taxels.iter().map(|t| world(t.link).transform_vector3(t.normal_in_link)).collect();
+        let extent = body
+            .triangles_at_rest()
+            .iter()
+            .flat_map(|(_, corners)| *corners)
+            .fold(0.0, |most: f64, p| most.max(p.abs().max_element()));
+        let mut dots = Self::at(places, normals, extent);
+        for (radius, taxel) in dots.radii.iter_mut().zip(&body.taxels).filter(|(_, taxel)| taxel.area > 0.0) {
+            *radius = radius.min((taxel.area / std::f64::consts::PI).sqrt());
+        }
+        dots
+    }
+
+    /// At `places`; a single one is drawn as if its neighbours were a tenth of `extent_m` away.
+    pub(super) fn at(places: Vec<DVec3>, normals: Vec<DVec3>, extent_m: f64) -> Self {
+        let tree = RTree::bulk_load(places.iter().map(DVec3::to_array).collect());
+        let gap = |place: &DVec3| {
+            let near = tree.nearest_neighbor_iter_with_distance_2(place.to_array()).take(32);
+            near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > ONE_PLACE_M)
+        };
+        let gaps: Vec<Option<f64>> = places.iter().map(gap).collect();
+        let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
+        known.sort_by(f64::total_cmp);
+        let spacing_m = known.get(known.len() / 2).copied().unwrap_or((0.1 * extent_m).max(1e-3));
+        let radii = gaps.iter().map(|gap| RADIUS * gap.unwrap_or(spacing_m).min(LARGEST * spacing_m)).collect();
+        Self { places, normals, radii, spacing_m }
+    }
+
+    /// Pairs of `fields` that share taxels or have some beside each other, by their numbers in that list.
+    pub(super) fn beside(&self, fields: &[&Field]) -> BTreeSet<(usize, usize)> {
+        let mut of_taxel: Vec<Vec<usize>> = vec![Vec::new(); self.places.len()];
+        for (number, field) in fields.iter().enumerate() {
+            field.members.iter().for_each(|member| of_taxel[member.taxel].push(number));
+        }
+        let tree =
+            RTree::bulk_load(self.places.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.to_array(), i)).collect());
+        let reach = BESIDE * self.spacing_m;
+        let mut pairs = BTreeSet::new();
+        for (place, own) in self.places.iter().zip(&of_taxel) {
+            for near in tree.locate_within_distance(place.to_array(), reach * reach) {
+                let near: &GeomWithData<[f64; 3], usize> = near;
+                for &one in own {
+                    pairs.extend(of_taxel[near.data].iter().filter(|&&other| other > one).map(|&other| (one, other)));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// The discs, about `middle`: each taxel's in the colours of the fields that it is in, a slice each; `colours` are
+    /// the fields' with their members.
+    pub(super) fn slices(&self, fields: &[(&Field, [u8; 3])], middle: DVec3, rims: bool) -> Vec<Slice> {
+        let mut of_taxel: Vec<Vec<[u8; 3]>> = vec![Vec::new(); self.places.len()];
+        for (field, colour) in fields {
+            field.members.iter().for_each(|member| of_taxel[member.taxel].push(*colour));
+        }
+        let mut slices = Vec::with_capacity(2 * self.places.len());
+        for (taxel, colours) in of_taxel.iter_mut().enumerate() {
+            let slice = |radius: f64, lift: f64, colour: [u8; 3], start: f64, sweep: f64| {
+                let [r, g, b] = linear(colour).map(|part| part as f32);
+                Slice {
+                    middle: (self.places[taxel] - middle).as_vec3().to_array(),
+                    radius: (radius * self.radii[taxel]) as f32,
+                    normal: self.normals[taxel].as_vec3().to_array(),
+                    lift: lift as f32,
+                    colour: [r, g, b, 1.0],
+                    span: [start as f32, sweep as f32, 0.0, 0.0],
+                }
+            };
+            if rims {
+                slices.push(slice(RIM, LIFT, colour::RIM, 0.0, TAU));
+            }
+            if colours.is_empty() {
+                colours.push(colour::REST);
+            }
+            colours.truncate(MOST_SLICES);
+            let sweep = TAU / colours.len() as f64;
+            for (number, &colour) in colours.iter().enumerate() {
+                // Above the rim by more than depth rounds away.
+                slices.push(slice(1.0, LIFT + 0.1, colour, number as f64 * sweep, sweep));
+            }
+        }
+        slices
+    }
+}
+
+/// The surface of `triangles` about `middle`: corners with normals, and triangles over them. Normals are those of the
+/// faces around a corner that meet this one at less than 45°, by their area.
+pub(super) fn surface(triangles: &[(usize, [DVec3; 3])], middle: DVec3) -> (Vec<Corner>, Vec<[u32; 3]>) {
+    let soup: Vec<DVec3> = triangles.iter().flat_map(|(_, corners)| corners.map(|p| p - middle)).collect();
+    let faces: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let topology = Topology::new(&soup, &faces);
+    let count = topology.triangles.len() as u32;
+    // Twice the area along the normal, and its direction.
+    let spanned: Vec<DVec3> = (0..count)
+        .map(|triangle| {
+            let [a, b, c] = topology.corners(triangle);
+            (b - a).cross(c - a)
+        })
+        .collect();
+    let facing: Vec<DVec3> = spanned.iter().map(|n| n.normalize_or(DVec3::Z)).collect();
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); topology.positions.len()];
+    for (triangle, corners) in (0..count).zip(&topology.triangles) {
+        corners.iter().for_each(|&vertex| around[vertex as usize].push(triangle));
+    }
+    let mut corners = Vec::with_capacity(3 * count as usize);
+    for (triangle, vertices) in (0..count).zip(&topology.triangles) {
+        let own = facing[triangle as usize];
+        for &vertex in vertices {
+            let smooth =
+                around[vertex as usize].iter().filter(|&&other| facing[other as usize].dot(own) > SMOOTH_COSINE);
+            let normal: DVec3 = smooth.map(|&other| spanned[other as usize]).sum();
+            corners.push(Corner {
+                position: topology.positions[vertex as usize].as_vec3().to_array(),
+                normal: normal.normalize_or(own).as_vec3().to_array(),
+            });
+        }
+    }
+    (corners, (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
+}

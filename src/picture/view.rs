@@ -1,0 +1,253 @@
+//! From where a body is seen, and how several views stand side by side at one scale.
+
+use std::str::FromStr;
+
+use glam::{DVec3, Mat4, Vec3};
+
+use crate::backend::gpu::raster::Eye;
+use crate::error::{Error, Result, nearest};
+
+/// Pixels around each view.
+const MARGIN: f64 = 14.0;
+/// Pixels above a view for its name.
+pub(super) const CAPTION: f64 = 26.0;
+/// A side that sees less than this part of what the best one sees shows nothing worth a picture.
+const LEAST_SEEN: f64 = 0.02;
+
+/// A side of a body. A body stands upright, +y up, and looks along +z; its left is +x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// From +z.
+    Front,
+    /// From −z.
+    Back,
+    /// From +x.
+    Left,
+    /// From −x.
+    Right,
+    /// From +y, its front below.
+    Top,
+    /// From −y, its front above.
+    Bottom,
+    /// From the front, its left, and above.
+    ThreeQuarter,
+}
+
+impl View {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Front, Self::Back, Self::Left, Self::Right, Self::Top, Self::Bottom, Self::ThreeQuarter];
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Front => "front",
+            Self::Back => "back",
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Top => "top",
+            Self::Bottom => "bottom",
+            Self::ThreeQuarter => "three-quarter",
+        }
+    }
+
+    /// Unit vectors of its eye: to the right, up, and towards it.
+    pub(super) fn axes(self) -> [DVec3; 3] {
+        let (towards, up) = match self {
+            Self::Front => (DVec3::Z, DVec3::Y),
+            Self::Back => (DVec3::NEG_Z, DVec3::Y),
+            Self::Left => (DVec3::X, DVec3::Y),
+            Self::Right => (DVec3::NEG_X, DVec3::Y),
+            Self::Top => (DVec3::Y, DVec3::NEG_Z),
+            Self::Bottom => (DVec3::NEG_Y, DVec3::Z),
+            Self::ThreeQuarter => (DVec3::new(0.6, 0.5, 0.8).normalize(), DVec3::Y),
+        };
+        let right = up.cross(towards).normalize();
+        [right, towards.cross(right), towards]
+    }
+
+    /// The four sides from which most of the taxels with these normals are seen, fewer where fewer see any; and from
+    /// the front, left and above where that leaves room. Without taxels, front, back, left and right.
+    pub(super) fn best(normals: &[DVec3]) -> Vec<Self> {
+        let seen = |view: Self| -> f64 {
+            let towards = view.axes()[2];
+            normals.iter().map(|normal| normal.dot(towards).max(0.0)).sum()
+        };
+        let mut sides: Vec<(f64, Self)> = Self::ALL[..6].iter().map(|&view| (seen(view), view)).collect();
+        sides.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let most = sides[0].0;
+        if most == 0.0 {
+            return Self::ALL[..4].to_vec();
+        }
+        let best: Vec<Self> =
+            sides[..4].iter().filter(|(seen, _)| *seen > LEAST_SEEN * most).map(|&(_, view)| view).collect();
+        let room = best.len() < 4;
+        Self::ALL.into_iter().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
+    }
+}
+
+impl FromStr for View {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let names = || Self::ALL.iter().map(|view| view.name());
+        Self::ALL.into_iter().find(|view| view.name() == text).ok_or_else(|| {
+            let hint = nearest(text, names()).map_or_else(
+                || format!("there are {} and all", names().collect::<Vec<_>>().join(", ")),
+                |near| format!("did you mean `{near}`?"),
+            );
+            Error::usage(format!("`{text}` is no view: {hint}"))
+        })
+    }
+}
+
+/// One view's place in the picture.
+pub(super) struct Placed {
+    pub(super) axes: [DVec3; 3],
+    /// Left, top, width and height, pixels.
+    pub(super) part: [u32; 4],
+    /// The middle of what it shows, along its axes, m.
+    middle: [f64; 2],
+}
+
+/// Views at one scale.
+pub(super) struct Arrangement {
+    pub(super) views: Vec<Placed>,
+    /// Pixels a metre.
+    pub(super) scale: f64,
+    /// Rows of pixels that they take.
+    pub(super) height: u32,
+}
+
+impl Arrangement {
+    /// Arranges `views` of `points` (in m, about their middle) in rows within `width` × `height` pixels, as large as they
+    /// can be; the first row starts at `top`.
+    pub(super) fn of(views: &[[DVec3; 3]], points: &[DVec3], [width, height]: [u32; 2], top: u32) -> Self {
+        let spans: Vec<[[f64; 2]; 2]> =
+            views.iter().map(|axes| [span(points, axes[0]), span(points, axes[1])]).collect();
+        let sizes: Vec<[f64; 2]> = spans.iter().map(|span| span.map(|[low, high]| high - low)).collect();
+        let largest = |sizes: &[[f64; 2]], side: usize| sizes.iter().map(|size| size[side]).fold(0.0, f64::max);
+        // Per number of columns: the columns' widths and the rows' heights, m, and the scale.
+        let arranged = (1..=views.len()).map(|columns| {
+            let widths: Vec<f64> = (0..columns)
+                .map(|column| sizes.iter().skip(column).step_by(columns).map(|size| size[0]).fold(0.0, f64::max))
+                .collect();
+            let heights: Vec<f64> = sizes.chunks(columns).map(|row| largest(row, 1)).collect();
+            let room = |pixels: u32, count: usize, each: f64| (f64::from(pixels) - count as f64 * each).max(1.0);
+            let across = room(width, columns, 2.0 * MARGIN) / widths.iter().sum::<f64>();
+            let down = room(height, heights.len(), 2.0 * MARGIN + CAPTION) / heights.iter().sum::<f64>();
+            (across.min(down), widths, heights)
+        });
+        let best = arranged.max_by(|a, b| a.0.total_cmp(&b.0));
+        let (scale, widths, heights) = best.unwrap_or((1.0, Vec::new(), Vec::new()));
+        let scale = if scale.is_finite() { scale } else { 1.0 };
+        let used: f64 = widths.iter().map(|w| w * scale + 2.0 * MARGIN).sum();
+        let left = ((f64::from(width) - used) / 2.0).max(0.0);
+        let mut placed = Vec::with_capacity(views.len());
+        let mut y = f64::from(top);
+        for (row, &tall) in heights.iter().enumerate() {
+            let mut x = left;
+            for (column, &wide) in widths.iter().enumerate() {
+                let Some(axes) = views.get(row * widths.len() + column) else { break };
+                let [across, up] = spans[row * widths.len() + column];
+                let size = [wide * scale + 2.0 * MARGIN, tall * scale + 2.0 * MARGIN];
+                placed.push(Placed {
+                    axes: *axes,
+                    part: [x, y + CAPTION, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),
+                    middle: [(across[0] + across[1]) / 2.0, (up[0] + up[1]) / 2.0],
+                });
+                x += size[0];
+            }
+            y += tall * scale + 2.0 * MARGIN + CAPTION;
+        }
+        // Rounding may take a part over the edge by one.
+        for Placed { part, .. } in &mut placed {
+            part[2] = part[2].min(width.saturating_sub(part[0])).max(1);
+        }
+        Self { views: placed, scale, height: (y - f64::from(top)).ceil() as u32 }
+    }
+
+    /// Where `point` (in m, about the middle) is seen in view `index`: right and down from the top left, pixels.
+    pub(super) fn pixel(&self, index: usize, point: DVec3) -> [f64; 2] {
+        let view = &self.views[index];
+        let [left, top, width, height] = view.part.map(f64::from);
+        let [x, y] = [0, 1].map(|axis| (point.dot(view.axes[axis]) - view.middle[axis]) * self.scale);
+        [left + width / 2.0 + x, top + height / 2.0 - y]
+    }
+
+    /// The eyes for the device. `radius_m` reaches around all that is drawn.
+    pub(super) fn eyes(&self, radius_m: f64) -> Vec<Eye> {
+        let eye = |view: &Placed| {
+            let [right, up, towards] = view.axes;
+            let [_, _, width, height] = view.part.map(f64::from);
+            let (across, down) = (2.0 * self.scale / width, 2.0 * self.scale / height);
+            let depth = -0.5 / radius_m;
+            // Rows of the matrix: what each clip coordinate takes from x, y and z, and its offset.
+            let rows = [
+                (right * across, -view.middle[0] * across),
+                (up * down, -view.middle[1] * down),
+                (towards * depth, 0.5),
+                (DVec3::ZERO, 1.0),
+            ];
+            let rows = rows.map(|(row, offset)| row.as_vec3().extend(offset as f32));
+            Eye {
+                clip_from_world: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
+                axes: view.axes.map(|axis| Vec3::from_array(axis.as_vec3().to_array())),
+                part: view.part,
+            }
+        };
+        self.views.iter().map(eye).collect()
+    }
+}
+
+/// How far `points` reach along `axis`, m; at least a nanometre, so that one point has a scale.
+fn span(points: &[DVec3], axis: DVec3) -> [f64; 2] {
+    let along = points.iter().map(|p| p.dot(axis));
+    let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    if low <= high { [low - 5e-10, high + 5e-10] } else { [-5e-10, 5e-10] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_eye_sees_right_up_and_near_where_they_are() {
+        for view in View::ALL {
+            let [right, up, towards] = view.axes();
+            assert!((right.cross(up) - towards).length() < 1e-15, "{view:?}");
+            assert_eq!(view.name().parse::<View>().unwrap(), view);
+        }
+        assert_eq!(View::Front.axes()[0], DVec3::X);
+        assert_eq!(View::Left.axes()[0], DVec3::NEG_Z, "from its left it looks to the left");
+        assert!("frnt".parse::<View>().unwrap_err().to_string().contains("did you mean `front`"));
+    }
+
+    #[test]
+    fn sides_that_see_nothing_are_left_out() {
+        assert_eq!(View::best(&[DVec3::Y; 9]), [View::Top, View::ThreeQuarter]);
+        assert_eq!(View::best(&[]), View::ALL[..4]);
+        let round: Vec<DVec3> = [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].into();
+        assert_eq!(View::best(&round), View::ALL[..4]);
+    }
+
+    #[test]
+    fn views_lie_within_the_picture_and_show_all_points() {
+        let points: Vec<DVec3> =
+            (0..64).map(|i| DVec3::new(f64::from(i % 4), f64::from(i / 4 % 4) * 3.0, 7.0)).collect();
+        for count in 1..=7 {
+            let views: Vec<_> = View::ALL[..count].iter().map(|view| view.axes()).collect();
+            let arrangement = Arrangement::of(&views, &points, [900, 700], 40);
+            assert!(arrangement.height <= 701);
+            for (eye, placed) in arrangement.eyes(20.0).iter().zip(&arrangement.views) {
+                let [left, top, width, height] = placed.part;
+                assert!(left + width <= 900 && top >= 40 && top + height <= 742, "{:?}", placed.part);
+                for point in &points {
+                    let seen = eye.clip_from_world.project_point3(point.as_vec3());
+                    assert!(seen.x.abs() < 1.0 && seen.y.abs() < 1.0 && (0.0..1.0).contains(&seen.z), "{seen}");
+                }
+            }
+        }
+    }
+}

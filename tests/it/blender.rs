@@ -1,0 +1,289 @@
+//! Bodies taken through a real Blender and back, untouched and edited. `tests/blender/run` sets it up; without it, in
+//! `SOMATIC_BLENDER`, this is skipped, loudly.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use somatic::Body;
+use somatic::author::{FindingKind, lint, refresh};
+use somatic::body::{FieldSpec, MemberSpec};
+use somatic::field::FieldSet;
+use tempfile::TempDir;
+
+use crate::lint::{Plate, kinds};
+
+/// Positions are current within this, m, and directions within this, rad; `docs/layout.md` has them.
+const NEAR_M: f64 = 1e-6;
+const NEAR_RAD: f64 = 1e-5;
+
+/// The Pythons that have a `bpy`, each with another Blender.
+fn blenders() -> Vec<PathBuf> {
+    let Some(list) = std::env::var_os("SOMATIC_BLENDER") else {
+        eprintln!("SKIPPED: no Blender; tests/blender/run installs one and runs this");
+        return Vec::new();
+    };
+    std::env::split_paths(&list).collect()
+}
+
+fn bundled(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("bodies").join(name)
+}
+
+/// The file that Blender writes of `source` after `edit`, with the folder that it is in.
+fn through(python: &Path, source: &Path, edit: &[&str]) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("back.glb");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/blender/edit.py");
+    let output = Command::new(python).arg(script).args([source, &target]).args(edit).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{edit:?}: {said}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(said.lines().any(|line| line.starts_with("DID ")), "{edit:?}: {said}");
+    (folder, target)
+}
+
+fn edited(python: &Path, source: &Path, edit: &[&str]) -> Body {
+    let (_folder, target) = through(python, source, edit);
+    Body::load(&target).unwrap()
+}
+
+/// Asserts that both have the same links, taxels and fields, but for what editors round.
+fn assert_same(before: &Body, after: &Body) {
+    assert_eq!(before.findings, after.findings);
+    let links =
+        |body: &Body| body.links.iter().map(|link| link.name.clone()).collect::<std::collections::BTreeSet<_>>();
+    assert!(links(after).is_superset(&links(before)), "{:?}", links(after));
+    assert_same_taxels(before, after, &[]);
+    let fields = |body: &Body| {
+        let mut fields = body.fields.clone();
+        fields.sort_by(|a, b| a.name.cmp(&b.name));
+        fields
+    };
+    assert_eq!(fields(before), fields(after));
+}
+
+/// Asserts that both have the same taxels, except for those in `except`.
+fn assert_same_taxels(before: &Body, after: &Body, except: &[u32]) {
+    let kept = |body: &'_ Body| body.taxels.iter().filter(|t| !except.contains(&t.id)).cloned().collect::<Vec<_>>();
+    let (old, new) = (kept(before), kept(after));
+    assert_eq!(old.len(), new.len());
+    for (old, new) in old.iter().zip(&new) {
+        assert_eq!((old.id, old.modality), (new.id, new.modality));
+        assert_eq!(before.links[old.link].name, after.links[new.link].name, "taxel {}", old.id);
+        let moved = old.position_in_link.distance(new.position_in_link);
+        let turned = old.normal_in_link.cross(new.normal_in_link).length();
+        assert!(moved < NEAR_M && turned < NEAR_RAD, "taxel {}: {moved} m, {turned} rad", old.id);
+        assert!((old.area - new.area).abs() <= 1e-6 * old.area, "taxel {}", old.id);
+    }
+}
+
+/// What `somatic run` says of `recording` on `body`.
+fn percepts(body: &Path, recording: &Path) -> Option<String> {
+    let Some(command) = option_env!("CARGO_BIN_EXE_somatic") else {
+        eprintln!("SKIPPED: percepts are compared where the command is built");
+        return None;
+    };
+    let mut command = Command::new(command);
+    command.arg("run").arg("--body").arg(body).arg("--source").arg(recording);
+    let output = command.args(["--backend", "reference", "--all-fields", "--sink", "-"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+/// Asserts that two percepts of the same name are the same, numbers within `near`.
+fn assert_near(name: &str, a: &Value, b: &Value, near: f64) {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => {
+            assert_eq!(a.len(), b.len(), "{name}");
+            a.iter().zip(b).for_each(|(a, b)| assert_near(name, a, b, near));
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+            // Angles just under π and just over 0 are near each other too.
+            let off = (a - b).abs();
+            let off = if name == "orientation" || name == "axis" { off.min(std::f64::consts::PI - off) } else { off };
+            assert!(off <= near, "{name}: {a} and {b}");
+        }
+        _ => assert_eq!(a, b, "{name}"),
+    }
+}
+
+#[test]
+fn a_rigid_body_comes_back_with_the_same_percepts() {
+    for python in blenders() {
+        let source = bundled("hand.glb");
+        let (_folder, target) = through(&python, &source, &[]);
+        assert_same(&Body::load(&source).unwrap(), &Body::load(&target).unwrap());
+        let touch = bundled("touch.csv");
+        let (before, after) = (percepts(&source, &touch), percepts(&target, &touch));
+        assert!(before == after, "the hand's percepts are not the same to the byte");
+    }
+}
+
+#[test]
+fn a_skinned_body_comes_back_with_the_same_percepts() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("touch.csv");
+    let ids: Vec<String> = (0..960).map(|id| id.to_string()).collect();
+    let mut text = format!("t,{}\n", ids.join(","));
+    for frame in 0..40_u32 {
+        // A tenth of the skin, another in each frame, at pressures that repeat nowhere near.
+        let row = (0..960_u32).map(|id| match (id * 7919 + frame * 104_729) % 1009 {
+            low if low < 101 => (1 + (id * 31 + frame * 17) % 887).to_string(),
+            _ => "0".to_owned(),
+        });
+        text += &format!("{:.2},{}\n", f64::from(frame) * 0.02, row.collect::<Vec<_>>().join(","));
+    }
+    std::fs::write(&recording, text).unwrap();
+    for python in blenders() {
+        let source = bundled("humanoid.glb");
+        let (_folder, target) = through(&python, &source, &[]);
+        assert_same(&Body::load(&source).unwrap(), &Body::load(&target).unwrap());
+        let (Some(before), Some(after)) = (percepts(&source, &recording), percepts(&target, &recording)) else {
+            return;
+        };
+        let (mut compared, mut doubtful) = (0, 0);
+        assert_eq!(before.lines().count(), 40);
+        assert_eq!(before.lines().count(), after.lines().count());
+        for (before, after) in before.lines().zip(after.lines()) {
+            let [before, after] = [before, after].map(|line| serde_json::from_str::<Value>(line).unwrap());
+            let lists = [&before, &after].map(|frame| frame["fields"].as_array().unwrap());
+            assert_eq!(lists[0].len(), lists[1].len());
+            for (old, new) in lists[0].iter().zip(lists[1]) {
+                let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+                assert_eq!(keys(old), keys(new));
+                let tie = old["flags"].as_array().unwrap().contains(&"tie".into());
+                for (name, value) in old.as_object().unwrap() {
+                    // What is farthest may change where two are about as far: that is what the flag is for.
+                    if name == "orientation" && tie {
+                        doubtful += 1;
+                        continue;
+                    }
+                    let near = match name.as_str() {
+                        // Two places, 20 ms apart.
+                        "speed" | "radial_speed" => 2.0 * NEAR_M / 0.02,
+                        "displacement" | "distance" | "radial_distance" => 2.0 * NEAR_M,
+                        "centroid" | "position" => NEAR_M,
+                        "area" => 1e-6 * value.as_f64().unwrap(),
+                        _ => NEAR_RAD,
+                    };
+                    assert_near(name, value, &new[name], near);
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 10_000 && doubtful < compared / 100, "{compared} {doubtful}");
+    }
+}
+
+#[test]
+fn a_taxel_moved_in_blender_is_found_and_its_normal_worked_out_again() {
+    for python in blenders() {
+        // One on a finger, one on a skinned belly; the edit moves each by 3 mm along x.
+        for (file, id) in [("hand.glb", 36), ("humanoid.glb", 5)] {
+            let before = Body::load(bundled(file)).unwrap();
+            let mut after = edited(&python, &bundled(file), &["move", &id.to_string()]);
+            assert_same_taxels(&before, &after, &[id]);
+            let taxel = |body: &Body| body.taxels[body.taxel_index(id).unwrap()].clone();
+            let moved = taxel(&after).position_in_link.distance(taxel(&before).position_in_link);
+            assert!((moved - 0.003).abs() < NEAR_M, "{moved}");
+            let findings = lint(&after, &FieldSet::new(&after).unwrap().fields);
+            let stale: Vec<_> = findings.iter().filter(|f| f.kind == FindingKind::StaleNormal).collect();
+            assert_eq!(stale.iter().map(|f| &f.taxels[..]).collect::<Vec<_>>(), [[id]], "{findings:?}");
+            let notes = refresh(&mut after);
+            assert!(notes.iter().any(|note| note.contains("normals worked out again for 1 of")), "{notes:?}");
+            assert!(!kinds(&after).contains(&FindingKind::StaleNormal));
+        }
+    }
+}
+
+#[test]
+fn the_chart_of_a_taxel_moved_in_blender_is_laid_again() {
+    for python in blenders() {
+        let mut plate = Plate::flat();
+        plate.geodesic();
+        let folder = tempfile::tempdir().unwrap();
+        let source = folder.path().join("plate.glb");
+        plate.save(&source);
+        let before = Body::load(&source).unwrap();
+        assert_same(&before, &edited(&python, &source, &[]));
+        let mut after = edited(&python, &source, &["move", "42"]);
+        assert_eq!(kinds(&after), [FindingKind::StaleChart], "on a plane the normal stays");
+        assert_eq!(refresh(&mut after), ["field `plate` charted again"]);
+        let uv = |body: &Body, id: u32| body.fields[0].members[&id].uv.unwrap();
+        for id in 0..100 {
+            let ([u, v], [x, y]) = (uv(&after, id), uv(&before, id));
+            let moved = if id == 42 { 0.003 } else { 0.0 };
+            assert!((u - x - moved).abs() < NEAR_M && (v - y).abs() < NEAR_M, "taxel {id}");
+        }
+    }
+}
+
+#[test]
+fn taxels_deleted_and_duplicated_in_blender_are_told() {
+    for python in blenders() {
+        for file in ["hand.glb", "humanoid.glb"] {
+            let before = Body::load(bundled(file)).unwrap();
+            let after = edited(&python, &bundled(file), &["delete", "5"]);
+            assert_eq!(after.taxels.len() + 1, before.taxels.len());
+            assert_same_taxels(&before, &after, &[5]);
+            let holding = before.fields.iter().filter(|field| field.members.contains_key(&5)).count();
+            assert!(holding > 0 && after.findings.len() == holding, "{:?}", after.findings);
+            assert!(after.findings.iter().all(|finding| finding.contains("names taxel 5")));
+            assert!(FieldSet::new(&after).is_ok());
+
+            let after = edited(&python, &bundled(file), &["duplicate", "5"]);
+            let new = before.taxels.last().unwrap().id + 1;
+            assert_eq!(after.taxels.len(), before.taxels.len() + 1);
+            assert_same_taxels(&before, &after, &[new]);
+            let copy = &after.taxels[after.taxel_index(new).unwrap()];
+            let original = &after.taxels[after.taxel_index(5).unwrap()];
+            assert!((copy.position_in_link.distance(original.position_in_link) - 0.003).abs() < NEAR_M);
+            let [finding] = &after.findings[..] else { panic!("{:?}", after.findings) };
+            assert!(finding.contains(&format!("is now {new}")), "{finding}");
+        }
+    }
+}
+
+#[test]
+fn a_field_added_and_a_density_painted_in_blender_come_back() {
+    for python in blenders() {
+        let mut after = edited(&python, &bundled("hand.glb"), &["add_field", "4"]);
+        let new = after.fields.iter().position(|field| field.name == "new").unwrap();
+        let members = [(4, MemberSpec::default()), (5, MemberSpec { weight: 0.5, uv: None })].into();
+        assert_eq!(after.fields.remove(new), FieldSpec { name: "new".into(), members, ..FieldSpec::default() });
+        assert_same(&Body::load(bundled("hand.glb")).unwrap(), &after);
+
+        let (_folder, target) = through(&python, &bundled("hand.glb"), &["paint", "0"]);
+        assert_same(&Body::load(bundled("hand.glb")).unwrap(), &Body::load(&target).unwrap());
+        let bytes = std::fs::read(&target).unwrap();
+        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        let json: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+        let primitives = json["meshes"].as_array().unwrap().iter().map(|mesh| &mesh["primitives"][0]["attributes"]);
+        let densities: Vec<&Value> = primitives.filter_map(|attributes| attributes.get("_DENSITY")).collect();
+        assert_eq!(densities.len(), 5, "one a mesh");
+        for accessor in densities {
+            let accessor = &json["accessors"][accessor.as_u64().unwrap() as usize];
+            assert_eq!((&accessor["type"], &accessor["componentType"]), (&"SCALAR".into(), &5126.into()));
+        }
+    }
+}
+
+#[test]
+fn options_left_off_are_named() {
+    let cases: [(&str, &[&str]); 4] = [
+        ("without_export_attributes", &["export_attributes"]),
+        ("without_use_mesh_vertices", &["use_mesh_vertices"]),
+        ("without_export_extras", &["export_extras"]),
+        ("without", &["export_attributes", "use_mesh_vertices", "export_extras"]),
+    ];
+    for python in blenders() {
+        for file in ["hand.glb", "humanoid.glb"] {
+            for (edit, options) in cases {
+                let body = edited(&python, &bundled(file), &[edit]);
+                let finding = body.findings.first().unwrap_or_else(|| panic!("{file} {edit}: nothing is said"));
+                assert!(options.iter().all(|option| finding.contains(option)), "{file} {edit}: {finding}");
+            }
+        }
+    }
+}
