@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::Place;
-use super::source::{Fan, Source, Start, Wedge};
+use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result};
 
@@ -203,7 +203,7 @@ impl<'a> LogMap<'a> {
         let mut ways: Vec<Way> = Vec::new();
         for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
             let at = mix(wedge.corners, place.barycentric);
-            let angle_rad = wedge.base_rad + at.y.atan2(at.x);
+            let angle_rad = wedge.base_rad + angle(at);
             ways.push(Way { distance_m: at.length(), angle_rad, bend_rad: 0.0, is_straight: true });
         }
         let mut list = self.entering[place.triangle as usize];
@@ -232,7 +232,7 @@ impl<'a> LogMap<'a> {
         };
         let rival = ways.iter().filter(|way| way.is_straight && apart(way) > APART).min_by(shortest);
         let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
-        Some(Reached { uv: DVec2::from_angle(angle_rad) * distance_m, distance_m, bend_rad, rival })
+        Some(Reached { uv: towards(angle_rad) * distance_m, distance_m, bend_rad, rival })
     }
 
     /// The way through `window` to the unfolded point `to`.
@@ -247,7 +247,7 @@ impl<'a> LogMap<'a> {
             (to, 0.0)
         };
         let source = &self.sources[window.source as usize];
-        let own = window.base_rad + first.y.atan2(first.x);
+        let own = window.base_rad + angle(first);
         Way {
             distance_m: source.distance_m + first.length() + rest,
             angle_rad: if source.bends { source.angle_rad } else { own },
@@ -286,7 +286,7 @@ impl<'a> LogMap<'a> {
         for corner in (0..3).filter(|&corner| Some(corner) != wedge.apex) {
             let at = wedge.corners[corner as usize];
             let onward = wedge.corners[(corner as usize + 1) % 3] - at;
-            let own = wedge.base_rad + at.y.atan2(at.x);
+            let own = wedge.base_rad + angle(at);
             self.arrive(3 * wedge.triangle + corner, at, onward, source, own);
         }
     }
@@ -308,7 +308,7 @@ impl<'a> LogMap<'a> {
         let distance_m = from.distance_m + at.length();
         if distance_m < self.arrivals[vertex].distance_m * (1.0 - ROUNDING) {
             let angle_rad = if from.bends { from.angle_rad } else { own_rad };
-            let back_rad = onward.angle_to(-at);
+            let back_rad = angle(DVec2::new(onward.dot(-at), onward.perp_dot(-at)));
             self.arrivals[vertex] = Arrival { distance_m, angle_rad, bend_rad: from.bend(own_rad), edge, back_rad };
             self.wait(distance_m, Event::Vertex(vertex as u32));
         }
@@ -353,7 +353,7 @@ impl<'a> LogMap<'a> {
         let (right, left) = (next(window.edge), next(next(window.edge)));
         if right_of_a && left_of_b {
             let onward = p - third;
-            let own = window.base_rad + third.y.atan2(third.x);
+            let own = window.base_rad + angle(third);
             self.arrive(left, third, onward, window.source, own);
         }
         if left_of_b {
