@@ -19,10 +19,12 @@
 mod carry;
 mod crowd;
 mod grid;
+pub mod group;
 mod grow;
 mod place;
 pub(crate) mod random;
 mod scatter;
+pub mod words;
 
 use glam::DVec3;
 

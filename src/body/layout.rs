@@ -97,6 +97,16 @@ struct ChartJson {
 }
 
 impl FieldSpec {
+    /// The same field with `ids` among its own members, with weight 1 where they were not: what a parent needs that is to
+    /// chart what is below it.
+    #[must_use]
+    pub fn with_members(mut self, ids: impl IntoIterator<Item = u32>) -> Self {
+        for id in ids {
+            self.members.entry(id).or_default();
+        }
+        self
+    }
+
     /// The field in the JSON string `text`.
     pub(crate) fn from_json(text: &str) -> Result<Self> {
         let bad = |what: String| Error::failed(what);

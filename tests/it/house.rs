@@ -99,7 +99,7 @@ fn each_heavy_dependency_has_one_door() {
         ("comfy_table", "cli"),
         ("toml", "signal|source/simulated"),
         ("rayon", "backend/cpu|experiments|author/crowd.rs"),
-        ("globset", "scene"),
+        ("globset", "scene|author/words.rs"),
         ("fearless_simd", "backend/cpu"),
         ("plotters", "experiments/plot.rs"),
         ("png", "experiments/plot.rs"),

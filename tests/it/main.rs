@@ -8,6 +8,7 @@ mod draft;
 mod extremes;
 mod filter;
 mod geodesic;
+mod grouping;
 mod house;
 mod legal;
 mod letters;
