@@ -9,7 +9,7 @@ use super::distortion::Distortion;
 use super::geodesic::{LogMap, Place};
 use super::surfaces::Surfaces;
 use super::{NoChart, anchor_from_link};
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology};
 
 /// A way that bends by more than this at one point leads around something, 20°.
 const MOST_BEND: f64 = PI / 9.0;
@@ -72,16 +72,48 @@ impl<'a> Unroller<'a> {
 
         let asked = |of: fn(&ChartSpec) -> Option<[f64; 3]>| spec.chart.as_ref().and_then(of).map(DVec3::from_array);
         let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
+        let places: Vec<Place> = members.iter().copied().map(locate).collect::<Result<_, _>>()?;
+        let ids = taxels.iter().map(|&taxel| body.taxels[taxel].id).collect();
+        let patch = Patch { topology, members, places, ids, u: asked(|chart| chart.u_in_anchor) };
         let origin = asked(|chart| chart.origin_in_anchor);
-        let origin = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
+        let nearest = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
+        match patch.lay(spec, nearest) {
+            // The mean of what is bent lies off the surface, and what is nearest to it there may be another part.
+            Err(why) if origin.is_none() => patch.lay(spec, patch.middle(mean)).map_err(|_| why),
+            laid => laid,
+        }
+    }
+}
+
+/// Members on a surface.
+struct Patch<'a> {
+    topology: &'a Topology,
+    /// Per member its position and normal.
+    members: Vec<(DVec3, DVec3)>,
+    places: Vec<Place>,
+    ids: Vec<u32>,
+    /// The direction of +u that is asked for.
+    u: Option<DVec3>,
+}
+
+impl Patch<'_> {
+    /// The place of the member nearest to `mean` among those that face as all do.
+    fn middle(&self, mean: DVec3) -> Place {
+        let facing = self.members.iter().map(|(_, normal)| *normal).sum::<DVec3>().normalize_or_zero();
+        let off = |i: usize| self.members[i].0.distance(mean) * (2.0 - self.members[i].1.dot(facing));
+        let middle = (0..self.members.len()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
+        self.places[middle.unwrap_or(0)]
+    }
+
+    /// `spec` with a geodesic chart around `origin`.
+    fn lay(&self, spec: &FieldSpec, origin: Place) -> Result<FieldSpec, NoChart> {
+        let Self { topology, members, places, ids, u } = self;
         let [a, b, c] = topology.corners(origin.triangle);
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
-        let [u, ..] = frame(normal, asked(|chart| chart.u_in_anchor));
-
-        let places: Vec<Place> = members.iter().copied().map(locate).collect::<Result<_, _>>()?;
+        let [u, ..] = frame(normal, *u);
         let part = |place: &Place| topology.part[place.triangle as usize];
         let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
-        let id = |i: usize| body.taxels[taxels[i]].id;
+        let id = |i: usize| ids[i];
         if let Some(&first) = beyond.first() {
             return Err(NoChart::Unreachable(id(first), beyond.len()));
         }
@@ -103,7 +135,7 @@ impl<'a> Unroller<'a> {
         };
         let ways: Vec<_> = reached.into_iter().flatten().collect();
         let uv: Vec<DVec2> = ways.iter().map(|way| way.uv).collect();
-        let distortion = Distortion::of(&members, &uv);
+        let distortion = Distortion::of(members, &uv);
         let nearest = |i: usize| {
             let others = members.iter().map(|(position, _)| position.distance(members[i].0)).filter(|&d| d > 0.0);
             others.fold(f64::INFINITY, f64::min)

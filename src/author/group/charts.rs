@@ -13,8 +13,14 @@ use crate::field::{Chart, FieldSet, NoChart, unions};
 /// around a cylinder that far is off by under 2 % of the field's radius.
 pub const FLAT: f64 = 0.05;
 
-/// Parts that a field is split into at most.
-const MOST_PARTS: usize = 24;
+/// Numbers of parts that a field is split into, as they are tried.
+const PARTS: [usize; 10] = [2, 3, 4, 5, 6, 8, 10, 13, 17, 22];
+
+/// The last of them.
+const MOST_PARTS: usize = PARTS[PARTS.len() - 1];
+
+/// Rounds in which the patches of a split find their middles.
+const SPLIT_ROUNDS: usize = 4;
 
 /// Parts that are tried where a split is only to be proposed.
 const MOST_PROPOSED: usize = 6;
@@ -122,16 +128,17 @@ impl Grower<'_> {
         let taxels: Vec<usize> = whole.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
         let notes = self.notes.len();
         let mut found = None;
-        'counts: for count in 2..=most.min(taxels.len()) {
-            let shells = self.sectors(&taxels, count);
-            for parts in [shells, self.patches(&taxels, count)] {
-                if parts.len() < 2 || parts.len() > most {
-                    continue;
-                }
-                found = self.fit_all(made, whole, bare, parts);
-                if found.is_some() {
-                    break 'counts;
-                }
+        let fits = |parts: &Vec<Vec<usize>>| (2..=most).contains(&parts.len());
+        for count in PARTS.into_iter().filter(|&count| count <= most.min(taxels.len())) {
+            let sectors = Some(self.sectors(&taxels, count)).filter(fits);
+            found = sectors.and_then(|parts| self.fit_all(made, whole, bare, parts));
+            if found.is_some() {
+                break;
+            }
+            let patches = Some(self.patches(&taxels, count, SPLIT_ROUNDS)).filter(fits);
+            found = patches.and_then(|parts| self.fit_all(made, whole, bare, parts));
+            if found.is_some() {
+                break;
             }
         }
         self.notes.truncate(notes);

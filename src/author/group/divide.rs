@@ -11,6 +11,9 @@ use super::ways::Ways;
 use crate::error::{Error, Result};
 use crate::field::unions;
 
+/// Rounds after which patches are left as they are.
+const MOST_ROUNDS: usize = 12;
+
 /// Children by name, each with indices of its taxels in their body.
 type Children = Vec<(String, Vec<usize>)>;
 
@@ -38,7 +41,7 @@ impl Grower<'_> {
                 Patches::Number(number) => number,
                 Patches::Of { of } => chosen.len().div_ceil(of),
             };
-            let patches = self.patches(chosen, count);
+            let patches = self.patches(chosen, count, MOST_ROUNDS);
             if patches.len() != count && matches!(wanted, Patches::Number(_)) {
                 let what = self.call(rule);
                 self.notes.push(format!(
@@ -83,9 +86,9 @@ impl Grower<'_> {
     }
 
     /// `chosen` in `count` patches, or more where they are on more links or parts, by their lowest ids.
-    pub(super) fn patches(&mut self, chosen: &[usize], count: usize) -> Vec<Vec<usize>> {
+    pub(super) fn patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
         let mut links = self.ways(chosen);
-        let patches = patches(&mut links, count);
+        let patches = patches(&mut links, count, most_rounds);
         self.tell_rough(&links);
         let taxels = |(link, patch): (usize, Vec<usize>)| patch.into_iter().map(|i| links[link].taxels[i]).collect();
         let mut patches: Vec<Vec<usize>> = patches.into_iter().map(taxels).collect();
@@ -128,15 +131,18 @@ impl Grower<'_> {
         let mut discs = Vec::new();
         for (number, seed) in seeds.iter().enumerate() {
             let (link, nearest, at) = self.settle_seed(seed, &links);
-            let ways = &mut links[link];
             let radius_m = match radius_m {
                 Some(radius_m) => radius_m,
                 None => {
                     let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
-                    let all = from(ways, nearest, at, &mut self.unroller, f64::INFINITY);
+                    let all: Vec<f64> = links[link].to_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
+                    let ways = &links[link];
                     let distance = |&other: &usize| match seeds[other] {
                         Seed::Taxel(taxel) => ways.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
-                        Seed::Point(_) => None,
+                        // Points stand for the taxels that are nearest to them.
+                        Seed::Point(_) => Some(self.settle_seed(&seeds[other], &links))
+                            .filter(|&(on, ..)| on == link)
+                            .map(|(_, i, _)| all[i]),
                     };
                     let least = others.iter().filter_map(distance).filter(|&d| d > 0.0).fold(f64::INFINITY, f64::min);
                     if least == f64::INFINITY {
@@ -148,6 +154,7 @@ impl Grower<'_> {
                     least / (2.0 * (1.0 - rule.overlap.unwrap_or(0.0)))
                 }
             };
+            let ways = &mut links[link];
             let reached = from(ways, nearest, at, &mut self.unroller, radius_m);
             let disc: Vec<usize> = (0..ways.len()).filter(|&i| reached[i] <= radius_m).map(|i| ways.taxels[i]).collect();
             if disc.is_empty() {

@@ -4,9 +4,6 @@ use glam::DVec2;
 
 use super::ways::{Reach, Ways};
 
-/// Rounds after which patches are left as they are.
-const MOST_ROUNDS: usize = 12;
-
 /// How often ways are followed twice as far because a taxel was not reached.
 const MOST_RAISED: u32 = 8;
 
@@ -35,8 +32,9 @@ impl Seeding {
     /// Takes the farthest taxel for a seed. On a part of the surface that has none yet, it is one at its rim.
     fn add(&mut self, ways: &mut Ways) {
         let (mut seed, limit_m) = self.farthest();
-        if limit_m == f64::INFINITY {
-            let from_here = ways.from(seed, f64::INFINITY);
+        let is_first = limit_m == f64::INFINITY;
+        if is_first {
+            let from_here = ways.to_all(seed);
             let finite = |reach: &&(usize, &Reach)| reach.1.distance_m < f64::INFINITY;
             let rim = from_here.iter().enumerate();
             let rim = rim.filter(|r| finite(&r)).max_by(|a, b| {
@@ -44,7 +42,7 @@ impl Seeding {
             });
             seed = rim.map_or(seed, |(i, _)| i);
         }
-        let reached = ways.from(seed, limit_m);
+        let reached = if is_first { ways.to_all(seed) } else { ways.from(seed, limit_m) };
         for (nearest, reach) in self.nearest_m.iter_mut().zip(&reached) {
             *nearest = nearest.min(reach.distance_m);
         }
@@ -56,8 +54,8 @@ impl Seeding {
 /// list of indices into its link's taxels. Patches keep to one link and one connected part.
 ///
 /// Seeds are taken each as far along the surface as possible from those before it (Gonzalez 1985), then moved to the middles
-/// of what is nearest to them until they rest (Lloyd).
-pub(super) fn patches(links: &mut [Ways], count: usize) -> Vec<(usize, Vec<usize>)> {
+/// of what is nearest to them (Lloyd) until they rest, or `most_rounds` times.
+pub(super) fn patches(links: &mut [Ways], count: usize, most_rounds: usize) -> Vec<(usize, Vec<usize>)> {
     let mut seedings: Vec<Seeding> = links.iter().map(Seeding::new).collect();
     let mut taken = 0;
     loop {
@@ -74,20 +72,20 @@ pub(super) fn patches(links: &mut [Ways], count: usize) -> Vec<(usize, Vec<usize
     }
     let mut patches = Vec::new();
     for (link, (ways, seeding)) in links.iter_mut().zip(seedings).enumerate() {
-        patches.extend(settle(ways, seeding).into_iter().map(|patch| (link, patch)));
+        patches.extend(settle(ways, seeding, most_rounds).into_iter().map(|patch| (link, patch)));
     }
     patches
 }
 
 /// Lloyd's iteration from `seeding`.
-fn settle(ways: &mut Ways, seeding: Seeding) -> Vec<Vec<usize>> {
+fn settle(ways: &mut Ways, seeding: Seeding, most_rounds: usize) -> Vec<Vec<usize>> {
     let Seeding { mut seeds, nearest_m } = seeding;
     if seeds.len() < 2 {
         return if ways.len() == 0 { Vec::new() } else { vec![(0..ways.len()).collect()] };
     }
     let mut limit_m = nearest_m.iter().copied().fold(0.0, f64::max);
     let mut patches = Vec::new();
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..most_rounds.max(1) {
         let (maps, widest_m);
         (patches, maps, widest_m) = assign(ways, &seeds, limit_m);
         let moved: Vec<usize> =

@@ -18,6 +18,13 @@ const BESIDE: f64 = 2.0;
 /// Taxels on one triangle that each of them is joined with in a net.
 const ON_TRIANGLE: usize = 8;
 
+/// The first ways followed to all taxels are as long as around half a circle whose diameter is the straight distance to the
+/// farthest, and a bit.
+const FIRST_REACH: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
+
+/// How often they are followed twice as far before it is as far as they lead.
+const MOST_DOUBLINGS: u32 = 4;
+
 /// What a way leads to: its length in m, infinite where there is none within the limit, and (u, v) about where it starts,
 /// m, where that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +44,7 @@ pub(super) struct Ways {
     skin: Rc<Skin>,
     places: Vec<Place>,
     /// The length from which exact ways have proved too many.
-    too_long_m: f64,
+    too_long_m: Option<f64>,
     net: Option<Vec<Vec<(u32, f64)>>>,
 }
 
@@ -45,7 +52,7 @@ impl Ways {
     /// Ways over `skin` between `taxels` at `points` (position, normal).
     pub(super) fn new(skin: Rc<Skin>, taxels: Vec<usize>, points: Vec<(DVec3, DVec3)>) -> Self {
         let places: Vec<Place> = points.iter().filter_map(|&(p, normal)| skin.locate(p, normal)).collect();
-        Self { taxels, points, skin, places, too_long_m: f64::INFINITY, net: None }
+        Self { taxels, points, skin, places, too_long_m: None, net: None }
     }
 
     /// How many taxels there are.
@@ -68,9 +75,26 @@ impl Ways {
         reached
     }
 
+    /// Ways from taxel `from` to all that a way leads to.
+    pub(super) fn to_all(&mut self, from: usize) -> Vec<Reach> {
+        let Some(start) = self.places.get(from) else { return self.from(from, f64::INFINITY) };
+        let part = |place: &Place| self.skin.topology.part[place.triangle as usize];
+        let same: Vec<usize> = (0..self.places.len()).filter(|&i| part(&self.places[i]) == part(start)).collect();
+        let apart = same.iter().map(|&i| self.points[i].0.distance(self.points[from].0));
+        let mut limit_m = FIRST_REACH * apart.fold(0.0, f64::max);
+        for _ in 0..MOST_DOUBLINGS {
+            let reached = self.from(from, limit_m);
+            if same.iter().all(|&i| reached[i].distance_m < f64::INFINITY) {
+                return reached;
+            }
+            limit_m *= 2.0;
+        }
+        self.from(from, f64::INFINITY)
+    }
+
     /// Ways from `place`, or in a net from taxel `nearest`, to all, up to `limit_m`.
     pub(super) fn from_place(&mut self, place: &Place, nearest: usize, limit_m: f64) -> Vec<Reach> {
-        if limit_m < self.too_long_m {
+        if self.too_long_m.is_none_or(|too_long_m| limit_m < too_long_m) {
             match LogMap::new(&self.skin.topology, *place, DVec3::X, limit_m) {
                 Ok(map) => {
                     let reach = |to: &Place| match map.reach(to) {
@@ -81,7 +105,7 @@ impl Ways {
                     };
                     return self.places.iter().map(reach).collect();
                 }
-                Err(_) => self.too_long_m = limit_m,
+                Err(_) => self.too_long_m = Some(limit_m),
             }
         }
         self.over_net(nearest, limit_m)
