@@ -149,7 +149,7 @@ fn patches_go_by_the_way_over_the_surface() {
         assert!(!spans(&ids(patch)), "{} is on both prongs", patch.name);
         // A fifth of all, more or less.
         let share = patch.members.len() as f64 / fork.taxels.len() as f64;
-        assert!((0.12..0.3).contains(&share), "{}: {share}", patch.name);
+        assert!((0.1..0.35).contains(&share), "{}: {share}", patch.name);
     }
     let held: usize = grouping.fields[1..].iter().map(|patch| patch.members.len()).sum();
     assert_eq!(held, fork.taxels.len());
@@ -201,7 +201,7 @@ fn discs_hold_what_is_within_their_radius_and_overlap_as_asked() {
     let held: BTreeSet<u32> = grouping.fields.iter().flat_map(ids).collect();
     assert_eq!(held.len(), sheet.taxels.len());
     let members: usize = grouping.fields[1..].iter().map(|disc| disc.members.len()).sum();
-    assert!(members > sheet.taxels.len() * 3 / 2, "discs overlap: {members} memberships");
+    assert!(members > sheet.taxels.len() * 5 / 4, "discs overlap: {members} memberships");
     let apart = grouped(&sheet, "[[fields]]\nradius = \"12 mm\"\noverlap = 0").unwrap();
     assert!(apart.fields.len() * 2 < grouping.fields.len());
     assert!(apart.notes[0].contains("in no disc"), "{:?}", apart.notes);

@@ -54,17 +54,17 @@ impl Window {
     }
 }
 
-enum Event {
-    Window(Window),
-    Vertex(u32),
-}
-
+/// What waits its turn: sixteen bytes, as a queue of whole windows takes most of the time to keep in order.
 struct Waiting {
     distance_m: f64,
     /// Makes the order total and the same on every machine.
-    turn: u64,
-    event: Event,
+    turn: u32,
+    /// Index of a window; or with [`VERTEX`] set, of a vertex.
+    what: u32,
 }
+
+/// Marks what waits as a vertex.
+const VERTEX: u32 = 1 << 31;
 
 impl Ord for Waiting {
     fn cmp(&self, other: &Self) -> Ordering {
@@ -139,11 +139,13 @@ pub struct LogMap<'a> {
     limit_m: f64,
     sources: Vec<Source>,
     arrivals: Vec<Arrival>,
+    /// All that were ever put on the queue, followed or not.
     windows: Vec<Window>,
+    followed: usize,
     /// Per triangle the last of the windows that enter it.
     entering: Vec<u32>,
     queue: BinaryHeap<Waiting>,
-    turn: u64,
+    turn: u32,
 }
 
 impl<'a> LogMap<'a> {
@@ -165,6 +167,7 @@ impl<'a> LogMap<'a> {
             sources: vec![source],
             arrivals: vec![UNKNOWN; topology.positions.len()],
             windows: Vec::new(),
+            followed: 0,
             entering: vec![NONE; topology.triangles.len()],
             queue: BinaryHeap::new(),
             turn: 0,
@@ -176,9 +179,9 @@ impl<'a> LogMap<'a> {
             map.leave(&wedge, 0);
         }
         while let Some(waiting) = map.queue.pop() {
-            match waiting.event {
-                Event::Window(window) => map.enter(window)?,
-                Event::Vertex(vertex) => map.bend_at(vertex, waiting.distance_m),
+            match waiting.what & VERTEX {
+                0 => map.enter(waiting.what)?,
+                _ => map.bend_at(waiting.what & !VERTEX, waiting.distance_m),
             }
         }
         Ok(map)
@@ -194,7 +197,7 @@ impl<'a> LogMap<'a> {
     /// How many windows were followed.
     #[must_use]
     pub fn windows(&self) -> usize {
-        self.windows.len()
+        self.followed
     }
 
     /// Where the shortest way to `place` leads; `None` beyond the limit, and on a part that the start is not on.
@@ -268,11 +271,9 @@ impl<'a> LogMap<'a> {
         p + along + (q - p).perp() * (edge.cross(far).length() / squared)
     }
 
-    fn wait(&mut self, distance_m: f64, event: Event) {
-        if distance_m <= self.limit_m {
-            self.turn += 1;
-            self.queue.push(Waiting { distance_m, turn: self.turn, event });
-        }
+    fn wait(&mut self, distance_m: f64, what: u32) {
+        self.turn += 1;
+        self.queue.push(Waiting { distance_m, turn: self.turn, what });
     }
 
     /// Lets lines start over `wedge` from source `source`.
@@ -298,7 +299,11 @@ impl<'a> LogMap<'a> {
             return;
         }
         let window = Window { edge: beyond, source, ends, part, base_rad, before: NONE };
-        self.wait(self.sources[source as usize].distance_m + window.nearest(), Event::Window(window));
+        let distance_m = self.sources[source as usize].distance_m + window.nearest();
+        if distance_m <= self.limit_m {
+            self.wait(distance_m, self.windows.len() as u32);
+            self.windows.push(window);
+        }
     }
 
     /// Notes the way from `source` to the vertex where `edge` starts, unfolded at `at`; `onward` is that edge, unfolded.
@@ -310,7 +315,9 @@ impl<'a> LogMap<'a> {
             let angle_rad = if from.bends { from.angle_rad } else { own_rad };
             let back_rad = angle(DVec2::new(onward.dot(-at), onward.perp_dot(-at)));
             self.arrivals[vertex] = Arrival { distance_m, angle_rad, bend_rad: from.bend(own_rad), edge, back_rad };
-            self.wait(distance_m, Event::Vertex(vertex as u32));
+            if distance_m <= self.limit_m {
+                self.wait(distance_m, vertex as u32 | VERTEX);
+            }
         }
     }
 
@@ -322,8 +329,9 @@ impl<'a> LogMap<'a> {
         known + unfolded.distance(end) < own * (1.0 - ROUNDING)
     }
 
-    /// Takes `window` into its triangle, and on to the two edges beyond.
-    fn enter(&mut self, mut window: Window) -> Result<()> {
+    /// Takes window `index` into its triangle, and on to the two edges beyond.
+    fn enter(&mut self, index: u32) -> Result<()> {
+        let window = self.windows[index as usize];
         let [p, q] = window.ends;
         // Any way through it is longer than one by way of an end of its edge (Xin and Wang 2009).
         if self.is_beaten(&window, window.part[1], window.edge, p)
@@ -331,15 +339,15 @@ impl<'a> LogMap<'a> {
         {
             return Ok(());
         }
-        if self.windows.len() == MOST_WINDOWS {
+        if self.followed == MOST_WINDOWS {
             return Err(Error::failed(format!(
                 "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
                 self.limit_m
             )));
         }
         let list = &mut self.entering[window.edge as usize / 3];
-        window.before = std::mem::replace(list, self.windows.len() as u32);
-        self.windows.push(window);
+        self.windows[index as usize].before = std::mem::replace(list, index);
+        self.followed += 1;
 
         let third = self.third(&window);
         let [a, b] = window.part.map(|t| window.at(t));
