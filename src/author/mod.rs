@@ -21,6 +21,7 @@ mod crowd;
 mod grid;
 pub mod group;
 mod grow;
+pub mod icub;
 mod place;
 pub(crate) mod random;
 mod scatter;

@@ -41,7 +41,9 @@ impl<'de> Deserialize<'de> for Length {
                     let number: f64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
                     Some(number / in_a_metre)
                 });
-                read.ok_or_else(|| E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)")))
+                read.ok_or_else(|| {
+                    E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)"))
+                })
             }
         }
         let metres = deserializer.deserialize_any(Reader)?;
@@ -163,10 +165,12 @@ mod tests {
 
     #[test]
     fn lengths_have_units_or_are_metres() {
-        for (text, metres) in [("8e-3", 8e-3), ("2", 2.0), ("\"8 mm\"", 8e-3), ("\" 2.5cm\"", 0.025), ("\"3 m\"", 3.0)] {
+        for (text, metres) in [("8e-3", 8e-3), ("2", 2.0), ("\"8 mm\"", 8e-3), ("\" 2.5cm\"", 0.025), ("\"3 m\"", 3.0)]
+        {
             assert_eq!(read(&format!("length = {text}")).unwrap().length.unwrap().metres, metres, "{text}");
         }
-        for (text, why) in [("\"8 feet\"", "8 feet"), ("0", "0 m"), ("-1.0", "-1 m"), ("nan", "NaN"), ("true", "a length")]
+        for (text, why) in
+            [("\"8 feet\"", "8 feet"), ("0", "0 m"), ("-1.0", "-1 m"), ("nan", "NaN"), ("true", "a length")]
         {
             assert!(read(&format!("length = {text}")).err().unwrap().contains(why), "{text}");
         }

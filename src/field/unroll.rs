@@ -79,7 +79,10 @@ impl<'a> Unroller<'a> {
         let nearest = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
         match patch.lay(spec, nearest) {
             // The mean of what is bent lies off the surface, and what is nearest to it there may be another part.
-            Err(why) if origin.is_none() => patch.lay(spec, patch.middle(mean)).map_err(|_| why),
+            Err(why) if origin.is_none() => patch.lay(spec, patch.middle(mean)).map_err(|other| match why {
+                NoChart::Unreachable(..) => other,
+                why => why,
+            }),
             laid => laid,
         }
     }

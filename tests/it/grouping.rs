@@ -191,7 +191,8 @@ fn discs_hold_what_is_within_their_radius_and_overlap_as_asked() {
     let point = DVec3::new(0.0313, 0.0, 0.0287);
     let text = format!("[[fields]]\nseeds = [[{}, 0.001, {}]]\nradius = 0.01", point.x, point.z);
     assert_eq!(ids(&grouped(&sheet, &text).unwrap().fields[0]), within(point, 0.01));
-    let middles = "[[fields]]\nname = \"a\"\ntaxels = [\"0..=19\"]\n[[fields]]\nname = \"b\"\nradius = 0.01\nseeds = \"a\"";
+    let middles =
+        "[[fields]]\nname = \"a\"\ntaxels = [\"0..=19\"]\n[[fields]]\nname = \"b\"\nradius = 0.01\nseeds = \"a\"";
     let grouping = grouped(&sheet, middles).unwrap();
     assert_eq!(ids(field(&grouping, "b/disc_01")), within(at(9), 0.01));
 
@@ -321,7 +322,8 @@ fn what_is_painted_on_a_mesh_chooses_its_taxels() {
     assert_eq!(field(&grouping, "plate").members.len(), 400);
     let why = group(&sheet, &paint, &rules("[[fields]]\nname = \"a\"\nmaterial = \"skim\"")).unwrap_err().to_string();
     assert!(why.contains("did you mean `skin`?"), "{why}");
-    let why = group(&sheet, &paint, &rules("[[fields]]\nname = \"a\"\nattribute = \"_SOFTT\"")).unwrap_err().to_string();
+    let why =
+        group(&sheet, &paint, &rules("[[fields]]\nname = \"a\"\nattribute = \"_SOFTT\"")).unwrap_err().to_string();
     assert!(why.contains("did you mean `_SOFT`?"), "{why}");
 }
 
@@ -434,7 +436,8 @@ fn rules_that_make_no_sense_are_named() {
     }
     let twice = why(&sheet, "[[fields]]\nname = \"a\"\n[[fields]]\nname = \"a\"");
     assert!(twice.contains("field rule 2") && twice.contains("there is one of that name"), "{twice}");
-    for text in ["nam = \"a\"", "chart = \"flat\"", "patches = \"many\"", "radius = \"3 feet\"", "taxels = [\"9..2\"]"] {
+    for text in ["nam = \"a\"", "chart = \"flat\"", "patches = \"many\"", "radius = \"3 feet\"", "taxels = [\"9..2\"]"]
+    {
         assert!(toml::from_str::<Recipe>(&format!("[[fields]]\n{text}")).is_err(), "{text}");
     }
 }
@@ -482,7 +485,13 @@ fn real_and_hostile_meshes_are_grouped_or_named() {
             }
             let patches = complete.fields.iter().filter(|field| field.name.starts_with("all/"));
             assert_eq!(patches.map(|field| field.members.len()).sum::<usize>(), 150);
-            eprintln!("{} link {link}: {} fields, {:?}\n  {}", path.display(), complete.fields.len(), began.elapsed(), grouping.notes.join("\n  "));
+            eprintln!(
+                "{} link {link}: {} fields, {:?}\n  {}",
+                path.display(),
+                complete.fields.len(),
+                began.elapsed(),
+                grouping.notes.join("\n  ")
+            );
             seen += 1;
         }
     }

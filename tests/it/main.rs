@@ -10,6 +10,7 @@ mod filter;
 mod geodesic;
 mod grouping;
 mod house;
+mod icub;
 mod legal;
 mod letters;
 mod meshes;

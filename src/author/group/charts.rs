@@ -13,17 +13,17 @@ use crate::field::{Chart, FieldSet, NoChart, unions};
 /// around a cylinder that far is off by under 2 % of the field's radius.
 pub const FLAT: f64 = 0.05;
 
-/// Numbers of parts that a field is split into, as they are tried.
-const PARTS: [usize; 10] = [2, 3, 4, 5, 6, 8, 10, 13, 17, 22];
+/// Sectors around a limb that are tried before it is cut across.
+const SECTORS: std::ops::RangeInclusive<usize> = 2..=4;
 
-/// The last of them.
-const MOST_PARTS: usize = PARTS[PARTS.len() - 1];
+/// Parts that a field is split into at most.
+const MOST_PARTS: usize = 64;
 
 /// Rounds in which the patches of a split find their middles.
 const SPLIT_ROUNDS: usize = 4;
 
 /// Parts that are tried where a split is only to be proposed.
-const MOST_PROPOSED: usize = 6;
+const MOST_PROPOSED: usize = 12;
 
 /// A field with the chart it gets, and the chart's distortion.
 type Fitted = std::result::Result<FieldSpec, NoChart>;
@@ -61,7 +61,10 @@ impl Grower<'_> {
             match made.wrap {
                 Wrap::Refuse => {
                     let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MOST_PROPOSED) };
-                    return Err(Error::failed(format!("field `{name}` {why}{}", advice(&why, parts.as_deref(), parent))));
+                    return Err(Error::failed(format!(
+                        "field `{name}` {why}{}",
+                        advice(&why, parts.as_deref(), parent)
+                    )));
                 }
                 Wrap::Split if !parent => {
                     fields.push(uncharted);
@@ -78,8 +81,7 @@ impl Grower<'_> {
                 _ => {
                     if !made.is_level {
                         let proposed = !parent && !matches!(why, NoChart::SeveralLinks(_) | NoChart::NoSurface);
-                        let parts =
-                            if proposed { self.split(&made, &whole, &mut bare, MOST_PROPOSED) } else { None };
+                        let parts = if proposed { self.split(&made, &whole, &mut bare, MOST_PROPOSED) } else { None };
                         let advice = advice(&why, parts.as_deref(), parent);
                         self.notes.push(format!("field `{name}` has no chart: {why}{advice}"));
                     }
@@ -122,51 +124,63 @@ impl Grower<'_> {
         }
     }
 
-    /// The fewest parts of `whole` that each have the chart that `made` asks for, if so many as `most` do; tried are compact
-    /// patches, and sectors around the limb.
+    /// Parts of `whole` that each have the chart that `made` asks for, at most `most`: the fewest sectors around a limb, or
+    /// else its two halves, and of each half that has no chart the same again.
     fn split(&mut self, made: &Made, whole: &FieldSpec, bare: &mut Body, most: usize) -> Option<Vec<FieldSpec>> {
         let taxels: Vec<usize> = whole.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
         let notes = self.notes.len();
-        let mut found = None;
-        let fits = |parts: &Vec<Vec<usize>>| (2..=most).contains(&parts.len());
-        for count in PARTS.into_iter().filter(|&count| count <= most.min(taxels.len())) {
-            let sectors = Some(self.sectors(&taxels, count)).filter(fits);
-            found = sectors.and_then(|parts| self.fit_all(made, whole, bare, parts));
-            if found.is_some() {
-                break;
-            }
-            let patches = Some(self.patches(&taxels, count, SPLIT_ROUNDS)).filter(fits);
-            found = patches.and_then(|parts| self.fit_all(made, whole, bare, parts));
-            if found.is_some() {
-                break;
-            }
-        }
+        let parts = self.parts(made, whole, bare, &taxels, most);
         self.notes.truncate(notes);
-        found
+        let mut parts = parts?;
+        parts.sort_by_key(|part| part.members.keys().next().copied());
+        let names = numbered("part", vec![Vec::new(); parts.len()]);
+        for (part, (name, _)) in parts.iter_mut().zip(names) {
+            part.name = format!("{}/{name}", whole.name);
+        }
+        Some(parts)
     }
 
-    /// `parts` as children of `whole`, if every one of them has its chart.
-    fn fit_all(
+    /// The parts that `taxels` of `whole` are split into, without their names.
+    fn parts(
         &mut self,
         made: &Made,
         whole: &FieldSpec,
         bare: &mut Body,
-        parts: Vec<Vec<usize>>,
+        taxels: &[usize],
+        most: usize,
     ) -> Option<Vec<FieldSpec>> {
-        let child = |(name, taxels): (String, Vec<usize>)| FieldSpec {
-            name: format!("{}/{name}", whole.name),
-            parent: Some(whole.name.clone()),
-            members: taxels
-                .iter()
-                .map(|&taxel| self.body.taxels[taxel].id)
-                .map(|id| (id, whole.members.get(&id).copied().unwrap_or_default()))
-                .collect(),
-            chart: None,
+        for count in SECTORS {
+            let sectors = self.sectors(taxels, count);
+            if sectors.len() > 1
+                && sectors.len() <= most
+                && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels)).collect()
+            {
+                return Some(parts);
+            }
+        }
+        let halves = self.patches(taxels, 2, SPLIT_ROUNDS);
+        let mut parts = Vec::new();
+        for half in &halves {
+            match self.part(made, whole, bare, half) {
+                Some(part) => parts.push(part),
+                None if halves.len() < 2 || parts.len() >= most => return None,
+                None => parts.extend(self.parts(made, whole, bare, half, most - parts.len())?),
+            }
+        }
+        (parts.len() <= most).then_some(parts)
+    }
+
+    /// The child of `whole` with `taxels`, if it has its chart.
+    fn part(&mut self, made: &Made, whole: &FieldSpec, bare: &mut Body, taxels: &[usize]) -> Option<FieldSpec> {
+        let member = |&taxel: &usize| {
+            let id = self.body.taxels[taxel].id;
+            (id, whole.members.get(&id).copied().unwrap_or_default())
         };
-        let parts: Vec<FieldSpec> = numbered("part", parts).into_iter().map(child).collect();
-        bare.fields = parts.iter().map(|part| planar(FieldSpec { parent: None, ..part.clone() }, made.u)).collect();
-        let planes = FieldSet::new(bare).ok()?.fields.into_iter().map(|field| field.chart);
-        parts.iter().zip(planes).map(|(part, plane)| self.fit(made, part, plane).ok()).collect()
+        let members = taxels.iter().map(member).collect();
+        let part = FieldSpec { name: whole.name.clone(), parent: Some(whole.name.clone()), members, chart: None };
+        bare.fields = vec![planar(FieldSpec { parent: None, ..part.clone() }, made.u)];
+        let plane = FieldSet::new(bare).ok()?.fields.pop()?.chart;
+        self.fit(made, &part, plane).ok()
     }
 
     /// `taxels` in `count` sectors by where their normals point around the axis that these are most across.

@@ -21,22 +21,29 @@ impl Grower<'_> {
         let mut chosen = among.to_vec();
         if let Some(lists) = &rule.taxels {
             let has = |id: u32| self.body.taxel_index(id).is_some();
-            let missing = lists.iter().find(|ids| !self.body.taxels.iter().any(|t| (ids.first..=ids.last).contains(&t.id)));
+            let missing =
+                lists.iter().find(|ids| !self.body.taxels.iter().any(|t| (ids.first..=ids.last).contains(&t.id)));
             if let Some(ids) = missing {
                 let (first, last) = (self.body.taxels.first(), self.body.taxels.last());
                 let span = match (first, last) {
                     (Some(first), Some(last)) => format!("its ids run from {} to {}", first.id, last.id),
                     _ => "it has none at all".into(),
                 };
-                let what = if ids.first == ids.last { format!("taxel {}", ids.first) } else { format!("taxel {}..={}", ids.first, ids.last) };
+                let what = if ids.first == ids.last {
+                    format!("taxel {}", ids.first)
+                } else {
+                    format!("taxel {}..={}", ids.first, ids.last)
+                };
                 return Err(Error::failed(format!("`taxels`: there is no {what} on this body; {span}")));
             }
-            let listed: BTreeSet<u32> = lists.iter().flat_map(|ids| (ids.first..=ids.last).filter(|&id| has(id))).collect();
+            let listed: BTreeSet<u32> =
+                lists.iter().flat_map(|ids| (ids.first..=ids.last).filter(|&id| has(id))).collect();
             chosen.retain(|&taxel| listed.contains(&self.body.taxels[taxel].id));
         }
         self.keep_modality(rule, &mut chosen)?;
         if let Some(globs) = &rule.link {
-            let carrying: BTreeSet<&str> = self.body.taxels.iter().map(|t| self.body.links[t.link].name.as_str()).collect();
+            let carrying: BTreeSet<&str> =
+                self.body.taxels.iter().map(|t| self.body.links[t.link].name.as_str()).collect();
             known("link", globs, "link that carries taxels", carrying.iter().copied())?;
             chosen.retain(|&taxel| globs.matches(&self.body.links[self.body.taxels[taxel].link].name));
         }

@@ -119,9 +119,9 @@ impl Grower<'_> {
             (Some(seeds), ..) => self.seeds(seeds, chosen)?,
             (None, Some(overlap), Some(radius_m)) => {
                 let apart_m = 2.0 * radius_m * (1.0 - overlap);
-                let spread = links.iter_mut().flat_map(|ways| {
-                    spread(ways, apart_m).into_iter().map(|i| ways.taxels[i]).collect::<Vec<_>>()
-                });
+                let spread = links
+                    .iter_mut()
+                    .flat_map(|ways| spread(ways, apart_m).into_iter().map(|i| ways.taxels[i]).collect::<Vec<_>>());
                 let mut taxels: Vec<usize> = spread.collect();
                 taxels.sort_unstable();
                 taxels.into_iter().map(Seed::Taxel).collect()
@@ -156,7 +156,8 @@ impl Grower<'_> {
             };
             let ways = &mut links[link];
             let reached = from(ways, nearest, at, &mut self.unroller, radius_m);
-            let disc: Vec<usize> = (0..ways.len()).filter(|&i| reached[i] <= radius_m).map(|i| ways.taxels[i]).collect();
+            let disc: Vec<usize> =
+                (0..ways.len()).filter(|&i| reached[i] <= radius_m).map(|i| ways.taxels[i]).collect();
             if disc.is_empty() {
                 return Err(Error::failed(format!(
                     "there is no taxel within {radius_m} m of seed {}; widen the `radius`, or move the seed",
@@ -177,10 +178,13 @@ impl Grower<'_> {
     /// The link of `links` that `seed` is on, the taxel there that is nearest to it, and its place where it is no taxel.
     fn settle_seed(&self, seed: &Seed, links: &[Ways]) -> (usize, usize, Option<(usize, DVec3)>) {
         let body = self.body;
-        let on = |p: DVec3, ways: &Ways| body.links[body.taxels[ways.taxels[0]].link].world_from_link.inverse().transform_point3(p);
+        let on = |p: DVec3, ways: &Ways| {
+            body.links[body.taxels[ways.taxels[0]].link].world_from_link.inverse().transform_point3(p)
+        };
         match *seed {
             Seed::Taxel(taxel) => {
-                let find = |(link, ways): (usize, &Ways)| Some((link, ways.taxels.iter().position(|&t| t == taxel)?, None));
+                let find =
+                    |(link, ways): (usize, &Ways)| Some((link, ways.taxels.iter().position(|&t| t == taxel)?, None));
                 links.iter().enumerate().find_map(find).unwrap_or((0, 0, None))
             }
             Seed::Point(p) => {
@@ -234,7 +238,10 @@ impl Grower<'_> {
         let at = |taxel: usize| {
             let taxel = &self.body.taxels[taxel];
             let world_from_link = self.body.links[taxel.link].world_from_link;
-            (world_from_link.transform_point3(taxel.position_in_link), world_from_link.transform_vector3(taxel.normal_in_link))
+            (
+                world_from_link.transform_point3(taxel.position_in_link),
+                world_from_link.transform_vector3(taxel.normal_in_link),
+            )
         };
         let points: Vec<(DVec3, DVec3)> = taxels.iter().map(|&taxel| at(taxel)).collect();
         let mean = points.iter().map(|(p, _)| *p).sum::<DVec3>() / points.len() as f64;

@@ -137,7 +137,11 @@ impl<'a> Grower<'a> {
                 self.add(&name, &taxels, rule)?;
             }
         }
-        if any { Ok(()) } else { Err(Error::failed("it chooses no taxel: nothing meets all of its conditions at once")) }
+        if any {
+            Ok(())
+        } else {
+            Err(Error::failed("it chooses no taxel: nothing meets all of its conditions at once"))
+        }
     }
 
     /// The fields that `rule` is applied in, each with its taxels; or all taxels.
@@ -202,8 +206,7 @@ impl<'a> Grower<'a> {
 fn check(rule: &FieldRule) -> Result<()> {
     let wrong = |what: &str| Err(Error::failed(what));
     let discs = rule.radius.is_some() || rule.seeds.is_some() || rule.overlap.is_some();
-    let ways =
-        [rule.each.is_some(), rule.patches.is_some(), discs, rule.rows.is_some(), rule.columns.is_some()];
+    let ways = [rule.each.is_some(), rule.patches.is_some(), discs, rule.rows.is_some(), rule.columns.is_some()];
     let divides = ways.into_iter().filter(|&way| way).count();
     if divides > 1 {
         return wrong(

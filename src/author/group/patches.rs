@@ -37,9 +37,8 @@ impl Seeding {
             let from_here = ways.to_all(seed);
             let finite = |reach: &&(usize, &Reach)| reach.1.distance_m < f64::INFINITY;
             let rim = from_here.iter().enumerate();
-            let rim = rim.filter(|r| finite(&r)).max_by(|a, b| {
-                a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0))
-            });
+            let rim =
+                rim.filter(|r| finite(&r)).max_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0)));
             seed = rim.map_or(seed, |(i, _)| i);
         }
         let reached = if is_first { ways.to_all(seed) } else { ways.from(seed, limit_m) };
