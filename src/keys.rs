@@ -26,9 +26,13 @@ impl Text<'_> {
 
     /// The error that `what` is wrong at `span`.
     pub(crate) fn wrong(self, span: Range<usize>, what: impl Into<String>) -> Error {
-        let before = &self.0.as_bytes()[..span.start.min(self.0.len())];
-        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        Error::failed(what).at(format!("line {line}"))
+        Error::failed(what).at(format!("line {}", self.line(span.start)))
+    }
+
+    /// The line, from 1, that byte `offset` is on.
+    pub(crate) fn line(self, offset: usize) -> usize {
+        let before = &self.0.as_bytes()[..offset.min(self.0.len())];
+        1 + before.iter().filter(|&&byte| byte == b'\n').count()
     }
 
     /// The number under `key`, if `fits` and not beyond belief.
