@@ -318,16 +318,16 @@ impl Original {
         splice.apply()
     }
 
-    /// Writes the file at `path`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`.
+    /// Writes the file at `path`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`. What is there is
+    /// replaced only if `replace` says so.
     ///
     /// # Errors
-    /// The folder cannot be written to, or the disk is full.
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+    /// Something is there, the folder cannot be written to, or the disk is full.
+    pub fn save(&self, path: impl AsRef<Path>, replace: bool) -> Result<()> {
         let path = path.as_ref();
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf")) {
-            return crate::whole::write(path, self.to_gltf().as_bytes());
-        }
-        crate::whole::write(path, &self.to_glb()?)
+        let is_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+        let bytes = if is_text { self.to_gltf().into_bytes() } else { self.to_glb()? };
+        if replace { crate::whole::write(path, &bytes) } else { crate::whole::write_new(path, &bytes) }
     }
 }
 
