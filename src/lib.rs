@@ -57,6 +57,8 @@ pub mod error;
 #[doc(hidden)]
 pub mod experiments;
 pub mod field;
+mod keys;
+mod length;
 pub mod percept;
 pub mod scene;
 pub mod signal;

@@ -25,6 +25,14 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
+/// Writes `bytes` at `path`, where nothing may be yet.
+pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = beside(path)?;
+    file.write_all(bytes).map_err(|e| Error::io(path, &e))?;
+    file.persist_noclobber(path).map_err(|e| Error::io(path, &e.error))?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     #[test]

@@ -6,8 +6,9 @@ use std::collections::{BTreeMap, BinaryHeap};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::SurfacePoint;
 use super::grid::{Grid, Spot};
-use super::place::Placed;
+use super::place::{Placed, Progress};
 
 /// Samples whose neighbours are listed at a time.
 const CHUNK: usize = 4096;
@@ -25,7 +26,12 @@ const MOST_LEVELS: i32 = 24;
 /// Whether two samples lie on one side of what they are on. Normals that face apart belong to two sides of a part,
 /// which are no neighbours however thin it is.
 pub(super) fn same_side(a: &Placed, b: &Placed) -> bool {
-    a.point.normal.dot(b.point.normal) > LEAST_COSINE
+    face_alike(&a.point, &b.point)
+}
+
+/// The same of two points.
+pub(super) fn face_alike(a: &SurfacePoint, b: &SurfacePoint) -> bool {
+    a.normal.dot(b.normal) > LEAST_COSINE
 }
 
 /// Per sample, the samples within the smaller of the two's reaches on the same side, each with a value made of their
@@ -117,7 +123,7 @@ fn standing(weight: f64, sample: usize) -> u64 {
 }
 
 /// The indices, rising, of the `count` samples that are left when the most crowded have gone one by one.
-pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize) -> Vec<usize> {
+pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize, progress: Progress<'_>) -> Vec<usize> {
     let mut weights: Vec<f64> = (0..samples).map(|i| crowd.of(i).iter().map(|(_, w)| w).sum()).collect();
     let mut alive = vec![true; samples];
     let mut heap: BinaryHeap<u64> = weights.iter().enumerate().map(|(i, &weight)| standing(weight, i)).collect();
@@ -134,6 +140,9 @@ pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize) -> Vec<
         PeekMut::pop(top);
         alive[sample] = false;
         left -= 1;
+        if left.is_multiple_of(CHUNK) {
+            progress((samples - left) as f64 / (samples - count) as f64);
+        }
         for &(j, weight) in crowd.of(sample) {
             weights[j as usize] -= weight;
         }
@@ -143,7 +152,7 @@ pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize) -> Vec<
 
 /// The indices, rising, of as many samples as fit with no two of them neighbours: always the one next that leaves the
 /// fewest others without room, so that a front of close neighbours grows over the surface.
-pub(super) fn pack<T: Copy + Send>(crowd: &Crowd<T>, samples: usize) -> Vec<usize> {
+pub(super) fn pack<T: Copy + Send>(crowd: &Crowd<T>, samples: usize, progress: Progress<'_>) -> Vec<usize> {
     let mut free: Vec<usize> = (0..samples).map(|i| crowd.of(i).len()).collect();
     let mut open = vec![true; samples];
     // By how many are free around them; an entry that is out of date has another in a lower bucket.
@@ -152,7 +161,7 @@ pub(super) fn pack<T: Copy + Send>(crowd: &Crowd<T>, samples: usize) -> Vec<usiz
         buckets[free].push(i as u32);
     }
     let mut kept = Vec::new();
-    let mut lowest = 0;
+    let (mut lowest, mut settled) = (0, 0_usize);
     while lowest < buckets.len() {
         let Some(sample) = buckets[lowest].pop() else {
             lowest += 1;
@@ -164,10 +173,15 @@ pub(super) fn pack<T: Copy + Send>(crowd: &Crowd<T>, samples: usize) -> Vec<usiz
         }
         open[sample] = false;
         kept.push(sample);
+        settled += 1;
+        if kept.len().is_multiple_of(CHUNK) {
+            progress(settled as f64 / samples as f64);
+        }
         for &(gone, _) in crowd.of(sample) {
             if !std::mem::replace(&mut open[gone as usize], false) {
                 continue;
             }
+            settled += 1;
             for &(near, _) in crowd.of(gone as usize) {
                 let near = near as usize;
                 if open[near] {

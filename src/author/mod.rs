@@ -16,15 +16,22 @@
 //! Everything here gives the same answer on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties
 //! go to the lower index.
 
+mod canvas;
 mod carry;
 mod crowd;
+mod glob;
 mod grid;
 pub mod group;
 mod grow;
 pub mod icub;
+mod lattice;
 mod place;
+mod points;
 pub(crate) mod random;
+mod recipe;
+mod region;
 mod scatter;
+mod skin;
 pub mod words;
 
 use glam::DVec3;
@@ -32,6 +39,8 @@ use glam::DVec3;
 pub use carry::{blend_skinning, heaviest_four};
 pub use grow::{PatchRules, mean_normal, split_into_patches};
 pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
+pub use recipe::Recipe;
+pub use skin::{Authored, PlaceReport, author};
 
 /// A point of a surface that a taxel sits on, or could. Coordinates are those of the mesh it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::SurfacePoint;
-use super::crowd::{Crowd, pack, same_side, thin_out};
+use super::crowd::{Crowd, face_alike, pack, same_side, thin_out};
 use super::scatter::Pieces;
 use crate::error::{Error, Result};
 
@@ -49,11 +49,45 @@ pub fn widest_radius(area: f64, count: usize) -> f64 {
 /// `count` is 0 or over 4 million, a triangle names a vertex that is not there, or the triangles have no finite,
 /// positive area.
 pub fn place_evenly(positions: &[DVec3], triangles: &[[u32; 3]], count: usize, seed: u64) -> Result<Vec<Placed>> {
+    evenly(positions, triangles, count, seed, &mut |_| {})
+}
+
+/// As [`place_evenly`]; tells `progress` the share that is done.
+pub(super) fn evenly(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    seed: u64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     check_count(count)?;
     let pieces = Pieces::whole(positions, triangles)?;
     let samples = pieces.scatter(OVERSAMPLING * count, seed);
     let reaches = vec![2.0 * widest_radius(pieces.weight(), count); samples.len()];
-    Ok(eliminate(&samples, &reaches, count))
+    Ok(eliminate(&samples, &reaches, count, progress))
+}
+
+/// As [`evenly`], but no two neighbours closer than `spacing_m`; `None` if so many do not fit.
+pub(super) fn evenly_apart(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    spacing_m: f64,
+    seed: u64,
+    progress: Progress<'_>,
+) -> Result<std::result::Result<Vec<Placed>, usize>> {
+    let placed = evenly(positions, triangles, count, seed, progress)?;
+    let points: Vec<SurfacePoint> = placed.iter().map(|placed| placed.point).collect();
+    if nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m) {
+        return Ok(Ok(placed));
+    }
+    let packed = apart(positions, triangles, spacing_m, seed, progress)?;
+    if packed.len() < count {
+        return Ok(Err(packed.len()));
+    }
+    let area: f64 = packed.iter().map(|placed| placed.point.area).sum();
+    let reaches = vec![(2.0 * widest_radius(area, count)).max(2.0 * spacing_m); packed.len()];
+    Ok(Ok(eliminate(&packed, &reaches, count, progress)))
 }
 
 /// Places exactly `count` points, as [`place_evenly`] does, more of them where `density` is higher: how many there are
@@ -70,6 +104,18 @@ pub fn place_by_density(
     seed: u64,
     density: impl Fn(&SurfacePoint) -> f64,
 ) -> Result<Vec<Placed>> {
+    by_density(positions, triangles, count, seed, |placed| density(&placed.point), &mut |_| {})
+}
+
+/// As [`place_by_density`], of a density by triangle and barycentric weights.
+pub(super) fn by_density(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    seed: u64,
+    density: impl Fn(&Placed) -> f64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     check_count(count)?;
     let area = Pieces::whole(positions, triangles)?.weight();
     let pieces = Pieces::by_density(positions, triangles, OVERSAMPLING * count, &density)?;
@@ -77,11 +123,11 @@ pub fn place_by_density(
     // Beyond what one point on the whole surface would keep, thinner is no different.
     let widest = 2.0 * widest_radius(area, 1);
     let reach_at = |sample: &Placed| {
-        let density = density(&sample.point);
+        let density = density(sample);
         if density > 0.0 { (2.0 * widest_radius(pieces.weight() / density, count)).min(widest) } else { widest }
     };
     let reaches: Vec<f64> = samples.iter().map(reach_at).collect();
-    Ok(eliminate(&samples, &reaches, count))
+    Ok(eliminate(&samples, &reaches, count, progress))
 }
 
 /// Places as many points as it finds room for with any two neighbours at least `spacing_m` apart: about two thirds of
@@ -93,6 +139,17 @@ pub fn place_by_density(
 /// `spacing_m` is not positive and finite, or so small that over 4 million points could fit; a triangle names a vertex
 /// that is not there, or the triangles have no finite, positive area.
 pub fn place_apart(positions: &[DVec3], triangles: &[[u32; 3]], spacing_m: f64, seed: u64) -> Result<Vec<Placed>> {
+    apart(positions, triangles, spacing_m, seed, &mut |_| {})
+}
+
+/// As [`place_apart`]; tells `progress` the share that is done.
+pub(super) fn apart(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    spacing_m: f64,
+    seed: u64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     if !(spacing_m.is_finite() && spacing_m > 0.0) {
         return Err(Error::failed(format!("taxels cannot lie {spacing_m} m apart; give a spacing over 0")));
     }
@@ -107,7 +164,8 @@ pub fn place_apart(positions: &[DVec3], triangles: &[[u32; 3]], spacing_m: f64, 
     let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
     let reaches = vec![spacing_m; samples.len()];
     let crowd = Crowd::new(&samples, &reaches, |_, _| ());
-    let kept = pack(&crowd, samples.len());
+    progress(0.5);
+    let kept = pack(&crowd, samples.len(), &mut |share| progress(0.5 + 0.5 * share));
     Ok(share_area(&samples, &kept, &crowd))
 }
 
@@ -124,7 +182,7 @@ fn check_count(count: usize) -> Result<()> {
 }
 
 /// The `count` samples that stay, each with the area that is its own.
-fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize) -> Vec<Placed> {
+fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Vec<Placed> {
     let ratio = count as f64 / samples.len() as f64;
     // Samples much closer than the outcome's spacing all have to go: that one is closer still says nothing.
     let closest = 1.0 - ratio * ratio.sqrt();
@@ -134,7 +192,8 @@ fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize) -> Vec<Placed>
         let fourth = squared * squared;
         fourth * fourth
     });
-    let kept = thin_out(&crowd, samples.len(), count);
+    progress(0.5);
+    let kept = thin_out(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share));
     share_area(samples, &kept, &crowd)
 }
 
@@ -173,6 +232,21 @@ fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Crowd<
     }
     placed
 }
+
+/// Per point how far away its nearest neighbour is, m; `None` where nobody else is on its side.
+pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
+    let spots = points.iter().enumerate().map(|(index, point)| Spot::new(point.position.to_array(), index));
+    let tree = RTree::bulk_load(spots.collect());
+    let nearest = |(index, point): (usize, &SurfacePoint)| {
+        let mut others = tree.nearest_neighbor_iter(point.position.to_array()).map(|spot| spot.data);
+        let other = others.find(|&other| other != index && face_alike(&points[other], point))?;
+        Some(points[other].position.distance(point.position))
+    };
+    points.iter().enumerate().map(nearest).collect()
+}
+
+/// Told the share of the work that is done.
+pub(super) type Progress<'a> = &'a mut dyn FnMut(f64);
 
 type Spot = GeomWithData<[f64; 3], usize>;
 

@@ -70,7 +70,7 @@ impl Pieces {
         positions: &[DVec3],
         triangles: &[[u32; 3]],
         count: usize,
-        density: impl Fn(&SurfacePoint) -> f64,
+        density: impl Fn(&Placed) -> f64,
     ) -> Result<Self> {
         let whole = Self::whole(positions, triangles)?;
         let corners = whole.corners;
@@ -82,7 +82,9 @@ impl Pieces {
                 normal: normal_of(triangle),
                 area: area_of(own),
             };
-            piece.density = density(&middle);
+            let [p, q, r] = piece.within;
+            let barycentric = std::array::from_fn(|k| (p[k] + q[k] + r[k]) / 3.0);
+            piece.density = density(&Placed { point: middle, triangle: piece.triangle as usize, barycentric });
             if !(piece.density.is_finite() && piece.density >= 0.0) {
                 return Err(Error::failed(format!(
                     "the density of taxels is {} at {}; it should be a number from 0 up",

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use globset::{GlobBuilder, GlobSet, GlobSetBuilder};
 use serde::de::{Deserialize, Deserializer, Error as _, SeqAccess, Visitor};
+
+use super::glob;
 
 /// A length over 0: a number of metres, or text with a unit, like `"8 mm"`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,15 +36,9 @@ impl<'de> Deserialize<'de> for Length {
             }
 
             fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<f64, E> {
-                let text = text.trim();
-                let units = [("um", 1e6), ("µm", 1e6), ("mm", 1e3), ("cm", 1e2), ("m", 1.0)];
-                let read = units.iter().find_map(|(unit, in_a_metre)| {
-                    let number: f64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
-                    Some(number / in_a_metre)
-                });
-                read.ok_or_else(|| {
-                    E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)"))
-                })
+                let read = crate::length::Length::parse(text.trim()).ok().flatten();
+                let metres = read.and_then(|length| Some(length.number * length.unit_m?));
+                metres.ok_or_else(|| E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)")))
             }
         }
         let metres = deserializer.deserialize_any(Reader)?;
@@ -58,7 +53,7 @@ impl<'de> Deserialize<'de> for Length {
 #[derive(Clone, Debug)]
 pub struct Globs {
     text: Vec<String>,
-    set: GlobSet,
+    set: glob::Globs,
 }
 
 impl Globs {
@@ -98,12 +93,7 @@ impl<'de> Deserialize<'de> for Globs {
             }
         }
         let text = deserializer.deserialize_any(Reader)?;
-        let mut set = GlobSetBuilder::new();
-        for glob in &text {
-            let built = GlobBuilder::new(glob).build();
-            set.add(built.map_err(|e| D::Error::custom(format!("`{glob}` is no glob: {}", e.kind())))?);
-        }
-        let set = set.build().map_err(D::Error::custom)?;
+        let set = glob::Globs::new(&text).map_err(D::Error::custom)?;
         Ok(Self { text, set })
     }
 }

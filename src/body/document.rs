@@ -51,6 +51,26 @@ impl Document {
         Ok(Self { root, buffers })
     }
 
+    /// Takes out the bytes of its buffers.
+    pub(crate) fn into_buffers(self) -> Vec<Vec<u8>> {
+        self.buffers
+    }
+
+    /// Accessor `index` as rows of as many numbers as it has, one after the other, and how many that is.
+    pub(crate) fn numbers(&self, index: usize) -> Result<(usize, Vec<f32>)> {
+        let Some(Checked::Valid(shape)) = self.root.accessors.get(index).map(|accessor| accessor.type_) else {
+            return Err(Error::failed(format!("accessor {index} is of no type that glTF has")));
+        };
+        let flat = match shape {
+            Type::Scalar => self.floats::<1>(index)?.into_flattened(),
+            Type::Vec2 => self.floats::<2>(index)?.into_flattened(),
+            Type::Vec3 => self.floats::<3>(index)?.into_flattened(),
+            Type::Vec4 => self.floats::<4>(index)?.into_flattened(),
+            _ => return Err(Error::failed(format!("accessor {index} holds matrices"))),
+        };
+        Ok((shape.multiplicity(), flat))
+    }
+
     /// Accessor `index` as rows of `N` numbers, integers normalised where the file says so.
     pub(crate) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
         let elements = self.elements(index)?;
@@ -205,7 +225,7 @@ impl Elements<'_> {
 }
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
-fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
+pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
     if bytes.is_empty() {
         return Err(Error::failed("the file is empty; give a .glb or .gltf"));
     }
@@ -310,7 +330,7 @@ fn validate(root: &json::Root) -> Result<()> {
     }
 }
 
-fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
+pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, body) =
             data.split_once(',').ok_or_else(|| Error::failed("its data URI has no data; export it again"))?;

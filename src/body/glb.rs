@@ -18,10 +18,22 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// A `.glb` being written.
+/// A `.glb` being written, or what is to be added to a file that is there already.
 pub struct Glb {
-    json: Map<String, Value>,
-    bin: Vec<u8>,
+    pub(super) json: Map<String, Value>,
+    pub(super) bin: Vec<u8>,
+    pub(super) before: Before,
+}
+
+/// What a file holds that is added to.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Before {
+    /// How long each of its lists is.
+    pub(super) counts: BTreeMap<String, usize>,
+    /// Bytes of its buffer, a multiple of four.
+    pub(super) bytes: usize,
+    /// Nodes of its own that get children: (parent, child).
+    pub(super) adopted: Vec<(usize, usize)>,
 }
 
 /// A triangle mesh to write, in metres.
@@ -62,7 +74,22 @@ impl Glb {
             "scenes": [{"nodes": []}],
         });
         let Value::Object(json) = json else { unreachable!("it was written as an object") };
-        Self { json, bin: Vec::new() }
+        Self { json, bin: Vec::new(), before: Before::default() }
+    }
+
+    /// What is added to a file that has `before`.
+    pub(super) fn added_to(before: Before) -> Self {
+        Self { before, ..Self::new() }
+    }
+
+    fn count_before(&self, key: &str) -> usize {
+        self.before.counts.get(key).copied().unwrap_or(0)
+    }
+
+    /// Element `index` of a list, if it is one that was added.
+    fn element(&mut self, key: &str, index: usize) -> Option<&mut Value> {
+        let own = index.checked_sub(self.count_before(key))?;
+        self.list(key).get_mut(own)
     }
 
     fn list(&mut self, key: &str) -> &mut Vec<Value> {
@@ -72,7 +99,8 @@ impl Glb {
     fn push(&mut self, key: &str, value: Value) -> usize {
         let list = self.list(key);
         list.push(value);
-        list.len() - 1
+        let own = list.len() - 1;
+        self.count_before(key) + own
     }
 
     /// Appends `bytes` as a buffer view of their own, and an accessor over them.
@@ -80,7 +108,8 @@ impl Glb {
         while !self.bin.len().is_multiple_of(4) {
             self.bin.push(0);
         }
-        let mut view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        let offset = self.before.bytes + self.bin.len();
+        let mut view = json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()});
         if let Some(target) = target {
             view["target"] = target.into();
         }
@@ -116,7 +145,13 @@ impl Glb {
         }
         let index = self.push("nodes", node);
         let (owner, key) = match parent {
-            Some(parent) => (&mut self.list("nodes")[parent], "children"),
+            Some(parent) => match self.element("nodes", parent) {
+                Some(parent) => (parent, "children"),
+                None => {
+                    self.before.adopted.push((parent, index));
+                    return index;
+                }
+            },
             None => (&mut self.list("scenes")[0], "nodes"),
         };
         match owner.get_mut(key).and_then(Value::as_array_mut) {
@@ -171,7 +206,7 @@ impl Glb {
 
     fn show(&mut self, node: usize, name: &str, primitive: &Value, skin: Option<usize>) {
         let mesh = self.push("meshes", json!({"name": name, "primitives": [primitive]}));
-        let node = &mut self.list("nodes")[node];
+        let node = self.element("nodes", node).expect("only nodes that were added show meshes");
         node["mesh"] = mesh.into();
         if let Some(skin) = skin {
             node["skin"] = skin.into();
@@ -211,7 +246,8 @@ impl Glb {
     /// Adds `field` as an empty node under `parent`, at `origin` in that node's frame.
     pub fn field(&mut self, field: &FieldSpec, parent: Option<usize>, origin: DVec3) -> usize {
         let node = self.node(&field.name, parent, origin);
-        self.list("nodes")[node]["extras"] = json!({FIELD_KEY: field.to_json()});
+        let own = self.element("nodes", node).expect("it was just added");
+        own["extras"] = json!({FIELD_KEY: field.to_json()});
         node
     }
 

@@ -7,11 +7,15 @@
 //! node's frame with scale and shear taken out, so that coordinates in it are metres whatever the file's units; a
 //! mirrored or scaled node keeps its rigid part as the frame and its points are stretched into it.
 
+mod details;
 mod document;
 mod glb;
 mod layout;
 mod nodes;
+mod original;
 mod read;
+mod splice;
+mod strip;
 mod surface;
 mod topology;
 
@@ -19,8 +23,10 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+pub use details::{Details, Mark, Paint, Part};
 pub use glb::{Glb, MeshData, Skinning};
 pub use layout::{ChartKind, ChartSpec, FieldSpec, MemberSpec};
+pub use original::Original;
 pub(crate) use surface::Nearest;
 pub use surface::{Hit, Home, Surface, SurfaceIndex};
 pub(crate) use topology::next;

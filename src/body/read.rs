@@ -14,10 +14,29 @@ use super::nodes::{FARTHEST, Nodes, is_near};
 use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
 use crate::error::{Error, Result};
 
+/// Where in the file what was read comes from, for those who write to it.
+#[derive(Default)]
+pub(super) struct Sources {
+    /// Per surface its node, and the primitive within the node's mesh.
+    pub(super) surfaces: Vec<(usize, usize)>,
+    /// Points that are no taxels: the node's name, and where they are in the world at rest.
+    pub(super) points: Vec<(String, Vec<DVec3>)>,
+}
+
 /// Reads the body called `name` from a whole file's bytes.
 pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
     let document = Document::parse(bytes, folder)?;
     let nodes = Nodes::of(&document)?;
+    from_document(name, &document, &nodes, None)
+}
+
+/// Reads the body called `name` from `document`, and where its parts come from.
+pub(super) fn from_document(
+    name: &str,
+    document: &Document,
+    nodes: &Nodes<'_>,
+    mut sources: Option<&mut Sources>,
+) -> Result<Body> {
     let mut body = Body {
         name: name.to_owned(),
         links: nodes.links(),
@@ -27,7 +46,7 @@ pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Bo
         findings: Vec::new(),
     };
     for &node in &nodes.in_order {
-        read_meshes(&document, &nodes, node, &mut body)?;
+        read_meshes(document, nodes, node, &mut body, sources.as_deref_mut())?;
     }
     complete_normals(&mut body)?;
     body.taxels.sort_by_key(|taxel| taxel.id);
@@ -37,7 +56,7 @@ pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Bo
             pair[0].id, body.links[pair[0].link].name, body.links[pair[1].link].name
         )));
     }
-    body.fields = read_fields(&document, &nodes, &body)?;
+    body.fields = read_fields(document, nodes, &body)?;
     if body.taxels.is_empty() && !body.fields.is_empty() {
         body.findings.push(
             "it has fields and no taxels: if it comes from Blender, export again with `Attributes`, `Loose Points` \
@@ -48,7 +67,7 @@ pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Bo
     Ok(body)
 }
 
-fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
+pub(super) fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
     primitive
         .attributes
         .iter()
@@ -60,8 +79,12 @@ fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
     attribute(primitive, &Semantic::Extras(name.to_owned()))
 }
 
+fn has_mode(primitive: &Primitive, mode: Mode) -> bool {
+    matches!(primitive.mode, Checked::Valid(own) if own == mode)
+}
+
 pub(super) fn is_taxels(primitive: &Primitive) -> bool {
-    matches!(primitive.mode, Checked::Valid(Mode::Points)) && custom(primitive, TAXEL_ID).is_some()
+    has_mode(primitive, Mode::Points) && custom(primitive, TAXEL_ID).is_some()
 }
 
 /// How the joints of a skinned node carry its points: per joint its link, and link_from_mesh.
@@ -135,7 +158,13 @@ fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, jo
     Ok(best.into_iter().map(|(_, joint)| joint).collect())
 }
 
-fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut Body) -> Result<()> {
+fn read_meshes(
+    document: &Document,
+    nodes: &Nodes<'_>,
+    node: usize,
+    body: &mut Body,
+    mut sources: Option<&mut Sources>,
+) -> Result<()> {
     let Some(mesh) = nodes.raw[node].mesh else { return Ok(()) };
     let mesh_name = document.root.meshes[mesh.value()].name.clone();
     let place = nodes.raw[node].name.clone().or(mesh_name).unwrap_or_else(|| format!("node_{node}"));
@@ -145,7 +174,7 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
         .link_above(node)
         .or_else(|| joints.as_ref()?.first().map(|(link, _)| *link))
         .ok_or_else(|| in_place(Error::failed("nothing carries it: put it under a link, or give its skin joints")))?;
-    for primitive in &document.root.meshes[mesh.value()].primitives {
+    for (index, primitive) in document.root.meshes[mesh.value()].primitives.iter().enumerate() {
         let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
         let positions = document.floats::<3>(positions).map_err(in_place)?;
         if let Some(bad) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
@@ -181,7 +210,18 @@ fn read_meshes(document: &Document, nodes: &Nodes<'_>, node: usize, body: &mut B
         }
         let triangles = read_triangles(document, primitive, positions.len()).map_err(in_place)?;
         if triangles.is_empty() {
+            if let Some(sources) = sources.as_deref_mut().filter(|_| has_mode(primitive, Mode::Points)) {
+                let in_world = |(point, p): (usize, &[f32; 3])| {
+                    let (link, link_from_mesh) = of_point(point);
+                    let world_from_mesh = body.links[link].world_from_link * link_from_mesh;
+                    world_from_mesh.transform_point3(DVec3::from_array(p.map(f64::from)))
+                };
+                sources.points.push((place.clone(), positions.iter().enumerate().map(in_world).collect()));
+            }
             continue;
+        }
+        if let Some(sources) = sources.as_deref_mut() {
+            sources.surfaces.push((node, index));
         }
         let home = match &joints {
             Some(joints) if !heaviest.is_empty() => Home::Skinned { joints: joints.clone(), heaviest },

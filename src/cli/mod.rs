@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, and what they share.
 
+mod author;
 mod bar;
 mod bench;
 mod completions;
@@ -33,6 +34,7 @@ Examples:
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic inspect robot.glb                     what taxels and fields a body has
+  somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
@@ -53,6 +55,7 @@ pub(crate) struct Arguments {
 enum Command {
     Run(Box<run::Arguments>),
     Inspect(inspect::Arguments),
+    Author(Box<author::Arguments>),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
@@ -64,6 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     match &arguments.command {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
+        Command::Author(arguments) => author::run(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use crate::error::{Error, Result};
+use crate::length::Length;
 use crate::stage::filter::{FilterBy, Settings};
 
 /// Which motion counts, for [`crate::Outputs::FILTERED`].
@@ -106,27 +107,6 @@ impl MotionFilter {
         let high = self.high_m.unwrap_or_else(|| (HIGH * spacing_m).max(APART * self.low_m.unwrap_or(0.0)));
         let low = self.low_m.unwrap_or_else(|| (LOW * spacing_m).min(high / APART));
         Ok(Settings { window_m: [low, high], by: self.by, time_constant_s: self.time_constant_s, still_within_m })
-    }
-}
-
-/// A number with a unit, or without.
-#[derive(Clone, Copy)]
-struct Length {
-    number: f64,
-    unit_m: Option<f64>,
-}
-
-impl Length {
-    /// `None` where there is nothing.
-    fn parse(text: &str) -> Result<Option<Self>, String> {
-        if text.is_empty() {
-            return Ok(None);
-        }
-        let units = [("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
-        let found = units.iter().find_map(|&(unit, metres)| Some((text.strip_suffix(unit)?, metres)));
-        let (number, unit_m) = found.map_or((text, None), |(number, metres)| (number, Some(metres)));
-        let number = number.trim_end().parse().map_err(|_| format!("`{text}` is no length"))?;
-        Ok(Some(Self { number, unit_m }))
     }
 }
 

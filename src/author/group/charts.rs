@@ -32,13 +32,14 @@ impl Grower<'_> {
     /// Lays all charts.
     ///
     /// # Errors
-    /// A field is to be refused, as it cannot have the chart it asks for; the line says what split would do.
-    pub fn finish(mut self) -> Result<Grouping> {
+    /// A field is to be refused, as it cannot have the chart it asks for; the line says what split would do. With it comes
+    /// which of the rules applied, from 0, made the field.
+    pub fn finish(mut self) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
         let mut bare = Body { fields: Vec::new(), ..self.body.clone() };
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
-        let planes: Vec<_> = FieldSet::new(&bare)?.fields.into_iter().map(|field| field.chart).collect();
+        let planes: Vec<_> = FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
         let mut fields = Vec::with_capacity(specs.len());
         let made = std::mem::take(&mut self.made);
@@ -61,10 +62,9 @@ impl Grower<'_> {
             match made.wrap {
                 Wrap::Refuse => {
                     let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MOST_PROPOSED) };
-                    return Err(Error::failed(format!(
-                        "field `{name}` {why}{}",
-                        advice(&why, parts.as_deref(), parent)
-                    )));
+                    let advice = advice(&why, parts.as_deref(), parent);
+                    let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
+                    return Err((made.rule, Error::failed(what)));
                 }
                 Wrap::Split if !parent => {
                     fields.push(uncharted);

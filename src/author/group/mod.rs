@@ -6,6 +6,7 @@
 mod charts;
 mod choose;
 mod divide;
+pub(super) mod painted;
 mod patches;
 mod rule;
 mod ways;
@@ -66,7 +67,7 @@ pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<
     if rules.is_empty() {
         grower.apply(&FieldRule { each: Some(Each::Link), ..FieldRule::default() })?;
     }
-    grower.finish()
+    grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
 
 /// A field on its way, with what is asked of its chart.
@@ -78,6 +79,8 @@ struct Made {
     u: Option<[f64; 3]>,
     /// Whether only a longer name asked for it.
     is_level: bool,
+    /// Which of the rules applied, from 0, made it.
+    rule: usize,
 }
 
 /// Applies rules one by one, so that whoever has them can say which of them is wrong.
@@ -91,6 +94,8 @@ pub struct Grower<'a> {
     made: Vec<Made>,
     index_of: HashMap<String, usize>,
     notes: Vec<String>,
+    /// Rules applied so far.
+    applied: usize,
 }
 
 impl<'a> Grower<'a> {
@@ -105,6 +110,7 @@ impl<'a> Grower<'a> {
             made: Vec::new(),
             index_of: HashMap::new(),
             notes: Vec::new(),
+            applied: 0,
         }
     }
 
@@ -137,6 +143,7 @@ impl<'a> Grower<'a> {
                 self.add(&name, &taxels, rule)?;
             }
         }
+        self.applied += 1;
         if any {
             Ok(())
         } else {
@@ -175,7 +182,7 @@ impl<'a> Grower<'a> {
             if !self.index_of.contains_key(level) {
                 let parent = above.map(str::to_owned);
                 let spec = FieldSpec { name: level.to_owned(), parent, ..FieldSpec::default() };
-                self.push(Made { spec, chart: ChartWish::Auto, wrap: Wrap::Bare, u: None, is_level: true });
+                self.push(Made { spec, chart: ChartWish::Auto, wrap: Wrap::Bare, u: None, is_level: true, rule: self.applied });
             }
         }
         let member = MemberSpec { weight: rule.weight.unwrap_or(1.0), uv: None };
@@ -183,7 +190,7 @@ impl<'a> Grower<'a> {
         let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
         let chart = rule.chart.unwrap_or_default();
         let named = if matches!(chart, ChartWish::Auto | ChartWish::None) { Wrap::Bare } else { Wrap::Refuse };
-        let made = Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false };
+        let made = Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
         match self.index_of.get(name) {
             Some(&there) if self.made[there].is_level => self.made[there] = made,
             Some(_) => {

@@ -12,6 +12,7 @@ mod source;
 
 pub use log_map::{LogMap, Reached, Rival};
 pub use place::Place;
+pub(crate) use place::barycentric;
 
 #[cfg(test)]
 mod tests;

@@ -29,7 +29,7 @@ impl Place {
 }
 
 /// The barycentric coordinates of `p` in the triangle, none of them negative.
-fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+pub(crate) fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
     let normal = (b - a).cross(c - a);
     let part = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)).max(0.0);
     let parts = [part(b, c), part(c, a), part(a, b)];

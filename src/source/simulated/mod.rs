@@ -24,7 +24,7 @@ pub use record::write_recording;
 pub use truth::Truth;
 
 use self::contact::{Footprint, Skin};
-use self::file::{File, Text};
+use self::file::File;
 use self::sensor::{Reading, Sensor};
 use self::setup::{Setup, Touch};
 use super::Source;
@@ -32,6 +32,7 @@ use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
 use crate::error::{Error, Result};
 use crate::field::FieldSet;
+use crate::keys::Text;
 use crate::signal::{Frame, RawValue};
 
 /// Frames made by simulated touches.

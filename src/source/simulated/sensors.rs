@@ -2,9 +2,10 @@
 
 use toml::Spanned;
 
-use super::file::{OutputName, SensorKeys, SensorName, Text};
+use super::file::{OutputName, SensorKeys, SensorName};
 use super::sensor::{Fault, FsrOutput, Kind, Sensor};
 use crate::error::Result;
+use crate::keys::Text;
 use crate::signal::FsrCircuit;
 
 /// The sensors that `keys` describe, for the taxels `ids`, ascending.

@@ -7,12 +7,13 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::contact::{Indenter, Skin};
-use super::file::{AngleKeys, IndenterName, SkinKeys, Text, TouchKeys};
+use super::file::{AngleKeys, IndenterName, SkinKeys, TouchKeys};
 use super::path::{Ground, Path};
 use super::profile::Profile;
 use crate::body::{Body, ChartKind, SurfaceIndex};
 use crate::error::Result;
 use crate::field::{FieldSet, Lift};
+use crate::keys::Text;
 
 /// One touch, ready to be asked where it is and how hard it presses.
 pub(super) struct Touch {

@@ -1,0 +1,217 @@
+//! All of a body's surface in one frame, to place taxels on: the world at rest, as a viewer shows the file.
+
+use std::cell::OnceCell;
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::place::Placed;
+use super::{blend_skinning, heaviest_four};
+use crate::body::{Body, Details, Home, Modality, Skinning, Taxel, Topology};
+use crate::error::{Error, Result, nearest};
+
+/// A body's surfaces as one.
+pub(super) struct Canvas<'a> {
+    pub(super) body: &'a Body,
+    pub(super) details: &'a Details,
+    /// Vertices in the world at rest, m.
+    pub(super) positions: Vec<DVec3>,
+    /// Counter-clockwise seen from outside, whatever mirrors them.
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Per triangle its part, and its number there.
+    pub(super) origin: Vec<(u32, u32)>,
+    /// Per triangle the link that carries it most.
+    pub(super) link: Vec<u32>,
+    /// Per part its first vertex.
+    first_vertex: Vec<u32>,
+    /// Per part the four joints that carry each vertex most.
+    skinning: Vec<Option<Skinning>>,
+    topology: OnceCell<Topology>,
+}
+
+/// A taxel as it is written: in the coordinates of the mesh that it is on.
+pub(super) struct Seated {
+    /// The part that it is on.
+    pub(super) part: usize,
+    /// Its place, normal and area in the mesh's coordinates; the link is that of the body.
+    pub(super) taxel: Taxel,
+    /// What carries it, on a skin.
+    pub(super) carriers: Option<([u16; 4], [f32; 4])>,
+}
+
+impl<'a> Canvas<'a> {
+    pub(super) fn new(body: &'a Body, details: &'a Details) -> Self {
+        let mut canvas = Self {
+            body,
+            details,
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            origin: Vec::new(),
+            link: Vec::new(),
+            first_vertex: Vec::new(),
+            skinning: Vec::new(),
+            topology: OnceCell::new(),
+        };
+        for part in 0..body.surfaces.len() {
+            canvas.take(part);
+        }
+        canvas
+    }
+
+    fn take(&mut self, part: usize) {
+        let surface = &self.body.surfaces[part];
+        let first = self.positions.len() as u32;
+        self.first_vertex.push(first);
+        let in_world = |link: usize, link_from_mesh: &DAffine3| self.body.links[link].world_from_link * *link_from_mesh;
+        let (skinning, world_from_mesh) = match &surface.home {
+            Home::Rigid { link, link_from_mesh } => (None, vec![in_world(*link, link_from_mesh)]),
+            Home::Skinned { joints, heaviest } => {
+                let skinning = merged(&self.details.parts[part].carriers, joints.len(), heaviest);
+                (Some(skinning), joints.iter().map(|(link, link_from_mesh)| in_world(*link, link_from_mesh)).collect())
+            }
+        };
+        for (vertex, &p) in surface.positions.iter().enumerate() {
+            self.positions.push(match &skinning {
+                None => world_from_mesh[0].transform_point3(p),
+                Some(skinning) => {
+                    let rows = skinning.joints[vertex].iter().zip(&skinning.weights[vertex]);
+                    let carried = rows.filter(|(_, weight)| **weight > 0.0).map(|(&joint, &weight)| {
+                        world_from_mesh[usize::from(joint)].transform_point3(p) * f64::from(weight)
+                    });
+                    carried.sum()
+                }
+            });
+        }
+        for (index, &[a, b, c]) in surface.triangles.iter().enumerate() {
+            let joint = skinning.as_ref().map(|skinning| blend_skinning(skinning, [a, b, c], [1.0 / 3.0; 3]).0[0]);
+            let joint = usize::from(joint.unwrap_or(0));
+            let link = match &surface.home {
+                Home::Rigid { link, .. } => *link,
+                Home::Skinned { joints, .. } => joints[joint].0,
+            };
+            let mirrored = world_from_mesh[joint].matrix3.determinant() < 0.0;
+            let [b, c] = if mirrored { [c, b] } else { [b, c] };
+            self.triangles.push([first + a, first + b, first + c]);
+            self.origin.push((part as u32, index as u32));
+            self.link.push(link as u32);
+        }
+        self.skinning.push(skinning);
+    }
+
+    /// How all triangles hang together.
+    pub(super) fn topology(&self) -> &Topology {
+        self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles))
+    }
+
+    /// The corners of `triangle` in the world, m.
+    pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|v| self.positions[v as usize])
+    }
+
+    /// The surface of `triangle`, m².
+    pub(super) fn area(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).length() / 2.0
+    }
+
+    /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it.
+    ///
+    /// # Errors
+    /// No part has such an attribute, or which of its numbers is meant is left open.
+    pub(super) fn painted(&self, name: &str) -> Result<Vec<Option<f64>>> {
+        let (attribute, channel) = match name.rsplit_once('.') {
+            Some((attribute, channel)) => {
+                let place = ["rgba", "xyzw", "0123"].iter().find_map(|names| names.find(channel));
+                let place = place.filter(|_| channel.len() == 1).ok_or_else(|| {
+                    Error::failed(format!("`{name}` ends in no number of a colour; write r, g, b or a after the dot"))
+                })?;
+                (attribute, Some(place))
+            }
+            None => (name, None),
+        };
+        let mut values = vec![None; self.positions.len()];
+        let (mut known, mut found) = (Vec::new(), false);
+        for (part, &first) in self.details.parts.iter().zip(&self.first_vertex) {
+            known.extend(part.paints.iter().map(|paint| paint.name.as_str()));
+            let Some(paint) = part.paints.iter().find(|paint| paint.name == attribute) else { continue };
+            found = true;
+            let place = match channel {
+                None if paint.width > 1 => {
+                    return Err(Error::failed(format!(
+                        "`{name}` has {} numbers a vertex; say which one, as in `{name}.r`",
+                        paint.width
+                    )));
+                }
+                Some(place) if place >= paint.width => {
+                    return Err(Error::failed(format!("`{attribute}` has only {} numbers a vertex", paint.width)));
+                }
+                place => place.unwrap_or(0),
+            };
+            for (vertex, row) in paint.values.chunks_exact(paint.width).enumerate() {
+                values[first as usize + vertex] = Some(f64::from(row[place]));
+            }
+        }
+        if found {
+            return Ok(values);
+        }
+        known.sort_unstable();
+        known.dedup();
+        Err(Error::failed(match (nearest(attribute, known.iter().copied()), &known[..]) {
+            (Some(near), _) => format!("no mesh has an attribute `{attribute}`; did you mean `{near}`?"),
+            (None, []) => format!(
+                "no mesh has an attribute `{attribute}`, nor any that is painted; from Blender, export with `Attributes` on \
+                 and the name beginning with an underscore"
+            ),
+            (None, known) => format!("no mesh has an attribute `{attribute}`; there is {}", known.join(", ")),
+        }))
+    }
+
+    /// The taxel with `id` at `placed`, whose triangle is one of the canvas.
+    pub(super) fn seat(&self, placed: &Placed, id: u32, modality: Modality) -> Seated {
+        let (part, index) = self.origin[placed.triangle];
+        let part = part as usize;
+        let surface = &self.body.surfaces[part];
+        let first = self.first_vertex[part];
+        let corners = self.triangles[placed.triangle].map(|v| v - first);
+        let at = |corner: usize| surface.positions[corners[corner] as usize] * placed.barycentric[corner];
+        let [a, b, c] = surface.triangles[index as usize].map(|v| surface.positions[v as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let carriers =
+            self.skinning[part].as_ref().map(|skinning| blend_skinning(skinning, corners, placed.barycentric));
+        let (link, link_from_mesh) = match (&surface.home, &carriers) {
+            (Home::Rigid { link, link_from_mesh }, _) => (*link, *link_from_mesh),
+            (Home::Skinned { joints, .. }, carriers) => {
+                joints[carriers.map_or(0, |(joints, _)| usize::from(joints[0]))]
+            }
+        };
+        // By how much the plane across the normal is stretched on the way to the link.
+        let DMat3 { x_axis: x, y_axis: y, z_axis: z } = link_from_mesh.matrix3;
+        let stretch = (DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal).length();
+        let area = if stretch > 0.0 { placed.point.area / stretch } else { 0.0 };
+        let position_in_link = at(0) + at(1) + at(2);
+        let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality };
+        Seated { part, taxel, carriers }
+    }
+}
+
+/// The four joints that carry each vertex most, of all sets; a vertex that no weight holds hangs on the joint that counts as
+/// its heaviest.
+fn merged(sets: &[Skinning], joints: usize, heaviest: &[usize]) -> Skinning {
+    let mut merged = Skinning::default();
+    for (vertex, &heaviest) in heaviest.iter().enumerate() {
+        let rows = sets.iter().flat_map(|set| set.joints[vertex].into_iter().zip(set.weights[vertex]));
+        let mut carriers: Vec<(u16, f64)> = Vec::new();
+        for (joint, weight) in rows.filter(|&(joint, weight)| usize::from(joint) < joints && weight.is_finite()) {
+            match carriers.iter_mut().find(|(known, _)| *known == joint) {
+                Some((_, sum)) => *sum += f64::from(weight),
+                None => carriers.push((joint, f64::from(weight))),
+            }
+        }
+        let (mut row, mut weights) = heaviest_four(carriers);
+        if weights[0] == 0.0 {
+            (row[0], weights[0]) = (heaviest as u16, 1.0);
+        }
+        merged.joints.push(row);
+        merged.weights.push(weights);
+    }
+    merged
+}

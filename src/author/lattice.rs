@@ -1,0 +1,231 @@
+//! Taxels on a grid: hexagonal or rectangular in the plane of a geodesic chart, each found by walking straight over the
+//! surface from the chart's origin.
+
+use glam::{DVec2, DVec3};
+
+use super::canvas::Canvas;
+use super::grid::Grid;
+use super::place::{Placed, Progress};
+use super::{SurfacePoint, crowd};
+use crate::body::{NONE, SurfaceIndex, Topology, next};
+use crate::error::{Error, Result};
+use crate::field::geodesic::{LogMap, Place};
+
+/// The first ways followed are as long as around half a circle whose diameter is the straight distance, and a bit.
+const FIRST_REACH: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
+
+/// How often ways are followed twice as far before a part of the region counts as out of reach.
+const MOST_DOUBLINGS: u32 = 6;
+
+/// No more places of the grid than this are tried.
+const MOST_PLACES: f64 = 4e6;
+
+/// A walk that ends this part of its length away from where the shortest way leads has gone past where ways meet.
+const ASTRAY: f64 = 1e-6;
+
+/// The start is kept this far, in barycentric weight, from its triangle's edges, where directions would be in doubt.
+const INWARD: f64 = 1e-6;
+
+/// +x is no +u where it lies within 10° of the normal.
+const NEARLY_PARALLEL: f64 = 0.984_807_753_012_208;
+
+/// The grid that is asked for.
+pub(super) struct Lattice {
+    pub(super) hexagonal: bool,
+    pub(super) pitch_m: f64,
+    /// Near which surface point it begins, in the world; none is the middle of the region.
+    pub(super) origin: Option<DVec3>,
+    /// Which way its rows run, in the world.
+    pub(super) u: Option<DVec3>,
+}
+
+/// A grid laid on a region.
+pub(super) struct Laid {
+    /// Row by row, each with the area of a cell of the grid.
+    pub(super) placed: Vec<Placed>,
+    /// The share of the region's surface that hangs together with the origin's.
+    pub(super) reached_share: f64,
+}
+
+impl Lattice {
+    /// Lays it on the triangles of `canvas` that are in `region`.
+    pub(super) fn lay(&self, canvas: &Canvas<'_>, region: &[bool], progress: Progress<'_>) -> Result<Laid> {
+        let topology = canvas.topology();
+        let sound: Vec<u32> = (0..topology.triangles.len() as u32)
+            .filter(|&triangle| region[topology.given[triangle as usize] as usize])
+            .collect();
+        let start = self.start(topology, &sound)?;
+        let part = topology.part[start.triangle as usize];
+        let area = |triangle: u32| canvas.area(topology.given[triangle as usize] as usize);
+        let whole: f64 = sound.iter().map(|&triangle| area(triangle)).sum();
+        let near: Vec<u32> = sound.into_iter().filter(|&triangle| topology.part[triangle as usize] == part).collect();
+        let reached_share = near.iter().map(|&triangle| area(triangle)).sum::<f64>() / whole;
+        let map = self.map(topology, start, &near)?;
+        let extent = extent(&map, &near);
+        let cells = self.cells(extent)?;
+        progress(0.3);
+        let [from, u, v, _] = map.frame();
+        let cell_area = self.pitch_m * self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
+        let mut found: Vec<(f64, Placed)> = Vec::new();
+        let count = cells.len();
+        for (index, cell) in cells.into_iter().enumerate() {
+            if index.is_multiple_of(512) {
+                progress(0.3 + 0.7 * index as f64 / count as f64);
+            }
+            let length = cell.length();
+            let direction = if length > 0.0 { (u * cell.x + v * cell.y) / length } else { u };
+            let Some(place) = walk(topology, start.triangle, from, direction, length) else { continue };
+            let triangle = topology.given[place.triangle as usize] as usize;
+            if !region[triangle] {
+                continue;
+            }
+            let shortest = map.reach(&place).map_or(0.0, |way| way.distance_m);
+            if shortest >= length * (1.0 - ASTRAY) {
+                let [a, b, c] = topology.corners(place.triangle);
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let point = SurfacePoint { position: place.position(topology), normal, area: cell_area };
+                found.push((length, Placed { point, triangle, barycentric: place.barycentric }));
+            }
+        }
+        Ok(Laid { placed: self.without_meetings(found), reached_share })
+    }
+
+    /// Where the grid begins.
+    fn start(&self, topology: &Topology, sound: &[u32]) -> Result<Place> {
+        let index = SurfaceIndex::of_triangles(sound.iter().map(|&triangle| topology.corners(triangle)));
+        let weighted = |&triangle: &u32| {
+            let [a, b, c] = topology.corners(triangle);
+            let area = (b - a).cross(c - a).length();
+            (area, (a + b + c) * (area / 3.0))
+        };
+        let (area, sum) = sound.iter().map(weighted).fold((0.0, DVec3::ZERO), |(a, s), (b, t)| (a + b, s + t));
+        let wanted = self.origin.unwrap_or(sum / area);
+        let hit = index.nearest(wanted).ok_or_else(|| Error::failed("the surface has no area to lay a grid on"))?;
+        let mut place = Place::in_triangle(topology, sound[hit.triangle], hit.position);
+        place.barycentric = place.barycentric.map(|weight| weight * (1.0 - 3.0 * INWARD) + INWARD);
+        Ok(place)
+    }
+
+    /// The ways to all of the triangles `near`.
+    fn map<'t>(&self, topology: &'t Topology, start: Place, near: &[u32]) -> Result<LogMap<'t>> {
+        let [a, b, c] = topology.corners(start.triangle);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let u = self.u.unwrap_or(if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X });
+        let from = start.position(topology);
+        let corners = near.iter().flat_map(|&triangle| topology.corners(triangle));
+        let mut limit = corners.map(|corner| corner.distance(from)).fold(self.pitch_m, f64::max) * FIRST_REACH;
+        for _ in 0..MOST_DOUBLINGS {
+            let map = LogMap::new(topology, start, u, limit)?;
+            if extent(&map, near) <= limit {
+                return Ok(map);
+            }
+            limit *= 2.0;
+        }
+        LogMap::new(topology, start, u, limit)
+    }
+
+    /// The grid's places within `extent` of its origin, row by row.
+    fn cells(&self, extent: f64) -> Result<Vec<DVec2>> {
+        let row_m = self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
+        let (rows, columns) = ((extent / row_m).floor(), (extent / self.pitch_m).floor() + 1.0);
+        if 4.0 * rows * columns > MOST_PLACES {
+            return Err(Error::failed(format!(
+                "a grid of {} m on a region that reaches {extent:.3} m has too many places; is `pitch` in metres?",
+                self.pitch_m
+            )));
+        }
+        let (rows, columns) = (rows as i64, columns as i64);
+        let mut cells = Vec::new();
+        for row in -rows..=rows {
+            let shift = if self.hexagonal && row % 2 != 0 { 0.5 } else { 0.0 };
+            for column in -columns..=columns {
+                let cell = DVec2::new((column as f64 + shift) * self.pitch_m, row as f64 * row_m);
+                if cell.length() <= extent {
+                    cells.push(cell);
+                }
+            }
+        }
+        Ok(cells)
+    }
+
+    /// Of places closer than half the pitch, where rows meet behind what the grid wraps, the one nearer the origin.
+    fn without_meetings(&self, found: Vec<(f64, Placed)>) -> Vec<Placed> {
+        let positions: Vec<DVec3> = found.iter().map(|(_, placed)| placed.point.position).collect();
+        let grid = Grid::new(&positions, 0..positions.len() as u32, self.pitch_m / 2.0);
+        let mut nearest_first: Vec<usize> = (0..found.len()).collect();
+        nearest_first.sort_by(|&a, &b| found[a].0.total_cmp(&found[b].0).then(a.cmp(&b)));
+        let mut kept = vec![false; found.len()];
+        for i in nearest_first {
+            let around = grid.around(grid.cube(positions[i]));
+            let meets = |&(p, j): &(DVec3, u32)| {
+                kept[j as usize]
+                    && p.distance(positions[i]) < self.pitch_m / 2.0
+                    && crowd::same_side(&found[i].1, &found[j as usize].1)
+            };
+            kept[i] = !around.into_iter().flatten().any(meets);
+        }
+        found.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|((_, placed), _)| placed).collect()
+    }
+}
+
+/// How long the shortest way to a corner of `near` is at most, m; infinite where one was not reached.
+fn extent(map: &LogMap<'_>, near: &[u32]) -> f64 {
+    let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let places = near.iter().flat_map(|&triangle| corners.map(|barycentric| Place { triangle, barycentric }));
+    places.map(|place| map.reach(&place).map_or(f64::INFINITY, |way| way.distance_m)).fold(0.0, f64::max)
+}
+
+/// Where somebody comes who goes straight on for `length` from `from` in `triangle`; `None` beyond the surface's edge.
+fn walk(
+    topology: &Topology,
+    mut triangle: u32,
+    mut from: DVec3,
+    mut direction: DVec3,
+    mut length: f64,
+) -> Option<Place> {
+    let mut entered = NONE;
+    // A walk crosses a triangle more than once only by coming round.
+    for _ in 0..100 * topology.triangles.len().max(100) {
+        let corners = topology.corners(triangle);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let mut exit: Option<(f64, u32)> = None;
+        for side in 0..3_u32 {
+            let edge = 3 * triangle + side;
+            if edge == entered {
+                continue;
+            }
+            let (a, b) = (corners[side as usize], corners[(side as usize + 1) % 3]);
+            let outward = (b - a).cross(normal);
+            let towards = outward.dot(direction);
+            if towards > 0.0 {
+                let t = (outward.dot(a - from) / towards).max(0.0);
+                if exit.is_none_or(|(least, _)| t < least) {
+                    exit = Some((t, edge));
+                }
+            }
+        }
+        let (t, edge) = exit?;
+        if t >= length {
+            return Some(Place::in_triangle(topology, triangle, from + direction * length));
+        }
+        let beyond = topology.across[edge as usize];
+        if beyond == NONE {
+            return None;
+        }
+        from += direction * t;
+        length -= t;
+        let [a, b] = [topology.ends(edge).0, topology.ends(edge).1].map(|v| topology.positions[v as usize]);
+        let along = (b - a).normalize_or_zero();
+        let (forward, aside) = (direction.dot(along.cross(normal)), direction.dot(along));
+        triangle = beyond / 3;
+        entered = beyond;
+        // Inward across the shared edge, in the plane of the triangle beyond.
+        let third = topology.positions[topology.ends(next(next(beyond))).0 as usize] - a;
+        let inward = (third - along * third.dot(along)).normalize_or_zero();
+        direction = (along * aside + inward * forward).normalize_or_zero();
+        if direction == DVec3::ZERO {
+            return None;
+        }
+    }
+    None
+}

@@ -1,0 +1,168 @@
+//! Taxels whose places are given: by empties and points in the file, or by a table. Each is taken to the nearest surface.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::canvas::Canvas;
+use super::glob::Globs;
+use super::place::{Placed, nearest_on_its_side};
+use super::{SurfacePoint, recipe};
+use crate::body::{MAX_TAXEL_ID, SurfaceIndex};
+use crate::error::{Error, Result, nearest};
+use crate::field::geodesic::barycentric;
+
+/// A place that was given.
+pub(super) struct Given {
+    /// Its id, where one came along.
+    pub(super) id: Option<u32>,
+    position_in_world: DVec3,
+    /// What messages call it.
+    name: String,
+}
+
+/// A given place on the surface, and how far it was moved there, m.
+pub(super) struct Snapped {
+    pub(super) placed: Placed,
+    pub(super) id: Option<u32>,
+    pub(super) moved_m: f64,
+}
+
+/// The places that the marks called `names` make, those of one name after the other, `tip.2` before `tip.10`.
+pub(super) fn of_marks(canvas: &Canvas<'_>, names: &Globs) -> Result<Vec<Given>> {
+    let mut marks: Vec<_> = canvas.details.marks.iter().filter(|mark| names.is_match(&mark.name)).collect();
+    if marks.is_empty() {
+        let known = canvas.details.marks.iter().map(|mark| mark.name.as_str());
+        let hint = nearest(names.first(), known).map_or_else(
+            || "put empties or points there and name them so".to_owned(),
+            |near| format!("did you mean `{near}`?"),
+        );
+        return Err(Error::failed(format!(
+            "no empty and no mesh of points is called `{}`; {hint} (from Blender, export with `Loose Points` on)",
+            names.text()
+        )));
+    }
+    marks.sort_by_key(|mark| natural(&mark.name));
+    let given = marks.iter().flat_map(|mark| {
+        mark.positions_in_world.iter().enumerate().map(|(index, &position_in_world)| Given {
+            id: None,
+            position_in_world,
+            name: if mark.positions_in_world.len() > 1 {
+                format!("point {index} of `{}`", mark.name)
+            } else {
+                format!("`{}`", mark.name)
+            },
+        })
+    });
+    Ok(given.collect())
+}
+
+/// A name in pieces that sort as people count.
+fn natural(name: &str) -> Vec<(String, u64)> {
+    let mut pieces = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let letters = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let (text, after) = rest.split_at(letters);
+        let digits = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+        let (number, after) = after.split_at(digits);
+        pieces.push((text.to_owned(), number.parse().unwrap_or(0)));
+        rest = after;
+    }
+    pieces
+}
+
+/// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres and, where they are in links' frames, `link`.
+pub(super) fn of_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
+    read_table(canvas, path).map_err(|e| e.at(path.display()))
+}
+
+fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
+    let file = std::fs::File::open(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::failed("no such file; it is looked for beside the recipe"),
+        _ => Error::failed(e.to_string()),
+    })?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let broken = |e: &csv::Error| {
+        let row = e.position().map_or(0, csv::Position::line);
+        Error::failed(format!("it is no table: {e}; give the columns id,x,y,z")).at(format!("line {row}"))
+    };
+    let header = reader.headers().map_err(|e| broken(&e))?.clone();
+    let column = |name: &str| header.iter().position(|own| own.eq_ignore_ascii_case(name));
+    let needed = |name: &str| {
+        let wrong = || {
+            Error::failed(format!("there is no column `{name}`; the first line names id,x,y,z and, if need be, link"))
+        };
+        column(name).ok_or_else(wrong)
+    };
+    let (id, places, link) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?], column("link"));
+    let mut given: Vec<Given> = Vec::new();
+    let mut seen = std::collections::HashMap::new();
+    for row in reader.records() {
+        let row = row.map_err(|e| broken(&e))?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let at = |e: Error| e.at(format!("line {line}"));
+        let cell = |column: usize| row.get(column).unwrap_or_default();
+        let id: u32 = cell(id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
+            at(Error::failed(format!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(id))))
+        })?;
+        if let Some(before) = seen.insert(id, line) {
+            return Err(at(Error::failed(format!(
+                "id {id} stands on line {before} already; give each taxel one of its own"
+            ))));
+        }
+        let mut position = [0.0; 3];
+        for (value, &column) in position.iter_mut().zip(&places) {
+            *value = cell(column)
+                .parse()
+                .ok()
+                .filter(|x: &f64| x.is_finite())
+                .ok_or_else(|| at(Error::failed(format!("`{}` is no coordinate; give metres", cell(column)))))?;
+        }
+        let mut position = DVec3::from_array(position);
+        if let Some(name) = link.map(cell).filter(|name| !name.is_empty()) {
+            let links = &canvas.body.links;
+            let link = canvas.body.link_index(name).ok_or_else(|| {
+                let hint = nearest(name, links.iter().map(|link| link.name.as_str()));
+                let hint = hint.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                at(Error::failed(format!("the body has no link `{name}`{hint}")))
+            })?;
+            position = links[link].world_from_link.transform_point3(position);
+        }
+        given.push(Given { id: Some(id), position_in_world: position, name: format!("line {line}: taxel {id}") });
+    }
+    if given.is_empty() {
+        return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));
+    }
+    Ok(given)
+}
+
+/// `given` taken to the nearest place in `region`.
+pub(super) fn snap(canvas: &Canvas<'_>, region: &[bool], given: &[Given], within_m: f64) -> Result<Vec<Snapped>> {
+    let triangles: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
+    let index = SurfaceIndex::of_triangles(triangles.iter().map(|&triangle| canvas.corners(triangle)));
+    let mut snapped = Vec::with_capacity(given.len());
+    for place in given {
+        let hit = index.nearest(place.position_in_world);
+        let hit = hit.ok_or_else(|| Error::failed("the surface has no area to put taxels on"))?;
+        let moved_m = hit.position.distance(place.position_in_world);
+        if moved_m > within_m {
+            return Err(Error::failed(format!(
+                "{} lies {} from the surface, farther than the {} of `within`; put it right, or allow more",
+                place.name,
+                recipe::shown(moved_m),
+                recipe::shown(within_m)
+            )));
+        }
+        let triangle = triangles[hit.triangle];
+        let barycentric = barycentric(canvas.corners(triangle), hit.position);
+        let point = SurfacePoint { position: hit.position, normal: hit.normal, area: 0.0 };
+        snapped.push(Snapped { placed: Placed { point, triangle, barycentric }, id: place.id, moved_m });
+    }
+    // A taxel stands for what a hexagonal grid of its distance from the nearest would give it.
+    let points: Vec<SurfacePoint> = snapped.iter().map(|snapped| snapped.placed.point).collect();
+    for (snapped, distance) in snapped.iter_mut().zip(nearest_on_its_side(&points)) {
+        snapped.placed.point.area = distance.map_or(0.0, |distance| distance * distance * 3.0_f64.sqrt() / 2.0);
+    }
+    Ok(snapped)
+}

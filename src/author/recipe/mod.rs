@@ -1,0 +1,222 @@
+//! Recipes: what a person asks of a layout, read and checked before a mesh is looked at.
+
+mod file;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::glob::Globs;
+use super::group::FieldRule;
+use super::region::Region;
+use crate::body::Modality;
+use crate::error::{Error, Result};
+use crate::length::{self, Length};
+
+/// How far a place that was given may lie from the surface where nothing else is said, m.
+const WITHIN_M: f64 = 0.01;
+
+/// Where something was asked for, for messages: `recipe.toml: line 12`, or a flag.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Origin {
+    file: String,
+    line: String,
+}
+
+impl Origin {
+    fn flag(name: &str) -> Self {
+        Self { file: String::new(), line: name.to_owned() }
+    }
+
+    /// The error that `what` is wrong with what was asked for.
+    pub(super) fn wrong(&self, what: impl Into<String>) -> Error {
+        self.put(Error::failed(what))
+    }
+
+    /// `error`, told to be here.
+    pub(super) fn put(&self, error: Error) -> Error {
+        let error = if self.line.is_empty() { error } else { error.at(&self.line) };
+        if self.file.is_empty() { error } else { error.at(&self.file) }
+    }
+}
+
+/// What is to be placed on a body, and how it is grouped.
+#[derive(Clone, Debug)]
+pub struct Recipe {
+    /// The unit of the mesh file's numbers, and its metres.
+    pub(super) unit: Option<(String, f64)>,
+    /// Regions that get no taxel from any place that samples.
+    pub(super) bare: Vec<(String, Origin)>,
+    /// Whether taxels that the file has stay.
+    pub(super) keeps_existing: bool,
+    pub(super) regions: BTreeMap<String, Region>,
+    pub(super) places: Vec<Place>,
+    pub(super) fields: Vec<(FieldRule, Origin)>,
+    seed: u64,
+}
+
+/// Taxels of one kind on some regions.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub(super) name: String,
+    /// Names of regions; none means all of the skin.
+    pub(super) regions: Vec<String>,
+    /// A seed of its own instead of the recipe's.
+    pub(super) seed: Option<u64>,
+    /// The first of its ids, which count up.
+    pub(super) first_id: u32,
+    pub(super) modality: Modality,
+    pub(super) how: How,
+    pub(super) at: Origin,
+}
+
+/// How taxels are placed.
+#[derive(Clone, Debug)]
+pub(super) enum How {
+    /// So many, as blue noise, with a least spacing if one is given.
+    Evenly { count: usize, apart_m: Option<f64> },
+    /// So many, by a painted density.
+    Density { count: usize, attribute: String },
+    /// As many as fit with a spacing.
+    Apart { spacing_m: f64 },
+    /// On a grid in a geodesic chart.
+    Grid { hexagonal: bool, pitch_m: f64, origin: Option<DVec3>, u: Option<DVec3> },
+    /// Where somebody put empties or points with these names.
+    Marks { names: Globs, within_m: f64 },
+    /// Where a table says.
+    Table { path: PathBuf, within_m: f64 },
+}
+
+impl How {
+    /// Whether ids come with the places.
+    pub(super) fn has_ids(&self) -> bool {
+        matches!(self, Self::Table { .. })
+    }
+
+    /// Whether it finds places of its own, which bare regions are kept from.
+    pub(super) fn samples(&self) -> bool {
+        !matches!(self, Self::Marks { .. } | Self::Table { .. })
+    }
+}
+
+impl Recipe {
+    /// Reads the recipe in the TOML file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML, or asks for something that makes no sense. One line says where.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        Self::parse(&path.display().to_string(), &text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// Reads the recipe in `text`, called `name` in messages; files that it names are looked for in `folder`.
+    ///
+    /// # Errors
+    /// As [`Recipe::load`].
+    pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Self> {
+        file::parse(name, text, folder)
+    }
+
+    /// No taxels: those that the body has are grouped.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            unit: None,
+            bare: Vec::new(),
+            keeps_existing: false,
+            regions: BTreeMap::new(),
+            places: Vec::new(),
+            fields: Vec::new(),
+            seed: 0,
+        }
+    }
+
+    /// So many taxels as blue noise (`taxels`), a given spacing (such as `8 mm`), or so many no closer than that, on the
+    /// nodes, meshes or links whose names match one of `nodes`; without any, on all of the skin.
+    ///
+    /// # Errors
+    /// Neither number nor spacing is given, or one that makes no sense.
+    pub fn simple(taxels: Option<u64>, spacing: Option<&str>, nodes: &[String]) -> Result<Self> {
+        let mut recipe = Self::none();
+        let flag = |name: &str| Origin::flag(name);
+        let spacing_m =
+            spacing.map(|text| metres(text).map_err(|what| Error::usage(what).at("--spacing"))).transpose()?;
+        let how = match (taxels, spacing_m) {
+            (Some(count), apart_m) => {
+                How::Evenly { count: check_count(count).map_err(|e| flag("--taxels").put(e))?, apart_m }
+            }
+            (None, Some(spacing_m)) => How::Apart { spacing_m },
+            (None, None) => return Err(Error::usage("say how many taxels (--taxels) or how far apart (--spacing)")),
+        };
+        let mut regions = Vec::new();
+        if !nodes.is_empty() {
+            let at = flag("--region");
+            let node = Some(Globs::new(nodes).map_err(|e| at.put(e))?);
+            let region = Region { node, material: None, attribute: None, bounds: None, except: Vec::new(), at };
+            recipe.regions.insert(nodes.join(", "), region);
+            regions.push(nodes.join(", "));
+        }
+        recipe.places.push(Place {
+            name: regions.first().cloned().unwrap_or_else(|| SKIN.to_owned()),
+            regions,
+            seed: None,
+            first_id: 0,
+            modality: Modality::Pressure,
+            how,
+            at: flag(if taxels.is_some() { "--taxels" } else { "--spacing" }),
+        });
+        Ok(recipe)
+    }
+
+    /// The same with another seed.
+    #[must_use]
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same with the mesh file's numbers in `unit`: `um`, `mm`, `cm` or `m`.
+    ///
+    /// # Errors
+    /// There is no such unit.
+    pub fn with_unit(self, unit: &str) -> Result<Self> {
+        Ok(Self { unit: Some((unit.to_owned(), unit_metres(unit).map_err(Error::usage)?)), ..self })
+    }
+
+    /// The seed that `place` samples with: made of its own or the recipe's, and of its name, so that no other place counts.
+    pub(super) fn seed_of(&self, place: &Place) -> u64 {
+        // FNV-1a.
+        let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3);
+        let name = place.name.bytes().fold(0xCBF2_9CE4_8422_2325, step);
+        place.seed.unwrap_or(self.seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ name
+    }
+}
+
+/// What a place is called that is on all of the skin.
+const SKIN: &str = "skin";
+
+fn check_count(count: u64) -> Result<usize> {
+    match usize::try_from(count) {
+        Ok(count) if (1..=4_000_000).contains(&count) => Ok(count),
+        _ => Err(Error::failed(format!("{count} taxels cannot be placed; ask for 1 to 4000000"))),
+    }
+}
+
+/// The length over 0 that `text` says, m.
+fn metres(text: &str) -> Result<f64, String> {
+    let length = Length::parse(text.trim())?.ok_or("a length is missing; write one like 8mm")?;
+    let unit = length.unit_m.ok_or_else(|| format!("`{text}` has no unit; write one like 8mm"))?;
+    let metres = length.number * unit;
+    let fits = metres.is_finite() && metres > 0.0;
+    fits.then_some(metres).ok_or_else(|| format!("`{text}` is no length over 0"))
+}
+
+fn unit_metres(unit: &str) -> Result<f64, String> {
+    length::unit(unit).ok_or_else(|| format!("there is no unit `{unit}`; it is um, mm, cm or m"))
+}
+
+/// `metres` as a person says it.
+pub(super) fn shown(metres: f64) -> String {
+    if metres < 1.0 { format!("{:.1} mm", metres * 1e3) } else { format!("{metres:.2} m") }
+}

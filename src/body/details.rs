@@ -1,0 +1,139 @@
+//! What authoring asks of a file beyond a [`Body`]: materials, painted attributes, what carries each vertex, and where in
+//! the file all that stands.
+
+use glam::DVec3;
+use gltf::json;
+use json::mesh::{Primitive, Semantic};
+use json::validation::Checked;
+
+use super::document::Document;
+use super::nodes::Nodes;
+use super::read::{Sources, attribute, from_document};
+use super::{Body, Skinning};
+use crate::error::{Error, Result};
+
+/// A file's surfaces with what is painted on them.
+#[derive(Clone, Debug)]
+pub struct Details {
+    /// One a surface of the body.
+    pub parts: Vec<Part>,
+    /// Places that were marked by hand.
+    pub marks: Vec<Mark>,
+    /// Per link of the body its glTF node.
+    pub node_of_link: Vec<usize>,
+}
+
+/// What a file says of a surface, beside its triangles.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Index of the glTF node that shows it.
+    pub node: usize,
+    /// Index of that node's parent.
+    pub parent_node: Option<usize>,
+    /// Name of the mesh.
+    pub mesh: Option<String>,
+    /// Name of the material.
+    pub material: Option<String>,
+    /// Index of the glTF skin, if it has one.
+    pub skin: Option<usize>,
+    /// For a skinned part, what carries each vertex: `JOINTS_n` and `WEIGHTS_n`, set by set.
+    pub carriers: Vec<Skinning>,
+    /// Colours and attributes of its own.
+    pub paints: Vec<Paint>,
+}
+
+/// Numbers painted on vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Paint {
+    /// As the file has it: `_DENSITY`, `COLOR_0`.
+    pub name: String,
+    /// How many numbers a vertex has.
+    pub width: usize,
+    /// The numbers, vertex by vertex; integers normalised where the file says so.
+    pub values: Vec<f32>,
+}
+
+/// Places marked by hand: an empty node, or the points of a mesh that are no taxels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// The node's name.
+    pub name: String,
+    /// Where, in the world at rest, m.
+    pub positions_in_world: Vec<DVec3>,
+}
+
+/// The body called `name` in `bytes`, a whole file that holds its own buffers, and its details.
+pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
+    let document = Document::parse(bytes, None)?;
+    let nodes = Nodes::of(&document)?;
+    let mut sources = Sources::default();
+    let body = from_document(name, &document, &nodes, Some(&mut sources))?;
+    let mut parts = Vec::with_capacity(sources.surfaces.len());
+    for (&(node, primitive), surface) in sources.surfaces.iter().zip(&body.surfaces) {
+        let part = part(&document, &nodes, node, primitive, surface.positions.len());
+        parts.push(part.map_err(|e| e.at(format!("node `{}`", surface.name)))?);
+    }
+    let mut marks: Vec<Mark> =
+        sources.points.into_iter().map(|(name, positions_in_world)| Mark { name, positions_in_world }).collect();
+    for &node in nodes.in_order.iter().filter(|&&node| nodes.raw[node].mesh.is_none() && nodes.field[node].is_none()) {
+        if let Some(name) = nodes.raw[node].name.clone() {
+            marks.push(Mark { name, positions_in_world: vec![nodes.world_from_node[node].translation] });
+        }
+    }
+    let mut node_of_link = vec![0; body.links.len()];
+    for (node, link) in nodes.link.iter().enumerate() {
+        if let Some(link) = link {
+            node_of_link[*link] = node;
+        }
+    }
+    Ok((body, Details { parts, marks, node_of_link }))
+}
+
+fn part(document: &Document, nodes: &Nodes<'_>, node: usize, primitive: usize, vertices: usize) -> Result<Part> {
+    let raw = &nodes.raw[node];
+    let mesh = raw.mesh.map(|mesh| &document.root.meshes[mesh.value()]);
+    let mesh = mesh.ok_or_else(|| Error::failed("it shows no mesh"))?;
+    let primitive = &mesh.primitives[primitive];
+    let material = primitive.material.and_then(|material| document.root.materials[material.value()].name.clone());
+    let skin = raw.skin.map(|skin| skin.value());
+    Ok(Part {
+        node,
+        parent_node: nodes.parent[node],
+        mesh: mesh.name.clone(),
+        material,
+        skin,
+        carriers: if skin.is_some() { carriers(document, primitive)? } else { Vec::new() },
+        paints: paints(document, primitive, vertices),
+    })
+}
+
+/// All sets of joints and weights; their lengths were checked when the body was read.
+fn carriers(document: &Document, primitive: &Primitive) -> Result<Vec<Skinning>> {
+    let mut sets = Vec::new();
+    while let (Some(joints), Some(weights)) = (
+        attribute(primitive, &Semantic::Joints(sets.len() as u32)),
+        attribute(primitive, &Semantic::Weights(sets.len() as u32)),
+    ) {
+        let joints = document.integers::<4>(joints)?;
+        let joints = joints.into_iter().map(|row| row.map(|joint| u16::try_from(joint).unwrap_or(u16::MAX))).collect();
+        sets.push(Skinning { joints, weights: document.floats::<4>(weights)? });
+    }
+    Ok(sets)
+}
+
+/// Colours and custom attributes; one that cannot be read is as if it were not there.
+fn paints(document: &Document, primitive: &Primitive, vertices: usize) -> Vec<Paint> {
+    let named = primitive.attributes.iter().filter_map(|(semantic, accessor)| match semantic {
+        Checked::Valid(Semantic::Colors(set)) => Some((format!("COLOR_{set}"), accessor.value())),
+        Checked::Valid(Semantic::Extras(name)) => Some((format!("_{name}"), accessor.value())),
+        _ => None,
+    });
+    let mut paints: Vec<Paint> = named
+        .filter_map(|(name, accessor)| {
+            let (width, values) = document.numbers(accessor).ok()?;
+            (values.len() == width * vertices).then_some(Paint { name, width, values })
+        })
+        .collect();
+    paints.sort_by(|a, b| a.name.cmp(&b.name));
+    paints
+}

@@ -1,0 +1,367 @@
+//! Somebody's file, opened to have a layout added: everything else in it stays as it is, to the byte where glTF allows.
+//!
+//! The JSON is changed as text and the buffer only grows. Buffers and images in files of their own are taken in, so that
+//! what is written stands alone.
+
+use std::path::Path;
+
+use base64::Engine as _;
+use serde_json::{Value, json};
+
+use super::details::{self, Details};
+use super::document::{Document, fetch, split};
+use super::glb::{Before, Glb};
+use super::splice::{Span, Splice};
+use super::{Body, strip};
+use crate::error::{Error, Result};
+
+/// The lists that a layout adds to.
+const LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
+
+/// Key in the extras of a node that scales a file to metres: what the file was drawn in.
+const UNIT_KEY: &str = "somatic_unit";
+
+/// A glTF file that is to get a layout.
+#[derive(Clone, Debug)]
+pub struct Original {
+    name: String,
+    pub(super) text: String,
+    /// The one buffer.
+    pub(super) bin: Vec<u8>,
+    /// The chunks that a `.glb` has after the buffer.
+    rest: Vec<u8>,
+    /// What could not be taken in.
+    pub notes: Vec<String>,
+}
+
+impl Original {
+    /// Opens the `.glb` or `.gltf` at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no sound glTF.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        Self::from_bytes(&path.display().to_string(), &bytes, path.parent())
+    }
+
+    /// Opens the file in `bytes`, called `name` in messages; files that it refers to are looked for in `folder`.
+    ///
+    /// # Errors
+    /// As [`Original::open`].
+    pub fn from_bytes(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
+        Self::take_up(name, bytes, folder).map_err(|e| e.at(name))
+    }
+
+    fn take_up(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
+        let buffers = Document::parse(bytes, folder)?.into_buffers();
+        let (text, chunk) = split(bytes)?;
+        let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        let text = std::str::from_utf8(text).map_err(|_| Error::failed("its JSON is not UTF-8; export it again"))?;
+        let rest = rest_of(bytes).to_vec();
+        let mut original =
+            Self { name: name.to_owned(), text: text.trim_end().to_owned(), bin: Vec::new(), rest, notes: Vec::new() };
+        original.gather(buffers, chunk)?;
+        if let Some(folder) = folder {
+            original.take_in_images(folder);
+        }
+        Ok(original)
+    }
+
+    /// Makes one buffer of all.
+    fn gather(&mut self, buffers: Vec<Vec<u8>>, chunk: Option<&[u8]>) -> Result<()> {
+        let mut splice = Splice::new(&self.text);
+        let spans = splice.list("buffers");
+        let Some(first) = spans.first().cloned() else {
+            self.bin = chunk.unwrap_or_default().to_vec();
+            return Ok(());
+        };
+        let length = |splice: &Splice<'_>, span: &Span| {
+            let length = splice.member(span, "byteLength").and_then(|span| splice.number(&span));
+            length.ok_or_else(|| Error::failed("a buffer has no length; export the file again"))
+        };
+        let is_alone = spans.len() == 1 && splice.member(&first, "uri").is_none();
+        let mut bases = Vec::with_capacity(buffers.len());
+        for (mut bytes, span) in buffers.into_iter().zip(&spans) {
+            // What lies beyond a buffer's length in its file is none of it; a chunk may be padded.
+            if !is_alone {
+                bytes.truncate(length(&splice, span)?);
+            }
+            self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+            bases.push(self.bin.len());
+            self.bin.extend(bytes);
+        }
+        if is_alone {
+            return Ok(());
+        }
+        for view in splice.list("bufferViews") {
+            let Some(buffer) = splice.member(&view, "buffer") else { continue };
+            let base = splice.number(&buffer).and_then(|index| bases.get(index)).copied().unwrap_or(0);
+            if base > 0 {
+                splice.replace(buffer, "0".to_owned());
+                match splice.member(&view, "byteOffset") {
+                    Some(span) => {
+                        let offset = splice.number(&span).unwrap_or(0);
+                        splice.replace(span, (base + offset).to_string());
+                    }
+                    None => splice.extend(&view, &[("byteOffset".to_owned(), base.to_string())]),
+                }
+            }
+        }
+        splice.remove_members(&first, |key| key == "uri");
+        if spans.len() > 1 {
+            if let Some(span) = splice.member(&first, "byteLength") {
+                splice.replace(span, self.bin.len().to_string());
+            }
+            if let Some(list) = splice.member(&splice.root(), "buffers") {
+                splice.remove_elements(&list, |index| index > 0);
+            }
+        }
+        self.text = splice.apply();
+        Ok(())
+    }
+
+    /// Takes in images that lie beside the file.
+    fn take_in_images(&mut self, folder: &Path) {
+        let mut splice = Splice::new(&self.text);
+        let first = splice.list("bufferViews").len();
+        let mut views = Vec::new();
+        for image in splice.list("images") {
+            let Some(uri) = splice.member(&image, "uri") else { continue };
+            let Ok(uri) = serde_json::from_str::<String>(splice.get(&uri)) else { continue };
+            if uri.starts_with("data:") {
+                continue;
+            }
+            let bytes = fetch(&uri, Some(folder));
+            let kind = match bytes.as_deref() {
+                Ok([0x89, b'P', b'N', b'G', ..]) => "\"image/png\"",
+                Ok([0xFF, 0xD8, 0xFF, ..]) => "\"image/jpeg\"",
+                _ => {
+                    self.notes.push(format!("the image `{uri}` was not taken in; keep it beside the file"));
+                    continue;
+                }
+            };
+            let bytes = bytes.unwrap_or_default();
+            self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+            let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+            let mut members = vec![("bufferView".to_owned(), (first + views.len()).to_string())];
+            if splice.member(&image, "mimeType").is_none() {
+                members.push(("mimeType".to_owned(), kind.to_owned()));
+            }
+            views.push(view.to_string());
+            self.bin.extend(bytes);
+            // In its place, so that nothing is added to an object that loses its only member.
+            let written: Vec<String> = members.iter().map(|(key, value)| format!("\"{key}\":{value}")).collect();
+            if let Some(span) = splice.member_with_key(&image, "uri") {
+                splice.replace(span, written.join(","));
+            }
+        }
+        if !views.is_empty() {
+            add_to_list(&mut splice, "bufferViews", &views);
+            set_length(&mut splice, self.bin.len());
+            self.text = splice.apply();
+        }
+    }
+
+    /// What messages call it.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Takes out the fields that it has, and unless `keep_taxels` the taxels.
+    ///
+    /// # Errors
+    /// They stand where nothing can be taken out, because an extension may count what comes after them.
+    pub fn clear_layout(&mut self, keep_taxels: bool) -> Result<()> {
+        strip::clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
+    }
+
+    /// Says that its numbers are in a `unit` of `metres`: everything comes under a node that is scaled by that.
+    ///
+    /// # Errors
+    /// It has been told another unit before, or two of its scenes share nodes.
+    pub fn set_unit(&mut self, unit: &str, metres: f64) -> Result<()> {
+        let mut splice = Splice::new(&self.text);
+        let nodes = splice.list("nodes");
+        let extras = nodes.iter().filter_map(|node| splice.member(node, "extras"));
+        let known = extras.filter_map(|extras| splice.member(&extras, UNIT_KEY)).next();
+        if let Some(known) = known.map(|span| splice.get(&span).trim_matches('"')) {
+            return match known == unit {
+                true => Ok(()),
+                false => Err(Error::usage(format!("it is in {known} already; leave `unit` out")).at(&self.name)),
+            };
+        }
+        if metres == 1.0 {
+            return Ok(());
+        }
+        let mut is_root = vec![true; nodes.len()];
+        for child in nodes.iter().filter_map(|node| splice.member(node, "children")).flat_map(|c| splice.elements(&c)) {
+            if let Some(child) = splice.number(&child).and_then(|child| is_root.get_mut(child)) {
+                *child = false;
+            }
+        }
+        let wrapper = |children: &[usize]| json!({"name": format!("unit {unit}"), "scale": [metres, metres, metres], "children": children, "extras": {UNIT_KEY: unit}});
+        let mut wrappers = Vec::new();
+        for scene in splice.list("scenes") {
+            let Some(list) = splice.member(&scene, "nodes") else { continue };
+            let roots: Vec<usize> = splice.elements(&list).iter().filter_map(|span| splice.number(span)).collect();
+            for &root in &roots {
+                if !is_root.get_mut(root).is_some_and(|is_root| std::mem::replace(is_root, false)) {
+                    let what = "two of its scenes share nodes, so that a unit cannot be given to each; keep one scene";
+                    return Err(Error::failed(what).at(&self.name));
+                }
+            }
+            if !roots.is_empty() {
+                splice.replace(list, format!("[{}]", nodes.len() + wrappers.len()));
+                wrappers.push(wrapper(&roots).to_string());
+            }
+        }
+        let unseen: Vec<usize> = (0..nodes.len()).filter(|&node| is_root[node]).collect();
+        if !unseen.is_empty() {
+            wrappers.push(wrapper(&unseen).to_string());
+        }
+        add_to_list(&mut splice, "nodes", &wrappers);
+        self.text = splice.apply();
+        Ok(())
+    }
+
+    /// The body that it holds now, and what else there is to its surfaces.
+    ///
+    /// # Errors
+    /// As [`Body::load`].
+    pub fn read(&self) -> Result<(Body, Details)> {
+        self.to_glb().and_then(|bytes| details::read(&self.name, &bytes)).map_err(|e| e.at(&self.name))
+    }
+
+    /// An empty addition; nodes are given parents by their index in the file.
+    #[must_use]
+    pub fn addition(&self) -> Glb {
+        let splice = Splice::new(&self.text);
+        let counts = LISTS.iter().map(|&key| (key.to_owned(), splice.list(key).len())).collect();
+        Glb::added_to(Before { counts, bytes: self.bin.len().next_multiple_of(4), adopted: Vec::new() })
+    }
+
+    /// Adds what was put into `addition`, which was made for the file as it is now.
+    pub fn add(&mut self, addition: &Glb) {
+        let mut splice = Splice::new(&self.text);
+        for key in LISTS {
+            let elements = addition.json.get(key).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+            let written: Vec<String> = elements.iter().map(ToString::to_string).collect();
+            add_to_list(&mut splice, key, &written);
+        }
+        let nodes = splice.list("nodes");
+        let mut adopted = addition.before.adopted.clone();
+        adopted.sort_unstable();
+        for children in adopted.chunk_by(|a, b| a.0 == b.0) {
+            let written: Vec<String> = children.iter().map(|(_, child)| child.to_string()).collect();
+            let Some(parent) = nodes.get(children[0].0) else { continue };
+            match splice.member(parent, "children") {
+                Some(list) => splice.append(&list, &written),
+                None => splice.extend(parent, &[("children".to_owned(), format!("[{}]", written.join(",")))]),
+            }
+        }
+        let in_scene = addition.json["scenes"][0]["nodes"].as_array().map_or(&[][..], Vec::as_slice);
+        let in_scene: Vec<String> = in_scene.iter().map(ToString::to_string).collect();
+        let shown = splice.member(&splice.root(), "scene").and_then(|span| splice.number(&span)).unwrap_or(0);
+        if let Some(scene) = splice.list("scenes").get(shown).filter(|_| !in_scene.is_empty()) {
+            match splice.member(scene, "nodes") {
+                Some(list) => splice.append(&list, &in_scene),
+                None => splice.extend(scene, &[("nodes".to_owned(), format!("[{}]", in_scene.join(",")))]),
+            }
+        }
+        if !addition.bin.is_empty() {
+            self.bin.resize(addition.before.bytes, 0);
+            self.bin.extend(&addition.bin);
+            set_length(&mut splice, self.bin.len());
+        }
+        self.text = splice.apply();
+    }
+
+    /// The whole file as a `.glb`.
+    ///
+    /// # Errors
+    /// It would pass the 4 GiB that a `.glb` can hold.
+    pub fn to_glb(&self) -> Result<Vec<u8>> {
+        let (text, bin) = (self.text.len().next_multiple_of(4), self.bin.len().next_multiple_of(4));
+        let length = 20 + text + if bin > 0 { 8 + bin } else { 0 } + self.rest.len();
+        let Ok(whole) = u32::try_from(length) else {
+            return Err(Error::failed("the body would pass the 4 GiB that a .glb can hold; split it"));
+        };
+        let mut bytes = Vec::with_capacity(length);
+        bytes.extend(b"glTF");
+        for number in [2, whole, text as u32] {
+            bytes.extend(number.to_le_bytes());
+        }
+        bytes.extend(b"JSON");
+        bytes.extend(self.text.as_bytes());
+        bytes.resize(20 + text, b' ');
+        if bin > 0 {
+            bytes.extend((bin as u32).to_le_bytes());
+            bytes.extend(b"BIN\0");
+            bytes.extend(&self.bin);
+            bytes.resize(28 + text + bin, 0);
+        }
+        bytes.extend(&self.rest);
+        Ok(bytes)
+    }
+
+    /// The whole file as a `.gltf` that carries its buffer along.
+    #[must_use]
+    pub fn to_gltf(&self) -> String {
+        let mut splice = Splice::new(&self.text);
+        if let Some(buffer) = splice.list("buffers").first() {
+            let data = base64::engine::general_purpose::STANDARD.encode(&self.bin);
+            let uri = format!("\"data:application/octet-stream;base64,{data}\"");
+            splice.extend(buffer, &[("uri".to_owned(), uri)]);
+        }
+        splice.apply()
+    }
+
+    /// Writes the file at `path`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`. What is there is
+    /// replaced only if `replace` says so.
+    ///
+    /// # Errors
+    /// Something is there, the folder cannot be written to, or the disk is full.
+    pub fn save(&self, path: impl AsRef<Path>, replace: bool) -> Result<()> {
+        let path = path.as_ref();
+        let is_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+        let bytes = if is_text { self.to_gltf().into_bytes() } else { self.to_glb()? };
+        if replace { crate::whole::write(path, &bytes) } else { crate::whole::write_new(path, &bytes) }
+    }
+}
+
+/// Adds `elements` to the list `key` of the root, which may not be there yet.
+fn add_to_list(splice: &mut Splice<'_>, key: &str, elements: &[String]) {
+    let root = splice.root();
+    match splice.member(&root, key) {
+        Some(list) => splice.append(&list, elements),
+        None if elements.is_empty() => {}
+        None => splice.extend(&root, &[(key.to_owned(), format!("[{}]", elements.join(",")))]),
+    }
+}
+
+/// Sets the length of the one buffer.
+pub(super) fn set_length(splice: &mut Splice<'_>, length: usize) {
+    let buffer = splice.list("buffers").first().cloned();
+    match buffer.and_then(|buffer| splice.member(&buffer, "byteLength")) {
+        Some(span) => splice.replace(span, length.to_string()),
+        None => add_to_list(splice, "buffers", &[json!({"byteLength": length}).to_string()]),
+    }
+}
+
+/// What a `.glb` has after its JSON and its buffer.
+fn rest_of(bytes: &[u8]) -> &[u8] {
+    let number = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    if !bytes.starts_with(b"glTF") {
+        return &[];
+    }
+    let container = &bytes[..number(8).unwrap_or(0).min(bytes.len())];
+    let after_json = number(12).map_or(container.len(), |length| length.saturating_add(20));
+    let is_bin = container.get(after_json.saturating_add(4)..).is_some_and(|rest| rest.starts_with(b"BIN\0"));
+    let after = match number(after_json).filter(|_| is_bin) {
+        Some(length) => after_json.saturating_add(8).saturating_add(length),
+        None => after_json,
+    };
+    container.get(after..).filter(|rest| rest.len() >= 8).unwrap_or(&[])
+}

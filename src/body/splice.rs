@@ -1,0 +1,251 @@
+//! JSON changed as text: what is not changed keeps every byte, its numbers' digits and its blanks included.
+
+use std::fmt;
+use std::ops::Range;
+
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use serde_json::value::RawValue;
+
+/// Where something stands in a text.
+pub(super) type Span = Range<usize>;
+
+struct Members<'a>(Vec<(String, &'a RawValue)>);
+
+impl<'de> Deserialize<'de> for Members<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Collect;
+        impl<'de> Visitor<'de> for Collect {
+            type Value = Members<'de>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut members = Vec::new();
+                while let Some(member) = map.next_entry()? {
+                    members.push(member);
+                }
+                Ok(Members(members))
+            }
+        }
+        deserializer.deserialize_map(Collect)
+    }
+}
+
+struct Elements<'a>(Vec<&'a RawValue>);
+
+impl<'de> Deserialize<'de> for Elements<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Collect;
+        impl<'de> Visitor<'de> for Collect {
+            type Value = Elements<'de>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+                let mut elements = Vec::new();
+                while let Some(element) = list.next_element()? {
+                    elements.push(element);
+                }
+                Ok(Elements(elements))
+            }
+        }
+        deserializer.deserialize_seq(Collect)
+    }
+}
+
+/// A text and the changes that it is to get, which may not overlap.
+pub(super) struct Splice<'a> {
+    text: &'a str,
+    changes: Vec<(Span, String)>,
+}
+
+impl<'a> Splice<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        Self { text, changes: Vec::new() }
+    }
+
+    /// The whole text's value, without the blanks around it.
+    pub(super) fn root(&self) -> Span {
+        let start = self.text.len() - self.text.trim_start().len();
+        start..self.text.trim_end().len()
+    }
+
+    fn span(&self, raw: &RawValue) -> Span {
+        let start = raw.get().as_ptr() as usize - self.text.as_ptr() as usize;
+        start..start + raw.get().len()
+    }
+
+    pub(super) fn get(&self, span: &Span) -> &'a str {
+        &self.text[span.clone()]
+    }
+
+    /// The members of the object at `span`; none where there is no object.
+    pub(super) fn members(&self, span: &Span) -> Vec<(String, Span)> {
+        let members = serde_json::from_str::<Members<'a>>(self.get(span)).map(|members| members.0);
+        members.unwrap_or_default().into_iter().map(|(key, raw)| (key, self.span(raw))).collect()
+    }
+
+    /// The member `key` of the object at `span`.
+    pub(super) fn member(&self, span: &Span, key: &str) -> Option<Span> {
+        self.members(span).into_iter().rev().find(|(known, _)| known == key).map(|(_, span)| span)
+    }
+
+    /// The elements of the list at `span`; none where there is no list.
+    pub(super) fn elements(&self, span: &Span) -> Vec<Span> {
+        let elements = serde_json::from_str::<Elements<'a>>(self.get(span)).map(|elements| elements.0);
+        elements.unwrap_or_default().into_iter().map(|raw| self.span(raw)).collect()
+    }
+
+    /// The elements of the list that is the member `key` of the root.
+    pub(super) fn list(&self, key: &str) -> Vec<Span> {
+        self.member(&self.root(), key).map_or_else(Vec::new, |span| self.elements(&span))
+    }
+
+    /// The whole number at `span`.
+    pub(super) fn number(&self, span: &Span) -> Option<usize> {
+        self.get(span).parse().ok()
+    }
+
+    pub(super) fn replace(&mut self, span: Span, with: String) {
+        self.changes.push((span, with));
+    }
+
+    /// Adds `elements` to the end of the list at `span`.
+    pub(super) fn append(&mut self, span: &Span, elements: &[String]) {
+        if !elements.is_empty() {
+            let first = if self.elements(span).is_empty() { "" } else { "," };
+            self.changes.push((span.end - 1..span.end - 1, format!("{first}{}", elements.join(","))));
+        }
+    }
+
+    /// Gives the object at `span` the `members` (key, value), which it does not have.
+    pub(super) fn extend(&mut self, span: &Span, members: &[(String, String)]) {
+        if !members.is_empty() {
+            let written: Vec<String> = members.iter().map(|(key, value)| format!("\"{key}\":{value}")).collect();
+            let first = if self.members(span).is_empty() { "" } else { "," };
+            self.changes.push((span.end - 1..span.end - 1, format!("{first}{}", written.join(","))));
+        }
+    }
+
+    /// Takes those `gone` out of `all`, the members or elements (with what goes before each, such as a key) of what is at
+    /// `span`.
+    fn cut(&mut self, span: &Span, all: &[Span], gone: impl Fn(usize) -> bool) {
+        // From the end of what stays before to the end of what goes, or at the start to the start of what stays.
+        let mut kept: Option<usize> = None;
+        let mut i = 0;
+        while i < all.len() {
+            if !gone(i) {
+                kept = Some(i);
+                i += 1;
+                continue;
+            }
+            let mut last = i;
+            while last + 1 < all.len() && gone(last + 1) {
+                last += 1;
+            }
+            let (start, end) = match (kept, all.get(last + 1)) {
+                (Some(before), _) => (all[before].end, all[last].end),
+                (None, Some(after)) => (all[i].start, after.start),
+                (None, None) => (span.start + 1, span.end - 1),
+            };
+            self.changes.push((start..end, String::new()));
+            i = last + 1;
+        }
+    }
+
+    /// Removes the elements `gone` of the list at `span`.
+    pub(super) fn remove_elements(&mut self, span: &Span, gone: impl Fn(usize) -> bool) {
+        let all = self.elements(span);
+        self.cut(span, &all, gone);
+    }
+
+    /// The members of the object at `span`, each with its key.
+    fn members_with_keys(&self, span: &Span) -> Vec<(String, Span)> {
+        // A member begins with its key, after the brace or the comma before it.
+        let mut from = span.start + 1;
+        let with_key = |(key, value): (String, Span)| {
+            let between = &self.text[from..value.start];
+            let start = from + between.find('"').unwrap_or(0);
+            from = value.end;
+            (key, start..value.end)
+        };
+        self.members(span).into_iter().map(with_key).collect()
+    }
+
+    /// The member `key` of the object at `span`, from its key on.
+    pub(super) fn member_with_key(&self, span: &Span, key: &str) -> Option<Span> {
+        self.members_with_keys(span).into_iter().rev().find(|(known, _)| known == key).map(|(_, span)| span)
+    }
+
+    /// Removes the members called `gone` of the object at `span`.
+    pub(super) fn remove_members(&mut self, span: &Span, gone: impl Fn(&str) -> bool) {
+        let (keys, all): (Vec<String>, Vec<Span>) = self.members_with_keys(span).into_iter().unzip();
+        self.cut(span, &all, |i| gone(&keys[i]));
+    }
+
+    /// The text with its changes.
+    pub(super) fn apply(mut self) -> String {
+        self.changes.sort_by_key(|(span, _)| (span.start, span.end));
+        let mut out = String::with_capacity(self.text.len());
+        let mut from = 0;
+        for (span, with) in &self.changes {
+            out += &self.text[from..span.start.max(from)];
+            out += with;
+            from = span.end.max(from);
+        }
+        out + &self.text[from..]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "{ \"a\": [1.00, 2e-7 ,3],\n\t\"b\" : {\"x\":0.10, \"y\": -0},\"c\":[ ] }\n";
+
+    #[test]
+    fn what_is_not_changed_keeps_its_bytes() {
+        let splice = Splice::new(TEXT);
+        assert_eq!(splice.list("a").iter().map(|span| splice.get(span)).collect::<Vec<_>>(), ["1.00", "2e-7", "3"]);
+        assert_eq!(splice.apply(), TEXT);
+        let mut splice = Splice::new(TEXT);
+        let root = splice.root();
+        let [a, b, c] = ["a", "b", "c"].map(|key| splice.member(&root, key).unwrap());
+        splice.append(&a, &["4".into(), "5".into()]);
+        splice.append(&c, &["6".into()]);
+        splice.extend(&b, &[("z".into(), "[]".into())]);
+        splice.extend(&root, &[("d".into(), "7".into()), ("e".into(), "8".into())]);
+        let expected =
+            "{ \"a\": [1.00, 2e-7 ,3,4,5],\n\t\"b\" : {\"x\":0.10, \"y\": -0,\"z\":[]},\"c\":[ 6] ,\"d\":7,\"e\":8}\n";
+        assert_eq!(splice.apply(), expected);
+    }
+
+    #[test]
+    fn what_goes_takes_its_comma_along() {
+        let without = |gone: &[usize]| {
+            let mut splice = Splice::new(TEXT);
+            let a = splice.member(&splice.root(), "a").unwrap();
+            splice.remove_elements(&a, |i| gone.contains(&i));
+            let text = splice.apply();
+            serde_json::from_str::<serde_json::Value>(&text).unwrap()["a"].to_string()
+        };
+        assert_eq!(without(&[0]), "[2e-7,3]");
+        assert_eq!([without(&[1]), without(&[2])], ["[1.0,3]", "[1.0,2e-7]"]);
+        assert_eq!([without(&[0, 2]), without(&[0, 1]), without(&[1, 2])], ["[2e-7]", "[3]", "[1.0]"]);
+        assert_eq!(without(&[0, 1, 2]), "[]");
+        for (gone, left) in [
+            ("a", "{\"b\":{\"x\":0.1,\"y\":-0.0},\"c\":[]}"),
+            ("c", "{\"a\":[1.0,2e-7,3],\"b\":{\"x\":0.1,\"y\":-0.0}}"),
+        ] {
+            let mut splice = Splice::new(TEXT);
+            let root = splice.root();
+            splice.remove_members(&root, |key| key == gone);
+            assert_eq!(serde_json::from_str::<serde_json::Value>(&splice.apply()).unwrap().to_string(), left);
+        }
+    }
+}

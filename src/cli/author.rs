@@ -1,0 +1,257 @@
+//! `somatic author`: a mesh in, a body with a skin out.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
+use console::{Term, style};
+use serde_json::{Value, json};
+use somatic::author::{Authored, PlaceReport, Recipe, author};
+use somatic::body::Original;
+use somatic::error::nearest;
+use somatic::{Error, Result, bundled};
+
+use super::bar::Bar;
+use super::words::{count, millimetres};
+use super::{DONE, print};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic author hand.glb --taxels 500 --seed 1 -o skin.glb     500 taxels, evenly over all of it
+  somatic author arm.glb --spacing 8mm --region 'forearm*' -o skin.glb
+  somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
+  somatic inspect skin.glb
+  somatic run --body skin.glb --source touch.csv
+
+A recipe says it region by region:
+  seed = 1
+  bare = [\"nails\"]
+  [regions.palm]
+  node = \"palm*\"               # or material, attribute, box, except
+  [regions.nails]
+  material = \"nail\"
+  [[place]]
+  region = \"palm\"
+  first_id = 0
+  spacing = \"4 mm\"             # or taxels, with density; grid; points; csv
+
+Whatever else the file holds stays as it is. A layout that it has is replaced.";
+
+/// Links, ids and moves that a person is shown.
+const MOST_LISTED: usize = 6;
+
+/// Put a skin on a mesh: taxels placed as asked, in fields, in a file that Blender and every glTF viewer open.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The mesh: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    #[arg(value_name = "MESH")]
+    mesh: String,
+
+    /// What to place where, a TOML file.
+    #[arg(long, value_name = "RECIPE.toml", conflicts_with_all = ["taxels", "spacing", "region"])]
+    recipe: Option<PathBuf>,
+
+    /// How many taxels, as evenly as blue noise goes.
+    #[arg(long, value_name = "N")]
+    taxels: Option<u64>,
+
+    /// How far taxels are apart at least, such as 8mm; with --taxels exactly so many, else as many as fit.
+    #[arg(long, value_name = "LENGTH")]
+    spacing: Option<String>,
+
+    /// Nodes, meshes or links that get taxels, as a glob; may be given again [default: all].
+    #[arg(long, value_name = "GLOB")]
+    region: Vec<String>,
+
+    /// Which of many equally good placements [default: the recipe's, or 0].
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m, as glTF says].
+    #[arg(long, value_name = "UNIT")]
+    unit: Option<String>,
+
+    /// The body to write, .glb or .gltf.
+    #[arg(short, long, value_name = "BODY.glb")]
+    output: PathBuf,
+
+    /// Replace the output if it is there, even where it is the mesh itself.
+    #[arg(long)]
+    force: bool,
+
+    /// Print what was placed as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    check_output(&arguments.output, arguments.force)?;
+    let mut recipe = match &arguments.recipe {
+        Some(path) => Recipe::load(path)?,
+        None => Recipe::simple(arguments.taxels, arguments.spacing.as_deref(), &arguments.region)?,
+    };
+    if let Some(seed) = arguments.seed {
+        recipe = recipe.with_seed(seed);
+    }
+    if let Some(unit) = &arguments.unit {
+        recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;
+    }
+    let file = open(&arguments.mesh)?;
+    let authored = {
+        let mut bar = Bar::new("placing taxels");
+        author(file, &recipe, |share| bar.show(share))?
+    };
+    authored.file.save(&arguments.output, arguments.force)?;
+    print(&match arguments.json {
+        true => format!("{}\n", summary(&arguments.output, &authored)),
+        false => text(&arguments.output, &authored),
+    })?;
+    Ok(DONE)
+}
+
+/// Refuses an output that could not be written, before any work is done.
+fn check_output(path: &Path, force: bool) -> Result<()> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    if !matches!(ending.as_deref(), Some("glb" | "gltf")) {
+        return Err(Error::usage("a body is a .glb or a .gltf; name the output so").at(path.display()));
+    }
+    if path.exists() && !force {
+        return Err(Error::failed("it is there already; choose another name, or say --force").at(path.display()));
+    }
+    Ok(())
+}
+
+/// The file `name`, or the bundled body of that name where there is no such file.
+fn open(name: &str) -> Result<Original> {
+    if !Path::new(name).exists() {
+        if let Some(bytes) = bundled::body(name) {
+            return Original::from_bytes(name, bytes, None);
+        }
+        if let Some(near) = nearest(name, bundled::BODIES) {
+            return Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name));
+        }
+    }
+    Original::open(name)
+}
+
+/// `ids` as runs: `0–499, 1000`.
+fn runs(ids: &[u32]) -> Vec<(u32, u32)> {
+    let mut ids = ids.to_vec();
+    ids.sort_unstable();
+    let mut runs: Vec<(u32, u32)> = Vec::new();
+    for id in ids {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == id => *last = id,
+            _ => runs.push((id, id)),
+        }
+    }
+    runs
+}
+
+fn text(output: &Path, authored: &Authored) -> String {
+    let body = &authored.body;
+    let taxels = count(body.taxels.len() as u64, "taxel");
+    let fields = count(body.fields.len() as u64, "field");
+    let mut text = format!("{}: {taxels} in {fields}\n", style(output.display()).bold());
+    if !authored.places.is_empty() {
+        text += &format!("\n{}", table(&authored.places));
+    }
+    for place in &authored.places {
+        text += &moves(place);
+    }
+    for note in &authored.notes {
+        text += &format!("  {} {note}\n", style("•").yellow());
+    }
+    text
+}
+
+fn table(places: &[PlaceReport]) -> String {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
+    let term = Term::stdout();
+    if term.is_term() {
+        table.set_width(term.size().1);
+    }
+    table.set_header(["place", "taxels", "least mm", "mean mm", "ids", "links"]);
+    for column in 1..4 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for place in places {
+        let length = |metres: Option<f64>| Cell::new(metres.map_or_else(|| "–".to_owned(), millimetres));
+        let run =
+            |(first, last): &(u32, u32)| if first == last { first.to_string() } else { format!("{first}–{last}") };
+        let ids: Vec<String> = runs(&place.ids).iter().map(run).collect();
+        let links: Vec<String> = place.links.iter().map(|(link, number)| format!("{link} {number}")).collect();
+        table.add_row([
+            Cell::new(&place.name),
+            Cell::new(place.ids.len()),
+            length(place.least_spacing_m),
+            length(place.mean_spacing_m),
+            Cell::new(listed(&ids)),
+            Cell::new(listed(&links)),
+        ]);
+    }
+    let mut text = String::new();
+    for (index, line) in table.lines().enumerate() {
+        let line = line.trim_end();
+        text += &if index == 0 { style(line).dim().to_string() } else { line.to_owned() };
+        text += "\n";
+    }
+    text
+}
+
+fn listed(words: &[String]) -> String {
+    match words.get(..MOST_LISTED) {
+        Some(first) if words.len() > MOST_LISTED => {
+            format!("{} and {} more", first.join(", "), words.len() - MOST_LISTED)
+        }
+        _ => words.join(", "),
+    }
+}
+
+/// How far places that were given had to be moved, the worst first.
+fn moves(place: &PlaceReport) -> String {
+    if place.moved_m.is_empty() {
+        return String::new();
+    }
+    let mut worst = place.moved_m.clone();
+    worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let mean = worst.iter().map(|(_, moved)| moved).sum::<f64>() / worst.len() as f64;
+    let shown: Vec<String> =
+        worst.iter().take(MOST_LISTED).map(|(id, moved)| format!("{id} by {} mm", millimetres(*moved))).collect();
+    format!(
+        "\n{}: moved to the surface by {} mm on average; farthest {}\n",
+        place.name,
+        millimetres(mean),
+        shown.join(", ")
+    )
+}
+
+fn summary(output: &Path, authored: &Authored) -> Value {
+    let place = |place: &PlaceReport| {
+        let moved: Vec<Value> = place.moved_m.iter().map(|(id, moved)| json!({"id": id, "moved": moved})).collect();
+        let mut object = json!({
+            "name": place.name,
+            "taxels": place.ids.len(),
+            "ids": runs(&place.ids),
+            "links": place.links,
+        });
+        if let (Some(least), Some(mean)) = (place.least_spacing_m, place.mean_spacing_m) {
+            object["spacing"] = json!({"least": least, "mean": mean});
+        }
+        if !moved.is_empty() {
+            object["moved"] = moved.into();
+        }
+        object
+    };
+    json!({
+        "output": output.display().to_string(),
+        "taxels": authored.body.taxels.len(),
+        "fields": authored.body.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>(),
+        "places": authored.places.iter().map(place).collect::<Vec<_>>(),
+        "notes": authored.notes,
+    })
+}
