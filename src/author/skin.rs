@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::SurfacePoint;
 use super::canvas::{Canvas, Seated};
 use super::group::painted::Paints;
-use super::group::{Grower, Grouping, group as group_by};
+use super::group::{Grouping, Grower, group as group_by};
 use super::lattice::Lattice;
 use super::place::{self, Placed, Progress, nearest_on_its_side};
-use super::points::{Snapped, of_marks, of_table, snap};
+use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{How, Origin, Place, Recipe, shown};
 use super::region::{Regions, nothing_left};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel};
@@ -192,6 +192,11 @@ fn fill(
             filled.collect()
         }
         How::Marks { names, within_m } => snap(canvas, region, &of_marks(canvas, names)?, *within_m)?,
+        How::Icub { path, link, within_m } => {
+            let (given, more) = of_icub(canvas, path, link.as_deref(), place.modality, place.first_id)?;
+            notes.extend(more);
+            snap(canvas, region, &given, *within_m)?
+        }
         How::Table { path, within_m } => {
             let given = of_table(canvas, path)?;
             snap(canvas, region, &given, *within_m).map_err(|e| e.at(path.display()))?

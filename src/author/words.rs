@@ -38,7 +38,9 @@ impl<'de> Deserialize<'de> for Length {
             fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<f64, E> {
                 let read = crate::length::Length::parse(text.trim()).ok().flatten();
                 let metres = read.and_then(|length| Some(length.number * length.unit_m?));
-                metres.ok_or_else(|| E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)")))
+                metres.ok_or_else(|| {
+                    E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)"))
+                })
             }
         }
         let metres = deserializer.deserialize_any(Reader)?;

@@ -39,7 +39,8 @@ impl Grower<'_> {
         let members = unions(&specs);
         let mut bare = Body { fields: Vec::new(), ..self.body.clone() };
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
-        let planes: Vec<_> = FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
+        let planes: Vec<_> =
+            FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
         let mut fields = Vec::with_capacity(specs.len());
         let made = std::mem::take(&mut self.made);

@@ -182,7 +182,14 @@ impl<'a> Grower<'a> {
             if !self.index_of.contains_key(level) {
                 let parent = above.map(str::to_owned);
                 let spec = FieldSpec { name: level.to_owned(), parent, ..FieldSpec::default() };
-                self.push(Made { spec, chart: ChartWish::Auto, wrap: Wrap::Bare, u: None, is_level: true, rule: self.applied });
+                self.push(Made {
+                    spec,
+                    chart: ChartWish::Auto,
+                    wrap: Wrap::Bare,
+                    u: None,
+                    is_level: true,
+                    rule: self.applied,
+                });
             }
         }
         let member = MemberSpec { weight: rule.weight.unwrap_or(1.0), uv: None };
@@ -190,7 +197,8 @@ impl<'a> Grower<'a> {
         let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
         let chart = rule.chart.unwrap_or_default();
         let named = if matches!(chart, ChartWish::Auto | ChartWish::None) { Wrap::Bare } else { Wrap::Refuse };
-        let made = Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
+        let made =
+            Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
         match self.index_of.get(name) {
             Some(&there) if self.made[there].is_level => self.made[there] = made,
             Some(_) => {

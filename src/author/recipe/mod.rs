@@ -86,6 +86,8 @@ pub(super) enum How {
     Marks { names: Globs, within_m: f64 },
     /// Where a table says.
     Table { path: PathBuf, within_m: f64 },
+    /// Where a position file of the iCub says, in the frame of `link`, or of the one that the file names.
+    Icub { path: PathBuf, link: Option<String>, within_m: f64 },
 }
 
 impl How {
@@ -96,7 +98,7 @@ impl How {
 
     /// Whether it finds places of its own, which bare regions are kept from.
     pub(super) fn samples(&self) -> bool {
-        !matches!(self, Self::Marks { .. } | Self::Table { .. })
+        !matches!(self, Self::Marks { .. } | Self::Table { .. } | Self::Icub { .. })
     }
 }
 
