@@ -135,7 +135,8 @@ impl Grower<'_> {
                 Some(radius_m) => radius_m,
                 None => {
                     let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
-                    let all: Vec<f64> = links[link].to_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
+                    let all: Vec<f64> =
+                        links[link].over_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
                     let ways = &links[link];
                     let distance = |&other: &usize| match seeds[other] {
                         Seed::Taxel(taxel) => ways.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
@@ -220,7 +221,9 @@ impl Grower<'_> {
                 let middles: Vec<Seed> = named
                     .filter_map(|(_, ids)| {
                         let taxels: Vec<usize> = ids.into_iter().filter_map(|id| body.taxel_index(id)).collect();
-                        self.middle(taxels.into_iter().filter(|taxel| chosen.binary_search(taxel).is_ok()).collect())
+                        let taxels: Vec<usize> =
+                            taxels.into_iter().filter(|taxel| chosen.binary_search(taxel).is_ok()).collect();
+                        self.middle(&taxels)
                     })
                     .map(Seed::Taxel)
                     .collect();
@@ -234,7 +237,7 @@ impl Grower<'_> {
     }
 
     /// The taxel nearest to the mean of `taxels`, among those that face as they do.
-    fn middle(&self, taxels: Vec<usize>) -> Option<usize> {
+    fn middle(&self, taxels: &[usize]) -> Option<usize> {
         let at = |taxel: usize| {
             let taxel = &self.body.taxels[taxel];
             let world_from_link = self.body.links[taxel.link].world_from_link;
@@ -278,8 +281,8 @@ fn from(
 ) -> Vec<f64> {
     let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, ways.points[nearest].1));
     let reached = match place {
-        Some(place) => ways.from_place(&place, nearest, limit_m),
-        None => ways.from(nearest, limit_m),
+        Some(place) => ways.over_place(&place, nearest, limit_m),
+        None => ways.over(nearest, limit_m),
     };
     reached.into_iter().map(|reach| reach.distance_m).collect()
 }

@@ -34,14 +34,14 @@ impl Seeding {
         let (mut seed, limit_m) = self.farthest();
         let is_first = limit_m == f64::INFINITY;
         if is_first {
-            let from_here = ways.to_all(seed);
+            let from_here = ways.over_all(seed);
             let finite = |reach: &&(usize, &Reach)| reach.1.distance_m < f64::INFINITY;
             let rim = from_here.iter().enumerate();
             let rim =
                 rim.filter(|r| finite(&r)).max_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0)));
             seed = rim.map_or(seed, |(i, _)| i);
         }
-        let reached = if is_first { ways.to_all(seed) } else { ways.from(seed, limit_m) };
+        let reached = if is_first { ways.over_all(seed) } else { ways.over(seed, limit_m) };
         for (nearest, reach) in self.nearest_m.iter_mut().zip(&reached) {
             *nearest = nearest.min(reach.distance_m);
         }
@@ -108,7 +108,7 @@ fn assign(ways: &mut Ways, seeds: &[usize], mut limit_m: f64) -> (Vec<Vec<usize>
     let mut raised = 0;
     loop {
         // Another way to the same place may be longer by rounding.
-        let maps: Vec<Vec<Reach>> = seeds.iter().map(|&seed| ways.from(seed, limit_m * (1.0 + 1e-9))).collect();
+        let maps: Vec<Vec<Reach>> = seeds.iter().map(|&seed| ways.over(seed, limit_m * (1.0 + 1e-9))).collect();
         let mut patches = vec![Vec::new(); seeds.len()];
         let (mut widest_m, mut out): (f64, bool) = (0.0, false);
         for i in 0..ways.len() {

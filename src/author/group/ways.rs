@@ -66,9 +66,9 @@ impl Ways {
     }
 
     /// Ways from taxel `from` to all, up to `limit_m`.
-    pub(super) fn from(&mut self, from: usize, limit_m: f64) -> Vec<Reach> {
+    pub(super) fn over(&mut self, from: usize, limit_m: f64) -> Vec<Reach> {
         let mut reached = match self.places.get(from).copied() {
-            Some(place) => self.from_place(&place, from, limit_m),
+            Some(place) => self.over_place(&place, from, limit_m),
             None => self.over_net(from, limit_m),
         };
         reached[from] = Reach { distance_m: 0.0, uv: Some(DVec2::ZERO) };
@@ -76,24 +76,24 @@ impl Ways {
     }
 
     /// Ways from taxel `from` to all that a way leads to.
-    pub(super) fn to_all(&mut self, from: usize) -> Vec<Reach> {
-        let Some(start) = self.places.get(from) else { return self.from(from, f64::INFINITY) };
+    pub(super) fn over_all(&mut self, from: usize) -> Vec<Reach> {
+        let Some(start) = self.places.get(from) else { return self.over(from, f64::INFINITY) };
         let part = |place: &Place| self.skin.topology.part[place.triangle as usize];
         let same: Vec<usize> = (0..self.places.len()).filter(|&i| part(&self.places[i]) == part(start)).collect();
         let apart = same.iter().map(|&i| self.points[i].0.distance(self.points[from].0));
         let mut limit_m = FIRST_REACH * apart.fold(0.0, f64::max);
         for _ in 0..MOST_DOUBLINGS {
-            let reached = self.from(from, limit_m);
+            let reached = self.over(from, limit_m);
             if same.iter().all(|&i| reached[i].distance_m < f64::INFINITY) {
                 return reached;
             }
             limit_m *= 2.0;
         }
-        self.from(from, f64::INFINITY)
+        self.over(from, f64::INFINITY)
     }
 
     /// Ways from `place`, or in a net from taxel `nearest`, to all, up to `limit_m`.
-    pub(super) fn from_place(&mut self, place: &Place, nearest: usize, limit_m: f64) -> Vec<Reach> {
+    pub(super) fn over_place(&mut self, place: &Place, nearest: usize, limit_m: f64) -> Vec<Reach> {
         if self.too_long_m.is_none_or(|too_long_m| limit_m < too_long_m) {
             match LogMap::new(&self.skin.topology, *place, DVec3::X, limit_m) {
                 Ok(map) => {
