@@ -130,8 +130,8 @@ def main():
     print(f"| log map, 20,480 triangles, to 1 rad | {seconds * 1e3:.1f} ms | vector heat {peer['seconds']:.2f} s "
           f"({peer['again']:.3f} s once factored) | {peer['seconds'] / seconds:.0f} ({peer['again'] / seconds:.1f}) | "
           f"{radial:.2%} radial | {peer['radial']:.2%} radial | {peer['mib']:.0f} MiB |")
-    print("\nsomatic's peak memory, all of its bench:", re.search(r"Maximum resident set size.*: (\d+)", own)
-          and f"{int(re.search(r'Maximum resident set size.*: (\d+)', own).group(1)) / 1024:.0f} MiB")
+    kib = int(re.search(r"Maximum resident set size.*: (\d+)", own).group(1))
+    print(f"\nsomatic's peak memory, all of its bench: {kib / 1024:.0f} MiB")
 
 
 if __name__ == "__main__":
