@@ -10,6 +10,71 @@ use somatic::author::{Placed, SurfacePoint, place_apart, place_by_density, place
 use somatic::body::Topology;
 use somatic::field::geodesic::{LogMap, Place};
 
+/// A unit sphere of 20·4ⁿ triangles.
+fn icosphere(cuts: u32) -> Topology {
+    let g = (1.0 + 5.0_f64.sqrt()) / 2.0;
+    let corner = |k: usize| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+        let p = match k / 4 {
+            0 => DVec3::new(sign(0), sign(1) * g, 0.0),
+            1 => DVec3::new(0.0, sign(0), sign(1) * g),
+            _ => DVec3::new(sign(1) * g, 0.0, sign(0)),
+        };
+        p.normalize()
+    };
+    let corners: Vec<DVec3> = (0..12).map(corner).collect();
+    let edge = (0..12).filter(|&k| k > 0).map(|k| corners[0].distance(corners[k])).fold(f64::INFINITY, f64::min);
+    let near = |a: usize, b: usize| corners[a].distance(corners[b]) < 1.01 * edge;
+    let mut soup = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in (b + 1..12).filter(|&c| near(a, b) && near(b, c) && near(c, a)) {
+                let [p, q, r] = [a, b, c].map(|k| corners[k]);
+                soup.push(if (q - p).cross(r - p).dot(p) > 0.0 { [p, q, r] } else { [p, r, q] });
+            }
+        }
+    }
+    for _ in 0..cuts {
+        let cut = |[a, b, c]: [DVec3; 3]| {
+            let [ab, bc, ca] = [(a + b).normalize(), (b + c).normalize(), (c + a).normalize()];
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        soup = soup.into_iter().flat_map(cut).collect();
+    }
+    let triangles: Vec<[u32; 3]> = (0..soup.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    Topology::new(&soup.concat(), &triangles)
+}
+
+/// The log map of an icosphere from a vertex, as peers lay it: the time with all (u, v), the worst radial error.
+fn against_peers() {
+    let topology = icosphere(5);
+    let pole = topology.corners(0)[0];
+    let place = Place::in_triangle(&topology, 0, pole);
+    let mut corner_of = vec![None; topology.positions.len()];
+    for (t, triangle) in topology.triangles.iter().enumerate() {
+        for (corner, &v) in triangle.iter().enumerate() {
+            let mut barycentric = [0.0; 3];
+            barycentric[corner] = 1.0;
+            corner_of[v as usize] = Some(Place { triangle: t as u32, barycentric });
+        }
+    }
+    let near = |p: DVec3| (0.01..=1.0).contains(&p.dot(pole).acos());
+    let places: Vec<(DVec3, Place)> = topology
+        .positions
+        .iter()
+        .zip(corner_of)
+        .filter_map(|(&p, place)| Some((p, place?)))
+        .filter(|(p, _)| near(*p))
+        .collect();
+    let (seconds, lengths) = timed(|| {
+        let map = LogMap::new(&topology, place, DVec3::Z, 1.01).unwrap();
+        places.iter().map(|(_, place)| map.reach(place).expect("it is within the limit").distance_m).collect::<Vec<_>>()
+    });
+    let off = places.iter().zip(&lengths).map(|((p, _), length)| (length / p.dot(pole).acos() - 1.0).abs());
+    let worst = off.fold(0.0, f64::max);
+    println!("log map of {} triangles: {seconds:.5} s, radial error {worst:.2e}", topology.triangles.len());
+}
+
 /// A unit sphere of 8·4ⁿ triangles, with each point pushed in or out by `bump`.
 fn sphere(cuts: u32, bump: impl Fn(DVec3) -> f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut soup = Vec::new();
@@ -65,6 +130,7 @@ fn unrolling() {
 
 fn main() {
     unrolling();
+    against_peers();
     let bump = |p: DVec3| 0.1 * (5.0 * p.x).sin() * (6.0 * p.y).sin() * (7.0 * p.z).cos();
     let (positions, triangles) = sphere(6, bump);
     let area: f64 = triangles

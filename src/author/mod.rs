@@ -25,7 +25,9 @@ mod crowd;
 mod glob;
 mod grid;
 mod ground;
+pub mod group;
 mod grow;
+pub mod icub;
 mod lattice;
 mod lint;
 mod place;
@@ -36,6 +38,7 @@ mod refresh;
 mod region;
 mod scatter;
 mod skin;
+pub mod words;
 
 use glam::DVec3;
 

@@ -6,9 +6,10 @@ use glam::DVec3;
 
 use super::canvas::Canvas;
 use super::glob::Globs;
+use super::icub::IcubFile;
 use super::place::{Placed, nearest_on_its_side};
 use super::{SurfacePoint, recipe};
-use crate::body::{MAX_TAXEL_ID, SurfaceIndex};
+use crate::body::{MAX_TAXEL_ID, Modality, SurfaceIndex};
 use crate::error::{Error, Result, nearest};
 use crate::field::geodesic::barycentric;
 
@@ -135,6 +136,48 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
         return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));
     }
     Ok(given)
+}
+
+/// The places in the iCub's position file at `path`, in the frame of the link that the file names or `link`: of its taxels
+/// for what `modality` is, each with its channel plus `first_id` for an id. With them comes what there is to say.
+pub(super) fn of_icub(
+    canvas: &Canvas<'_>,
+    path: &Path,
+    link: Option<&str>,
+    modality: Modality,
+    first_id: u32,
+) -> Result<(Vec<Given>, Vec<String>)> {
+    let place = |e: Error| e.at(path.display());
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let mut file = IcubFile::read(&text).map_err(place)?;
+    let links = &canvas.body.links;
+    let name = link.unwrap_or(&file.part);
+    let link = canvas.body.link_index(name).ok_or_else(|| {
+        let near = nearest(name, links.iter().map(|link| link.name.as_str()));
+        let hint = near.map_or("say which it is by `link`".to_owned(), |near| format!("did you mean `{near}`?"));
+        Error::failed(format!("the body has no link `{name}`; {hint}"))
+    })?;
+    let world_from_link = links[link].world_from_link;
+    let chosen = file.taxels().filter(|(_, taxel)| taxel.modality == modality);
+    let given: Vec<Given> = chosen
+        .map(|(channel, taxel)| Given {
+            id: Some(first_id.saturating_add(channel)),
+            position_in_world: world_from_link.transform_point3(taxel.position_in_link),
+            name: format!("channel {channel} of {}", path.display()),
+        })
+        .collect();
+    if given.is_empty() {
+        return Err(place(Error::failed(format!("it has no taxel for {}", modality.name()))));
+    }
+    let others = file.taxels().count() - given.len();
+    let mut notes = std::mem::take(&mut file.notes);
+    if others > 0 {
+        let what =
+            format!("{others} taxels for something else than {} are left to a place of their own", modality.name());
+        notes.push(what);
+    }
+    let name = path.file_name().map_or(path.display().to_string(), |name| name.to_string_lossy().into_owned());
+    Ok((given, notes.into_iter().map(|note| format!("{name}: {note}")).collect()))
 }
 
 /// `given` taken to the nearest place in `region`.

@@ -1,18 +1,21 @@
 //! From a file and a recipe to a file with a skin.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use super::SurfacePoint;
 use super::canvas::{Canvas, Seated};
+use super::group::painted::Paints;
+use super::group::{Grouping, Grower, group as group_by};
 use super::lattice::Lattice;
 use super::place::{self, Placed, Progress, nearest_on_its_side};
-use super::points::{Snapped, of_marks, of_table, snap};
+use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{How, Origin, Place, Recipe, shown};
 use super::region::{Regions, nothing_left};
-use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, MemberSpec, Original, Skinning, Taxel};
+use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel};
 use crate::error::{Error, Result};
+use crate::field::unions;
 
 /// Shares of the work: before anything is placed, and when all is.
 const OPENED: f64 = 0.05;
@@ -113,7 +116,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     drop(regions);
     file.add(&addition);
     let (body, details) = file.read()?;
-    let (fields, more) = group(&body, recipe)?;
+    let Grouping { fields, notes: more } = group(&body, &details, recipe)?;
     notes.extend(more);
     add_fields(&mut file, &body, &details, &fields);
     progress(0.95);
@@ -189,6 +192,11 @@ fn fill(
             filled.collect()
         }
         How::Marks { names, within_m } => snap(canvas, region, &of_marks(canvas, names)?, *within_m)?,
+        How::Icub { path, link, within_m } => {
+            let (given, more) = of_icub(canvas, path, link.as_deref(), place.modality, place.first_id)?;
+            notes.extend(more);
+            snap(canvas, region, &given, *within_m)?
+        }
         How::Table { path, within_m } => {
             let given = of_table(canvas, path)?;
             snap(canvas, region, &given, *within_m).map_err(|e| e.at(path.display()))?
@@ -262,30 +270,24 @@ fn written(file: &Original, canvas: &Canvas<'_>, seated: Vec<Seated>) -> Glb {
 }
 
 /// The fields that `recipe` asks for over the taxels of `body`, and what there is to say of them.
-fn group(body: &Body, recipe: &Recipe) -> Result<(Vec<FieldSpec>, Vec<String>)> {
-    if let Some((_, at)) = recipe.fields.first() {
-        return Err(at.wrong("there are no rules for [[fields]]; leave them out for one field a link"));
+fn group(body: &Body, details: &Details, recipe: &Recipe) -> Result<Grouping> {
+    let painted = Paints { body, details };
+    if recipe.fields.is_empty() {
+        return group_by(body, &painted, &[]);
     }
-    Ok((one_field_per_link(body), Vec::new()))
-}
-
-/// A field for each link that has taxels, named after it.
-fn one_field_per_link(body: &Body) -> Vec<FieldSpec> {
-    let links: BTreeSet<usize> = body.taxels.iter().map(|taxel| taxel.link).collect();
-    let field = |link: usize| {
-        let own = body.taxels.iter().filter(|taxel| taxel.link == link);
-        let members = own.map(|taxel| (taxel.id, MemberSpec::default())).collect();
-        FieldSpec { name: body.links[link].name.clone(), parent: None, members, chart: None }
-    };
-    links.into_iter().map(field).collect()
+    let mut grower = Grower::new(body, &painted);
+    for (rule, at) in &recipe.fields {
+        grower.apply(rule).map_err(|e| at.put(e))?;
+    }
+    grower.finish().map_err(|(rule, e)| recipe.fields[rule].1.put(e))
 }
 
 /// Adds `fields` as empty nodes, each below its anchor and in the middle of its taxels.
 fn add_fields(file: &mut Original, body: &Body, details: &Details, fields: &[FieldSpec]) {
     let mut addition = file.addition();
-    for field in fields {
+    for (field, ids) in fields.iter().zip(unions(fields)) {
         let taxels: Vec<&Taxel> =
-            field.members.keys().filter_map(|&id| body.taxel_index(id)).map(|index| &body.taxels[index]).collect();
+            ids.into_iter().filter_map(|id| body.taxel_index(id)).map(|index| &body.taxels[index]).collect();
         let anchor = body.common_ancestor(taxels.iter().map(|taxel| taxel.link));
         let in_world = |taxel: &Taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link);
         let mean = taxels.iter().map(|taxel| in_world(taxel)).sum::<DVec3>() / taxels.len().max(1) as f64;

@@ -40,7 +40,7 @@ pub enum Home {
 
 impl Surface {
     /// Takes mesh coordinates to the frame of `link`: at bind for a skinned mesh, at rest for a rigid one.
-    fn link_from_mesh(&self, body: &Body, link: usize) -> Option<DAffine3> {
+    pub(crate) fn link_from_mesh(&self, body: &Body, link: usize) -> Option<DAffine3> {
         match &self.home {
             Home::Rigid { link: carrier, link_from_mesh } => {
                 Some(body.rest_transform(link, *carrier) * *link_from_mesh)

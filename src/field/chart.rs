@@ -89,12 +89,13 @@ impl fmt::Display for NoChart {
             }
             Self::NoTaxels => f.write_str("it has no taxels of its own; list those that it is to chart"),
             Self::NoSurface => f.write_str("there is no surface to measure ways on; add the mesh"),
-            Self::Unreachable(taxel, count) => write!(
-                f,
-                "no way over the surface leads from its origin to taxel {taxel}, nor to {} more; split it, or join the \
-                 parts of the mesh",
-                count - 1
-            ),
+            Self::Unreachable(taxel, count) => {
+                write!(f, "no way over the surface leads from its origin to taxel {taxel}")?;
+                if *count > 1 {
+                    write!(f, ", nor to {} more", count - 1)?;
+                }
+                f.write_str("; split it, or join the parts of the mesh")
+            }
             Self::CutLocus { taxel, distance_m, apart_rad } => write!(
                 f,
                 "it meets itself around a limb or a knob: to taxel {taxel}, {:.1} mm away, two ways lead that leave {:.0}° \

@@ -9,6 +9,7 @@ mod distortion;
 pub mod geodesic;
 mod lift;
 mod neighbours;
+mod surfaces;
 mod unroll;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,9 +20,10 @@ pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
 pub use lift::Lift;
 pub use neighbours::neighbours;
+pub(crate) use surfaces::Skin;
 pub use unroll::Unroller;
 
-use crate::body::{Body, Nearest};
+use crate::body::{Body, FieldSpec, Nearest};
 use crate::error::{Error, Result};
 
 /// Name of the frame that fields are anchored in when their links share no ancestor, and of posed percepts.
@@ -91,18 +93,8 @@ impl FieldSet {
     /// # Errors
     /// A field without any taxel, even through its children.
     pub fn new(body: &Body) -> Result<Self> {
-        let index_of: BTreeMap<&str, usize> =
-            body.fields.iter().enumerate().map(|(i, f)| (f.name.as_str(), i)).collect();
-        let parents: Vec<Option<usize>> =
-            body.fields.iter().map(|f| f.parent.as_deref().and_then(|p| index_of.get(p).copied())).collect();
-        // Children come after their parents, so that one pass from the back gathers all descendants.
-        let mut taxels: Vec<BTreeSet<u32>> = body.fields.iter().map(|f| f.members.keys().copied().collect()).collect();
-        for child in (0..taxels.len()).rev() {
-            if let Some(parent) = parents[child] {
-                let below = taxels[child].clone();
-                taxels[parent].extend(below);
-            }
-        }
+        let parents = parents(&body.fields);
+        let taxels = unions(&body.fields);
         let nearest = Nearest::new(body);
         let mut fields = Vec::with_capacity(body.fields.len());
         for (index, spec) in body.fields.iter().enumerate() {
@@ -124,6 +116,27 @@ impl FieldSet {
         }
         Ok(Self { fields })
     }
+}
+
+/// Per field the index of its parent.
+fn parents(fields: &[FieldSpec]) -> Vec<Option<usize>> {
+    let index_of: BTreeMap<&str, usize> = fields.iter().enumerate().map(|(i, f)| (f.name.as_str(), i)).collect();
+    fields.iter().map(|f| f.parent.as_deref().and_then(|p| index_of.get(p).copied())).collect()
+}
+
+/// Per field of `fields`, which has parents before their children, the ids of its own taxels and its descendants'.
+#[must_use]
+pub fn unions(fields: &[FieldSpec]) -> Vec<BTreeSet<u32>> {
+    let parents = parents(fields);
+    let mut taxels: Vec<BTreeSet<u32>> = fields.iter().map(|f| f.members.keys().copied().collect()).collect();
+    // Children come after their parents, so that one pass from the back gathers all descendants.
+    for child in (0..taxels.len()).rev() {
+        if let Some(parent) = parents[child] {
+            let below = taxels[child].clone();
+            taxels[parent].extend(below);
+        }
+    }
+    taxels
 }
 
 /// At rest, the transform from link `link` to a field's anchor.

@@ -1,6 +1,5 @@
 //! Laying geodesic charts: from a body's surface and a field's taxels to the (u, v) that the layout keeps.
 
-use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
@@ -8,8 +7,9 @@ use glam::{DVec2, DVec3};
 use super::chart::frame;
 use super::distortion::Distortion;
 use super::geodesic::{LogMap, Place};
+use super::surfaces::Surfaces;
 use super::{NoChart, anchor_from_link};
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, SurfaceIndex, Topology};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology};
 
 /// A way that bends by more than this at one point leads around something, 20°.
 const MOST_BEND: f64 = PI / 9.0;
@@ -26,18 +26,24 @@ const MOST_DOUBLINGS: u32 = 6;
 /// A body's surface as charts need it, link by link.
 pub struct Unroller<'a> {
     body: &'a Body,
-    surfaces: BTreeMap<usize, (Topology, SurfaceIndex)>,
+    surfaces: Surfaces<'a>,
 }
 
 impl<'a> Unroller<'a> {
     /// For `body`; surfaces are taken up as fields on them come.
     #[must_use]
     pub fn new(body: &'a Body) -> Self {
-        Self { body, surfaces: BTreeMap::new() }
+        Self { body, surfaces: Surfaces::new(body) }
+    }
+
+    /// The surface, as taken up so far.
+    pub(crate) fn surfaces(&mut self) -> &mut Surfaces<'a> {
+        &mut self.surfaces
     }
 
     /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those that
-    /// `spec`'s chart asks for, else the defaults of a plane chart.
+    /// `spec`'s chart asks for, else the defaults of a plane chart. A parent that is to have a chart needs its
+    /// descendants' taxels among its own: [`FieldSpec::with_members`].
     ///
     /// # Errors
     /// Why there is no such chart.
@@ -60,25 +66,57 @@ impl<'a> Unroller<'a> {
                 (position, anchor_from_taxel.transform_vector3(taxel.normal_in_link))
             })
             .collect();
-        let (topology, index) = self.surfaces.entry(link).or_insert_with(|| take_up(body, link));
-        let locate = |p: DVec3| {
-            let hit = index.nearest(p).ok_or(NoChart::NoSurface)?;
-            Ok(Place::in_triangle(topology, hit.triangle as u32, hit.position))
-        };
+        let skin = self.surfaces.in_link(link);
+        let topology = &skin.topology;
+        let locate = |(p, normal): (DVec3, DVec3)| skin.locate(p, normal).ok_or(NoChart::NoSurface);
 
         let asked = |of: fn(&ChartSpec) -> Option<[f64; 3]>| spec.chart.as_ref().and_then(of).map(DVec3::from_array);
         let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
+        let places: Vec<Place> = members.iter().copied().map(locate).collect::<Result<_, _>>()?;
+        let ids = taxels.iter().map(|&taxel| body.taxels[taxel].id).collect();
+        let patch = Patch { topology, members, places, ids, u: asked(|chart| chart.u_in_anchor) };
         let origin = asked(|chart| chart.origin_in_anchor);
-        let nearest = || index.nearest(mean).map_or(mean, |hit| hit.position);
-        let origin = locate(origin.unwrap_or_else(nearest))?;
+        let nearest = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
+        match patch.lay(spec, nearest) {
+            // The mean of what is bent lies off the surface, and what is nearest to it there may be another part.
+            Err(why) if origin.is_none() => patch.lay(spec, patch.middle(mean)).map_err(|other| match why {
+                NoChart::Unreachable(..) => other,
+                why => why,
+            }),
+            laid => laid,
+        }
+    }
+}
+
+/// Members on a surface.
+struct Patch<'a> {
+    topology: &'a Topology,
+    /// Per member its position and normal.
+    members: Vec<(DVec3, DVec3)>,
+    places: Vec<Place>,
+    ids: Vec<u32>,
+    /// The direction of +u that is asked for.
+    u: Option<DVec3>,
+}
+
+impl Patch<'_> {
+    /// The place of the member nearest to `mean` among those that face as all do.
+    fn middle(&self, mean: DVec3) -> Place {
+        let facing = self.members.iter().map(|(_, normal)| *normal).sum::<DVec3>().normalize_or_zero();
+        let off = |i: usize| self.members[i].0.distance(mean) * (2.0 - self.members[i].1.dot(facing));
+        let middle = (0..self.members.len()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
+        self.places[middle.unwrap_or(0)]
+    }
+
+    /// `spec` with a geodesic chart around `origin`.
+    fn lay(&self, spec: &FieldSpec, origin: Place) -> Result<FieldSpec, NoChart> {
+        let Self { topology, members, places, ids, u } = self;
         let [a, b, c] = topology.corners(origin.triangle);
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
-        let [u, ..] = frame(normal, asked(|chart| chart.u_in_anchor));
-
-        let places: Vec<Place> = members.iter().map(|(position, _)| locate(*position)).collect::<Result<_, _>>()?;
+        let [u, ..] = frame(normal, *u);
         let part = |place: &Place| topology.part[place.triangle as usize];
         let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
-        let id = |i: usize| body.taxels[taxels[i]].id;
+        let id = |i: usize| ids[i];
         if let Some(&first) = beyond.first() {
             return Err(NoChart::Unreachable(id(first), beyond.len()));
         }
@@ -100,7 +138,7 @@ impl<'a> Unroller<'a> {
         };
         let ways: Vec<_> = reached.into_iter().flatten().collect();
         let uv: Vec<DVec2> = ways.iter().map(|way| way.uv).collect();
-        let distortion = Distortion::of(&members, &uv);
+        let distortion = Distortion::of(members, &uv);
         let nearest = |i: usize| {
             let others = members.iter().map(|(position, _)| position.distance(members[i].0)).filter(|&d| d > 0.0);
             others.fold(f64::INFINITY, f64::min)
@@ -136,13 +174,4 @@ impl<'a> Unroller<'a> {
         }
         Ok(spec)
     }
-}
-
-/// The surface in the frame of `link`, and where on it a point is, by its triangles' numbers in the topology.
-fn take_up(body: &Body, link: usize) -> (Topology, SurfaceIndex) {
-    let corners: Vec<DVec3> = body.triangles_in_link(link).flatten().collect();
-    let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    let topology = Topology::new(&corners, &triangles);
-    let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
-    (topology, index)
 }

@@ -2,6 +2,7 @@
 
 mod author;
 mod bench;
+mod fields;
 mod inspect;
 mod live;
 mod paper;

@@ -9,6 +9,7 @@ use toml::Spanned;
 
 use super::{How, Origin, Place, Recipe, SKIN, WITHIN_M, check_count, metres, unit_metres};
 use crate::author::glob::Globs;
+use crate::author::group::FieldRule;
 use crate::author::region::Region;
 use crate::body::{MAX_TAXEL_ID, Modality};
 use crate::error::{Result, nearest};
@@ -29,7 +30,7 @@ struct File {
     #[serde(default)]
     place: Vec<Spanned<PlaceKeys>>,
     #[serde(default)]
-    fields: Vec<Spanned<toml::Table>>,
+    fields: Vec<Spanned<FieldRule>>,
 }
 
 #[derive(Clone, Copy, Default, Deserialize, PartialEq)]
@@ -75,6 +76,8 @@ struct PlaceKeys {
     u: Option<Spanned<[f64; 3]>>,
     points: Option<Spanned<Names>>,
     csv: Option<Spanned<String>>,
+    icub: Option<Spanned<String>>,
+    link: Option<Spanned<String>>,
     within: Option<Spanned<LengthKey>>,
 }
 
@@ -251,10 +254,11 @@ fn how(page: Page<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(
         ("grid", keys.grid.as_ref().map(|key| page.origin(key))),
         ("points", keys.points.as_ref().map(|key| page.origin(key))),
         ("csv", keys.csv.as_ref().map(|key| page.origin(key))),
+        ("icub", keys.icub.as_ref().map(|key| page.origin(key))),
     ];
     let mut given = ways.into_iter().filter_map(|(name, at)| Some((name, at?)));
     let Some((way, way_at)) = given.next() else {
-        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points` or `csv`"));
+        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points`, `csv` or `icub`"));
     };
     if let Some((other, other_at)) = given.next()
         && (way, other) != ("taxels", "spacing")
@@ -267,7 +271,12 @@ fn how(page: Page<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(
         ("pitch", keys.pitch.as_ref().map(|key| page.origin(key)), "grid"),
         ("origin", keys.origin.as_ref().map(|key| page.origin(key)), "grid"),
         ("u", keys.u.as_ref().map(|key| page.origin(key)), "grid"),
-        ("within", keys.within.as_ref().map(|key| page.origin(key)), if way == "csv" { "csv" } else { "points" }),
+        (
+            "within",
+            keys.within.as_ref().map(|key| page.origin(key)),
+            if ["csv", "icub"].contains(&way) { way } else { "points" },
+        ),
+        ("link", keys.link.as_ref().map(|key| page.origin(key)), "icub"),
     ];
     if let Some((name, at, _)) = extras.into_iter().filter_map(|(n, at, of)| Some((n, at?, of))).find(|e| e.2 != way) {
         return Err(at.wrong(format!("`{name}` means nothing beside `{way}`; remove it")));
@@ -296,12 +305,15 @@ fn how(page: Page<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(
             origin: keys.origin.as_ref().map(|origin| page.point("origin", origin)).transpose()?,
             u: keys.u.as_ref().map(|u| page.point("u", u)).transpose()?,
         }
+    } else if let Some(icub) = &keys.icub {
+        let link = keys.link.as_ref().map(|link| link.get_ref().clone());
+        How::Icub { path: folder.join(icub.get_ref()), link, within_m }
     } else if let Some(csv) = &keys.csv {
         How::Table { path: folder.join(csv.get_ref()), within_m }
     } else if let Some(names) = page.globs(keys.points.as_ref())? {
         How::Marks { names, within_m }
     } else {
-        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points` or `csv`"));
+        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points`, `csv` or `icub`"));
     };
     Ok((how, way_at))
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::glob::Globs;
+use super::group::FieldRule;
 use super::region::Region;
 use crate::body::Modality;
 use crate::error::{Error, Result};
@@ -100,7 +101,7 @@ pub struct Recipe {
     pub(super) keeps_existing: bool,
     pub(super) regions: BTreeMap<String, Region>,
     pub(super) places: Vec<Place>,
-    pub(super) fields: Vec<(toml::Table, Origin)>,
+    pub(super) fields: Vec<(FieldRule, Origin)>,
     seed: u64,
 }
 
@@ -134,6 +135,8 @@ pub(super) enum How {
     Marks { names: Globs, within_m: f64 },
     /// Where a table says.
     Table { path: PathBuf, within_m: f64 },
+    /// Where a position file of the iCub says, in the frame of `link`, or of the one that the file names.
+    Icub { path: PathBuf, link: Option<String>, within_m: f64 },
 }
 
 impl How {
@@ -144,7 +147,7 @@ impl How {
 
     /// Whether it finds places of its own, which bare regions are kept from.
     pub(super) fn samples(&self) -> bool {
-        !matches!(self, Self::Marks { .. } | Self::Table { .. })
+        !matches!(self, Self::Marks { .. } | Self::Table { .. } | Self::Icub { .. })
     }
 }
 

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::Place;
-use super::source::{Fan, Source, Start, Wedge};
+use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result};
 
@@ -54,17 +54,17 @@ impl Window {
     }
 }
 
-enum Event {
-    Window(Window),
-    Vertex(u32),
-}
-
+/// What waits its turn: sixteen bytes, as a queue of whole windows takes most of the time to keep in order.
 struct Waiting {
     distance_m: f64,
     /// Makes the order total and the same on every machine.
-    turn: u64,
-    event: Event,
+    turn: u32,
+    /// Index of a window; or with [`VERTEX`] set, of a vertex.
+    what: u32,
 }
+
+/// Marks what waits as a vertex.
+const VERTEX: u32 = 1 << 31;
 
 impl Ord for Waiting {
     fn cmp(&self, other: &Self) -> Ordering {
@@ -139,11 +139,13 @@ pub struct LogMap<'a> {
     limit_m: f64,
     sources: Vec<Source>,
     arrivals: Vec<Arrival>,
+    /// All that were ever put on the queue, followed or not.
     windows: Vec<Window>,
+    followed: usize,
     /// Per triangle the last of the windows that enter it.
     entering: Vec<u32>,
     queue: BinaryHeap<Waiting>,
-    turn: u64,
+    turn: u32,
 }
 
 impl<'a> LogMap<'a> {
@@ -165,6 +167,7 @@ impl<'a> LogMap<'a> {
             sources: vec![source],
             arrivals: vec![UNKNOWN; topology.positions.len()],
             windows: Vec::new(),
+            followed: 0,
             entering: vec![NONE; topology.triangles.len()],
             queue: BinaryHeap::new(),
             turn: 0,
@@ -176,9 +179,9 @@ impl<'a> LogMap<'a> {
             map.leave(&wedge, 0);
         }
         while let Some(waiting) = map.queue.pop() {
-            match waiting.event {
-                Event::Window(window) => map.enter(window)?,
-                Event::Vertex(vertex) => map.bend_at(vertex, waiting.distance_m),
+            match waiting.what & VERTEX {
+                0 => map.enter(waiting.what)?,
+                _ => map.bend_at(waiting.what & !VERTEX, waiting.distance_m),
             }
         }
         Ok(map)
@@ -194,7 +197,7 @@ impl<'a> LogMap<'a> {
     /// How many windows were followed.
     #[must_use]
     pub fn windows(&self) -> usize {
-        self.windows.len()
+        self.followed
     }
 
     /// Where the shortest way to `place` leads; `None` beyond the limit, and on a part that the start is not on.
@@ -203,7 +206,7 @@ impl<'a> LogMap<'a> {
         let mut ways: Vec<Way> = Vec::new();
         for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
             let at = mix(wedge.corners, place.barycentric);
-            let angle_rad = wedge.base_rad + at.y.atan2(at.x);
+            let angle_rad = wedge.base_rad + angle(at);
             ways.push(Way { distance_m: at.length(), angle_rad, bend_rad: 0.0, is_straight: true });
         }
         let mut list = self.entering[place.triangle as usize];
@@ -232,7 +235,7 @@ impl<'a> LogMap<'a> {
         };
         let rival = ways.iter().filter(|way| way.is_straight && apart(way) > APART).min_by(shortest);
         let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
-        Some(Reached { uv: DVec2::from_angle(angle_rad) * distance_m, distance_m, bend_rad, rival })
+        Some(Reached { uv: towards(angle_rad) * distance_m, distance_m, bend_rad, rival })
     }
 
     /// The way through `window` to the unfolded point `to`.
@@ -247,7 +250,7 @@ impl<'a> LogMap<'a> {
             (to, 0.0)
         };
         let source = &self.sources[window.source as usize];
-        let own = window.base_rad + first.y.atan2(first.x);
+        let own = window.base_rad + angle(first);
         Way {
             distance_m: source.distance_m + first.length() + rest,
             angle_rad: if source.bends { source.angle_rad } else { own },
@@ -268,11 +271,9 @@ impl<'a> LogMap<'a> {
         p + along + (q - p).perp() * (edge.cross(far).length() / squared)
     }
 
-    fn wait(&mut self, distance_m: f64, event: Event) {
-        if distance_m <= self.limit_m {
-            self.turn += 1;
-            self.queue.push(Waiting { distance_m, turn: self.turn, event });
-        }
+    fn wait(&mut self, distance_m: f64, what: u32) {
+        self.turn += 1;
+        self.queue.push(Waiting { distance_m, turn: self.turn, what });
     }
 
     /// Lets lines start over `wedge` from source `source`.
@@ -286,7 +287,7 @@ impl<'a> LogMap<'a> {
         for corner in (0..3).filter(|&corner| Some(corner) != wedge.apex) {
             let at = wedge.corners[corner as usize];
             let onward = wedge.corners[(corner as usize + 1) % 3] - at;
-            let own = wedge.base_rad + at.y.atan2(at.x);
+            let own = wedge.base_rad + angle(at);
             self.arrive(3 * wedge.triangle + corner, at, onward, source, own);
         }
     }
@@ -298,7 +299,11 @@ impl<'a> LogMap<'a> {
             return;
         }
         let window = Window { edge: beyond, source, ends, part, base_rad, before: NONE };
-        self.wait(self.sources[source as usize].distance_m + window.nearest(), Event::Window(window));
+        let distance_m = self.sources[source as usize].distance_m + window.nearest();
+        if distance_m <= self.limit_m {
+            self.wait(distance_m, self.windows.len() as u32);
+            self.windows.push(window);
+        }
     }
 
     /// Notes the way from `source` to the vertex where `edge` starts, unfolded at `at`; `onward` is that edge, unfolded.
@@ -308,9 +313,11 @@ impl<'a> LogMap<'a> {
         let distance_m = from.distance_m + at.length();
         if distance_m < self.arrivals[vertex].distance_m * (1.0 - ROUNDING) {
             let angle_rad = if from.bends { from.angle_rad } else { own_rad };
-            let back_rad = onward.angle_to(-at);
+            let back_rad = angle(DVec2::new(onward.dot(-at), onward.perp_dot(-at)));
             self.arrivals[vertex] = Arrival { distance_m, angle_rad, bend_rad: from.bend(own_rad), edge, back_rad };
-            self.wait(distance_m, Event::Vertex(vertex as u32));
+            if distance_m <= self.limit_m {
+                self.wait(distance_m, vertex as u32 | VERTEX);
+            }
         }
     }
 
@@ -322,8 +329,9 @@ impl<'a> LogMap<'a> {
         known + unfolded.distance(end) < own * (1.0 - ROUNDING)
     }
 
-    /// Takes `window` into its triangle, and on to the two edges beyond.
-    fn enter(&mut self, mut window: Window) -> Result<()> {
+    /// Takes window `index` into its triangle, and on to the two edges beyond.
+    fn enter(&mut self, index: u32) -> Result<()> {
+        let window = self.windows[index as usize];
         let [p, q] = window.ends;
         // Any way through it is longer than one by way of an end of its edge (Xin and Wang 2009).
         if self.is_beaten(&window, window.part[1], window.edge, p)
@@ -331,15 +339,15 @@ impl<'a> LogMap<'a> {
         {
             return Ok(());
         }
-        if self.windows.len() == MOST_WINDOWS {
+        if self.followed == MOST_WINDOWS {
             return Err(Error::failed(format!(
                 "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
                 self.limit_m
             )));
         }
         let list = &mut self.entering[window.edge as usize / 3];
-        window.before = std::mem::replace(list, self.windows.len() as u32);
-        self.windows.push(window);
+        self.windows[index as usize].before = std::mem::replace(list, index);
+        self.followed += 1;
 
         let third = self.third(&window);
         let [a, b] = window.part.map(|t| window.at(t));
@@ -353,7 +361,7 @@ impl<'a> LogMap<'a> {
         let (right, left) = (next(window.edge), next(next(window.edge)));
         if right_of_a && left_of_b {
             let onward = p - third;
-            let own = window.base_rad + third.y.atan2(third.x);
+            let own = window.base_rad + angle(third);
             self.arrive(left, third, onward, window.source, own);
         }
         if left_of_b {

@@ -93,7 +93,7 @@ impl Start {
         let (u, v) = tangents(normal, u);
         let seen = |to: u32| {
             let offset = topology.positions[to as usize] - position;
-            offset.dot(v).atan2(offset.dot(u))
+            angle(DVec2::new(offset.dot(u), offset.dot(v)))
         };
         // +u lies in one of the wedges as they are seen along the normal, at some part of its angle.
         let holds_u = fan.wedges.iter().find_map(|wedge| {
@@ -137,7 +137,7 @@ impl Fan {
             corners[(apex as usize + 1) % 3] = DVec2::new(along, 0.0);
             corners[(apex as usize + 2) % 3] = DVec2::new(x, y);
             let wedge = Wedge { triangle: edge / 3, corners, base_rad: angle_rad, apex: Some(apex) };
-            angle_rad += y.atan2(x);
+            angle_rad += angle(DVec2::new(x, y));
             wedge
         });
         let wedges = wedges.collect();
@@ -148,7 +148,18 @@ impl Fan {
 /// The wedge's angle at its apex.
 fn wedge_angle(wedge: &Wedge) -> f64 {
     let far = wedge.corners[(wedge.apex.unwrap_or(0) as usize + 2) % 3];
-    far.y.atan2(far.x)
+    angle(far)
+}
+
+/// The direction of `p`, rad in (−π, π]: the same bits on every machine.
+pub(super) fn angle(p: DVec2) -> f64 {
+    libm::atan2(p.y, p.x)
+}
+
+/// The unit vector in the direction `angle_rad`: the same bits on every machine.
+pub(super) fn towards(angle_rad: f64) -> DVec2 {
+    let (sin, cos) = libm::sincos(angle_rad);
+    DVec2::new(cos, sin)
 }
 
 fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {

@@ -1,0 +1,171 @@
+//! Which taxels a rule is about.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::words::Globs;
+use super::rule::{Each, FieldRule};
+use super::{Grower, Painted};
+use crate::body::Modality;
+use crate::error::{Error, Result, nearest};
+use crate::field::Skin;
+
+/// A taxel counts as painted where the attribute is over this.
+const PAINTED: f64 = 0.5;
+
+/// What a taxel sits on: a surface of its body, a triangle of that, and the weights of the triangle's corners.
+type Seat = (usize, usize, [f64; 3]);
+
+impl Grower<'_> {
+    /// Of `among`, indices into the body's taxels, those that `rule` chooses.
+    pub(super) fn choose(&mut self, rule: &FieldRule, among: &[usize]) -> Result<Vec<usize>> {
+        let mut chosen = among.to_vec();
+        if let Some(lists) = &rule.taxels {
+            let has = |id: u32| self.body.taxel_index(id).is_some();
+            let missing =
+                lists.iter().find(|ids| !self.body.taxels.iter().any(|t| (ids.first..=ids.last).contains(&t.id)));
+            if let Some(ids) = missing {
+                let (first, last) = (self.body.taxels.first(), self.body.taxels.last());
+                let span = match (first, last) {
+                    (Some(first), Some(last)) => format!("its ids run from {} to {}", first.id, last.id),
+                    _ => "it has none at all".into(),
+                };
+                let what = if ids.first == ids.last {
+                    format!("taxel {}", ids.first)
+                } else {
+                    format!("taxel {}..={}", ids.first, ids.last)
+                };
+                return Err(Error::failed(format!("`taxels`: there is no {what} on this body; {span}")));
+            }
+            let listed: BTreeSet<u32> =
+                lists.iter().flat_map(|ids| (ids.first..=ids.last).filter(|&id| has(id))).collect();
+            chosen.retain(|&taxel| listed.contains(&self.body.taxels[taxel].id));
+        }
+        self.keep_modality(rule, &mut chosen)?;
+        if let Some(globs) = &rule.link {
+            let carrying: BTreeSet<&str> =
+                self.body.taxels.iter().map(|t| self.body.links[t.link].name.as_str()).collect();
+            known("link", globs, "link that carries taxels", carrying.iter().copied())?;
+            chosen.retain(|&taxel| globs.matches(&self.body.links[self.body.taxels[taxel].link].name));
+        }
+        if let Some(globs) = &rule.mesh {
+            known("mesh", globs, "node that shows a mesh", self.body.surfaces.iter().map(|s| s.name.as_str()))?;
+            let body = self.body;
+            chosen.retain(|&taxel| self.seat(taxel).is_some_and(|(s, ..)| globs.matches(&body.surfaces[s].name)));
+        }
+        let painted = self.painted;
+        if let Some(globs) = &rule.material {
+            let names = painted.materials();
+            known("material", globs, "material", names.iter().map(String::as_str))?;
+            chosen.retain(|&taxel| {
+                self.seat(taxel).and_then(|(s, t, _)| painted.material(s, t)).is_some_and(|name| globs.matches(name))
+            });
+        }
+        if let Some(name) = &rule.attribute {
+            let names = painted.attributes();
+            if !names.contains(name) {
+                return Err(unknown("attribute", name, "painted attribute", names.iter().map(String::as_str)));
+            }
+            chosen.retain(|&taxel| {
+                let seat = self.seat(taxel);
+                let value = seat.and_then(|(s, t, barycentric)| painted.attribute(name, s, t, barycentric));
+                value.is_some_and(|value| value > PAINTED)
+            });
+        }
+        Ok(chosen)
+    }
+
+    /// Keeps the taxels for what `rule` asks for; unless it lists them, those for pressure, where there are any.
+    fn keep_modality(&self, rule: &FieldRule, chosen: &mut Vec<usize>) -> Result<()> {
+        let of = |taxel: usize| self.body.taxels[taxel].modality;
+        if let Some(wanted) = &rule.modality {
+            let names: BTreeSet<String> = self.body.taxels.iter().map(|t| t.modality.name()).collect();
+            if !names.contains(wanted) {
+                return Err(unknown("modality", wanted, "modality of its taxels", names.iter().map(String::as_str)));
+            }
+            chosen.retain(|&taxel| of(taxel).name() == *wanted);
+        } else if rule.taxels.is_none() && chosen.iter().any(|&taxel| of(taxel) == Modality::Pressure) {
+            chosen.retain(|&taxel| of(taxel) == Modality::Pressure);
+        }
+        Ok(())
+    }
+
+    /// What taxel `taxel` sits on.
+    fn seat(&mut self, taxel: usize) -> Option<Seat> {
+        let (body, unroller) = (self.body, &mut self.unroller);
+        *self.seats.entry(taxel).or_insert_with(|| {
+            let taxel = &body.taxels[taxel];
+            let skin: &Skin = &unroller.surfaces().in_link(taxel.link);
+            let place = skin.locate(taxel.position_in_link, taxel.normal_in_link)?;
+            Some(skin.origin_of(&place))
+        })
+    }
+
+    /// `chosen` by what `each` names, in the order of the names' first taxels; what has no such name is left out, and how
+    /// many those are is told.
+    pub(super) fn by_each(&mut self, each: Each, chosen: &[usize]) -> (Vec<(String, Vec<usize>)>, usize) {
+        let (body, painted) = (self.body, self.painted);
+        let mut order: Vec<(String, Vec<usize>)> = Vec::new();
+        let mut place_of: BTreeMap<String, usize> = BTreeMap::new();
+        let mut nameless = 0;
+        for &taxel in chosen {
+            let name = match each {
+                Each::Link => Some(body.links[body.taxels[taxel].link].name.clone()),
+                Each::Mesh => self.seat(taxel).map(|(s, ..)| body.surfaces[s].name.clone()),
+                Each::Material => self.seat(taxel).and_then(|(s, t, _)| painted.material(s, t)).map(str::to_owned),
+            };
+            let Some(name) = name else {
+                nameless += 1;
+                continue;
+            };
+            // A slash would make a level.
+            let name = name.replace('/', "_");
+            let place = *place_of.entry(name).or_insert_with_key(|name| {
+                order.push((name.clone(), Vec::new()));
+                order.len() - 1
+            });
+            order[place].1.push(taxel);
+        }
+        (order, nameless)
+    }
+}
+
+/// An error where no glob of `key` matches any of `names`.
+fn known<'n>(key: &str, globs: &Globs, thing: &str, names: impl Iterator<Item = &'n str> + Clone) -> Result<()> {
+    if names.clone().any(|name| globs.matches(name)) {
+        return Ok(());
+    }
+    Err(unknown(key, &globs.text().join("`, `"), thing, names))
+}
+
+/// The error that says that `key` names no `thing` of `names`.
+fn unknown<'n>(key: &str, asked: &str, thing: &str, names: impl Iterator<Item = &'n str> + Clone) -> Error {
+    let names: BTreeSet<&str> = names.collect();
+    let hint = match nearest(asked, names.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if names.is_empty() => "there is none at all".to_owned(),
+        None => {
+            let some: Vec<String> = names.iter().take(6).map(|name| format!("`{name}`")).collect();
+            format!("there are {}{}", some.join(", "), if names.len() > 6 { ", …" } else { "" })
+        }
+    };
+    Error::failed(format!("`{key}`: no {thing} matches `{asked}`: {hint}"))
+}
+
+/// What is painted on a body without anything painted on it.
+impl Painted for () {
+    fn materials(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn material(&self, _: usize, _: usize) -> Option<&str> {
+        None
+    }
+
+    fn attributes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn attribute(&self, _: &str, _: usize, _: usize, _: [f64; 3]) -> Option<f64> {
+        None
+    }
+}

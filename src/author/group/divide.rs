@@ -1,0 +1,299 @@
+//! A rule's children: one for each of something, patches, discs, rows, columns.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::Grower;
+use super::patches::{patches, spread};
+use super::rule::{FieldRule, Patches, Rows, Seeds};
+use super::ways::Ways;
+use crate::error::{Error, Result};
+use crate::field::unions;
+
+/// Rounds after which patches are left as they are.
+const MOST_ROUNDS: usize = 12;
+
+/// Children by name, each with indices of its taxels in their body.
+type Children = Vec<(String, Vec<usize>)>;
+
+/// The middle of a disc.
+enum Seed {
+    Taxel(usize),
+    /// In the world at rest, m.
+    Point(DVec3),
+}
+
+impl Grower<'_> {
+    /// The children that `rule` makes of `chosen`; none where it does not divide.
+    pub(super) fn divide(&mut self, rule: &FieldRule, chosen: &[usize]) -> Result<Children> {
+        let stem = |default: &str| rule.stem.clone().unwrap_or(default.to_owned());
+        if let Some(each) = rule.each {
+            let (children, nameless) = self.by_each(each, chosen);
+            if nameless > 0 {
+                let what = self.call(rule);
+                self.notes.push(format!("{what}: {nameless} taxels have none of what there is a field for each of"));
+            }
+            return Ok(children);
+        }
+        if let Some(wanted) = rule.patches {
+            let count = match wanted {
+                Patches::Number(number) => number,
+                Patches::Of { of } => chosen.len().div_ceil(of),
+            };
+            let patches = self.patches(chosen, count, MOST_ROUNDS);
+            if patches.len() != count && matches!(wanted, Patches::Number(_)) {
+                let what = self.call(rule);
+                self.notes.push(format!(
+                    "{what}: {} patches instead of {count}: a patch keeps to one link and one connected part of the \
+                     surface, and has a place of its own",
+                    patches.len()
+                ));
+            }
+            return Ok(numbered(&stem("patch"), patches));
+        }
+        if rule.radius.is_some() || rule.seeds.is_some() {
+            let discs = self.discs(rule, chosen)?;
+            return Ok(numbered(&stem("disc"), discs));
+        }
+        if let Some(rows) = rule.rows {
+            return Ok(self.runs(chosen, rows, &stem("row"), true));
+        }
+        if let Some(columns) = rule.columns {
+            return Ok(self.runs(chosen, columns, &stem("column"), false));
+        }
+        Ok(Vec::new())
+    }
+
+    /// What a note calls `rule`.
+    fn call(&self, rule: &FieldRule) -> String {
+        rule.name.as_ref().map_or("a rule without name".to_owned(), |name| format!("rule `{name}`"))
+    }
+
+    /// The ways between `chosen`, link by link.
+    fn ways(&mut self, chosen: &[usize]) -> Vec<Ways> {
+        let body = self.body;
+        let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for &taxel in chosen {
+            by_link.entry(body.taxels[taxel].link).or_default().push(taxel);
+        }
+        let of_link = |(link, taxels): (usize, Vec<usize>)| {
+            let point = |&taxel: &usize| (body.taxels[taxel].position_in_link, body.taxels[taxel].normal_in_link);
+            let points = taxels.iter().map(point).collect();
+            Ways::new(self.unroller.surfaces().in_link(link), taxels, points)
+        };
+        by_link.into_iter().map(of_link).collect()
+    }
+
+    /// `chosen` in `count` patches, or more where they are on more links or parts, by their lowest ids.
+    pub(super) fn patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
+        let mut links = self.ways(chosen);
+        let patches = patches(&mut links, count, most_rounds);
+        self.tell_rough(&links);
+        let taxels = |(link, patch): (usize, Vec<usize>)| patch.into_iter().map(|i| links[link].taxels[i]).collect();
+        let mut patches: Vec<Vec<usize>> = patches.into_iter().map(taxels).collect();
+        patches.iter_mut().for_each(|patch| patch.sort_unstable());
+        patches.sort_by_key(|patch| patch[0]);
+        patches
+    }
+
+    fn tell_rough(&mut self, links: &[Ways]) {
+        for ways in links.iter().filter(|ways| ways.are_rough()) {
+            let link = &self.body.links[self.body.taxels[ways.taxels[0]].link].name;
+            let note = format!(
+                "link `{link}`: distances are those along edges, or from taxel to taxel, as its surface is too rough to \
+                 measure on, or there is none"
+            );
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+    }
+
+    /// The discs that `rule` makes of `chosen`.
+    fn discs(&mut self, rule: &FieldRule, chosen: &[usize]) -> Result<Vec<Vec<usize>>> {
+        let mut links = self.ways(chosen);
+        // Neighbours at the distance d share 2r − d of 2r.
+        let radius_m = rule.radius.map(|radius| radius.metres);
+        let seeds: Vec<Seed> = match (&rule.seeds, rule.overlap, radius_m) {
+            (Some(seeds), ..) => self.seeds(seeds, chosen)?,
+            (None, Some(overlap), Some(radius_m)) => {
+                let apart_m = 2.0 * radius_m * (1.0 - overlap);
+                let spread = links
+                    .iter_mut()
+                    .flat_map(|ways| spread(ways, apart_m).into_iter().map(|i| ways.taxels[i]).collect::<Vec<_>>());
+                let mut taxels: Vec<usize> = spread.collect();
+                taxels.sort_unstable();
+                taxels.into_iter().map(Seed::Taxel).collect()
+            }
+            _ => Vec::new(),
+        };
+        let mut discs = Vec::new();
+        for (number, seed) in seeds.iter().enumerate() {
+            let (link, nearest, at) = self.settle_seed(seed, &links);
+            let radius_m = match radius_m {
+                Some(radius_m) => radius_m,
+                None => {
+                    let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
+                    let all: Vec<f64> =
+                        links[link].over_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
+                    let ways = &links[link];
+                    let distance = |&other: &usize| match seeds[other] {
+                        Seed::Taxel(taxel) => ways.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
+                        // Points stand for the taxels that are nearest to them.
+                        Seed::Point(_) => Some(self.settle_seed(&seeds[other], &links))
+                            .filter(|&(on, ..)| on == link)
+                            .map(|(_, i, _)| all[i]),
+                    };
+                    let least = others.iter().filter_map(distance).filter(|&d| d > 0.0).fold(f64::INFINITY, f64::min);
+                    if least == f64::INFINITY {
+                        return Err(Error::failed(format!(
+                            "seed {} has no other on its part of the surface to overlap with; give a `radius`",
+                            number + 1
+                        )));
+                    }
+                    least / (2.0 * (1.0 - rule.overlap.unwrap_or(0.0)))
+                }
+            };
+            let ways = &mut links[link];
+            let reached = from(ways, nearest, at, &mut self.unroller, radius_m);
+            let disc: Vec<usize> =
+                (0..ways.len()).filter(|&i| reached[i] <= radius_m).map(|i| ways.taxels[i]).collect();
+            if disc.is_empty() {
+                return Err(Error::failed(format!(
+                    "there is no taxel within {radius_m} m of seed {}; widen the `radius`, or move the seed",
+                    number + 1
+                )));
+            }
+            discs.push(disc);
+        }
+        self.tell_rough(&links);
+        let held: BTreeSet<usize> = discs.iter().flatten().copied().collect();
+        if held.len() < chosen.len() {
+            let what = self.call(rule);
+            self.notes.push(format!("{what}: {} taxels are in no disc", chosen.len() - held.len()));
+        }
+        Ok(discs)
+    }
+
+    /// The link of `links` that `seed` is on, the taxel there that is nearest to it, and its place where it is no taxel.
+    fn settle_seed(&self, seed: &Seed, links: &[Ways]) -> (usize, usize, Option<(usize, DVec3)>) {
+        let body = self.body;
+        let on = |p: DVec3, ways: &Ways| {
+            body.links[body.taxels[ways.taxels[0]].link].world_from_link.inverse().transform_point3(p)
+        };
+        match *seed {
+            Seed::Taxel(taxel) => {
+                let find =
+                    |(link, ways): (usize, &Ways)| Some((link, ways.taxels.iter().position(|&t| t == taxel)?, None));
+                links.iter().enumerate().find_map(find).unwrap_or((0, 0, None))
+            }
+            Seed::Point(p) => {
+                let all = links.iter().enumerate().flat_map(|(link, ways)| {
+                    let p = on(p, ways);
+                    (0..ways.len()).map(move |i| (link, i, p, ways.points[i].0.distance_squared(p)))
+                });
+                let nearest = all.min_by(|a, b| a.3.total_cmp(&b.3));
+                let (link, i, p, _) = nearest.unwrap_or((0, 0, p, 0.0));
+                (link, i, Some((body.taxels[links[link].taxels[i]].link, p)))
+            }
+        }
+    }
+
+    /// The seeds that a rule names.
+    fn seeds(&self, seeds: &Seeds, chosen: &[usize]) -> Result<Vec<Seed>> {
+        let body = self.body;
+        match seeds {
+            Seeds::Points(points) => Ok(points.iter().map(|&p| Seed::Point(DVec3::from_array(p))).collect()),
+            Seeds::Ids(lists) => {
+                let ids = lists.iter().flat_map(|ids| ids.first..=ids.last.min(crate::body::MAX_TAXEL_ID));
+                let mut taxels = Vec::new();
+                for id in ids {
+                    let taxel = body.taxel_index(id).filter(|taxel| chosen.contains(taxel));
+                    let why = || Error::failed(format!("`seeds`: taxel {id} is not among those that the rule chooses"));
+                    taxels.push(Seed::Taxel(taxel.ok_or_else(why)?));
+                }
+                Ok(taxels)
+            }
+            Seeds::Fields(globs) => {
+                let specs: Vec<_> = self.made.iter().map(|made| made.spec.clone()).collect();
+                let named = specs.iter().zip(unions(&specs)).filter(|(spec, _)| globs.matches(&spec.name));
+                let middles: Vec<Seed> = named
+                    .filter_map(|(_, ids)| {
+                        let taxels: Vec<usize> = ids.into_iter().filter_map(|id| body.taxel_index(id)).collect();
+                        let taxels: Vec<usize> =
+                            taxels.into_iter().filter(|taxel| chosen.binary_search(taxel).is_ok()).collect();
+                        self.middle(&taxels)
+                    })
+                    .map(Seed::Taxel)
+                    .collect();
+                if middles.is_empty() {
+                    let asked = globs.text().join("`, `");
+                    return Err(Error::failed(format!("`seeds`: no field matches `{asked}` and holds a chosen taxel")));
+                }
+                Ok(middles)
+            }
+        }
+    }
+
+    /// The taxel nearest to the mean of `taxels`, among those that face as they do.
+    fn middle(&self, taxels: &[usize]) -> Option<usize> {
+        let at = |taxel: usize| {
+            let taxel = &self.body.taxels[taxel];
+            let world_from_link = self.body.links[taxel.link].world_from_link;
+            (
+                world_from_link.transform_point3(taxel.position_in_link),
+                world_from_link.transform_vector3(taxel.normal_in_link),
+            )
+        };
+        let points: Vec<(DVec3, DVec3)> = taxels.iter().map(|&taxel| at(taxel)).collect();
+        let mean = points.iter().map(|(p, _)| *p).sum::<DVec3>() / points.len() as f64;
+        let facing = points.iter().map(|(_, normal)| *normal).sum::<DVec3>().normalize_or_zero();
+        let off = |i: usize| points[i].0.distance(mean) * (2.0 - points[i].1.dot(facing));
+        (0..taxels.len()).min_by(|&a, &b| off(a).total_cmp(&off(b))).map(|i| taxels[i])
+    }
+
+    /// Runs of ids, or with `by_row` false the places in them.
+    fn runs(&self, chosen: &[usize], rows: Rows, stem: &str, by_row: bool) -> Children {
+        let id = |taxel: usize| self.body.taxels[taxel].id;
+        let first = rows.first.or(chosen.iter().map(|&taxel| id(taxel)).min()).unwrap_or(0);
+        let stride = rows.stride.unwrap_or(rows.of);
+        let mut runs: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for &taxel in chosen.iter().filter(|&&taxel| id(taxel) >= first) {
+            let (row, column) = ((id(taxel) - first) / stride, (id(taxel) - first) % stride);
+            if column < rows.of {
+                runs.entry(if by_row { row } else { column }).or_default().push(taxel);
+            }
+        }
+        let width = width_of(runs.keys().last().map_or(0, |&last| last as usize + 1));
+        // A row that has no taxel still has its number.
+        runs.into_iter().map(|(run, taxels)| (format!("{stem}_{:0width$}", run + 1), taxels)).collect()
+    }
+}
+
+/// Distances from a seed to the taxels of `ways`.
+fn from(
+    ways: &mut Ways,
+    nearest: usize,
+    at: Option<(usize, DVec3)>,
+    unroller: &mut crate::field::Unroller<'_>,
+    limit_m: f64,
+) -> Vec<f64> {
+    let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, ways.points[nearest].1));
+    let reached = match place {
+        Some(place) => ways.over_place(&place, nearest, limit_m),
+        None => ways.over(nearest, limit_m),
+    };
+    reached.into_iter().map(|reach| reach.distance_m).collect()
+}
+
+/// Names from 1, all of one length.
+pub(super) fn numbered(stem: &str, lists: Vec<Vec<usize>>) -> Children {
+    let width = width_of(lists.len());
+    lists.into_iter().zip(1..).map(|(taxels, number)| (format!("{stem}_{number:0width$}"), taxels)).collect()
+}
+
+/// Digits of the largest number, two at least.
+fn width_of(largest: usize) -> usize {
+    largest.to_string().len().max(2)
+}

@@ -1,0 +1,260 @@
+//! Fields made by rules: which taxels go together, under which names, with which charts.
+//!
+//! Rules are applied in order, each to the taxels of a body and the fields that those before it made; [`FieldRule`] says
+//! what they can ask for. What comes out can be written into the body's file as it is.
+
+mod charts;
+mod choose;
+mod divide;
+pub(super) mod painted;
+mod patches;
+mod rule;
+mod ways;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+pub use charts::FLAT;
+pub use rule::{ChartWish, Each, FieldRule, Patches, Rows, Seeds, Wrap};
+
+use crate::body::{Body, FieldSpec, MemberSpec};
+use crate::error::{Error, Result, nearest};
+use crate::field::{Unroller, unions};
+
+/// What a body's surface carries beyond its shape. Surfaces and triangles are counted as in [`Body::surfaces`].
+pub trait Painted {
+    /// The names of all materials.
+    fn materials(&self) -> Vec<String>;
+
+    /// The material of `triangle`.
+    fn material(&self, surface: usize, triangle: usize) -> Option<&str>;
+
+    /// The names of all painted attributes that hold one number a vertex, as a recipe has them.
+    fn attributes(&self) -> Vec<String>;
+
+    /// Attribute `name` at `barycentric` of `triangle`; `None` where the surface does not carry it.
+    fn attribute(&self, name: &str, surface: usize, triangle: usize, barycentric: [f64; 3]) -> Option<f64>;
+}
+
+/// The fields that rules made.
+#[derive(Clone, Debug, Default)]
+pub struct Grouping {
+    /// The fields, a parent before its children.
+    pub fields: Vec<FieldSpec>,
+    /// What a person should know: what was split, left out, or has no chart, and why. A line each.
+    pub notes: Vec<String>,
+}
+
+/// Groups the taxels of `body` by `rules`; without rules, one field for each link.
+///
+/// ```
+/// use somatic::{Body, author::group::group, bundled};
+///
+/// let body = Body::from_bytes("mat", bundled::MAT)?;
+/// let rules = vec![serde_json::from_str(r#"{"name": "mat", "rows": {"of": 32}}"#).unwrap()];
+/// let grouping = group(&body, &(), &rules)?;
+/// assert_eq!((grouping.fields[0].name.as_str(), grouping.fields[64].name.as_str()), ("mat", "mat/row_64"));
+/// # Ok::<(), somatic::Error>(())
+/// ```
+///
+/// # Errors
+/// A rule contradicts itself, names what is not there, or asks to be refused a field that cannot have its chart. The number
+/// of the rule, from 1, stands before it.
+pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<Grouping> {
+    let mut grower = Grower::new(body, painted);
+    for (rule, number) in rules.iter().zip(1..) {
+        grower.apply(rule).map_err(|e| e.at(format!("field rule {number}")))?;
+    }
+    if rules.is_empty() {
+        grower.apply(&FieldRule { each: Some(Each::Link), ..FieldRule::default() })?;
+    }
+    grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
+}
+
+/// A field on its way, with what is asked of its chart.
+#[derive(Clone)]
+struct Made {
+    spec: FieldSpec,
+    chart: ChartWish,
+    wrap: Wrap,
+    u: Option<[f64; 3]>,
+    /// Whether only a longer name asked for it.
+    is_level: bool,
+    /// Which of the rules applied, from 0, made it.
+    rule: usize,
+}
+
+/// Applies rules one by one, so that whoever has them can say which of them is wrong.
+pub struct Grower<'a> {
+    body: &'a Body,
+    painted: &'a dyn Painted,
+    unroller: Unroller<'a>,
+    /// Per taxel that was looked at what it sits on.
+    seats: BTreeMap<usize, Option<(usize, usize, [f64; 3])>>,
+    /// A parent before its children.
+    made: Vec<Made>,
+    index_of: HashMap<String, usize>,
+    notes: Vec<String>,
+    /// Rules applied so far.
+    applied: usize,
+}
+
+impl<'a> Grower<'a> {
+    /// For `body`, on which `painted` is painted. The fields that the body has already mean nothing.
+    #[must_use]
+    pub fn new(body: &'a Body, painted: &'a dyn Painted) -> Self {
+        Self {
+            body,
+            painted,
+            unroller: Unroller::new(body),
+            seats: BTreeMap::new(),
+            made: Vec::new(),
+            index_of: HashMap::new(),
+            notes: Vec::new(),
+            applied: 0,
+        }
+    }
+
+    /// Makes the fields of `rule`.
+    ///
+    /// # Errors
+    /// The rule contradicts itself, names what is not there, chooses no taxel, or makes a field of a name that is taken.
+    pub fn apply(&mut self, rule: &FieldRule) -> Result<()> {
+        check(rule)?;
+        let mut any = false;
+        for (host, among) in self.hosts(rule)? {
+            let chosen = self.choose(rule, &among)?;
+            if chosen.is_empty() {
+                continue;
+            }
+            any = true;
+            let prefix = match (&host, &rule.name) {
+                (Some(host), Some(name)) => Some(format!("{host}/{name}")),
+                (host, name) => host.clone().or(name.clone()),
+            };
+            let children = self.divide(rule, &chosen)?;
+            if let (Some(name), Some(_)) = (&prefix, &rule.name) {
+                // What its children hold is its own without saying, but for a weight.
+                let below: BTreeSet<usize> = children.iter().flat_map(|(_, taxels)| taxels).copied().collect();
+                let own = chosen.iter().copied().filter(|taxel| rule.weight.is_some() || !below.contains(taxel));
+                self.add(name, &own.collect::<Vec<_>>(), rule)?;
+            }
+            for (child, taxels) in children {
+                let name = prefix.as_ref().map_or(child.clone(), |prefix| format!("{prefix}/{child}"));
+                self.add(&name, &taxels, rule)?;
+            }
+        }
+        self.applied += 1;
+        if any {
+            Ok(())
+        } else {
+            Err(Error::failed("it chooses no taxel: nothing meets all of its conditions at once"))
+        }
+    }
+
+    /// The fields that `rule` is applied in, each with its taxels; or all taxels.
+    fn hosts(&self, rule: &FieldRule) -> Result<Vec<(Option<String>, Vec<usize>)>> {
+        let Some(globs) = &rule.within else {
+            return Ok(vec![(None, (0..self.body.taxels.len()).collect())]);
+        };
+        let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
+        let taxels = |ids: BTreeSet<u32>| ids.into_iter().filter_map(|id| self.body.taxel_index(id)).collect();
+        let all = specs.iter().zip(unions(&specs)).filter(|(spec, _)| globs.matches(&spec.name));
+        let hosts: Vec<_> = all.map(|(spec, ids)| (Some(spec.name.clone()), taxels(ids))).collect();
+        if hosts.is_empty() {
+            let asked = globs.text().join("`, `");
+            let hint = match nearest(&asked, specs.iter().map(|spec| spec.name.as_str())) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("there are {} so far, and rules see only those before them", specs.len()),
+            };
+            return Err(Error::failed(format!("`within`: no field matches `{asked}`: {hint}")));
+        }
+        Ok(hosts)
+    }
+
+    /// Adds the field `name` with the levels above it.
+    fn add(&mut self, name: &str, taxels: &[usize], rule: &FieldRule) -> Result<()> {
+        if name.split('/').any(|level| level.trim().is_empty()) {
+            return Err(Error::failed(format!("`{name}` is no name for a field: a level of it is empty")));
+        }
+        let parent = name.rsplit_once('/').map(|(parent, _)| parent.to_owned());
+        let levels = name.match_indices('/').map(|(end, _)| &name[..end]);
+        for (level, above) in levels.scan(None, |above: &mut Option<&str>, level| Some((level, above.replace(level)))) {
+            if !self.index_of.contains_key(level) {
+                let parent = above.map(str::to_owned);
+                let spec = FieldSpec { name: level.to_owned(), parent, ..FieldSpec::default() };
+                self.push(Made {
+                    spec,
+                    chart: ChartWish::Auto,
+                    wrap: Wrap::Bare,
+                    u: None,
+                    is_level: true,
+                    rule: self.applied,
+                });
+            }
+        }
+        let member = MemberSpec { weight: rule.weight.unwrap_or(1.0), uv: None };
+        let members = taxels.iter().map(|&taxel| (self.body.taxels[taxel].id, member)).collect();
+        let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
+        let chart = rule.chart.unwrap_or_default();
+        let named = if matches!(chart, ChartWish::Auto | ChartWish::None) { Wrap::Bare } else { Wrap::Refuse };
+        let made =
+            Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
+        match self.index_of.get(name) {
+            Some(&there) if self.made[there].is_level => self.made[there] = made,
+            Some(_) => {
+                return Err(Error::failed(format!(
+                    "it makes a field `{name}`, and there is one of that name; give it another `name` or `stem`"
+                )));
+            }
+            None => self.push(made),
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, made: Made) {
+        self.index_of.insert(made.spec.name.clone(), self.made.len());
+        self.made.push(made);
+    }
+}
+
+/// What is wrong with `rule` whatever body it is for.
+fn check(rule: &FieldRule) -> Result<()> {
+    let wrong = |what: &str| Err(Error::failed(what));
+    let discs = rule.radius.is_some() || rule.seeds.is_some() || rule.overlap.is_some();
+    let ways = [rule.each.is_some(), rule.patches.is_some(), discs, rule.rows.is_some(), rule.columns.is_some()];
+    let divides = ways.into_iter().filter(|&way| way).count();
+    if divides > 1 {
+        return wrong(
+            "it divides in several ways: keep one of `each`, `patches`, `radius` with `seeds` or `overlap`, `rows` and \
+             `columns`, and divide further by a rule `within` what this one makes",
+        );
+    }
+    if divides == 0 && rule.name.is_none() {
+        return wrong("it makes nothing: give it a `name`, or `each`, `patches`, `radius`, `rows` or `columns`");
+    }
+    if matches!(rule.patches, Some(Patches::Number(0) | Patches::Of { of: 0 })) {
+        return wrong("`patches`: 0 makes no sense; ask for 1 or more");
+    }
+    if rule.rows.or(rule.columns).is_some_and(|rows| rows.of == 0 || rows.stride == Some(0)) {
+        return wrong("`of` and `stride` of rows count from 1");
+    }
+    if rule.overlap.is_some_and(|overlap| !(0.0..1.0).contains(&overlap)) {
+        return wrong("`overlap` is a share of a disc's width, from 0 to under 1");
+    }
+    if discs && (rule.radius.is_none() && (rule.seeds.is_none() || rule.overlap.is_none())) {
+        return wrong("discs need a `radius`, or `seeds` and an `overlap`");
+    }
+    if discs && rule.seeds.is_none() && rule.overlap.is_none() {
+        return wrong("discs of a `radius` need `seeds`, or the `overlap` at which they are to be spread");
+    }
+    if rule.radius.is_some() && rule.seeds.is_some() && rule.overlap.is_some() {
+        return wrong("`radius`, `seeds` and `overlap` together say one thing too many; leave one of them out");
+    }
+    if rule.weight.is_some_and(|weight| !(weight.is_finite() && (1e-6..=1e6).contains(&weight))) {
+        return wrong("`weight` lies between 1e-6 and 1e6");
+    }
+    if rule.u.is_some_and(|u| !u.iter().all(|x| x.is_finite()) || u == [0.0; 3]) {
+        return wrong("`u` is a direction [x, y, z], and not all 0");
+    }
+    Ok(())
+}
