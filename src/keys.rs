@@ -13,7 +13,7 @@ const MOST: f64 = 1e9;
 
 /// A file's text, which knows on which line something stands.
 #[derive(Clone, Copy)]
-pub(crate) struct Text<'a>(pub(crate) &'a str);
+pub struct Text<'a>(pub &'a str);
 
 impl Text<'_> {
     /// What the text holds; an error has its line, and the nearest word to one that is not known.
@@ -21,6 +21,19 @@ impl Text<'_> {
         toml::from_str(self.0).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
             self.wrong(span, explain(e.message()))
+        })
+    }
+
+    /// The same; an error has the column, too.
+    ///
+    /// # Errors
+    /// The text is no TOML, or has other keys or values than a `T`.
+    pub fn parse_to_the_column<T: DeserializeOwned>(self) -> Result<T> {
+        toml::from_str(self.0).map_err(|e| {
+            let start = e.span().map_or(0, |span| span.start).min(self.0.len());
+            let before = self.0.as_bytes()[..start].rsplit(|&byte| byte == b'\n').next().unwrap_or_default();
+            let column = 1 + String::from_utf8_lossy(before).chars().count();
+            Error::failed(explain(e.message())).at(format!("line {}, column {column}", self.line(start)))
         })
     }
 

@@ -59,7 +59,8 @@ pub mod experiments;
 pub mod field;
 #[cfg(feature = "cli")]
 mod ink;
-mod keys;
+#[doc(hidden)]
+pub mod keys;
 mod length;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]

@@ -13,7 +13,8 @@ use somatic::experiments::shape::Shape;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
-use super::run::{output, stop_on_signal};
+use super::run::stop_on_signal;
+use super::scene::output;
 use super::words::count;
 use super::{DONE, print, say};
 

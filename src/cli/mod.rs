@@ -8,11 +8,14 @@ mod feed;
 mod inspect;
 mod live;
 mod paper;
+mod plan;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;
+mod scene;
 mod screen;
 mod simulate;
+mod table;
 mod words;
 
 use std::io::{self, Write as _};
@@ -38,6 +41,7 @@ Examples:
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         where they are
+  somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
@@ -61,6 +65,7 @@ enum Command {
     Author(Box<author::Arguments>),
     #[cfg(feature = "gpu")]
     Render(render::Arguments),
+    Plan(Box<plan::Arguments>),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
@@ -75,6 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Author(arguments) => author::run(arguments),
         #[cfg(feature = "gpu")]
         Command::Render(arguments) => render::render(arguments),
+        Command::Plan(arguments) => plan::plan(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),

@@ -1,10 +1,12 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
 mod curves;
+mod explain;
 mod filter;
 mod plan;
 mod slots;
 
+pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use plan::{Plan, choose_fields};
 pub(crate) use plan::{PlanField, Stages};

@@ -1,13 +1,14 @@
 //! A body in words and tables.
 
-use comfy_table::{Cell, CellAlignment, ColumnConstraint, ContentArrangement, Table};
-use console::{Term, style};
+use comfy_table::{ColumnConstraint, Table};
+use console::style;
 use rstar::RTree;
 use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, WORLD};
 
 use super::Seen;
+use crate::cli::table::{plain, right, shown};
 use crate::cli::words::{count, millimetres};
 
 /// All there is to say, the oddest last, where it is read.
@@ -165,33 +166,6 @@ fn branches(parents: &[Option<usize>]) -> Vec<(usize, String)> {
         order.push((index, format!("{above}{own}")));
     }
     order
-}
-
-fn plain<const N: usize>(headings: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_header(headings.map(Cell::new));
-    let term = Term::stdout();
-    if term.is_term() {
-        table.set_width(term.size().1);
-    }
-    table
-}
-
-fn right(table: &mut Table, column: usize) {
-    if let Some(column) = table.column_mut(column) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-}
-
-fn shown(table: &Table) -> String {
-    let mut text = String::new();
-    for (index, line) in table.lines().enumerate() {
-        let line = line.trim_end();
-        text += &if index == 0 { style(line).dim().to_string() } else { line.to_owned() };
-        text += "\n";
-    }
-    text
 }
 
 #[cfg(test)]

@@ -1,0 +1,420 @@
+//! What is asked for: by the arguments of `somatic run` and `somatic plan`, and by scene files, which have the same words.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use schemars::JsonSchema;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use somatic::error::nearest;
+use somatic::keys::Text;
+use somatic::scene::{FilterBy, MotionFilter};
+use somatic::signal::{FsrSignal, Letter, Receptor};
+use somatic::sink::SinkSpec;
+use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
+use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
+
+use super::load_body;
+
+/// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
+/// its name; paths in a file are relative to that file. Flags come before keys.
+#[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+#[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do; docs/scenes.md")]
+pub(super) struct Asked {
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand, or a
+    /// simulation's own].
+    #[arg(long, value_name = "BODY")]
+    pub(super) body: Option<String>,
+
+    /// Where frames come from: csv:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled touch].
+    #[arg(long = "source", value_name = "SOURCE")]
+    #[serde(rename = "source", deserialize_with = "one_or_many_specs::<SourceSpec, _>")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) sources: Vec<String>,
+
+    /// Where percepts go: ndjson:FILE, or - for NDJSON on standard output; may be several.
+    #[arg(long = "sink", value_name = "SINK")]
+    #[serde(rename = "sink", deserialize_with = "one_or_many_specs::<SinkSpec, _>")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) sinks: Vec<String>,
+
+    /// What computes: double precision (reference), single precision on the CPU, shaders (gpu), or the faster of the last
+    /// two by a measurement [default: auto].
+    #[arg(long, value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
+        .try_map(|name| name.parse::<BackendKind>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
+    pub(super) backend: Option<BackendKind>,
+
+    /// Only these quantities [default: all but touches and filtered_*].
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
+    #[serde(deserialize_with = "outputs")]
+    #[schemars(with = "Vec<String>", transform = output_names)]
+    pub(super) outputs: Vec<Outputs>,
+
+    /// Only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be several.
+    #[arg(long, value_name = "GLOB")]
+    #[serde(deserialize_with = "one_or_many")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) fields: Vec<String>,
+
+    /// List fields without contact too.
+    #[arg(long)]
+    pub(super) all_fields: bool,
+
+    /// The robot's calibration, a TOML file; without one, pressures are the raw values.
+    #[arg(long, value_name = "FILE")]
+    pub(super) calibration: Option<PathBuf>,
+
+    /// What of the sensors' pressures is looked at: how hard they are pressed (sustained), or how fast that changes, per
+    /// second (change). Every field is there once for each [default: sustained].
+    #[arg(long, value_name = "LETTER,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["sustained", "change"]).try_map(|name| name.parse::<Receptor>()))]
+    #[serde(deserialize_with = "words")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) letters: Vec<Receptor>,
+
+    /// Which signal force-sensing resistors deliver (raw, linear), instead of what the calibration says; with both, every
+    /// field is there once for each.
+    #[arg(long, value_name = "SIGNAL,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["raw", "linear"]).try_map(|name| name.parse::<FsrSignal>()))]
+    #[serde(deserialize_with = "words")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) signal: Vec<FsrSignal>,
+
+    /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
+    #[arg(long)]
+    pub(super) tare: bool,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "rate_hz")]
+    pub(super) rate: Option<f64>,
+
+    /// Frames a call, at most: more is faster, fewer is sooner [default: 256 for recordings, 1 live].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[serde(deserialize_with = "batch")]
+    #[schemars(range(min = 1, max = 65536))]
+    pub(super) batch: Option<u32>,
+
+    /// Play a recording at this many times the speed it was made at [default: as fast as possible].
+    #[arg(long, value_name = "X")]
+    pub(super) speed: Option<f64>,
+
+    /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing [default: 0].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "max_age_s")]
+    pub(super) max_age: Option<f64>,
+
+    /// The longest time between two frames over which motion is measured, in seconds [default: 10].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "max_gap_s")]
+    pub(super) max_gap: Option<f64>,
+
+    /// Which motion counts, for the filtered_* outputs: the centroid's way from where it last counted. What is shorter is
+    /// held back until it has added up, so that slow motion passes and jitter does not; what is longer is another touch.
+    /// Either end may be left out [default: from 1/16 of the spacing of a field's taxels to 3 times that].
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    #[serde(deserialize_with = "window")]
+    pub(super) filter_window: Option<String>,
+
+    /// What that window measures: the way, or the paper's change of the distance from the chart's origin, which is blind to
+    /// motion around it [default: distance].
+    #[arg(long, value_name = "MEASURE", value_parser = PossibleValuesParser::new(["distance", "radial"])
+        .try_map(|name| name.parse::<FilterBy>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = ["distance", "radial"]))]
+    pub(super) filter_by: Option<FilterBy>,
+
+    /// How long filtered_direction takes to turn (its time constant), in seconds; 0 is at once [default: 0.1].
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[serde(rename = "filter_time_s")]
+    pub(super) filter_time: Option<f64>,
+
+    /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
+    #[arg(long)]
+    pub(super) verify: bool,
+
+    /// Show no table, progress or remarks.
+    #[arg(short, long)]
+    pub(super) quiet: bool,
+}
+
+/// One text, or a list of them.
+#[derive(Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a text, or a list of texts")]
+enum OneOrMany {
+    One(String),
+    Many(Vec<String>),
+}
+
+fn one_or_many<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    Ok(match OneOrMany::deserialize(from)? {
+        OneOrMany::One(one) => vec![one],
+        OneOrMany::Many(many) => many,
+    })
+}
+
+/// Texts that are names of a `T`.
+fn one_or_many_specs<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    let all = one_or_many(from)?;
+    match all.iter().find_map(|text| text.parse::<T>().err()) {
+        Some(error) => Err(D::Error::custom(error)),
+        None => Ok(all),
+    }
+}
+
+fn words<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
+    one_or_many(from)?.iter().map(|text| text.parse().map_err(D::Error::custom)).collect()
+}
+
+fn word<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    String::deserialize(from)?.parse().map(Some).map_err(D::Error::custom)
+}
+
+fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Outputs>, D::Error> {
+    one_or_many(from)?.iter().map(|name| output(name).map_err(D::Error::custom)).collect()
+}
+
+fn batch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
+    let frames = i64::deserialize(from)?;
+    match u32::try_from(frames) {
+        Ok(frames @ 1..=65_536) => Ok(Some(frames)),
+        _ => Err(D::Error::custom(format!("`batch` is {frames}; it must be between 1 and 65536"))),
+    }
+}
+
+fn window<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(from)?;
+    MotionFilter::default().with_window(&text).map_err(D::Error::custom)?;
+    Ok(Some(text))
+}
+
+/// Says in a schema which outputs there are.
+fn output_names(schema: &mut schemars::Schema) {
+    let names: Vec<String> = Outputs::all().names().collect();
+    schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
+}
+
+fn outputs_help() -> String {
+    let names: Vec<String> = Outputs::all().names().collect();
+    format!("Only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
+}
+
+pub(super) fn output(name: &str) -> Result<Outputs> {
+    Outputs::named(name).ok_or_else(|| {
+        let names: Vec<String> = Outputs::all().names().collect();
+        let hint = match nearest(name, names.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are {}", names.join(", ")),
+        };
+        Error::usage(format!("there is no output `{name}`; {hint}"))
+    })
+}
+
+impl Asked {
+    /// What the scene file at `path` asks for, its paths made relative to where we are.
+    ///
+    /// # Errors
+    /// It cannot be read, or asks for what there is not: one line with its line and column.
+    fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let mut asked: Self = Text(&text).parse_to_the_column().map_err(|e| e.at(path.display()))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let there = |file: &Path| folder.join(file).display().to_string();
+        asked.calibration = asked.calibration.map(|file| folder.join(file));
+        // A bundled body, unless a file is called the same.
+        asked.body = asked.body.map(|body| match there(Path::new(&body)) {
+            file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
+            _ => body,
+        });
+        for source in &mut asked.sources {
+            match source.parse()? {
+                SourceSpec::Csv(file) => *source = format!("csv:{}", there(&file)),
+                SourceSpec::Mcap(file) => *source = format!("mcap:{}", there(&file)),
+                SourceSpec::Sim(file) => *source = format!("sim:{}", there(&file)),
+                _ => {}
+            }
+        }
+        for sink in &mut asked.sinks {
+            match sink.parse()? {
+                SinkSpec::Ndjson(file) => *sink = format!("ndjson:{}", there(&file)),
+                SinkSpec::Mcap(file) => *sink = format!("mcap:{}", there(&file)),
+                _ => {}
+            }
+        }
+        Ok(asked)
+    }
+
+    /// What these arguments and the scene file at `scene` ask for together; an argument comes before a key.
+    ///
+    /// # Errors
+    /// As [`Asked::load`]; values that make no sense.
+    pub(super) fn with(&self, scene: Option<&Path>) -> Result<Self> {
+        let file = scene.map(Self::load).transpose()?.unwrap_or_default();
+        fn list<T: Clone>(first: &[T], then: Vec<T>) -> Vec<T> {
+            if first.is_empty() { then } else { first.to_vec() }
+        }
+        let asked = Self {
+            body: self.body.clone().or(file.body),
+            sources: list(&self.sources, file.sources),
+            sinks: list(&self.sinks, file.sinks),
+            backend: self.backend.or(file.backend),
+            outputs: list(&self.outputs, file.outputs),
+            fields: list(&self.fields, file.fields),
+            all_fields: self.all_fields || file.all_fields,
+            calibration: self.calibration.clone().or(file.calibration),
+            letters: list(&self.letters, file.letters),
+            signal: list(&self.signal, file.signal),
+            tare: self.tare || file.tare,
+            rate: self.rate.or(file.rate),
+            batch: self.batch.or(file.batch),
+            speed: self.speed.or(file.speed),
+            max_age: self.max_age.or(file.max_age),
+            max_gap: self.max_gap.or(file.max_gap),
+            filter_window: self.filter_window.clone().or(file.filter_window),
+            filter_by: self.filter_by.or(file.filter_by),
+            filter_time: self.filter_time.or(file.filter_time),
+            verify: self.verify || file.verify,
+            quiet: self.quiet || file.quiet,
+        };
+        asked.check().map_err(|e| scene.map_or(e.clone(), |path| e.at(path.display())))?;
+        Ok(asked)
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.sources.len() > 1 {
+            return Err(Error::usage("this version reads one --source at a time; merge them, or run once for each"));
+        }
+        if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
+            return Err(Error::usage(format!(
+                "--speed {speed} is no speed; give a positive number, 1 for as recorded"
+            )));
+        }
+        if let Some(age) = self.max_age.filter(|age| !(age.is_finite() && *age >= 0.0)) {
+            return Err(Error::usage(format!("--max-age {age} is no time span; give seconds from 0")));
+        }
+        if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
+            return Err(Error::usage(format!("--max-gap {gap} is no time span; give seconds over 0")));
+        }
+        Ok(())
+    }
+
+    /// Which motion counts, if that is asked for.
+    fn filter(&self, outputs: Outputs) -> Result<MotionFilter> {
+        let usual = MotionFilter::default();
+        let given = [
+            ("--filter-window", self.filter_window.is_some()),
+            ("--filter-by", self.filter_by.is_some()),
+            ("--filter-time", self.filter_time.is_some()),
+        ];
+        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
+            return Err(Error::usage(format!(
+                "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
+            )));
+        }
+        let filter = MotionFilter {
+            by: self.filter_by.unwrap_or(usual.by),
+            time_constant_s: self.filter_time.unwrap_or(usual.time_constant_s),
+            ..usual
+        };
+        self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
+    }
+
+    /// The body that is meant.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(super) fn body_for(&self, input: &Input) -> Result<Body> {
+        match (&self.body, &input.spec) {
+            (Some(body), _) => load_body(body),
+            // A simulation says what body it is on.
+            (None, Some(SourceSpec::Sim(path))) => Ok(SimulatedSource::open(path)?.body().clone()),
+            (None, _) => load_body("hand"),
+        }
+    }
+
+    /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
+    ///
+    /// # Errors
+    /// What is asked for does not go together; the calibration cannot be read.
+    pub(super) fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
+        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL);
+        let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
+        let usual = Scene::default();
+        let scene = Scene {
+            outputs,
+            fields: self.fields.clone(),
+            max_age_s: self.max_age.unwrap_or(usual.max_age_s),
+            max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
+            letters: Letter::all_of(letters, &self.signal),
+            filter: self.filter(outputs)?,
+        };
+        let load = |path: &PathBuf| {
+            let calibration = Calibration::load(path, ids)?;
+            calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
+            Ok(calibration)
+        };
+        let calibration = self.calibration.as_ref().map(load).transpose()?;
+        Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
+    }
+}
+
+/// What frames are read from.
+pub(super) struct Input {
+    /// As messages call it.
+    pub(super) name: String,
+    /// `None` is the bundled touch.
+    spec: Option<SourceSpec>,
+}
+
+impl Input {
+    /// What is read for `asked`, if anything is: a plan can be made without.
+    pub(super) fn named_or_none(asked: &Asked) -> Result<Option<Self>> {
+        let nothing = asked.sources.is_empty() && !matches!(asked.body.as_deref(), None | Some("hand"));
+        if nothing { Ok(None) } else { Self::named(asked).map(Some) }
+    }
+
+    pub(super) fn named(asked: &Asked) -> Result<Self> {
+        let Some(text) = asked.sources.first() else {
+            return match asked.body.as_deref() {
+                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None }),
+                Some(body) => Err(Error::usage(format!(
+                    "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
+                ))),
+            };
+        };
+        let spec: SourceSpec = text.parse()?;
+        let name = match &spec {
+            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
+            SourceSpec::Stdin => "stdin".to_owned(),
+            _ => text.clone(),
+        };
+        let input = Self { name, spec: Some(spec) };
+        if asked.speed.is_some() && !input.is_recording() {
+            return Err(Error::usage("--speed is for recordings; live frames come when they come"));
+        }
+        Ok(input)
+    }
+
+    pub(super) fn is_bundled(&self) -> bool {
+        self.spec.is_none()
+    }
+
+    pub(super) fn is_recording(&self) -> bool {
+        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
+    }
+
+    pub(super) fn open(&self, ids: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
+        match &self.spec {
+            Some(spec) => spec.open(ids, rate_hz),
+            None => {
+                let length = Some(bundled::TOUCH.len() as u64);
+                Ok(Box::new(CsvSource::from_reader(&self.name, bundled::TOUCH, length, rate_hz)?))
+            }
+        }
+    }
+}
