@@ -5,6 +5,7 @@ mod bar;
 mod bench;
 mod completions;
 mod feed;
+mod input;
 mod inspect;
 mod live;
 mod paper;

@@ -1,5 +1,6 @@
 //! `somatic plan`: what a scene costs, and what it leaves out.
 
+use std::hint::black_box;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -10,8 +11,9 @@ use serde_json::{Value, json};
 use somatic::scene::PlannedStage;
 use somatic::{Agreement, BackendKind, Body, Engine, Error, Frame, Options, Outputs, RawValue, Result};
 
+use super::input::Input;
 use super::run::RECORDED_BATCH;
-use super::scene::{Asked, Input};
+use super::scene::Asked;
 use super::table::{plain, right, shown};
 use super::words::count;
 use super::{DONE, print};
@@ -30,6 +32,10 @@ stage's time is what a plan with it takes more than a plan without.";
 const ROUNDS: usize = 15;
 /// A round's turn, s.
 const TURN_S: f64 = 2e-3;
+/// Values that made-up frames hold, about.
+const VALUES: usize = 1 << 22;
+/// From the last frame to the first one of the next time, s.
+const STEP_S: f64 = 0.01;
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]
@@ -100,7 +106,7 @@ impl Bill {
         if let (Some(source), Some(input)) = (&mut source, recorded) {
             engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
             let mut frame = Frame::missing(0.0, source.taxels().len());
-            while frames.len() < batch && source.next_frame(&mut frame)? {
+            while frames.len() < batch.max(RECORDED_BATCH) && source.next_frame(&mut frame)? {
                 frames.push(frame.clone());
             }
         }
@@ -110,10 +116,7 @@ impl Bill {
         };
         let listened: Option<Vec<u32>> = source.filter(|_| !frames.is_empty()).map(|s| s.taxels().to_vec());
         if frames.is_empty() {
-            let pressed = |index| RawValue::new((index % 977 + 1) as f64);
-            let values: Vec<RawValue> = (0..ids.len()).map(pressed).collect();
-            let frame = |t: usize| Frame { t_s: t as f64 * 0.01, values: values.clone(), pose: Vec::new() };
-            frames = (0..batch).map(frame).collect();
+            frames = pressed(ids.len(), batch);
         }
         let (name, what, why) = engine.backend();
         let backend = (name.to_owned(), what, why.to_owned());
@@ -146,7 +149,8 @@ impl Bill {
         let fields = [plan.fields().len(), body.fields.len() * plan.letters().len()];
         let (channels, memberships) = (plan.channels(), plan.memberships());
         let bytes = [plan.bytes_up(), plan.bytes_down()];
-        let us = measured(&mut engines, &frames)?;
+        let mut frames = Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() };
+        let us = measured(&mut engines, &mut frames)?;
         let stages = explained.into_iter().zip(&timed).map(|(stage, timed)| {
             let took = match (stage.name, timed) {
                 ("contact", _) => Some(us[0]),
@@ -156,7 +160,7 @@ impl Bill {
             (stage, took)
         });
         let agreement = (kind != BackendKind::Reference)
-            .then(|| made(engine.plan().outputs())?.process_and_compare(&frames).map(|(_, agreement)| agreement))
+            .then(|| frames.compared(&mut made(engine.plan().outputs())?))
             .transpose()?;
         Ok(Self {
             body: body.name.clone(),
@@ -196,10 +200,10 @@ impl Bill {
         for (stage, us) in &self.stages {
             let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
             let place = if stage.on_host { "host" } else { &self.backend.0 };
-            let over = if ["calibrate", "change"].contains(&stage.name) { "values" } else { "fields" };
+            let over = if ["calibrate", "change"].contains(&stage.name) { "value" } else { "field" };
             table.add_row([
                 stage.name.to_owned(),
-                if stage.runs { format!("{} {over}", stage.over) } else { "–".to_owned() },
+                if stage.runs { count(stage.over as u64, over) } else { "–".to_owned() },
                 number(stage.memberships),
                 us.map_or(String::new(), |us| format!("{us:.3}")),
                 if stage.runs { place.to_owned() } else { String::new() },
@@ -272,19 +276,56 @@ fn accuracy(agreement: &Agreement) -> String {
     if words.is_empty() { verdict.to_owned() } else { format!("{verdict}: {}", words.join(", ")) }
 }
 
+/// Frames in which every one of `taxels` is pressed, each time otherwise: enough for a call of `batch`, and for motion.
+fn pressed(taxels: usize, batch: usize) -> Vec<Frame> {
+    let frames = batch.max((VALUES / taxels.max(1)).clamp(2, 64));
+    let value = |index: usize, frame: usize| RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64);
+    let values = |frame| (0..taxels).map(|index| value(index, frame)).collect();
+    let frame = |frame: usize| Frame { t_s: frame as f64 * 0.01, values: values(frame), pose: Vec::new() };
+    (0..frames).map(frame).collect()
+}
+
+/// Frames as calls get them, again and again, in a time that goes on.
+struct Played {
+    calls: Vec<Vec<Frame>>,
+}
+
+impl Played {
+    /// Puts all frames after what was.
+    fn again(&mut self) {
+        let times = || self.calls.iter().flatten().map(|frame| frame.t_s);
+        let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+        let later = last - first + STEP_S;
+        self.calls.iter_mut().flatten().for_each(|frame| frame.t_s += later);
+    }
+
+    fn compared(&mut self, engine: &mut Engine) -> Result<Agreement> {
+        let mut sum = Agreement::default();
+        for frames in &self.calls {
+            sum.merge(engine.process_and_compare(frames)?.1);
+        }
+        Ok(sum)
+    }
+}
+
 /// The median time of a frame on each of `engines`, which take turns, µs.
-fn measured(engines: &mut [Engine], frames: &[Frame]) -> Result<Vec<f64>> {
+fn measured(engines: &mut [Engine], played: &mut Played) -> Result<Vec<f64>> {
     let mut times = vec![Vec::with_capacity(ROUNDS); engines.len()];
     for round in 0..=ROUNDS {
         for (engine, times) in engines.iter_mut().zip(&mut times) {
-            let (start, mut calls) = (Instant::now(), 0_u32);
-            while calls == 0 || start.elapsed().as_secs_f64() < TURN_S {
-                std::hint::black_box(engine.process(std::hint::black_box(frames))?);
-                calls += 1;
+            let (mut took_s, mut frames) = (0.0, 0);
+            while took_s < TURN_S {
+                played.again();
+                let start = Instant::now();
+                for call in &played.calls {
+                    black_box(engine.process(black_box(call))?);
+                    frames += call.len();
+                }
+                took_s += start.elapsed().as_secs_f64();
             }
             // The first round warms up.
             if round > 0 {
-                times.push(start.elapsed().as_secs_f64() * 1e6 / f64::from(calls) / frames.len() as f64);
+                times.push(took_s * 1e6 / frames as f64);
             }
         }
     }

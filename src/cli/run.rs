@@ -12,8 +12,9 @@ use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
 use somatic::{Agreement, BackendKind, Engine, Error, Plan, Result};
 
 use super::feed::{Arrival, Feed, Manner};
+use super::input::Input;
 use super::live::{About, View};
-use super::scene::{Asked, Input};
+use super::scene::Asked;
 use super::{DONE, FAILED, LOST, say};
 
 const EXAMPLES: &str = "\

@@ -1,21 +1,23 @@
 //! What is asked for: by the arguments of `somatic run` and `somatic plan`, and by scene files, which have the same words.
 
+mod said;
+
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 use somatic::error::nearest;
-use somatic::keys::Text;
+use somatic::keys;
 use somatic::scene::{FilterBy, MotionFilter};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::SinkSpec;
-use somatic::source::{CsvSource, SimulatedSource, Source, SourceSpec};
+use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
+use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
+use super::input::Input;
 use super::load_body;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
@@ -31,13 +33,13 @@ pub(super) struct Asked {
 
     /// Where frames come from: csv:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
-    #[serde(rename = "source", deserialize_with = "one_or_many_specs::<SourceSpec, _>")]
+    #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
     /// Where percepts go: ndjson:FILE, or - for NDJSON on standard output; may be several.
     #[arg(long = "sink", value_name = "SINK")]
-    #[serde(rename = "sink", deserialize_with = "one_or_many_specs::<SinkSpec, _>")]
+    #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sinks: Vec<String>,
 
@@ -57,7 +59,7 @@ pub(super) struct Asked {
 
     /// Only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be several.
     #[arg(long, value_name = "GLOB")]
-    #[serde(deserialize_with = "one_or_many")]
+    #[serde(deserialize_with = "texts")]
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
@@ -143,56 +145,6 @@ pub(super) struct Asked {
     pub(super) quiet: bool,
 }
 
-/// One text, or a list of them.
-#[derive(Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "a text, or a list of texts")]
-enum OneOrMany {
-    One(String),
-    Many(Vec<String>),
-}
-
-fn one_or_many<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    Ok(match OneOrMany::deserialize(from)? {
-        OneOrMany::One(one) => vec![one],
-        OneOrMany::Many(many) => many,
-    })
-}
-
-/// Texts that are names of a `T`.
-fn one_or_many_specs<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    let all = one_or_many(from)?;
-    match all.iter().find_map(|text| text.parse::<T>().err()) {
-        Some(error) => Err(D::Error::custom(error)),
-        None => Ok(all),
-    }
-}
-
-fn words<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
-    one_or_many(from)?.iter().map(|text| text.parse().map_err(D::Error::custom)).collect()
-}
-
-fn word<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    String::deserialize(from)?.parse().map(Some).map_err(D::Error::custom)
-}
-
-fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Outputs>, D::Error> {
-    one_or_many(from)?.iter().map(|name| output(name).map_err(D::Error::custom)).collect()
-}
-
-fn batch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
-    let frames = i64::deserialize(from)?;
-    match u32::try_from(frames) {
-        Ok(frames @ 1..=65_536) => Ok(Some(frames)),
-        _ => Err(D::Error::custom(format!("`batch` is {frames}; it must be between 1 and 65536"))),
-    }
-}
-
-fn window<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
-    let text = String::deserialize(from)?;
-    MotionFilter::default().with_window(&text).map_err(D::Error::custom)?;
-    Ok(Some(text))
-}
-
 /// Says in a schema which outputs there are.
 fn output_names(schema: &mut schemars::Schema) {
     let names: Vec<String> = Outputs::all().names().collect();
@@ -222,7 +174,7 @@ impl Asked {
     /// It cannot be read, or asks for what there is not: one line with its line and column.
     fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
-        let mut asked: Self = Text(&text).parse_to_the_column().map_err(|e| e.at(path.display()))?;
+        let mut asked: Self = keys::Text(&text).parse_to_the_column().map_err(|e| e.at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let there = |file: &Path| folder.join(file).display().to_string();
         asked.calibration = asked.calibration.map(|file| folder.join(file));
@@ -360,61 +312,5 @@ impl Asked {
         };
         let calibration = self.calibration.as_ref().map(load).transpose()?;
         Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
-    }
-}
-
-/// What frames are read from.
-pub(super) struct Input {
-    /// As messages call it.
-    pub(super) name: String,
-    /// `None` is the bundled touch.
-    spec: Option<SourceSpec>,
-}
-
-impl Input {
-    /// What is read for `asked`, if anything is: a plan can be made without.
-    pub(super) fn named_or_none(asked: &Asked) -> Result<Option<Self>> {
-        let nothing = asked.sources.is_empty() && !matches!(asked.body.as_deref(), None | Some("hand"));
-        if nothing { Ok(None) } else { Self::named(asked).map(Some) }
-    }
-
-    pub(super) fn named(asked: &Asked) -> Result<Self> {
-        let Some(text) = asked.sources.first() else {
-            return match asked.body.as_deref() {
-                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None }),
-                Some(body) => Err(Error::usage(format!(
-                    "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
-                ))),
-            };
-        };
-        let spec: SourceSpec = text.parse()?;
-        let name = match &spec {
-            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
-            SourceSpec::Stdin => "stdin".to_owned(),
-            _ => text.clone(),
-        };
-        let input = Self { name, spec: Some(spec) };
-        if asked.speed.is_some() && !input.is_recording() {
-            return Err(Error::usage("--speed is for recordings; live frames come when they come"));
-        }
-        Ok(input)
-    }
-
-    pub(super) fn is_bundled(&self) -> bool {
-        self.spec.is_none()
-    }
-
-    pub(super) fn is_recording(&self) -> bool {
-        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
-    }
-
-    pub(super) fn open(&self, ids: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
-        match &self.spec {
-            Some(spec) => spec.open(ids, rate_hz),
-            None => {
-                let length = Some(bundled::TOUCH.len() as u64);
-                Ok(Box::new(CsvSource::from_reader(&self.name, bundled::TOUCH, length, rate_hz)?))
-            }
-        }
     }
 }

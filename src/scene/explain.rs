@@ -99,7 +99,7 @@ impl Plan {
 
     /// Numbers that a field's percept takes on the way back from a device.
     fn numbers_a_field(&self) -> usize {
-        let place = Outputs::POSITION | Outputs::NORMAL | Outputs::TOUCHES;
+        let place = Outputs::POSITION | Outputs::NORMAL;
         let numbers = [
             (Outputs::TOTAL, 1),
             (Outputs::PEAK, 1),

@@ -6,6 +6,7 @@ mod fields;
 mod inspect;
 mod live;
 mod paper;
+mod plan;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;
@@ -94,7 +95,9 @@ fn files_in(folder: &Path) -> Vec<String> {
 #[test]
 fn help_teaches_and_names_everything() {
     let help = done(&["--help"]);
-    for word in ["run", "inspect", "author", "render", "paper", "bench", "completions", "Examples:", "Exit codes"] {
+    for word in
+        ["run", "inspect", "author", "render", "plan", "paper", "bench", "completions", "Examples:", "Exit codes"]
+    {
         assert!(help.contains(word), "{word}: {help}");
     }
     let help = done(&["run", "--help"]);

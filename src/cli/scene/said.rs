@@ -1,0 +1,123 @@
+//! How a scene file's values are read: each where it stands, so that an error has its line and column.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use somatic::scene::MotionFilter;
+use somatic::{Error, Outputs, Result};
+
+use super::output;
+
+// As a schema says it.
+/// One text, or a list of them.
+#[derive(JsonSchema)]
+#[schemars(untagged)]
+#[expect(dead_code, reason = "only its schema is of use")]
+pub(super) enum OneOrMany {
+    One(String),
+    Many(Vec<String>),
+}
+
+/// What a text says, read where it stands, so that an error has its place.
+struct Said<T>(T);
+
+impl<'de, T: FromStr<Err = Error>> Deserialize<'de> for Said<T> {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        String::deserialize(from)?.parse().map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// Takes one text, or a list of them.
+struct Texts<T>(PhantomData<T>);
+
+impl<'de, T: FromStr<Err = Error>> Visitor<'de> for Texts<T> {
+    type Value = Vec<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a text, or a list of texts")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Vec<T>, E> {
+        text.parse().map(|one| vec![one]).map_err(E::custom)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<T>, A::Error> {
+        let mut all = Vec::new();
+        while let Some(Said(one)) = list.next_element()? {
+            all.push(one);
+        }
+        Ok(all)
+    }
+}
+
+pub(super) fn words<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
+    from.deserialize_any(Texts(PhantomData))
+}
+
+pub(super) fn word<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    Said::deserialize(from).map(|Said(one)| Some(one))
+}
+
+/// A text that says what a `T` is, and stays a text.
+struct Checked<T>(String, PhantomData<T>);
+
+impl<T: FromStr<Err = Error>> FromStr for Checked<T> {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        text.parse::<T>().map(|_| Self(text.to_owned(), PhantomData))
+    }
+}
+
+pub(super) fn names_of<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    let checked: Vec<Checked<T>> = words(from)?;
+    Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
+}
+
+/// Any text: whether it matches something is for the body to say.
+struct Text(String);
+
+impl FromStr for Text {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Ok(Self(text.to_owned()))
+    }
+}
+
+pub(super) fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    Ok(words(from)?.into_iter().map(|Text(text)| text).collect())
+}
+
+/// The one output of a name.
+struct Output(Outputs);
+
+impl FromStr for Output {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        output(name).map(Self)
+    }
+}
+
+pub(super) fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Outputs>, D::Error> {
+    Ok(words(from)?.into_iter().map(|Output(output)| output).collect())
+}
+
+pub(super) fn batch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
+    let frames = i64::deserialize(from)?;
+    match u32::try_from(frames) {
+        Ok(frames @ 1..=65_536) => Ok(Some(frames)),
+        _ => Err(D::Error::custom(format!("`batch` is {frames}; it must be between 1 and 65536"))),
+    }
+}
+
+pub(super) fn window<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    let text = String::deserialize(from)?;
+    MotionFilter::default().with_window(&text).map_err(D::Error::custom)?;
+    Ok(Some(text))
+}

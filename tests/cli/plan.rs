@@ -1,0 +1,101 @@
+//! Scenes from files, and what is said of their cost.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{done, fails, frames};
+
+const PALM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/scenes/palm.toml");
+
+fn scene(folder: &Path, text: &str) -> String {
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn a_scene_says_what_flags_would_and_flags_come_first() {
+    let touch = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+    let flags = ["--body", "hand", "--source", touch, "--fields", "hand/palm", "--fields", "hand/palm/*"];
+    let rest = ["--outputs", "centroid,orientation", "--backend", "cpu", "--max-gap", "0.1", "--sink", "-"];
+    let by_flags = done(&[&["run"][..], &flags, &rest].concat());
+    let by_scene = done(&["run", PALM, "--sink", "-"]);
+    assert_eq!(by_scene, by_flags);
+    let totals = done(&["run", PALM, "--sink", "-", "--outputs", "total"]);
+    let touched = frames(&totals).into_iter().find(|frame| frame["fields"][0].is_object()).unwrap();
+    assert!(touched["fields"][0]["total"].is_number() && touched["fields"][0]["centroid"].is_null());
+}
+
+#[test]
+fn paths_in_a_scene_are_relative_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("frames.csv"), "t,4,5\n0,1,2\n0.1,3,4\n").unwrap();
+    let text = "source = \"frames.csv\"\nsink = [\"ndjson:out.ndjson\"]\nbackend = \"reference\"\nbody = \"hand\"\n";
+    done(&["run", &scene(folder.path(), text), "--quiet"]);
+    let out = std::fs::read_to_string(folder.path().join("out.ndjson")).unwrap();
+    assert_eq!(frames(&out).len(), 2);
+}
+
+#[test]
+fn what_a_scene_gets_wrong_is_one_line_with_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, place, what) in [
+        ("\n  sorce = \"-\"", "line 2, column 3", "did you mean `source`"),
+        ("outputs = [\"total\", \"centriod\"]", "line 1, column 11", "did you mean `centroid`"),
+        ("backend = \"cuda\"", "line 1, column 11", "choose auto, reference, cpu or gpu"),
+        ("batch = 0", "line 1, column 9", "between 1 and 65536"),
+        ("source = \"seril:a\"", "line 1, column 10", "did you mean `serial:`"),
+        ("sink = 3", "line 1, column 8", "a text, or a list of texts"),
+        ("filter_window = \"5..2mm\"", "line 1, column 17", "lets nothing pass"),
+        ("body = \"hand", "line 1", "basic string"),
+    ] {
+        let line = fails(1, &["run", &scene(folder.path(), text)]);
+        assert!(line.contains(place) && line.contains(what) && line.lines().count() == 1, "{text}: {line}");
+    }
+    assert!(fails(2, &["run", &scene(folder.path(), "max_age_s = -1")]).contains("scene.toml"));
+    assert!(fails(1, &["run", "no/such.toml"]).contains("no such file"));
+    assert!(fails(2, &["run", &scene(folder.path(), "fields = \"hand/plam\"")]).contains("did you mean `hand/palm`"));
+}
+
+#[test]
+fn a_plan_counts_what_a_scene_needs_and_leaves_out_the_rest() {
+    let plan = |arguments: &[&str]| -> Value {
+        serde_json::from_str(&done(&[&["plan", "--json", "--backend", "cpu"], arguments].concat())).unwrap()
+    };
+    let palm = plan(&[PALM]);
+    let running = |bill: &Value| -> Vec<String> {
+        let stages = bill["stages"].as_array().unwrap().iter().filter(|stage| stage["runs"] == true);
+        stages.map(|stage| stage["stage"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(running(&palm), ["calibrate", "contact", "centroid", "orientation"]);
+    assert_eq!(palm["bytes_up"].as_u64().unwrap(), 4 * palm["taxels"].as_u64().unwrap());
+    // A status, u, v and the orientation.
+    assert_eq!(palm["bytes_down"].as_u64().unwrap(), 16 * palm["fields"].as_u64().unwrap());
+    assert!(palm["taxels"].as_u64() < palm["of_taxels"].as_u64());
+    assert!(palm["us"].as_f64().unwrap() > 0.0 && palm["agrees"] == true);
+    assert!(palm["worst_errors"]["centroid"].as_f64().unwrap() < 1e-6);
+    let centroid = plan(&["--outputs", "centroid", "--body", "humanoid"]);
+    assert_eq!(running(&centroid), ["calibrate", "contact", "centroid"]);
+    // Without a source a plan is still a plan.
+    assert_eq!(centroid["taxels"], centroid["of_taxels"]);
+    let text = done(&["plan", "--body", "humanoid", "--outputs", "centroid", "--backend", "reference"]);
+    assert!(text.contains("no output needs it") && text.contains("memberships"), "{text}");
+}
+
+#[test]
+fn the_schema_that_is_shipped_is_the_one_that_is_printed() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/scene.schema.json");
+    let printed = done(&["plan", "--schema"]);
+    // To make it: somatic plan --schema > docs/scene.schema.json
+    assert_eq!(std::fs::read_to_string(path).unwrap(), printed);
+    let schema: Value = serde_json::from_str(&printed).unwrap();
+    let documented = include_str!("../../docs/scenes.md");
+    let keys = schema["properties"].as_object().unwrap();
+    for (key, says) in keys {
+        assert!(documented.contains(&format!("| `{key}` |")), "docs/scenes.md does not tell of `{key}`");
+        assert!(says["description"].is_string(), "{key}");
+    }
+    assert_eq!(documented.lines().filter(|line| line.starts_with("| `")).count(), keys.len());
+    assert!(documented.contains(include_str!("../../examples/scenes/palm.toml")));
+}
