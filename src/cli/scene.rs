@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
-use somatic::scene::{FilterBy, MotionFilter};
+use somatic::scene::{Coverage, FilterBy, MotionFilter};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::SinkSpec;
 use somatic::source::{SimulatedSource, SourceSpec};
@@ -136,6 +136,14 @@ pub(super) struct Asked {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
+    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), or what pays (auto).
+    /// Percepts are the same [default: auto].
+    #[arg(long, value_name = "WHICH", value_parser = PossibleValuesParser::new(["auto", "all", "touched"])
+        .try_map(|name| name.parse::<Coverage>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = ["auto", "all", "touched"]))]
+    pub(super) coverage: Option<Coverage>,
+
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
     pub(super) verify: bool,
@@ -230,6 +238,7 @@ impl Asked {
             filter_window: self.filter_window.clone().or(file.filter_window),
             filter_by: self.filter_by.or(file.filter_by),
             filter_time: self.filter_time.or(file.filter_time),
+            coverage: self.coverage.or(file.coverage),
             verify: self.verify || file.verify,
             quiet: self.quiet || file.quiet,
         };
@@ -304,6 +313,7 @@ impl Asked {
             max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
             letters: Letter::all_of(letters, &self.signal),
             filter: self.filter(outputs)?,
+            coverage: self.coverage.unwrap_or_default(),
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use globset::{GlobBuilder, GlobSetBuilder};
 
-use super::Scene;
 use super::curves::Curves;
+use super::{Coverage, Scene};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
@@ -51,6 +51,7 @@ pub struct Plan {
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
+    coverage: Coverage,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
@@ -164,6 +165,7 @@ impl Plan {
             stages: Stages::of(scene.outputs),
             columns: scene.outputs,
             letters: scene.letters.clone(),
+            coverage: scene.coverage,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -346,6 +348,10 @@ impl Plan {
     /// How many taxels' pressures percepts keep.
     pub(crate) fn kept_pressures(&self) -> usize {
         if self.stages().touches { self.slots() } else { 0 }
+    }
+
+    pub(crate) fn coverage(&self) -> Coverage {
+        self.coverage
     }
 
     pub(crate) fn stages(&self) -> Stages {

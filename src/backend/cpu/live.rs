@@ -5,6 +5,7 @@ use fearless_simd::prelude::*;
 use rayon::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
+use super::gate::Gate;
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
@@ -214,6 +215,9 @@ pub(super) struct Live {
     /// Those of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
     gathered: Gathered,
+    gate: Option<Gate>,
+    /// What is stale where no gate says it: all units.
+    everything: Vec<bool>,
     shared: bool,
 }
 
@@ -232,7 +236,14 @@ impl Live {
         for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
             groups.iter_mut().for_each(Narrow::weigh);
         }
+        let slots = |field: usize| plan.members_of(&plan.fields[field]).iter().map(|member| member.slot);
+        let gate = Gate::new(plan, wide.len() + narrow.len(), |unit| match unit.checked_sub(wide.len()) {
+            None => slots(wide[unit]).collect(),
+            Some(group) => narrow[group].fields.iter().flat_map(|&field| slots(field)).collect(),
+        });
         Self {
+            gate,
+            everything: vec![true; wide.len() + narrow.len()],
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
             wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
             narrow,
@@ -249,6 +260,13 @@ impl Live {
         }
     }
 
+    /// Computes everything anew in the next frame.
+    pub(super) fn forget(&mut self) {
+        if let Some(gate) = &mut self.gate {
+            gate.forget();
+        }
+    }
+
     /// All stages for one frame, into `cells`, which is one frame.
     pub(super) fn frame(
         &mut self,
@@ -258,8 +276,12 @@ impl Live {
         moment: &Moment<'_>,
         cells: &mut CellsMut<'_>,
     ) {
-        let Self { pressures, statuses, before: (was, said), .. } = self;
-        let mut faults = calibrate::frame(level, plan, tables, moment.now, pressures, statuses);
+        let Self { pressures, statuses, before: (was, said), gate, .. } = self;
+        let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
+        let mut faults = match &mut gate {
+            Some(gate) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
+            None => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
+        };
         if plan.has_changes() {
             calibrate::frame(level, plan, tables, moment.before, was, said);
             let before = (was.as_flattened(), said.as_flattened());
@@ -275,23 +297,28 @@ impl Live {
             statuses: self.statuses.as_flattened(),
             faults,
         };
+        let stale = gate.as_ref().map_or(&self.everything[..], |gate| gate.stale());
         let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
+        let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
         let together = self.together;
         if self.shared {
-            let wide = self.wide.par_iter().zip(wide).enumerate();
+            let wide = self.wide.par_iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
             let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
-            wide.for_each_init(Gathered::default, |gathered, (table, (field, answer))| {
+            wide.for_each_init(Gathered::default, |gathered, (table, ((field, answer), _))| {
                 frame.wide(table, field, gathered, answer);
             });
-            narrow.for_each_init(Gathered::default, |gathered, (groups, answers)| {
-                frame.piece(groups, gathered, answers);
+            let narrow = narrow.zip(stale_narrow.par_chunks(together));
+            narrow.for_each_init(Gathered::default, |gathered, ((groups, answers), stale)| {
+                frame.stale(groups, stale, gathered, answers);
             });
         } else {
-            for (table, (field, answer)) in self.wide.iter().zip(wide).enumerate() {
+            let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+            for (table, ((field, answer), _)) in wide {
                 frame.wide(table, field, &mut self.gathered, answer);
             }
-            for (groups, answers) in self.narrow.chunks(together).zip(narrow.chunks_mut(together)) {
-                frame.piece(groups, &mut self.gathered, answers);
+            let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
+            for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
+                frame.stale(groups, stale, &mut self.gathered, answers);
             }
         }
         if !cells.pressures.is_empty() {
@@ -330,6 +357,18 @@ impl Frame<'_> {
         let (table, values): (&Table, _) = (&self.tables.wide[table], &mut gathered.values);
         values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
         wide::cell(self.level, self.plan, Wide { table, values }, &field.kind, self.faults, answer);
+    }
+
+    /// Those of `groups` that are stale, those side by side together.
+    fn stale(&self, mut groups: &[Narrow], stale: &[bool], gathered: &mut Gathered, mut answers: &mut [Cells]) {
+        for run in stale.chunk_by(|a, b| a == b) {
+            let (now, later) = groups.split_at(run.len());
+            let (into, rest) = answers.split_at_mut(run.len());
+            if run[0] {
+                self.piece(now, gathered, into);
+            }
+            (groups, answers) = (later, rest);
+        }
     }
 
     /// Groups together.

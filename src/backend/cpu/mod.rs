@@ -11,6 +11,7 @@ mod calibrate;
 mod centroid;
 mod change;
 mod contact;
+mod gate;
 mod hysteresis;
 mod lines;
 mod live;
@@ -149,6 +150,7 @@ impl Backend for Cpu {
     fn recalibrate(&mut self, plan: &Plan) {
         self.plan.recalibrate(plan);
         self.tables.tiles = calibrate::Tile::all(plan);
+        self.live.forget();
     }
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {

@@ -1,0 +1,181 @@
+//! The gate: what has not changed since the frame before is not computed again.
+//!
+//! Most of a skin is idle. A tile of sixteen values whose bits are the same is not calibrated, and one whose pressures and
+//! statuses come out the same lets no field through: a group of fields all of whose tiles are the same keeps its answers.
+//! What comes out has the same bits as without a gate.
+
+use fearless_simd::Level;
+use fearless_simd::prelude::*;
+
+use super::super::Rows;
+use super::lines::{Aligned, Lines};
+use super::simd::{LANES, Row, load, load_u, read, width, with_widest};
+use super::{Tables, calibrate};
+use crate::scene::{Coverage, Plan};
+
+/// A plan of fewer values than this is computed before a gate has looked at it.
+const WORTH_IT: usize = 1 << 12;
+/// Frames without a gate after two in which it held back less than half.
+const PAUSE: u32 = 62;
+
+/// What is known of the last frame that went through it.
+#[derive(Clone, Debug)]
+pub(super) struct Gate {
+    /// By tile.
+    bits: Lines<u32>,
+    /// By tile, whether calibration said something; and of how many.
+    faulty: Vec<bool>,
+    faults: usize,
+    /// By tile, where its readers begin among all of them, and one beyond the last.
+    starts: Vec<u32>,
+    /// Units (wide fields, then groups of narrow ones) that read something of a tile.
+    readers: Vec<u32>,
+    /// By unit, whether it is to be computed.
+    stale: Vec<bool>,
+    /// Whether the tables and answers stand for `bits`.
+    known: bool,
+    /// Whether it may step aside.
+    always: bool,
+    /// Frames to come without it, and how many it has let through nearly whole.
+    pause: u32,
+    open: u32,
+}
+
+impl Gate {
+    /// A gate before `units` units, where `reads` says which slots a unit reads; if the plan is to have one.
+    pub(super) fn new(plan: &Plan, units: usize, reads: impl Fn(usize) -> Vec<u32>) -> Option<Self> {
+        let wanted = match plan.coverage() {
+            Coverage::All => false,
+            Coverage::Auto => plan.slots() >= WORTH_IT,
+            Coverage::Touched => true,
+        };
+        // What changes also hangs on the time between frames.
+        if !wanted || plan.has_changes() {
+            return None;
+        }
+        let tiles = plan.slots().div_ceil(LANES);
+        let mut of_tile: Vec<Vec<u32>> = vec![Vec::new(); tiles];
+        for unit in 0..units {
+            for slot in reads(unit) {
+                let readers = &mut of_tile[slot as usize / LANES];
+                if readers.last() != Some(&(unit as u32)) {
+                    readers.push(unit as u32);
+                }
+            }
+        }
+        let mut starts = vec![0];
+        starts.extend(of_tile.iter().scan(0, |end, readers| {
+            *end += readers.len() as u32;
+            Some(*end)
+        }));
+        Some(Self {
+            bits: Lines::new(tiles, 0),
+            faulty: vec![false; tiles],
+            faults: 0,
+            starts,
+            readers: of_tile.concat(),
+            stale: vec![true; units],
+            known: false,
+            always: plan.coverage() == Coverage::Touched,
+            pause: 0,
+            open: 0,
+        })
+    }
+
+    /// Forgets what it knows: another calibration makes other pressures of the same values.
+    pub(super) fn forget(&mut self) {
+        self.known = false;
+    }
+
+    /// Whether it stands before the next frame.
+    pub(super) fn is_due(&mut self) -> bool {
+        self.pause = self.pause.saturating_sub(1);
+        self.pause == 0
+    }
+
+    /// By unit, whether it is to be computed.
+    pub(super) fn stale(&self) -> &[bool] {
+        &self.stale
+    }
+
+    /// Calibrates what has changed; whether any status says anything.
+    pub(super) fn pass(
+        &mut self,
+        level: Level,
+        plan: &Plan,
+        tables: &Tables,
+        raw: (Rows<'_>, usize),
+        pressures: &mut [Row<f32>],
+        statuses: &mut [Row<u32>],
+    ) -> bool {
+        if !self.known {
+            self.faulty.fill(false);
+            self.faults = 0;
+        }
+        self.stale.fill(!self.known);
+        with_widest!(level, simd => self.tiles(simd, plan, tables, raw, pressures, statuses));
+        self.known = true;
+        self.open =
+            if 2 * self.stale.iter().filter(|&&stale| stale).count() > self.stale.len() { self.open + 1 } else { 0 };
+        if self.open > 1 && !self.always {
+            (self.open, self.pause, self.known) = (0, PAUSE, false);
+        }
+        self.faults > 0
+    }
+
+    #[inline(always)]
+    fn tiles<S: Simd>(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        tables: &Tables,
+        (raw, frame): (Rows<'_>, usize),
+        pressures: &mut [Row<f32>],
+        statuses: &mut [Row<u32>],
+    ) {
+        let Aligned(bits) = &mut Aligned([0; LANES]);
+        let (Aligned(p), Aligned(status)) = (&mut Aligned([0.0; LANES]), &mut Aligned([0; LANES]));
+        for (index, tile) in tables.tiles.iter().enumerate() {
+            read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
+            let last = &mut self.bits[index];
+            if self.known && same(simd, bits, last) {
+                continue;
+            }
+            *last = *bits;
+            let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
+            if self.known && same_pressures(simd, p, &pressures[index]) && same(simd, status, &statuses[index]) {
+                continue;
+            }
+            (pressures[index], statuses[index]) = (*p, *status);
+            self.faults += usize::from(faulty);
+            self.faults -= usize::from(std::mem::replace(&mut self.faulty[index], faulty));
+            let readers = self.starts[index] as usize..self.starts[index + 1] as usize;
+            for &unit in &self.readers[readers] {
+                self.stale[unit as usize] = true;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn same<S: Simd>(simd: S, a: &Row<u32>, b: &Row<u32>) -> bool {
+    let mut at = 0;
+    let mut same = true;
+    while at < LANES {
+        same &= load_u(simd, a, at).simd_eq(load_u(simd, b, at)).all_true();
+        at += width::<S>();
+    }
+    same
+}
+
+/// Pressures are no NaN, and no −0.
+#[inline(always)]
+fn same_pressures<S: Simd>(simd: S, a: &Row<f32>, b: &Row<f32>) -> bool {
+    let mut at = 0;
+    let mut same = true;
+    while at < LANES {
+        same &= load(simd, a, at).simd_eq(load(simd, b, at)).all_true();
+        at += width::<S>();
+    }
+    same
+}
