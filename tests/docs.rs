@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
-const RUN_ELSEWHERE: [&str; 13] = [
+const RUN_ELSEWHERE: [&str; 14] = [
     "cargo run --release -- run",
     "cargo run --release --example embed",
     "cargo run --example bodies",
@@ -18,6 +18,7 @@ const RUN_ELSEWHERE: [&str; 13] = [
     "cargo bench",
     "cargo bench --bench engine -- live",
     "cargo bench --bench gpu > gpu.json",
+    "cargo bench --bench activity",
     "cargo bench -- --max-time 5",
     "benches/peers/run",
 ];

@@ -62,33 +62,67 @@ pub(crate) struct RawBatch<'a> {
     pub(crate) steps: &'a [Step],
 }
 
+/// Tiles of sixteen values that are looked at together.
+pub(crate) const BLOCK: usize = 16;
+
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
     /// Per slot that is calibrated, which are the channels once for every signal.
     pub(crate) places: Vec<u32>,
     pub(crate) channels: usize,
-    /// Per sixteen slots whose values lie within 32 of a frame: where those start, and which of their bytes are wanted.
-    pub(crate) near: Vec<Option<(usize, [u8; 64])>>,
+    /// Per sixteen slots.
+    pub(crate) near: Vec<Near>,
+    /// Per [`BLOCK`] tiles of sixteen whose values lie one after the other: where they start.
+    pub(crate) blocks: Vec<Option<usize>>,
+    /// What [`Near::Shuffled`] refers to: which bytes of 32 values are wanted.
+    pub(crate) bytes: Vec<[u8; 64]>,
+}
+
+/// Where sixteen values lie in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Near {
+    /// One after the other from here on.
+    Straight(usize),
+    /// Among the 32 from here on, as so many bytes say.
+    Shuffled(usize, usize),
+    Scattered,
 }
 
 impl Picks {
     /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
+        let mut all_bytes = Vec::new();
+        // What fills up the last ones is as good a value as any.
         let near = places.chunks(16).map(|places| {
-            let (low, high) = (*places.iter().min()? as usize, *places.iter().max()? as usize);
-            let from = low.min(width.checked_sub(32)?);
+            let (low, high) = places.iter().fold((u32::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
+            let (low, high) = (low as usize, high as usize);
+            if low + 16 <= width && places.iter().zip(low..).all(|(&place, at)| place as usize == at) {
+                return Near::Straight(low);
+            }
+            let from = low.min(width.saturating_sub(32));
+            if width < 32 || high >= from + 32 {
+                return Near::Scattered;
+            }
             let mut bytes = [0; 64];
-            // What fills up the last ones is as good a value as any.
             let places_and_more = places.iter().chain(std::iter::repeat(&places[0]));
             for (bytes, &place) in bytes.chunks_exact_mut(4).zip(places_and_more) {
                 let first = 4 * (place as usize - from);
                 bytes.iter_mut().zip(first..).for_each(|(byte, index)| *byte = index as u8);
             }
-            (high < from + 32).then_some((from, bytes))
+            all_bytes.push(bytes);
+            Near::Shuffled(from, all_bytes.len() - 1)
         });
-        Self { near: near.collect(), channels: channels.len(), places }
+        let near: Vec<Near> = near.collect();
+        let block = |tiles: &[Near]| {
+            let Some(&Near::Straight(from)) = tiles.first().filter(|_| tiles.len() == BLOCK) else { return None };
+            let follows =
+                |(index, near): (usize, &Near)| matches!(near, Near::Straight(at) if *at == from + index * 16);
+            tiles.iter().enumerate().all(follows).then_some(from)
+        };
+        let blocks = near.chunks(BLOCK).map(block).collect();
+        Self { near, blocks, bytes: all_bytes, channels: channels.len(), places }
     }
 }
 
@@ -109,6 +143,39 @@ impl<'a> Rows<'a> {
             Self::Picked { frames, picks } => (&frames[frame].values, &picks.places, picks.channels),
         };
         (0..channels).map(move |channel| values[picks.get(channel).map_or(channel, |&pick| pick as usize)])
+    }
+
+    /// The bits of frame `frame` for the sixteen slots from 16 · `tile` on, where they lie one after the other.
+    #[inline(always)]
+    pub(crate) fn straight(self, frame: usize, tile: usize) -> Option<&'a [u32; 16]> {
+        let (values, from) = match self {
+            Self::Packed { values, channels } => {
+                let first = tile * 16;
+                let straight = first + 16 <= channels;
+                (&values[frame * channels..][..channels], straight.then_some(first)?)
+            }
+            Self::Picked { frames, picks } => match picks.near[tile] {
+                Near::Straight(from) => (&frames[frame].values[..], from),
+                _ => return None,
+            },
+        };
+        bytemuck::cast_slice(&values[from..]).first_chunk()
+    }
+
+    /// The bits of frame `frame` for the 16 · [`BLOCK`] slots of block `block`, where they lie one after the other.
+    pub(crate) fn straight_block(self, frame: usize, block: usize) -> Option<&'a [u32]> {
+        const SLOTS: usize = 16 * BLOCK;
+        let values = match self {
+            Self::Packed { values, channels } => {
+                let first = block * SLOTS;
+                values[frame * channels..][..channels].get(first..first + SLOTS)?
+            }
+            Self::Picked { frames, picks } => {
+                let from = (*picks.blocks.get(block)?)?;
+                &frames[frame].values[from..from + SLOTS]
+            }
+        };
+        Some(bytemuck::cast_slice(values))
     }
 
     /// The bits of frame `frame` for the slots from `first` on, as far as `bits` goes; zeros after the last.

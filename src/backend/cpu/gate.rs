@@ -7,10 +7,11 @@
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
-use super::super::Rows;
+use super::super::{BLOCK, Rows};
+use super::Tables;
+use super::calibrate::{self, Tile};
 use super::lines::{Aligned, Lines};
 use super::simd::{LANES, Row, load, load_u, read, width, with_widest};
-use super::{Tables, calibrate};
 use crate::scene::{Coverage, Plan};
 
 /// A plan of fewer values than this is computed before a gate has looked at it.
@@ -133,26 +134,56 @@ impl Gate {
         pressures: &mut [Row<f32>],
         statuses: &mut [Row<u32>],
     ) {
+        let mut index = 0;
+        while let Some(tile) = tables.tiles.get(index) {
+            // Many at once, while they are the same.
+            if self.known
+                && index % BLOCK == 0
+                && let Some(values) = raw.straight_block(frame, index / BLOCK)
+                && *values == *self.bits[index..index + BLOCK].as_flattened()
+            {
+                index += BLOCK;
+                continue;
+            }
+            self.tile(simd, plan, tables, (raw, frame), (index, tile), pressures, statuses);
+            index += 1;
+        }
+    }
+
+    /// Calibrates a tile if it has changed.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "as `pass`, and which")]
+    fn tile<S: Simd>(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        tables: &Tables,
+        (raw, frame): (Rows<'_>, usize),
+        (index, tile): (usize, &Tile),
+        pressures: &mut [Row<f32>],
+        statuses: &mut [Row<u32>],
+    ) {
         let Aligned(bits) = &mut Aligned([0; LANES]);
         let (Aligned(p), Aligned(status)) = (&mut Aligned([0.0; LANES]), &mut Aligned([0; LANES]));
-        for (index, tile) in tables.tiles.iter().enumerate() {
-            read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
-            let last = &mut self.bits[index];
-            if self.known && same(simd, bits, last) {
-                continue;
-            }
-            *last = *bits;
-            let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
-            if self.known && same_pressures(simd, p, &pressures[index]) && same(simd, status, &statuses[index]) {
-                continue;
-            }
-            (pressures[index], statuses[index]) = (*p, *status);
-            self.faults += usize::from(faulty);
-            self.faults -= usize::from(std::mem::replace(&mut self.faulty[index], faulty));
-            let readers = self.starts[index] as usize..self.starts[index + 1] as usize;
-            for &unit in &self.readers[readers] {
-                self.stale[unit as usize] = true;
-            }
+        let last = &mut self.bits[index];
+        if self.known && raw.straight(frame, index).is_some_and(|values| same(simd, values, last)) {
+            return;
+        }
+        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
+        if self.known && same(simd, bits, last) {
+            return;
+        }
+        *last = *bits;
+        let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
+        if self.known && same_pressures(simd, p, &pressures[index]) && same(simd, status, &statuses[index]) {
+            return;
+        }
+        (pressures[index], statuses[index]) = (*p, *status);
+        self.faults += usize::from(faulty);
+        self.faults -= usize::from(std::mem::replace(&mut self.faulty[index], faulty));
+        let readers = self.starts[index] as usize..self.starts[index + 1] as usize;
+        for &unit in &self.readers[readers] {
+            self.stale[unit as usize] = true;
         }
     }
 }

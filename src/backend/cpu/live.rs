@@ -63,12 +63,16 @@ impl Slots {
                     unreachable!("they have room for any such slot")
                 };
                 for (row, slots) in rows.iter_mut().zip(&slots[..]) {
-                    *row = slots.map(|slot| values[usize::from(slot)]);
+                    for (value, &slot) in row.iter_mut().zip(slots) {
+                        *value = values[usize::from(slot)];
+                    }
                 }
             }
             Self::Far(slots) => {
                 for (row, slots) in rows.iter_mut().zip(&slots[..]) {
-                    *row = slots.map(|slot| values[slot as usize]);
+                    for (value, &slot) in row.iter_mut().zip(slots) {
+                        *value = values[slot as usize];
+                    }
                 }
             }
         }
@@ -301,7 +305,9 @@ impl Live {
         let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
         let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
         let together = self.together;
-        if self.shared {
+        // What little is left behind a gate is done before others are awake.
+        let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
+        if self.shared && share * plan.memberships() as f64 >= SHARED as f64 {
             let wide = self.wide.par_iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
             let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
             wide.for_each_init(Gathered::default, |gathered, (table, ((field, answer), _))| {

@@ -8,7 +8,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{u8x64, u32x16};
 
-use super::super::Rows;
+use super::super::{Near, Rows};
 
 /// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
 /// what every processor has: sets in between would cost their compilation and gain little.
@@ -101,14 +101,22 @@ pub(super) fn read<S: Simd>(
     shuffles: bool,
     bits: &mut Row<u32>,
 ) {
-    if let (Rows::Picked { frames, picks }, true) = (raw, shuffles)
-        && let Some((from, bytes)) = &picks.near[tile]
-    {
-        let values: &[u32] = bytemuck::cast_slice(&frames[frame].values[*from..from + 2 * LANES]);
-        let [low, high] = [&values[..LANES], &values[LANES..]];
-        let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
-        low.concat_swizzle_dyn(high, u8x64::from_slice(simd, bytes)).store_slice(bits);
-        return;
+    if let Rows::Picked { frames, picks } = raw {
+        let values: &[u32] = bytemuck::cast_slice(&frames[frame].values);
+        match picks.near[tile] {
+            Near::Straight(from) => {
+                bits.copy_from_slice(&values[from..from + LANES]);
+                return;
+            }
+            Near::Shuffled(from, bytes) if shuffles => {
+                let [low, high] = [&values[from..from + LANES], &values[from + LANES..from + 2 * LANES]];
+                let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
+                let bytes = u8x64::from_slice(simd, &picks.bytes[bytes]);
+                low.concat_swizzle_dyn(high, bytes).store_slice(bits);
+                return;
+            }
+            _ => {}
+        }
     }
     raw.read(frame, tile * LANES, calibrated, bits);
 }
