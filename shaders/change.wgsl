@@ -6,13 +6,21 @@
 @group(0) @binding(1) var<storage, read> taxels: array<Taxel>;
 @group(0) @binding(2) var<storage, read> steps: array<Step>;
 // The frame before the batch's first, four times over.
-@group(0) @binding(3) var<storage, read> pressures_before: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> pressures_before: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> statuses_before: array<u32>;
-@group(0) @binding(5) var<storage, read_write> pressures: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> pressures: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> statuses: array<u32>;
 
 const HUGE_BITS = 0x5d800000u;
 const TINY_BITS = 0x21800000u;
+
+// What is said of a quad whose pressures have these bits, and lie at `here`.
+fn heard_at(bits: vec4<u32>, here: u32) -> u32 {
+    if is_marked(bits) {
+        return statuses[here];
+    }
+    return 0u;
+}
 
 @compute @workgroup_size(GROUP)
 fn main(
@@ -27,14 +35,20 @@ fn main(
     }
     let slot = batch.calibrated + change;
     let taxel = taxels[slot];
-    let now = pressures[at(taxel.response, quad)];
-    let heard = statuses[at(taxel.response, quad)];
-    var first_before = pressures_before[taxel.response].x;
-    var heard_before = statuses_before[taxel.response] & 0xffu;
+    let here = at(taxel.response, quad);
+    let bits = pressures[here];
+    let now = unmarked(bits);
+    let heard = heard_at(bits, here);
+    var bits_before = pressures_before[taxel.response];
+    var heard_before = 0u;
     if quad > 0u {
-        first_before = pressures[at(taxel.response, quad - 1u)].w;
-        heard_before = statuses[at(taxel.response, quad - 1u)] >> 24u;
+        let there = at(taxel.response, quad - 1u);
+        bits_before = pressures[there];
+        heard_before = heard_at(bits_before, there) >> 24u;
+    } else if is_marked(bits_before) {
+        heard_before = statuses_before[taxel.response] >> 24u;
     }
+    let first_before = unmarked(bits_before).w;
     let before = vec4<f32>(first_before, now.xyz);
     let known = unpacked(heard | (heard << 8u) | heard_before);
     var changes = vec4<f32>();
@@ -56,6 +70,8 @@ fn main(
         }
         result[i] = status;
     }
-    pressures[at(slot, quad)] = changes;
-    statuses[at(slot, quad)] = packed(result);
+    pressures[at(slot, quad)] = marked(changes, result);
+    if any(result != vec4<u32>()) {
+        statuses[at(slot, quad)] = packed(result);
+    }
 }

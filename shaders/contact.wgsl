@@ -11,13 +11,11 @@ struct Sums {
 }
 
 fn no_sums() -> Sums {
-    return Sums(vec4<f32>(), vec4<f32>(), vec4<f32>(), vec4<u32>(), 0u, 0xffffffffu);
+    return Sums(vec4<f32>(), vec4<f32>(), vec4<f32>(), vec4<u32>(), 0u, 0u);
 }
 
-fn add_sums(so_far: Sums, member: Member, pressure: vec4<f32>, pull: vec4<f32>, status: u32) -> Sums {
+fn add_sums(so_far: Sums, member: Member, pressure: vec4<f32>, pull: vec4<f32>) -> Sums {
     var sums = so_far;
-    sums.status |= status;
-    sums.unusable &= status;
     sums.total += pull;
     let pressed = pressure > vec4<f32>();
     sums.pressed += select(vec4<u32>(), vec4<u32>(1u), pressed);

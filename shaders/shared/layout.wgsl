@@ -126,6 +126,22 @@ fn at(slot: u32, quad: u32) -> u32 {
     return ((((quad >> batch.lanes_log2) * slots) + slot) << batch.lanes_log2) + (quad & (lanes() - 1u));
 }
 
+// A pressure is never negative: its sign says that there is a status to look up. Where there is none, none is written.
+const SAID = 0x80000000u;
+const NUMBER = 0x7fffffffu;
+
+fn marked(pressures: vec4<f32>, statuses: vec4<u32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(pressures) | select(vec4<u32>(), vec4<u32>(SAID), statuses != vec4<u32>());
+}
+
+fn unmarked(pressures: vec4<u32>) -> vec4<f32> {
+    return bitcast<vec4<f32>>(pressures & vec4<u32>(NUMBER));
+}
+
+fn is_marked(pressures: vec4<u32>) -> bool {
+    return any(pressures > vec4<u32>(NUMBER));
+}
+
 // Four statuses in one word.
 fn packed(statuses: vec4<u32>) -> u32 {
     return statuses.x | (statuses.y << 8u) | (statuses.z << 16u) | (statuses.w << 24u);

@@ -8,7 +8,7 @@
 // Their third coordinate, for fields without a chart.
 @group(0) @binding(3) var<storage, read> depths: array<f32>;
 @group(0) @binding(4) var<storage, read> taxels: array<Taxel>;
-@group(0) @binding(5) var<storage, read> pressures: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> pressures: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read> statuses: array<u32>;
 // Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
 @group(0) @binding(7) var<storage, read_write> results: array<u32>;
@@ -51,6 +51,22 @@ fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
 
 fn store_numbers(column: u32, index: u32, quad: u32, values: vec4<f32>) {
     store(column, index, quad, bitcast<vec4<u32>>(values));
+}
+
+// Adds what the taxels have to say of a field's members `start`, `start + step` and so on.
+fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Sums {
+    var sums = so_far;
+    sums.unusable = 0xffffffffu;
+    for (var m = start; m < end; m += step) {
+        let here = first + (members[m].slot << batch.lanes_log2);
+        var status = 0u;
+        if is_marked(pressures[here]) {
+            status = statuses[here];
+        }
+        sums.status |= status;
+        sums.unusable &= status;
+    }
+    return sums;
 }
 
 // What a field's later stages are told of its earlier ones.
@@ -133,15 +149,20 @@ fn main(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
+    var said = vec4<u32>();
     for (var m = field.first; m < end; m++) {
         let member = members[m];
-        let here = first + (member.slot << batch.lanes_log2);
-        let pressure = pressures[here];
+        let bits = pressures[first + (member.slot << batch.lanes_log2)];
+        let pressure = unmarked(bits);
         let pull = member.weight * pressure;
-        sums = add_sums(sums, member, pressure, pull, statuses[here]);
+        said |= bits;
+        sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
         }
+    }
+    if is_marked(said) {
+        sums = add_statuses(sums, field.first, end, 1u, first);
     }
     let found = found_of(field, sums, place);
     store_sums(index, quad, sums, found.place);
@@ -150,7 +171,7 @@ fn main(
     if (ORIENTED || AXED) && charted {
         for (var m = field.first; m < end; m++) {
             let member = members[m];
-            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
+            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
@@ -246,15 +267,20 @@ fn wide(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
+    var said = vec4<u32>();
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
-        let here = first + (member.slot << batch.lanes_log2);
-        let pressure = pressures[here];
+        let bits = pressures[first + (member.slot << batch.lanes_log2)];
+        let pressure = unmarked(bits);
         let pull = member.weight * pressure;
-        sums = add_sums(sums, member, pressure, pull, statuses[here]);
+        said |= bits;
+        sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
         }
+    }
+    if is_marked(said) {
+        sums = add_statuses(sums, field.first + local, end, GROUP, first);
     }
     put_sums(local, sums, place);
     for (var half = GROUP / 2u; half > 0u; half /= 2u) {
@@ -276,7 +302,7 @@ fn wide(
     if ORIENTED || AXED {
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
-            let pressure = pressures[first + (member.slot << batch.lanes_log2)];
+            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);

@@ -10,10 +10,10 @@ pub(crate) const WIDE: usize = 4096;
 #[cfg(feature = "gpu")]
 pub(crate) const FEW: usize = 4096;
 
-/// Members of a field at most: lavapipe ends an invocation's loops after 65,535 rounds, and it has two passes over every
-/// 64th member.
+/// Members of a field at most: lavapipe ends an invocation's loops after 65,535 rounds, and it has three passes over every
+/// 64th member at most.
 #[cfg(feature = "gpu")]
-pub(crate) const WIDEST: usize = 65_000 / 2 * 64;
+pub(crate) const WIDEST: usize = 65_000 / 3 * 64;
 
 /// A field of as many members or more has sixteen of them abreast on the CPU: fewer do as well one after the other, with
 /// sixteen frames or fields abreast.
@@ -51,6 +51,12 @@ pub(crate) fn padded_quads(frames: usize) -> usize {
     frames.div_ceil(4).max(1).next_multiple_of(lanes(frames) as usize)
 }
 
+/// Raw values that a frame of `channels` takes, filled up to whole vectors.
+#[cfg(feature = "gpu")]
+pub(crate) fn padded_channels(channels: usize) -> usize {
+    channels.next_multiple_of(4)
+}
+
 /// A taxel as a letter reads it: its calibration, or what holds for its changes.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -65,6 +71,15 @@ pub(crate) struct Taxel {
     pub(crate) area: f32,
     /// [`STRAIGHT`], [`MASKED`], or [`FIRST_CURVE`] and up: which of the curves. Of a change: the slot that changes.
     pub(crate) response: u32,
+}
+
+impl Taxel {
+    /// Whether its pressure is its raw value, with nothing to check but that it is a number.
+    pub(crate) fn raw_is_pressure(&self) -> bool {
+        let Self { baseline, gain, dead_band, p_max, raw_low, raw_high, area: _, response } = *self;
+        let unlimited = p_max >= f32::MAX && raw_low <= f32::MIN && raw_high >= f32::MAX;
+        response == STRAIGHT && baseline == 0.0 && gain == 1.0 && dead_band == 0.0 && unlimited
+    }
 }
 
 /// P = gain · (raw − baseline).

@@ -43,7 +43,7 @@ impl Tile {
                     raw_low: [f32::MIN; LANES],
                     raw_high: [f32::MAX; LANES],
                     response: [0; LANES],
-                    raw_is_pressure: taxels.len() == LANES && taxels.iter().all(raw_is_pressure),
+                    raw_is_pressure: taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure),
                     straight: taxels.iter().all(|taxel| taxel.response == STRAIGHT),
                 };
                 for (lane, taxel) in taxels.iter().enumerate() {
@@ -59,12 +59,6 @@ impl Tile {
             })
             .collect()
     }
-}
-
-fn raw_is_pressure(taxel: &Taxel) -> bool {
-    let Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area: _, response } = *taxel;
-    let unlimited = p_max >= f32::MAX && raw_low <= f32::MIN && raw_high >= f32::MAX;
-    response == STRAIGHT && baseline == 0.0 && gain == 1.0 && dead_band == 0.0 && unlimited
 }
 
 /// Raw bits to pressures and statuses; whether any status says anything. `first` is the tile's first slot.

@@ -62,6 +62,8 @@ pub(crate) struct Gpu {
     before: Option<wgpu::Buffer>,
     taxels: wgpu::Buffer,
     stages: Vec<Stage>,
+    /// Stages that take the place of the first ones should the plan cease to be plain.
+    careful: Vec<Stage>,
     /// Number of wide fields.
     wide: u32,
     columns: Columns,
@@ -89,7 +91,7 @@ impl Gpu {
     pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
         let columns = Columns::new(plan);
         let capacity = capacity(&device, plan, &columns, batch)?;
-        let (slots, channels, fields) = (plan.slots() as u64, plan.channels() as u64, plan.fields.len() as u64);
+        let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
         let frames = capacity as u64;
         let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages| {
             device.device.create_buffer(&wgpu::BufferDescriptor {
@@ -106,7 +108,8 @@ impl Gpu {
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let batch = buffer("batch", HEADER, uniform);
         let steps = working("steps", frames * STEP);
-        let raw = working("raw", frames * channels * 4);
+        let row = layout::padded_channels(plan.channels()) as u64 * 4;
+        let raw = working("raw", frames * row);
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
@@ -133,11 +136,17 @@ impl Gpu {
             (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
         let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
         let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
-        let signals = [("SIGNALS", (plan.calibrated() / plan.channels()) as f64)];
-        let mut stages =
-            vec![Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &signals, &buffers[..used])];
+        let calibrated = |plain: bool| {
+            let signals = (plan.calibrated() / plan.channels()) as f64;
+            let told = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
+            Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
+        };
+        let plain = is_plain(plan);
+        let mut stages = vec![calibrated(plain)];
+        // What a plan is calibrated with once it has more to say than that raw values are pressures.
+        let mut careful: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
         // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
-        let before = plan.has_changes().then(|| working("raw before", channels * 4));
+        let before = plan.has_changes().then(|| working("raw before", row));
         if let Some(before) = &before {
             let one = buffer("one frame", HEADER, uniform);
             device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1, wide.len() as u32)));
@@ -145,7 +154,9 @@ impl Gpu {
             let pressed = working("pressures before", calibrated * 16);
             let heard = working("statuses before", calibrated * 4);
             let buffers = [&one, &taxels, before, &pressed, &heard, &curves, &knots];
-            stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
+            for stages in [&mut stages, &mut careful].into_iter().filter(|stages| !stages.is_empty()) {
+                stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
+            }
             let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
@@ -175,7 +186,7 @@ impl Gpu {
         let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < BLOCK { 1 } else { SETS };
-        let ring = (0..sets).map(|_| Set::new(&device, HEADER + frames * (STEP + channels * 4), back)).collect();
+        let ring = (0..sets).map(|_| Set::new(&device, HEADER + frames * (STEP + row), back)).collect();
         device.check()?;
         Ok(Self {
             plan: plan.clone(),
@@ -188,13 +199,14 @@ impl Gpu {
             before,
             taxels,
             stages,
+            careful,
             wide: wide.len() as u32,
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             packed_steps: Vec::with_capacity(capacity),
-            packed_row: Vec::with_capacity(plan.channels()),
+            packed_row: Vec::with_capacity(layout::padded_channels(plan.channels())),
             memory: [touched, last],
         })
     }
@@ -206,7 +218,7 @@ impl Gpu {
         let set = &mut self.ring[set];
         set.upload.unmap();
         let frames = raw.frames as u64;
-        let (steps, row) = (frames * STEP, self.plan.channels() as u64 * 4);
+        let (steps, row) = (frames * STEP, layout::padded_channels(self.plan.channels()) as u64 * 4);
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&set.upload, 0, &self.batch, 0, HEADER);
         encoder.copy_buffer_to_buffer(&set.upload, HEADER, &self.steps, 0, steps);
@@ -239,7 +251,8 @@ impl Gpu {
     fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
         self.packed_steps.clear();
         self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let row = self.plan.channels() * 4;
+        let padded = layout::padded_channels(self.plan.channels());
+        let row = padded * 4;
         let values = (HEADER + raw.frames as u64 * STEP) as usize;
         let end = (values + raw.frames * row) as u64;
         let mapped = self.ring[set].upload.get_mapped_range_mut(0..end);
@@ -259,6 +272,7 @@ impl Gpu {
                     self.packed_row.extend_from_slice(&values[frame * channels..][..channels]);
                 }
             }
+            self.packed_row.resize(padded, RawValue::new(0.0));
             mapped.slice(at..at + row).copy_from_slice(cast_slice(&self.packed_row));
         }
         Ok(())
@@ -338,6 +352,11 @@ impl Backend for Gpu {
     fn recalibrate(&mut self, plan: &Plan) {
         self.plan.recalibrate(plan);
         self.device.queue.write_buffer(&self.taxels, 0, cast_slice(&self.plan.taxels));
+        if !is_plain(&self.plan) {
+            for (stage, careful) in self.stages.iter_mut().zip(self.careful.drain(..)) {
+                *stage = careful;
+            }
+        }
     }
 
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
@@ -365,6 +384,11 @@ impl Gpu {
         }
         Ok(())
     }
+}
+
+/// Whether raw values are pressures, with nothing to check but that they are numbers.
+fn is_plain(plan: &Plan) -> bool {
+    plan.taxels[..plan.calibrated()].iter().all(layout::Taxel::raw_is_pressure)
 }
 
 /// What a dispatch over `frames` frames is told of the plan.

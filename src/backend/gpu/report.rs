@@ -9,6 +9,7 @@ use super::stage::Over;
 use super::{Gpu, header};
 use crate::error::Result;
 use crate::scene::Plan;
+use crate::stage::layout;
 
 /// Bytes that bandwidths are measured with: far beyond any cache but for the largest.
 const MUCH: u64 = 128 << 20;
@@ -120,10 +121,11 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let batch = header(plan, frames as u32, gpu.wide);
     gpu.device.queue.write_buffer(&gpu.batch, 0, bytemuck::bytes_of(&batch));
     let clock = Clock::new(&gpu.device);
+    let channels = layout::padded_channels(plan.channels());
     let mut set = gpu.ring.swap_remove(0);
     {
         // Every taxel pressed.
-        let values: Vec<f32> = (0..frames * plan.channels()).map(|i| (i % 977 + 1) as f32).collect();
+        let values: Vec<f32> = (0..frames * channels).map(|i| (i % 977 + 1) as f32).collect();
         let mapped = set.upload.get_mapped_range_mut(..(values.len() * 4) as u64);
         mapped.map_err(|e| gpu.device.lost(&e))?.slice(..).copy_from_slice(bytemuck::cast_slice(&values));
     }
@@ -155,7 +157,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         Ok(device_s.unwrap_or(start.elapsed().as_secs_f64()))
     };
     let cells = (frames * plan.fields.len()) as u64;
-    let (bytes_up, bytes_down) = ((frames * plan.channels()) as u64 * 4, cells * 4 * gpu.columns.read().len() as u64);
+    let (bytes_up, bytes_down) = ((frames * channels) as u64 * 4, cells * 4 * gpu.columns.read().len() as u64);
     let nothing = |_: Over| [0, 0, 0];
     let everything = |over: Over| over.groups(&batch);
     let empty_s = median(ROUNDS, || run(&nothing, None, bytes_up, bytes_down))?;
@@ -167,7 +169,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         }
     };
     // Raw values, pressures and statuses there and back, what is known of members, and the results.
-    let members = (plan.members.len() * size_of::<crate::stage::layout::Member>()) as u64;
+    let members = (plan.members.len() * size_of::<layout::Member>()) as u64;
     let slots = (frames * plan.slots()) as u64;
     let results = cells * 4 * gpu.columns.count() as u64;
     let least_bytes = bytes_up + 2 * slots * 5 + members + results;

@@ -24,9 +24,9 @@ pub(super) struct Stage {
 /// What a dispatch counts.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Over {
-    /// One invocation a slot that is calibrated and a few quads.
+    /// One invocation four slots that are calibrated and a few quads.
     Calibrated,
-    /// One invocation a slot that is calibrated, for one frame.
+    /// One invocation four slots that are calibrated, for one frame.
     CalibratedOnce,
     /// One invocation a slot that is a change and a quad.
     Changes,
@@ -44,9 +44,11 @@ impl Over {
     /// How many groups a batch takes: along x and folded over z, and along y, which counts frames.
     pub(super) fn groups(self, batch: &layout::Batch) -> [u32; 3] {
         let (quads, lanes) = (batch.frames.div_ceil(4), 1 << batch.lanes_log2);
+        // Four channels of each signal.
+        let vectors = batch.channels.div_ceil(4) * (batch.calibrated / batch.channels);
         let (count, tall) = match self {
-            Self::Calibrated => (batch.calibrated.div_ceil(GROUP), quads.div_ceil(TURNS.min(lanes))),
-            Self::CalibratedOnce => (batch.calibrated.div_ceil(GROUP), 1),
+            Self::Calibrated => (vectors.div_ceil(GROUP), quads.div_ceil(TURNS.min(lanes))),
+            Self::CalibratedOnce => (vectors.div_ceil(GROUP), 1),
             Self::Changes => (batch.changes.div_ceil(GROUP), quads),
             Self::Quads => (batch.fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
             Self::WideFields => (batch.wide, quads),

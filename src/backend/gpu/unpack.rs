@@ -75,7 +75,7 @@ impl Gpu {
         }
     }
 
-    /// From blocks of quads, in each slot by slot, to frames.
+    /// From blocks of quads, in each slot by slot, to frames. A sign says only that there is a status.
     fn unpack_pressures(&self, quads: &[[f32; 4]], frames: usize, pressures: &mut [f64]) {
         let slots = self.plan.slots();
         let lanes = layout::lanes(frames) as usize;
@@ -83,7 +83,7 @@ impl Gpu {
             for (slot, quads) in quads.chunks_exact(lanes).enumerate() {
                 let frames = block * lanes * 4..frames.min((block + 1) * lanes * 4);
                 for (frame, &pressure) in frames.zip(quads.as_flattened()) {
-                    pressures[frame * slots + slot] = pressure.into();
+                    pressures[frame * slots + slot] = pressure.abs().into();
                 }
             }
         }
