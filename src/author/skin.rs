@@ -12,6 +12,7 @@ use super::lattice::Lattice;
 use super::place::{self, Placed, Progress, nearest_on_its_side};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{How, Origin, Place, Recipe, shown};
+use super::refresh::refresh;
 use super::region::{Regions, nothing_left};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel};
 use crate::error::{Error, Result};
@@ -52,7 +53,8 @@ pub struct PlaceReport {
 }
 
 /// Gives `file` the skin that `recipe` asks for. A layout that it has is replaced; without any place in the recipe, or where
-/// the recipe says so, its taxels stay. `progress` is told the share that is done.
+/// the recipe says so, its taxels stay, and without any fields either its fields. What stays is brought up to date, as by
+/// [`refresh`], and ids that were there twice are written as they were read. `progress` is told the share that is done.
 ///
 /// The same file and recipe give the same bytes. What a place gets depends on no other place.
 ///
@@ -63,10 +65,16 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         file.set_unit(unit, *metres)?;
     }
     let keeps_taxels = recipe.places.is_empty() || recipe.keeps_existing;
-    file.clear_layout(keeps_taxels)?;
-    let (body, details) = file.read()?;
+    let asks_nothing = recipe.places.is_empty() && recipe.fields.is_empty();
+    if !asks_nothing {
+        file.clear_layout(keeps_taxels)?;
+    }
+    let (mut body, mut details) = file.read()?;
     if recipe.places.is_empty() && body.taxels.is_empty() {
-        let what = "it has no taxels, and none are asked for; say how many, or write a [[place]]";
+        if let Some(finding) = body.findings.first() {
+            return Err(Error::failed(finding).at(file.name()));
+        }
+        let what = "it has no taxels, and none are asked for; say how many (`--taxels 500`), or write a recipe with a [[place]]";
         return Err(Error::usage(what).at(file.name()));
     }
     if body.surfaces.is_empty() && !recipe.places.is_empty() {
@@ -74,6 +82,15 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     }
     progress(OPENED);
     let mut notes = std::mem::take(&mut file.notes);
+    if !body.taxels.is_empty() {
+        notes.append(&mut body.findings);
+        notes.extend(renew(&mut file, &body, &details)?);
+        (body, details) = file.read()?;
+    }
+    let keeps_fields = asks_nothing && !body.fields.is_empty();
+    if keeps_fields {
+        return Ok(Authored { file, body, places: Vec::new(), notes });
+    }
     let canvas = Canvas::new(&body, &details);
     let mut regions = Regions::new(&canvas, &recipe.regions);
     let mut bare = vec![false; canvas.triangles.len()];
@@ -122,6 +139,14 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     progress(0.95);
     let (body, _) = file.read()?;
     Ok(Authored { file, body, places: reports, notes })
+}
+
+/// Brings up to date what the file that holds `body` has of taxels and fields that stay; a line each of what that was.
+fn renew(file: &mut Original, body: &Body, details: &Details) -> Result<Vec<String>> {
+    let mut now = body.clone();
+    let mut notes = refresh(&mut now);
+    notes.extend(file.amend(body, &now, details)?);
+    Ok(notes)
 }
 
 /// A taxel's place, and what else there is to it.

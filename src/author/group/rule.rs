@@ -36,7 +36,8 @@ use super::super::words::{Globs, Ids, Length};
 /// | `columns = { of = 8, first = 0 }` | one for each place in runs of 8 ids |
 ///
 /// Patches and discs keep to one link each. Children are called by `stem` (`patch`, `disc`, `row`, `column`) and a number from
-/// 1. Every level of a name is a field; one that no rule makes holds what is below it.
+/// 1. Every level of a name is a field; one that no rule makes holds what is below it. With `parent`, the topmost level stands
+/// below that field: `parent = "body"` puts `left_arm/forearm` under `body` without a longer name.
 ///
 /// **Charts.** `chart` is `"auto"` (a plane where that is true to length to 5 %, else geodesic), `"plane"`, `"geodesic"` or
 /// `"none"`; `u` the direction of +u in the anchor's frame. A field that has no such chart, as it goes around a limb, is by
@@ -47,6 +48,8 @@ use super::super::words::{Globs, Ids, Length};
 pub struct FieldRule {
     /// Name of the field, or of what its children stand below.
     pub name: Option<String>,
+    /// The field that the topmost level of its names stands below.
+    pub parent: Option<String>,
     /// Fields to apply the rule in.
     pub within: Option<Globs>,
     /// Names of links.
