@@ -12,7 +12,7 @@ use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
 use super::bar::Bar;
-use super::words::{count, millimetres};
+use super::words::{bullet, count, millimetres};
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -172,7 +172,7 @@ fn text(output: &Path, authored: &Authored) -> String {
         text += &moves(place);
     }
     for note in &authored.notes {
-        text += &format!("  {} {note}\n", style("•").yellow());
+        text += &bullet(note);
     }
     text
 }

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::divide::numbered;
+use super::words::{self, Words};
 use super::{ChartWish, Grouping, Grower, Made, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
@@ -14,7 +15,7 @@ use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
 pub const FLAT: f64 = 0.05;
 
 /// A chart that is further from true than this is no good where a split can give better ones.
-const POOR: f64 = 0.25;
+pub(super) const POOR: f64 = 0.25;
 
 /// A sector with fewer taxels is no part of a split: they would say little of orientation.
 const LEAST_IN_SECTOR: usize = 3;
@@ -49,7 +50,7 @@ impl Grower<'_> {
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
         let mut fields = Vec::with_capacity(specs.len());
-        let mut bare_ones: Vec<(String, NoChart, bool)> = Vec::new();
+        let mut words = Words::default();
         let made = std::mem::take(&mut self.made);
         for ((made, plane), ids) in made.into_iter().zip(planes).zip(members) {
             let name = made.spec.name.clone();
@@ -70,7 +71,8 @@ impl Grower<'_> {
             match made.wrap {
                 Wrap::Refuse => {
                     let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MOST_PROPOSED) };
-                    let advice = advice(&why, parts.as_deref(), parent);
+                    let advice = words::advice(&why, parts.map(|parts| parts.len()), parent, MOST_PROPOSED);
+                    let why = words::plain(&why);
                     let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
                     return Err((made.rule, Error::failed(what)));
                 }
@@ -78,7 +80,8 @@ impl Grower<'_> {
                     fields.push(uncharted);
                     match self.split(&made, &whole, &mut bare, MOST_PARTS) {
                         Some(parts) => {
-                            self.notes.push(format!("field `{name}` is split into {}: {why}", parts.len()));
+                            let why = words::plain(&why);
+                            words.split.push((name, parts.len(), why));
                             fields.extend(parts);
                         }
                         None => self.notes.push(format!(
@@ -89,14 +92,14 @@ impl Grower<'_> {
                 _ => {
                     // A level that nobody asked a chart of leaves that to what is below it.
                     if !parent || made.chart != ChartWish::Auto {
-                        bare_ones.push((name, why, parent));
+                        words.bare.push((name, why, parent));
                     }
                     fields.push(uncharted);
                 }
             }
         }
-        self.notes.extend(without_charts(&bare_ones));
-        self.notes.extend(with_poor_charts(&self.poor));
+        words.poor = std::mem::take(&mut self.poor);
+        self.notes.extend(words.lines());
         Ok(Grouping { fields, notes: self.notes })
     }
 
@@ -236,55 +239,4 @@ fn least_axis(normals: &[DVec3]) -> DVec3 {
 fn planar(spec: FieldSpec, u: Option<[f64; 3]>) -> FieldSpec {
     let chart = u.map(|u| ChartSpec { kind: ChartKind::Plane, origin_in_anchor: None, u_in_anchor: Some(u) });
     FieldSpec { chart, ..spec }
-}
-
-/// A line for each kind of reason why fields have no chart, with all that have it.
-fn without_charts(bare: &[(String, NoChart, bool)]) -> Vec<String> {
-    let kind = |one: &(String, NoChart, bool)| std::mem::discriminant(&one.1);
-    let mut kinds: Vec<_> = bare.iter().map(kind).collect();
-    let mut seen = Vec::new();
-    kinds.retain(|kind| !seen.contains(kind) && (seen.push(*kind), true).1);
-    let line = |of| {
-        let alike: Vec<_> = bare.iter().filter(|one| kind(one) == of).collect();
-        let (name, why, is_parent) = alike.first()?;
-        let advice = match why {
-            NoChart::SeveralLinks(_) | NoChart::NoSurface => advice(why, None, *is_parent),
-            _ if *is_parent => "; fields below it may have".to_owned(),
-            _ => "; `wrap = \"split\"` or smaller `patches` give charts".to_owned(),
-        };
-        Some(match alike.len() {
-            1 => format!("field `{name}` has no chart: {why}{advice}"),
-            several => {
-                let names: Vec<&str> = alike.iter().map(|one| &one.0[..]).collect();
-                format!("{several} fields have no chart: `{}`; of `{name}`: {why}{advice}", names.join("`, `"))
-            }
-        })
-    };
-    kinds.into_iter().filter_map(line).collect()
-}
-
-/// A line with the fields whose charts are poor, and how far the worst is off.
-fn with_poor_charts(poor: &[(String, f64)]) -> Option<String> {
-    let worst = poor.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let names: Vec<&str> = poor.iter().map(|(name, _)| &name[..]).collect();
-    let (fields, have) = if poor.len() == 1 { ("field", "has a chart") } else { ("fields", "have charts") };
-    Some(format!(
-        "{} {fields} {have} that are over {:.0} % off, `{}` up to {:.0} %; `wrap = \"split\"` or smaller `patches` give better: `{}`",
-        poor.len(),
-        POOR * 100.0,
-        worst.0,
-        worst.1 * 100.0,
-        names.join("`, `")
-    ))
-}
-
-/// What to do about a field without a chart.
-fn advice(why: &NoChart, parts: Option<&[FieldSpec]>, is_parent: bool) -> String {
-    match (why, parts) {
-        (NoChart::SeveralLinks(_), _) => "; one field for each of them (`each = \"link\"`) may have".into(),
-        (_, Some(parts)) => format!("; {} parts would have (`wrap = \"split\"`)", parts.len()),
-        _ if is_parent => "; fields below it may have".into(),
-        (NoChart::NoSurface, _) => String::new(),
-        _ => format!("; no split into {MOST_PROPOSED} or fewer has"),
-    }
 }

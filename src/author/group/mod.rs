@@ -10,6 +10,7 @@ pub(super) mod painted;
 mod patches;
 mod rule;
 mod ways;
+mod words;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

@@ -67,8 +67,8 @@ impl FindingKind {
     /// What to do about it.
     fn remedy(self) -> &'static str {
         match self {
-            Self::NoTaxels => "add a layout, see docs/layout.md",
-            Self::NoFields => "add some, see docs/layout.md",
+            Self::NoTaxels => "place some, as with `somatic author`",
+            Self::NoFields => "make some, as with `somatic author`",
             Self::SmallField => "give it more taxels, or ask it for no orientation",
             Self::UnusedTaxel => "put it into a field",
             Self::CoincidentTaxels => "move one, or remove it",
