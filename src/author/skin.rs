@@ -1,6 +1,6 @@
 //! From a file and a recipe to a file with a skin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
@@ -9,6 +9,7 @@ use super::canvas::{Canvas, Seated};
 use super::group::painted::Paints;
 use super::group::{Grouping, Grower, group as group_by};
 use super::lattice::Lattice;
+use super::lint::listed;
 use super::place::{self, Placed, Progress, nearest_on_its_side};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{How, Origin, Place, Recipe, shown};
@@ -135,6 +136,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     let (body, details) = file.read()?;
     let Grouping { fields, notes: more } = group(&body, &details, recipe)?;
     notes.extend(more);
+    notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
     progress(0.95);
     let (body, _) = file.read()?;
@@ -292,6 +294,16 @@ fn written(file: &Original, canvas: &Canvas<'_>, seated: Vec<Seated>) -> Glb {
         }
     }
     addition
+}
+
+/// What is said of taxels that none of `fields` holds.
+fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
+    let held: BTreeSet<u32> = unions(fields).into_iter().flatten().collect();
+    let loose: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).filter(|id| !held.contains(id)).collect();
+    let are = if loose.len() == 1 { "taxel is" } else { "taxels are" };
+    (!loose.is_empty()).then(|| {
+        format!("{} {are} in no field, so that nothing is felt there; give them some: {}", loose.len(), listed(&loose))
+    })
 }
 
 /// The fields that `recipe` asks for over the taxels of `body`, and what there is to say of them.
