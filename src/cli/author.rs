@@ -233,12 +233,12 @@ fn moves(place: &PlaceReport) -> String {
     let mean = worst.iter().map(|(_, moved)| moved).sum::<f64>() / worst.len() as f64;
     let shown: Vec<String> =
         worst.iter().take(MOST_LISTED).map(|(id, moved)| format!("{id} by {} mm", millimetres(*moved))).collect();
-    format!(
-        "\n{}: moved to the surface by {} mm on average; farthest {}\n",
+    bullet(&format!(
+        "place `{}`: moved to the surface by {} mm on average; farthest {}",
         place.name,
         millimetres(mean),
         shown.join(", ")
-    )
+    ))
 }
 
 fn summary(output: &Path, authored: &Authored) -> Value {

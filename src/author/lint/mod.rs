@@ -74,7 +74,7 @@ impl FindingKind {
             Self::CoincidentTaxels => "move one, or remove it",
             Self::OffSurface => "snap it to the surface",
             Self::InwardNormal => "turn it over, or the triangles beneath it",
-            Self::StaleNormal | Self::StaleChart => "work it out again",
+            Self::StaleNormal | Self::StaleChart => "work it out again, as `somatic author BODY -o OUT` does",
             Self::IsolatedTaxel => "see whether it is where it should be",
         }
     }
