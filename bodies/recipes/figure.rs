@@ -8,9 +8,6 @@ use super::solid::{Ellipsoid, Solid, Taper, smooth_max, smooth_min};
 pub(crate) struct Bone {
     /// Name of the link.
     pub(crate) link: String,
-    /// The limb it belongs to and what it is called within: `left_arm`, `forearm`.
-    pub(crate) limb: String,
-    pub(crate) segment: &'static str,
     /// Index of the bone above.
     pub(crate) parent: Option<usize>,
     /// Where its joint is, in the body's frame.
@@ -63,10 +60,8 @@ pub(crate) fn figure() -> Figure {
 }
 
 fn trunk() -> Vec<Bone> {
-    let bone = |link: &str, limb: &str, segment, parent, joint: [f64; 3], fillet, solids| Bone {
+    let bone = |link: &str, parent, joint: [f64; 3], fillet, solids| Bone {
         link: link.to_owned(),
-        limb: limb.to_owned(),
-        segment,
         parent,
         joint: joint.into(),
         solids,
@@ -90,11 +85,11 @@ fn trunk() -> Vec<Bone> {
         ellipsoid([-0.080, 0.662, -0.004], [0.016, 0.026, 0.026]),
     ];
     vec![
-        bone("pelvis", "torso", "pelvis", None, [0.0, 0.320, 0.0], 0.0, pelvis),
-        bone("spine", "torso", "waist", Some(0), [0.0, 0.365, 0.0], 0.06, spine),
-        bone("chest", "torso", "chest", Some(1), [0.0, 0.425, 0.0], 0.045, chest),
-        bone("neck", "head", "neck", Some(2), [0.0, 0.545, -0.005], 0.030, neck),
-        bone("head", "head", "skull", Some(3), [0.0, 0.595, 0.0], 0.024, head),
+        bone("pelvis", None, [0.0, 0.320, 0.0], 0.0, pelvis),
+        bone("spine", Some(0), [0.0, 0.365, 0.0], 0.06, spine),
+        bone("chest", Some(1), [0.0, 0.425, 0.0], 0.045, chest),
+        bone("neck", Some(2), [0.0, 0.545, -0.005], 0.030, neck),
+        bone("head", Some(3), [0.0, 0.595, 0.0], 0.024, head),
     ]
 }
 
@@ -105,7 +100,6 @@ const PELVIS: usize = 0;
 fn chain(
     bones: &mut Vec<Bone>,
     side: &str,
-    limb: &str,
     root: usize,
     segments: impl IntoIterator<Item = (&'static str, [f64; 3], f64, Vec<Box<dyn Solid>>)>,
 ) {
@@ -113,8 +107,6 @@ fn chain(
     for (segment, joint, fillet, solids) in segments {
         bones.push(Bone {
             link: format!("{side}_{segment}"),
-            limb: format!("{side}_{limb}"),
-            segment,
             parent: Some(parent),
             joint: joint.into(),
             solids,
@@ -145,7 +137,7 @@ fn arm(bones: &mut Vec<Bone>, side: &str, x: f64) {
         vec![Box::new(mitten), taper(thumb_root.to_array(), 0.0135, thumb_tip.to_array(), 0.0115)];
     let segments =
         [("upper_arm", shoulder, 0.036, upper_arm), ("forearm", elbow, 0.016, forearm), ("hand", wrist, 0.014, hand)];
-    chain(bones, side, "arm", CHEST, segments);
+    chain(bones, side, CHEST, segments);
 }
 
 /// A leg, on the side where x has the sign of `x`.
@@ -161,5 +153,5 @@ fn leg(bones: &mut Vec<Bone>, side: &str, x: f64) {
         ellipsoid([x * 0.073, 0.018, 0.056], [0.037, 0.026, 0.036]),
     ];
     let segments = [("thigh", hip, 0.022, thigh), ("shank", knee, 0.012, shank), ("foot", ankle, 0.016, foot)];
-    chain(bones, side, "leg", PELVIS, segments);
+    chain(bones, side, PELVIS, segments);
 }

@@ -19,7 +19,7 @@ pub(crate) fn files() -> Result<Vec<(&'static str, Vec<u8>)>> {
         ("hand.glb", hand.glb.to_bytes()?),
         ("touch.csv", touch::csv(&hand.sensors).into_bytes()),
         ("mat.glb", mat::make().to_bytes()?),
-        ("humanoid.glb", humanoid::make()?.to_bytes()?),
+        ("humanoid.glb", humanoid::make()?),
     ])
 }
 

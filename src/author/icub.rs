@@ -219,8 +219,17 @@ impl IcubFile {
         say(&without, "rows beyond the last id, kept where they have a place");
         say(&taxel(|taxel| taxel.normal == NormalFrom::Scaled), "normals of another length than 1, made 1");
         say(&taxel(|taxel| taxel.normal == NormalFrom::Neighbours), "normals missing, made from their neighbours'");
-        for place in self.shared_places() {
-            notes.push(format!("{} taxels on one point, all kept: {}", place.len(), spans(&place)));
+        let shared = self.shared_places();
+        let each: Vec<String> = shared.iter().map(|place| spans(place)).collect();
+        match &shared[..] {
+            [] => {}
+            [place] => notes.push(format!("{} taxels on one point, all kept: {}", place.len(), each[0])),
+            places => notes.push(format!(
+                "{} taxels share {} points, all kept: {}",
+                places.iter().map(Vec::len).sum::<usize>(),
+                places.len(),
+                each.join("; ")
+            )),
         }
         let mut normals = self.taxels().map(|(_, taxel)| taxel.normal_in_link);
         let first = normals.next();

@@ -1,17 +1,17 @@
-//! Authoring: placing taxels on a surface and growing fields over them.
+//! Authoring: placing taxels on a surface and grouping them into fields.
 //!
-//! [`author`] does all of it to a file, as a [`Recipe`] says; the pieces are here too:
+//! [`author`] does all of it to a file, as a [`Recipe`] says; the pieces are here too. [`place_evenly`] and its kin place
+//! points on triangles, [`group::group`] makes fields of a body's taxels, [`lint()`] finds what is wrong with a layout:
 //!
 //! ```
 //! use glam::DVec3;
-//! use somatic::author::{PatchRules, SurfacePoint, place_evenly, split_into_patches};
+//! use somatic::author::place_evenly;
 //!
-//! // A sheet of 0.2 m × 0.1 m with 50 taxels on it, in four patches.
+//! // A sheet of 0.2 m × 0.1 m with 50 taxels on it.
 //! let corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)].map(|(x, y)| DVec3::new(x, y, 0.0));
 //! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1)?;
-//! let points: Vec<SurfacePoint> = placed.iter().map(|p| p.point).collect();
-//! let patches = split_into_patches(&points, &PatchRules { patches: 4, ..PatchRules::default() })?;
-//! assert_eq!(patches.iter().map(Vec::len).sum::<usize>(), 50);
+//! let shared: f64 = placed.iter().map(|p| p.point.area).sum();
+//! assert!(placed.len() == 50 && (shared - 0.02).abs() < 1e-9);
 //! # Ok::<(), somatic::Error>(())
 //! ```
 //!
@@ -26,7 +26,6 @@ mod glob;
 mod grid;
 mod ground;
 pub mod group;
-mod grow;
 pub mod icub;
 mod lattice;
 mod lint;
@@ -44,7 +43,6 @@ use glam::DVec3;
 
 pub use carry::{blend_skinning, heaviest_four};
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
-pub use grow::{PatchRules, mean_normal, split_into_patches};
 pub use lint::{Finding, FindingKind, lint};
 pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
 pub use recipe::Recipe;

@@ -1,6 +1,6 @@
 //! From a file and a recipe to a file with a skin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
@@ -9,9 +9,11 @@ use super::canvas::{Canvas, Seated};
 use super::group::painted::Paints;
 use super::group::{Grouping, Grower, group as group_by};
 use super::lattice::Lattice;
+use super::lint::listed;
 use super::place::{self, Placed, Progress, nearest_on_its_side};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{How, Origin, Place, Recipe, shown};
+use super::refresh::refresh;
 use super::region::{Regions, nothing_left};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel};
 use crate::error::{Error, Result};
@@ -52,7 +54,8 @@ pub struct PlaceReport {
 }
 
 /// Gives `file` the skin that `recipe` asks for. A layout that it has is replaced; without any place in the recipe, or where
-/// the recipe says so, its taxels stay. `progress` is told the share that is done.
+/// the recipe says so, its taxels stay, and without any fields either its fields. What stays is brought up to date, as by
+/// [`refresh`], and ids that were there twice are written as they were read. `progress` is told the share that is done.
 ///
 /// The same file and recipe give the same bytes. What a place gets depends on no other place.
 ///
@@ -63,10 +66,16 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         file.set_unit(unit, *metres)?;
     }
     let keeps_taxels = recipe.places.is_empty() || recipe.keeps_existing;
-    file.clear_layout(keeps_taxels)?;
-    let (body, details) = file.read()?;
+    let asks_nothing = recipe.places.is_empty() && recipe.fields.is_empty();
+    if !asks_nothing {
+        file.clear_layout(keeps_taxels)?;
+    }
+    let (mut body, mut details) = file.read()?;
     if recipe.places.is_empty() && body.taxels.is_empty() {
-        let what = "it has no taxels, and none are asked for; say how many, or write a [[place]]";
+        if let Some(finding) = body.findings.first() {
+            return Err(Error::failed(finding).at(file.name()));
+        }
+        let what = "it has no taxels, and none are asked for; say how many (`--taxels 500`), or write a recipe with a [[place]]";
         return Err(Error::usage(what).at(file.name()));
     }
     if body.surfaces.is_empty() && !recipe.places.is_empty() {
@@ -74,6 +83,15 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     }
     progress(OPENED);
     let mut notes = std::mem::take(&mut file.notes);
+    if !body.taxels.is_empty() {
+        notes.append(&mut body.findings);
+        notes.extend(renew(&mut file, &body, &details)?);
+        (body, details) = file.read()?;
+    }
+    let keeps_fields = asks_nothing && !body.fields.is_empty();
+    if keeps_fields {
+        return Ok(Authored { file, body, places: Vec::new(), notes });
+    }
     let canvas = Canvas::new(&body, &details);
     let mut regions = Regions::new(&canvas, &recipe.regions);
     let mut bare = vec![false; canvas.triangles.len()];
@@ -118,10 +136,19 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     let (body, details) = file.read()?;
     let Grouping { fields, notes: more } = group(&body, &details, recipe)?;
     notes.extend(more);
+    notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
     progress(0.95);
     let (body, _) = file.read()?;
     Ok(Authored { file, body, places: reports, notes })
+}
+
+/// Brings up to date what the file that holds `body` has of taxels and fields that stay; a line each of what that was.
+fn renew(file: &mut Original, body: &Body, details: &Details) -> Result<Vec<String>> {
+    let mut now = body.clone();
+    let mut notes = refresh(&mut now);
+    notes.extend(file.amend(body, &now, details)?);
+    Ok(notes)
 }
 
 /// A taxel's place, and what else there is to it.
@@ -267,6 +294,16 @@ fn written(file: &Original, canvas: &Canvas<'_>, seated: Vec<Seated>) -> Glb {
         }
     }
     addition
+}
+
+/// What is said of taxels that none of `fields` holds.
+fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
+    let held: BTreeSet<u32> = unions(fields).into_iter().flatten().collect();
+    let loose: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).filter(|id| !held.contains(id)).collect();
+    let are = if loose.len() == 1 { "taxel is" } else { "taxels are" };
+    (!loose.is_empty()).then(|| {
+        format!("{} {are} in no field, so that nothing is felt there; give them some: {}", loose.len(), listed(&loose))
+    })
 }
 
 /// The fields that `recipe` asks for over the taxels of `body`, and what there is to say of them.

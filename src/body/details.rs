@@ -8,6 +8,7 @@ use json::validation::Checked;
 
 use super::document::Document;
 use super::nodes::Nodes;
+pub use super::read::TaxelSource;
 use super::read::{Sources, attribute, from_document};
 use super::{Body, Skinning};
 use crate::error::{Error, Result};
@@ -21,6 +22,8 @@ pub struct Details {
     pub marks: Vec<Mark>,
     /// Per link of the body its glTF node.
     pub node_of_link: Vec<usize>,
+    /// Per taxel of the body where the file has it.
+    pub taxels: Vec<TaxelSource>,
 }
 
 /// What a file says of a surface, beside its triangles.
@@ -84,7 +87,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
             node_of_link[*link] = node;
         }
     }
-    Ok((body, Details { parts, marks, node_of_link }))
+    Ok((body, Details { parts, marks, node_of_link, taxels: sources.taxels }))
 }
 
 fn part(document: &Document, nodes: &Nodes<'_>, node: usize, primitive: usize, vertices: usize) -> Result<Part> {

@@ -133,7 +133,8 @@ impl Glb {
         self.accessor(bytes, Some(ARRAY_BUFFER), json!({"componentType": FLOAT, "count": count, "type": kind}))
     }
 
-    fn scalars(&mut self, values: &[f32]) -> usize {
+    /// Adds one number for each of some points, and returns the index of the accessor.
+    pub(super) fn scalars(&mut self, values: &[f32]) -> usize {
         self.vectors("SCALAR", values.len(), bytemuck::cast_slice(values))
     }
 

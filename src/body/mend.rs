@@ -19,12 +19,22 @@ const MOST_LISTED: usize = 8;
 ///
 /// New ids count up from the highest in use, in the order of the old ones; where that would pass [`MAX_TAXEL_ID`] the
 /// lowest free ones are taken. The new taxels are in no field: what was made by duplicating a point lies elsewhere.
-pub(super) fn renumber(body: &mut Body) -> Result<()> {
+///
+/// Gives per taxel which it was before, if they were not in this order.
+pub(super) fn renumber(body: &mut Body) -> Result<Option<Vec<usize>>> {
+    // Strictly ascending, as most files have them, is all that is asked.
+    if body.taxels.is_sorted_by(|a, b| a.id < b.id) {
+        return Ok(None);
+    }
+    let mut order: Vec<usize> = (0..body.taxels.len()).collect();
     // Stable: of two the first in the file keeps its id, and editors append what they copy.
+    order.sort_by_key(|&index| body.taxels[index].id);
     body.taxels.sort_by_key(|taxel| taxel.id);
     let later: Vec<usize> =
         (1..body.taxels.len()).filter(|&index| body.taxels[index].id == body.taxels[index - 1].id).collect();
-    let Some(highest) = body.taxels.last().filter(|_| !later.is_empty()).map(|taxel| taxel.id) else { return Ok(()) };
+    let Some(highest) = body.taxels.last().filter(|_| !later.is_empty()).map(|taxel| taxel.id) else {
+        return Ok(Some(order));
+    };
     let used: BTreeSet<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let above = later.len() as u64 + u64::from(highest) <= u64::from(MAX_TAXEL_ID);
     let mut free = (if above { highest + 1 } else { 0 }..=MAX_TAXEL_ID).filter(|id| !used.contains(id));
@@ -37,13 +47,15 @@ pub(super) fn renumber(body: &mut Body) -> Result<()> {
         renumbered.push(format!("{} on link `{}` is now {id}", taxel.id, body.links[taxel.link].name));
         taxel.id = id;
     }
+    let mut by_id: Vec<usize> = (0..order.len()).collect();
+    by_id.sort_by_key(|&index| body.taxels[index].id);
     body.taxels.sort_by_key(|taxel| taxel.id);
     let (are, later) = match renumbered.len() {
         1 => ("1 taxel has the id".to_owned(), "the later in the file"),
         several => (format!("{several} taxels have the ids"), "those later in the file"),
     };
     body.findings.push(format!("{are} of another; {later} renumbered, and in no field: {}", listed(&renumbered)));
-    Ok(())
+    Ok(Some(by_id.into_iter().map(|index| order[index]).collect()))
 }
 
 /// Takes members that the body does not have out of `fields`, as when somebody deleted their taxels in an editor.

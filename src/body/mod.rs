@@ -7,6 +7,7 @@
 //! node's frame with scale and shear taken out, so that coordinates in it are metres whatever the file's units; a
 //! mirrored or scaled node keeps its rigid part as the frame and its points are stretched into it.
 
+mod amend;
 mod details;
 mod document;
 mod glb;
@@ -24,7 +25,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-pub use details::{Details, Mark, Paint, Part};
+pub use details::{Details, Mark, Paint, Part, TaxelSource};
 pub use glb::{Glb, MeshData, Skinning};
 pub use layout::{ChartKind, ChartSpec, FieldSpec, MemberSpec};
 pub use original::Original;

@@ -21,6 +21,23 @@ pub(super) struct Sources {
     pub(super) surfaces: Vec<(usize, usize)>,
     /// Points that are no taxels: the node's name, and where they are in the world at rest.
     pub(super) points: Vec<(String, Vec<DVec3>)>,
+    /// Per taxel of the body, in its order.
+    pub(super) taxels: Vec<TaxelSource>,
+}
+
+/// A point of the file that is a taxel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaxelSource {
+    /// Index of the glTF mesh.
+    pub mesh: usize,
+    /// Index of the primitive within it.
+    pub primitive: usize,
+    /// Index of the point within that.
+    pub point: usize,
+    /// The taxel's id in the file.
+    pub id: u32,
+    /// From the file's coordinates there to the link's.
+    pub link_from_mesh: DAffine3,
 }
 
 /// Reads the body called `name` from a whole file's bytes.
@@ -49,7 +66,9 @@ pub(super) fn from_document(
         read_meshes(document, nodes, node, &mut body, sources.as_deref_mut())?;
     }
     complete_normals(&mut body)?;
-    mend::renumber(&mut body)?;
+    if let (Some(order), Some(sources)) = (mend::renumber(&mut body)?, sources) {
+        sources.taxels = order.into_iter().map(|index| sources.taxels[index]).collect();
+    }
     body.fields = read_fields(document, nodes, &mut body)?;
     mend::name_what_was_not_exported(document, &mut body);
     Ok(body)
@@ -63,7 +82,7 @@ pub(super) fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<us
         .map(|(_, accessor)| accessor.value())
 }
 
-fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
+pub(super) fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
     attribute(primitive, &Semantic::Extras(name.to_owned()))
 }
 
@@ -193,6 +212,16 @@ fn read_meshes(
         }
         if is_taxels(primitive) {
             let taxels = read_taxels(document, primitive, &positions, of_point).map_err(in_place)?;
+            if let Some(sources) = sources.as_deref_mut() {
+                let source = |(point, taxel): (usize, &Taxel)| TaxelSource {
+                    mesh: mesh.value(),
+                    primitive: index,
+                    point,
+                    id: taxel.id,
+                    link_from_mesh: of_point(point).1,
+                };
+                sources.taxels.extend(taxels.iter().enumerate().map(source));
+            }
             body.taxels.extend(taxels);
             continue;
         }

@@ -12,7 +12,7 @@ use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
 use super::bar::Bar;
-use super::words::{count, millimetres};
+use super::words::{bullet, count, millimetres};
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -33,9 +33,12 @@ A recipe says it region by region:
   [[place]]
   region = \"palm\"
   first_id = 0
-  spacing = \"4 mm\"             # or taxels, with density; grid; points; csv
+  spacing = \"4 mm\"             # or taxels, with density; grid; points; csv; icub
 
-Whatever else the file holds stays as it is. A layout that it has is replaced.";
+Whatever else the file holds stays as it is. A layout that it has is replaced; a recipe without
+[[place]] keeps its taxels and groups them anew. Without recipe, --taxels and --spacing the layout
+is brought up to date, as after editing it in Blender:
+  somatic author edited.glb -o skin.glb";
 
 /// Links, ids and moves that a person is shown.
 const MOST_LISTED: usize = 6;
@@ -89,6 +92,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     check_output(&arguments.output, arguments.force)?;
     let mut recipe = match &arguments.recipe {
         Some(path) => Recipe::load(path)?,
+        None if arguments.taxels.is_none() && arguments.spacing.is_none() && arguments.region.is_empty() => {
+            Recipe::none()
+        }
         None => Recipe::simple(arguments.taxels, arguments.spacing.as_deref(), &arguments.region)?,
     };
     if let Some(seed) = arguments.seed {
@@ -154,14 +160,19 @@ fn text(output: &Path, authored: &Authored) -> String {
     let taxels = count(body.taxels.len() as u64, "taxel");
     let fields = count(body.fields.len() as u64, "field");
     let mut text = format!("{}: {taxels} in {fields}\n", style(output.display()).bold());
-    if !authored.places.is_empty() {
+    if authored.places.is_empty() {
+        text += &format!(
+            "  its taxels are those it had{}\n",
+            if authored.notes.is_empty() { ", and nothing of them is stale" } else { "" }
+        );
+    } else {
         text += &format!("\n{}", table(&authored.places));
     }
     for place in &authored.places {
         text += &moves(place);
     }
     for note in &authored.notes {
-        text += &format!("  {} {note}\n", style("•").yellow());
+        text += &bullet(note);
     }
     text
 }
@@ -222,12 +233,12 @@ fn moves(place: &PlaceReport) -> String {
     let mean = worst.iter().map(|(_, moved)| moved).sum::<f64>() / worst.len() as f64;
     let shown: Vec<String> =
         worst.iter().take(MOST_LISTED).map(|(id, moved)| format!("{id} by {} mm", millimetres(*moved))).collect();
-    format!(
-        "\n{}: moved to the surface by {} mm on average; farthest {}\n",
+    bullet(&format!(
+        "place `{}`: moved to the surface by {} mm on average; farthest {}",
         place.name,
         millimetres(mean),
         shown.join(", ")
-    )
+    ))
 }
 
 fn summary(output: &Path, authored: &Authored) -> Value {

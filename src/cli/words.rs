@@ -40,6 +40,27 @@ pub(super) fn span(seconds: f64) -> String {
     }
 }
 
+/// A line of a list for people: a mark, and `text` between words onto as many lines as a terminal needs.
+pub(super) fn bullet(text: &str) -> String {
+    let term = console::Term::stdout();
+    let width = if term.is_term() { usize::from(term.size().1).max(40) } else { usize::MAX };
+    let mut lines = format!("  {} ", console::style("•").yellow());
+    let mut used = 4;
+    for (index, word) in text.split(' ').enumerate() {
+        let wide = console::measure_text_width(word);
+        if index > 0 && used + 1 + wide > width {
+            lines += "\n    ";
+            used = 4;
+        } else if index > 0 {
+            lines += " ";
+            used += 1;
+        }
+        lines += word;
+        used += wide;
+    }
+    lines + "\n"
+}
+
 /// `text` in exactly `width` columns. What does not fit loses its start, as the end of a name tells most.
 pub(super) fn fitted(text: &str, width: usize, right: bool) -> String {
     let have = console::measure_text_width(text);

@@ -74,6 +74,8 @@ pub enum NoChart {
     Bent(u32, f64),
     /// Ways cannot be followed, for this reason.
     TooRough(String),
+    /// The truest chart that it could have is this far from true: the largest relative error of a distance.
+    Untrue(f64),
 }
 
 impl fmt::Display for NoChart {
@@ -112,6 +114,7 @@ impl fmt::Display for NoChart {
                 bend.to_degrees()
             ),
             Self::TooRough(why) => f.write_str(why),
+            Self::Untrue(most) => write!(f, "its truest chart is up to {:.0} % off", most * 100.0),
         }
     }
 }

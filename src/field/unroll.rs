@@ -23,6 +23,9 @@ const FIRST_REACH: f64 = 1.1 * FRAC_PI_2;
 /// How often ways are followed twice as far before a member counts as out of reach.
 const MOST_DOUBLINGS: u32 = 6;
 
+/// How far an origin is kept off the edges of its triangle, as a part of its height: far over what rounding does to a place.
+const OFF_EDGES: f64 = 1e-6;
+
 /// A body's surface as charts need it, link by link.
 pub struct Unroller<'a> {
     body: &'a Body,
@@ -77,15 +80,26 @@ impl<'a> Unroller<'a> {
         let patch = Patch { topology, members, places, ids, u: asked(|chart| chart.u_in_anchor) };
         let origin = asked(|chart| chart.origin_in_anchor);
         let nearest = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
-        match patch.lay(spec, nearest) {
+        match patch.lay(spec, off_edges(nearest)) {
             // The mean of what is bent lies off the surface, and what is nearest to it there may be another part.
-            Err(why) if origin.is_none() => patch.lay(spec, patch.middle(mean)).map_err(|other| match why {
+            Err(why) if origin.is_none() => patch.lay(spec, off_edges(patch.middle(mean))).map_err(|other| match why {
                 NoChart::Unreachable(..) => other,
                 why => why,
             }),
             laid => laid,
         }
     }
+}
+
+/// `place`, moved off the edge or corner of its triangle that it may lie on: stored and read, it is on the same triangle, and
+/// a chart laid there again is the same chart.
+fn off_edges(place: Place) -> Place {
+    if place.barycentric.iter().all(|&weight| weight >= 0.5 * OFF_EDGES) {
+        return place;
+    }
+    let inward = place.barycentric.map(|weight| weight.max(0.0) + OFF_EDGES);
+    let sum: f64 = inward.iter().sum();
+    Place { barycentric: inward.map(|weight| weight / sum), ..place }
 }
 
 /// Members on a surface.

@@ -131,11 +131,11 @@ impl Plan {
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
-            let hint = body.findings.first().map_or("add some with a layout, see docs/layout.md", String::as_str);
+            let hint = body.findings.first().map_or("put some on it with `somatic author`", String::as_str);
             return Err(Error::failed(format!("the body has no taxels: {hint}")).at(&body.name));
         }
         if fields.fields.is_empty() {
-            return Err(Error::failed("the body has no fields: add some, see docs/layout.md").at(&body.name));
+            return Err(Error::failed("the body has no fields: make some with `somatic author`").at(&body.name));
         }
         calibration.check_body(&body.name)?;
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));

@@ -77,12 +77,15 @@ fn what_cannot_be_authored_is_one_line_and_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.glb");
     let out = text_of(&output);
+    let (_elsewhere, bare) =
+        file("bare.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"name":"a"}]}"#);
     let one = |code: i32, arguments: &[&str], word: &str| {
         let line = fails(code, arguments);
         assert!(line.contains(word) && line.lines().count() == 1, "{arguments:?}: {line}");
         assert!(!Path::new(out).exists());
     };
-    one(2, &["author", "humanoid", "-o", out], "--taxels");
+    one(2, &["author", text_of(&bare), "-o", out], "--taxels");
+    one(2, &["author", "humanoid", "--region", "head", "-o", out], "--taxels");
     one(1, &["author", "humanoid", "--taxels", "0", "-o", out], "--taxels: 0 taxels");
     one(2, &["author", "humanoid", "--spacing", "8", "-o", out], "--spacing: `8` has no unit");
     one(1, &["author", "humanoid", "--taxels", "100", "--spacing", "1m", "-o", out], "do not fit");
@@ -102,4 +105,75 @@ fn help_teaches_recipes() {
     for word in ["--recipe", "--spacing", "Examples:", "[[place]]", "--force", "mm"] {
         assert!(help.contains(word), "{word}: {help}");
     }
+}
+
+/// The hand as text, to be edited; with what `edit` does to it.
+fn edited(edit: impl FnOnce(&mut Value, &mut Vec<u8>)) -> (tempfile::TempDir, std::path::PathBuf) {
+    let bytes = somatic::bundled::HAND;
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut json: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let mut bin = bytes[28 + length..].to_vec();
+    edit(&mut json, &mut bin);
+    let folder = tempfile::tempdir().unwrap();
+    json["buffers"][0]["uri"] = "hand.bin".into();
+    std::fs::write(folder.path().join("hand.bin"), bin).unwrap();
+    let path = folder.path().join("hand.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_layout_that_stays_is_brought_up_to_date() {
+    // What is current keeps its bytes.
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.glb");
+    let text = done(&["author", "hand", "-o", text_of(&out)]);
+    assert!(text.contains("40 taxels in 13 fields") && text.contains("nothing of them is stale"), "{text}");
+    assert!(std::fs::read(&out).unwrap() == somatic::bundled::HAND);
+
+    // A normal that somebody turned, and an id that is there twice: taxel 1 of the palm board was made of taxel 0.
+    let (_folder, path) = edited(|json, bin| {
+        let mesh = json["meshes"].as_array().unwrap().iter().find(|mesh| mesh["primitives"][0]["mode"] == 0).unwrap();
+        let attributes = mesh["primitives"][0]["attributes"].clone();
+        let mut put = |name: &str, point: usize, value: f32| {
+            let accessor = &json["accessors"][attributes[name].as_u64().unwrap() as usize];
+            let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+            let at = view["byteOffset"].as_u64().unwrap_or(0) as usize + 4 * point;
+            bin[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        };
+        put("_NX", 5, 0.7);
+        put("_TAXEL_ID", 1, 0.0);
+    });
+    let seen = |path: &Path| -> Value { serde_json::from_str(&done(&["inspect", text_of(path), "--json"])).unwrap() };
+    fails(1, &["inspect", text_of(&path), "--strict"]);
+    let text = done(&["author", text_of(&path), "-o", text_of(&out), "--force"]);
+    for words in ["normals worked out again for 1 of 40 taxels: 5", "1 taxel has the id of another", "names taxel 1"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let (before, after) = (seen("hand".as_ref()), seen(&out));
+    let by_id = |told: &Value, id: u64| {
+        told["taxels"].as_array().unwrap().iter().find(|taxel| taxel["id"] == id).cloned().unwrap_or_default()
+    };
+    // The normal is back, to the rounding of a unit vector in single precision; all other taxels are as they were.
+    for (x, y) in [0, 1, 2].map(|axis| {
+        let normal = |told: &Value| by_id(told, 5)["normal"][axis].as_f64().unwrap();
+        (normal(&before), normal(&after))
+    }) {
+        assert!((x - y).abs() <= 2.0 * f64::from(f32::EPSILON), "{x} {y}");
+    }
+    assert_eq!(by_id(&after, 52)["position"], by_id(&before, 1)["position"], "it has the next free id");
+    for id in [0, 2, 3, 4, 6, 51] {
+        assert_eq!(by_id(&after, id), by_id(&before, id));
+    }
+    // Fields are those it had, less the taxel that lost its id; nothing is found twice any more.
+    let fields = |told: &Value| told["fields"].as_array().unwrap().len();
+    assert_eq!(fields(&after), fields(&before));
+    let said = done(&["inspect", text_of(&out)]);
+    assert!(!said.contains("id of another") && !said.contains("not the surface's"), "{said}");
+
+    // With rules of its own, a recipe groups anew and keeps the taxels.
+    let (_folder, recipe) = file("recipe.toml", "[[fields]]\nname = \"all\"\n");
+    let text = done(&["author", "hand", "--recipe", text_of(&recipe), "-o", text_of(&out), "--force"]);
+    assert!(text.contains("40 taxels in 1 field"), "{text}");
+    assert_eq!(seen(&out)["taxels"], before["taxels"]);
 }

@@ -3,15 +3,22 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::divide::numbered;
+use super::words::{self, Words};
 use super::{ChartWish, Grouping, Grower, Made, Wrap};
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
-use crate::field::{Chart, FieldSet, NoChart, unions};
+use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
 
 /// A plane chart whose [`crate::field::Distortion`] is at most this is let stand where either kind will do: neighbours
-/// 5 mm apart come out 0.25 mm off at worst. A plane goes 18° to each side of its middle by then, and a centroid in a field
-/// around a cylinder that far is off by under 2 % of the field's radius.
+/// 5 mm apart come out 0.25 mm off at worst. Around a cylinder of radius R a plane goes to θ = arccos 0.95 = 18° on each side
+/// of its middle by then. What lies that far out, Rθ, is drawn at R sin θ: 1.7 % of the way short, and a centroid by no more.
 pub const FLAT: f64 = 0.05;
+
+/// A chart that is further from true than this is no good where a split can give better ones.
+pub(super) const POOR: f64 = 0.25;
+
+/// A sector with fewer taxels is no part of a split: they would say little of orientation.
+const LEAST_IN_SECTOR: usize = 3;
 
 /// Sectors around a limb that are tried before it is cut across.
 const SECTORS: std::ops::RangeInclusive<usize> = 2..=4;
@@ -22,7 +29,7 @@ const MOST_PARTS: usize = 64;
 /// Rounds in which the patches of a split find their middles.
 const SPLIT_ROUNDS: usize = 4;
 
-/// Parts that are tried where a split is only to be proposed.
+/// Parts that are tried where a split is only to be proposed, to somebody whose field is refused.
 const MOST_PROPOSED: usize = 12;
 
 /// A field with the chart it gets, and the chart's distortion.
@@ -43,6 +50,7 @@ impl Grower<'_> {
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
         let mut fields = Vec::with_capacity(specs.len());
+        let mut words = Words::default();
         let made = std::mem::take(&mut self.made);
         for ((made, plane), ids) in made.into_iter().zip(planes).zip(members) {
             let name = made.spec.name.clone();
@@ -63,7 +71,8 @@ impl Grower<'_> {
             match made.wrap {
                 Wrap::Refuse => {
                     let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MOST_PROPOSED) };
-                    let advice = advice(&why, parts.as_deref(), parent);
+                    let advice = words::advice(&why, parts.map(|parts| parts.len()), parent, MOST_PROPOSED);
+                    let why = words::plain(&why);
                     let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
                     return Err((made.rule, Error::failed(what)));
                 }
@@ -71,7 +80,8 @@ impl Grower<'_> {
                     fields.push(uncharted);
                     match self.split(&made, &whole, &mut bare, MOST_PARTS) {
                         Some(parts) => {
-                            self.notes.push(format!("field `{name}` is split into {}: {why}", parts.len()));
+                            let why = words::plain(&why);
+                            words.split.push((name, parts.len(), why));
                             fields.extend(parts);
                         }
                         None => self.notes.push(format!(
@@ -80,16 +90,16 @@ impl Grower<'_> {
                     }
                 }
                 _ => {
-                    if !made.is_level {
-                        let proposed = !parent && !matches!(why, NoChart::SeveralLinks(_) | NoChart::NoSurface);
-                        let parts = if proposed { self.split(&made, &whole, &mut bare, MOST_PROPOSED) } else { None };
-                        let advice = advice(&why, parts.as_deref(), parent);
-                        self.notes.push(format!("field `{name}` has no chart: {why}{advice}"));
+                    // A level that nobody asked a chart of leaves that to what is below it.
+                    if !parent || made.chart != ChartWish::Auto {
+                        words.bare.push((name, why, parent));
                     }
                     fields.push(uncharted);
                 }
             }
         }
+        words.poor = std::mem::take(&mut self.poor);
+        self.notes.extend(words.lines());
         Ok(Grouping { fields, notes: self.notes })
     }
 
@@ -109,29 +119,41 @@ impl Grower<'_> {
                 if flat || matches!(plane, Err(NoChart::SeveralLinks(_))) {
                     return plane.map(|_| planar(whole.clone(), made.u));
                 }
-                match (self.unroller.unroll(&asked(ChartKind::Geodesic, whole)), plane) {
-                    (Ok(unrolled), _) => Ok(unrolled),
-                    (Err(why), Ok(chart)) => {
-                        self.notes.push(format!(
-                            "field `{}` keeps a plane chart that is up to {:.0} % off, as it cannot be unrolled: {why}",
-                            whole.name,
-                            chart.distortion * 100.0
-                        ));
-                        Ok(planar(whole.clone(), made.u))
-                    }
-                    (Err(why), Err(_)) => Err(why),
+                let unrolled = self.unroller.unroll(&asked(ChartKind::Geodesic, whole));
+                let unrolled = unrolled.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                let plane = plane.map(|chart| (chart.distortion, planar(whole.clone(), made.u)));
+                let (off, truer) = match (unrolled, plane) {
+                    (Ok(unrolled), Ok(plane)) if plane.0 < unrolled.0 => plane,
+                    (Ok(unrolled), _) => unrolled,
+                    (Err(_), Ok(plane)) => plane,
+                    (Err(why), Err(_)) => return Err(why),
+                };
+                if off > POOR && made.wrap == Wrap::Split {
+                    return Err(NoChart::Untrue(off));
                 }
+                if off > POOR {
+                    self.poor.push((whole.name.clone(), off));
+                }
+                Ok(truer)
             }
         }
+    }
+
+    /// How far the geodesic chart of `unrolled` is from true.
+    fn distortion(&self, unrolled: &FieldSpec) -> f64 {
+        let of_member = |(&id, member): (&u32, &MemberSpec)| {
+            let taxel = &self.body.taxels[self.body.taxel_index(id)?];
+            Some(((taxel.position_in_link, taxel.normal_in_link), DVec2::from_array(member.uv?)))
+        };
+        let (members, places): (Vec<_>, Vec<_>) = unrolled.members.iter().filter_map(of_member).unzip();
+        Distortion::of(&members, &places).largest
     }
 
     /// Parts of `whole` that each have the chart that `made` asks for, at most `most`: the fewest sectors around a limb, or
     /// else its two halves, and of each half that has no chart the same again.
     fn split(&mut self, made: &Made, whole: &FieldSpec, bare: &mut Body, most: usize) -> Option<Vec<FieldSpec>> {
         let taxels: Vec<usize> = whole.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
-        let notes = self.notes.len();
         let parts = self.parts(made, whole, bare, &taxels, most);
-        self.notes.truncate(notes);
         let mut parts = parts?;
         parts.sort_by_key(|part| part.members.keys().next().copied());
         let names = numbered("part", vec![Vec::new(); parts.len()]);
@@ -154,6 +176,7 @@ impl Grower<'_> {
             let sectors = self.sectors(taxels, count);
             if sectors.len() > 1
                 && sectors.len() <= most
+                && sectors.iter().all(|sector| sector.len() >= LEAST_IN_SECTOR)
                 && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels)).collect()
             {
                 return Some(parts);
@@ -216,15 +239,4 @@ fn least_axis(normals: &[DVec3]) -> DVec3 {
 fn planar(spec: FieldSpec, u: Option<[f64; 3]>) -> FieldSpec {
     let chart = u.map(|u| ChartSpec { kind: ChartKind::Plane, origin_in_anchor: None, u_in_anchor: Some(u) });
     FieldSpec { chart, ..spec }
-}
-
-/// What to do about a field without a chart.
-fn advice(why: &NoChart, parts: Option<&[FieldSpec]>, is_parent: bool) -> String {
-    match (why, parts) {
-        (NoChart::SeveralLinks(_), _) => "; one field for each of them (`each = \"link\"`) may have".into(),
-        (_, Some(parts)) => format!("; {} parts would have (`wrap = \"split\"`)", parts.len()),
-        _ if is_parent => "; fields below it may have".into(),
-        (NoChart::NoSurface, _) => String::new(),
-        _ => format!("; no split into {MOST_PROPOSED} or fewer has"),
-    }
 }

@@ -10,6 +10,7 @@ pub(super) mod painted;
 mod patches;
 mod rule;
 mod ways;
+mod words;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -94,6 +95,8 @@ pub struct Grower<'a> {
     made: Vec<Made>,
     index_of: HashMap<String, usize>,
     notes: Vec<String>,
+    /// Fields whose charts are far from true, and how far.
+    poor: Vec<(String, f64)>,
     /// Rules applied so far.
     applied: usize,
 }
@@ -110,6 +113,7 @@ impl<'a> Grower<'a> {
             made: Vec::new(),
             index_of: HashMap::new(),
             notes: Vec::new(),
+            poor: Vec::new(),
             applied: 0,
         }
     }
@@ -173,25 +177,13 @@ impl<'a> Grower<'a> {
 
     /// Adds the field `name` with the levels above it.
     fn add(&mut self, name: &str, taxels: &[usize], rule: &FieldRule) -> Result<()> {
-        if name.split('/').any(|level| level.trim().is_empty()) {
-            return Err(Error::failed(format!("`{name}` is no name for a field: a level of it is empty")));
-        }
-        let parent = name.rsplit_once('/').map(|(parent, _)| parent.to_owned());
-        let levels = name.match_indices('/').map(|(end, _)| &name[..end]);
-        for (level, above) in levels.scan(None, |above: &mut Option<&str>, level| Some((level, above.replace(level)))) {
-            if !self.index_of.contains_key(level) {
-                let parent = above.map(str::to_owned);
-                let spec = FieldSpec { name: level.to_owned(), parent, ..FieldSpec::default() };
-                self.push(Made {
-                    spec,
-                    chart: ChartWish::Auto,
-                    wrap: Wrap::Bare,
-                    u: None,
-                    is_level: true,
-                    rule: self.applied,
-                });
+        for name in [Some(name), rule.parent.as_deref()].into_iter().flatten() {
+            if name.split('/').any(|level| level.trim().is_empty()) {
+                return Err(Error::failed(format!("`{name}` is no name for a field: a level of it is empty")));
             }
         }
+        let above = self.top(name, rule)?;
+        let parent = self.add_levels(name, above);
         let member = MemberSpec { weight: rule.weight.unwrap_or(1.0), uv: None };
         let members = taxels.iter().map(|&taxel| (self.body.taxels[taxel].id, member)).collect();
         let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
@@ -200,7 +192,11 @@ impl<'a> Grower<'a> {
         let made =
             Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
         match self.index_of.get(name) {
-            Some(&there) if self.made[there].is_level => self.made[there] = made,
+            Some(&there) if self.made[there].is_level => {
+                let above = self.made[there].spec.parent.take();
+                self.made[there] = made;
+                self.made[there].spec.parent = self.made[there].spec.parent.take().or(above);
+            }
             Some(_) => {
                 return Err(Error::failed(format!(
                     "it makes a field `{name}`, and there is one of that name; give it another `name` or `stem`"
@@ -209,6 +205,47 @@ impl<'a> Grower<'a> {
             None => self.push(made),
         }
         Ok(())
+    }
+
+    /// What the topmost level of `name` stands below, which is made if it is not there.
+    fn top(&mut self, name: &str, rule: &FieldRule) -> Result<Option<String>> {
+        let Some(parent) = &rule.parent else { return Ok(None) };
+        let top = name.split('/').next().unwrap_or(name);
+        if parent.split('/').next() == Some(top) {
+            return Err(Error::failed(format!("`parent`: `{top}` cannot stand below itself")));
+        }
+        if let Some(&there) = self.index_of.get(top) {
+            let above = self.made[there].spec.parent.as_deref();
+            if above != Some(parent) {
+                let above = above.map_or("nothing".to_owned(), |above| format!("`{above}`"));
+                return Err(Error::failed(format!(
+                    "`parent`: `{top}` stands below {above} since an earlier rule, and cannot be below `{parent}` as well"
+                )));
+            }
+        }
+        let above = self.add_levels(parent, None);
+        self.add_level(parent, above);
+        Ok(Some(parent.clone()))
+    }
+
+    /// Adds what stands above `name` by its slashes, the topmost below `above`; what `name` itself stands below.
+    fn add_levels(&mut self, name: &str, above: Option<String>) -> Option<String> {
+        let mut parent = above;
+        for level in name.match_indices('/').map(|(end, _)| &name[..end]) {
+            self.add_level(level, parent);
+            parent = Some(level.to_owned());
+        }
+        parent
+    }
+
+    /// Adds the field `name`, which holds what is below it, unless there is one.
+    fn add_level(&mut self, name: &str, parent: Option<String>) {
+        if self.index_of.contains_key(name) {
+            return;
+        }
+        let spec = FieldSpec { name: name.to_owned(), parent, ..FieldSpec::default() };
+        let (chart, wrap) = (ChartWish::Auto, Wrap::Bare);
+        self.push(Made { spec, chart, wrap, u: None, is_level: true, rule: self.applied });
     }
 
     fn push(&mut self, made: Made) {
@@ -234,6 +271,9 @@ fn check(rule: &FieldRule) -> Result<()> {
     }
     if matches!(rule.patches, Some(Patches::Number(0) | Patches::Of { of: 0 })) {
         return wrong("`patches`: 0 makes no sense; ask for 1 or more");
+    }
+    if rule.parent.is_some() && rule.within.is_some() {
+        return wrong("`parent` means nothing beside `within`, whose fields its own stand below; remove one");
     }
     if rule.rows.or(rule.columns).is_some_and(|rows| rows.of == 0 || rows.stride == Some(0)) {
         return wrong("`of` and `stride` of rows count from 1");

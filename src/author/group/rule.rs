@@ -36,9 +36,11 @@ use super::super::words::{Globs, Ids, Length};
 /// | `columns = { of = 8, first = 0 }` | one for each place in runs of 8 ids |
 ///
 /// Patches and discs keep to one link each. Children are called by `stem` (`patch`, `disc`, `row`, `column`) and a number from
-/// 1. Every level of a name is a field; one that no rule makes holds what is below it.
+/// one. Every level of a name is a field; one that no rule makes holds what is below it. With `parent`, the topmost level stands
+/// below that field: `parent = "body"` puts `left_arm/forearm` under `body` without a longer name.
 ///
-/// **Charts.** `chart` is `"auto"` (a plane where that is true to length to 5 %, else geodesic), `"plane"`, `"geodesic"` or
+/// **Charts.** `chart` is `"auto"` (a plane where that is true to length to 5 %, else the truer of both; one that is over 25 %
+/// off is split where `wrap` says so, else told), `"plane"`, `"geodesic"` or
 /// `"none"`; `u` the direction of +u in the anchor's frame. A field that has no such chart, as it goes around a limb, is by
 /// `wrap` given none (`"bare"`, which is what happens without the key to `auto`), split into children that have one
 /// (`"split"`), or an error that says what split would do (`"refuse"`, without the key where a chart is asked for by name).
@@ -47,6 +49,8 @@ use super::super::words::{Globs, Ids, Length};
 pub struct FieldRule {
     /// Name of the field, or of what its children stand below.
     pub name: Option<String>,
+    /// The field that the topmost level of its names stands below.
+    pub parent: Option<String>,
     /// Fields to apply the rule in.
     pub within: Option<Globs>,
     /// Names of links.
@@ -140,7 +144,7 @@ pub struct Rows {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChartWish {
-    /// A plane where that is true to length, else a geodesic one.
+    /// A plane where that is true to length, else the truer of a plane and a geodesic one.
     #[default]
     Auto,
     /// The tangent plane's.

@@ -67,14 +67,14 @@ impl FindingKind {
     /// What to do about it.
     fn remedy(self) -> &'static str {
         match self {
-            Self::NoTaxels => "add a layout, see docs/layout.md",
-            Self::NoFields => "add some, see docs/layout.md",
+            Self::NoTaxels => "place some, as with `somatic author`",
+            Self::NoFields => "make some, as with `somatic author`",
             Self::SmallField => "give it more taxels, or ask it for no orientation",
             Self::UnusedTaxel => "put it into a field",
             Self::CoincidentTaxels => "move one, or remove it",
             Self::OffSurface => "snap it to the surface",
             Self::InwardNormal => "turn it over, or the triangles beneath it",
-            Self::StaleNormal | Self::StaleChart => "work it out again",
+            Self::StaleNormal | Self::StaleChart => "work it out again, as `somatic author BODY -o OUT` does",
             Self::IsolatedTaxel => "see whether it is where it should be",
         }
     }

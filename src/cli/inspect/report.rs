@@ -9,7 +9,7 @@ use somatic::field::{Field, WORLD};
 
 use super::Seen;
 use crate::cli::table::{plain, right, shown};
-use crate::cli::words::{count, millimetres};
+use crate::cli::words::{bullet, count, millimetres};
 
 /// All there is to say, the oddest last, where it is read.
 pub(super) fn text(seen: &Seen) -> String {
@@ -38,7 +38,7 @@ pub(super) fn text(seen: &Seen) -> String {
     }
     text += &format!("{}\n", style(count(findings.len() as u64, "finding")).bold());
     for finding in findings {
-        text += &format!("  {} {finding}\n", style("•").yellow());
+        text += &bullet(finding);
     }
     text
 }

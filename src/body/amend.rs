@@ -1,0 +1,130 @@
+//! A layout that stays in somebody's file, brought up to date there: ids, normals, and what fields say of their members.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::details::Details;
+use super::document::Document;
+use super::layout::{FIELD_KEY, NORMAL, TAXEL_ID};
+use super::original::Original;
+use super::read::custom;
+use super::splice::Splice;
+use super::{Body, FieldSpec};
+use crate::error::Result;
+
+/// New columns of taxels' attributes: by mesh and primitive, names (without their underscore) and one number a point.
+type Columns = BTreeMap<(usize, usize), Vec<(&'static str, Vec<f32>)>>;
+
+impl Original {
+    /// Takes over from `now` what of its taxels' ids and normals, and of its fields, the file has otherwise. `read` is the
+    /// body that the file holds, with its `details`, and `now` the same but for those. What is the same keeps its bits.
+    ///
+    /// Gives a line for each mesh whose points stay as they are because several nodes show it.
+    ///
+    /// # Errors
+    /// The file is no sound body any more.
+    pub fn amend(&mut self, read: &Body, now: &Body, details: &Details) -> Result<Vec<String>> {
+        let (columns, notes) = self.columns(read, now, details)?;
+        let mut addition = self.addition();
+        let mut accessors = Vec::new();
+        for (place, columns) in columns {
+            for (name, values) in columns {
+                accessors.push((place, format!("_{name}"), addition.scalars(&values)));
+            }
+        }
+        self.add(&addition);
+        let mut splice = Splice::new(&self.text);
+        let meshes = splice.list("meshes");
+        let mut added: BTreeMap<(usize, usize), Vec<(String, String)>> = BTreeMap::new();
+        for ((mesh, primitive), name, accessor) in accessors {
+            let primitives = splice.member(&meshes[mesh], "primitives").map_or_else(Vec::new, |s| splice.elements(&s));
+            let Some(attributes) = primitives.get(primitive).and_then(|p| splice.member(p, "attributes")) else {
+                continue;
+            };
+            match splice.member(&attributes, &name) {
+                Some(old) => splice.replace(old, accessor.to_string()),
+                None => added.entry((attributes.start, attributes.end)).or_default().push((name, accessor.to_string())),
+            }
+        }
+        for ((start, end), members) in added {
+            splice.extend(&(start..end), &members);
+        }
+        for node in splice.list("nodes") {
+            let extras = splice.member(&node, "extras");
+            let Some(span) = extras.and_then(|extras| splice.member(&extras, FIELD_KEY)) else { continue };
+            let text = serde_json::from_str::<String>(splice.get(&span));
+            let Some(old) = text.ok().and_then(|text| FieldSpec::from_json(&text).ok()) else { continue };
+            if let Some(new) = now.fields.iter().find(|field| field.name == old.name).filter(|new| **new != old) {
+                splice.replace(span, serde_json::Value::from(new.to_json()).to_string());
+            }
+        }
+        self.text = splice.apply();
+        Ok(notes)
+    }
+
+    /// The columns that have something else in `now`.
+    fn columns(&self, read: &Body, now: &Body, details: &Details) -> Result<(Columns, Vec<String>)> {
+        let mut changed: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+        let (mut points, mut shared) = (BTreeSet::new(), BTreeSet::new());
+        for (index, source) in details.taxels.iter().enumerate() {
+            let place = (source.mesh, source.primitive);
+            if !points.insert((place, source.point)) {
+                shared.insert(place);
+            }
+            if now.taxels[index].id != source.id
+                || now.taxels[index].normal_in_link != read.taxels[index].normal_in_link
+            {
+                changed.entry(place).or_default().push(index);
+            }
+        }
+        let (mut columns, mut notes) = (Columns::new(), Vec::new());
+        if changed.is_empty() {
+            return Ok((columns, notes));
+        }
+        let document = Document::parse(&self.to_glb()?, None)?;
+        for (place, taxels) in changed {
+            let mesh = &document.root.meshes[place.0];
+            if shared.contains(&place) {
+                let name = mesh.name.clone().unwrap_or_else(|| format!("mesh_{}", place.0));
+                notes.push(format!(
+                    "several nodes show the taxels of mesh `{name}`, so that they stay as they are; give each its own mesh"
+                ));
+                continue;
+            }
+            let primitive = &mesh.primitives[place.1];
+            let column = |name: &str| -> Result<Option<Vec<f32>>> {
+                let values = custom(primitive, name).map(|accessor| document.floats::<1>(accessor)).transpose()?;
+                Ok(values.map(|values| values.into_iter().map(|[x]| x).collect()))
+            };
+            let new = columns.entry(place).or_default();
+            if let Some(mut ids) = column(TAXEL_ID)? {
+                taxels.iter().for_each(|&index| ids[details.taxels[index].point] = now.taxels[index].id as f32);
+                new.push((TAXEL_ID, ids));
+            }
+            let moved = |&&index: &&usize| now.taxels[index].normal_in_link != read.taxels[index].normal_in_link;
+            let turned: Vec<usize> = taxels.iter().filter(moved).copied().collect();
+            if turned.is_empty() {
+                continue;
+            }
+            let own = details.taxels.iter().filter(|source| (source.mesh, source.primitive) == place).count();
+            for (axis, name) in NORMAL.into_iter().enumerate() {
+                // A normal that the file does not have is zero, which is as good as none.
+                let mut values = column(name)?.unwrap_or_else(|| vec![0.0; own]);
+                for &index in &turned {
+                    let source = &details.taxels[index];
+                    values[source.point] =
+                        in_mesh(source.link_from_mesh, now.taxels[index].normal_in_link)[axis] as f32;
+                }
+                new.push((name, values));
+            }
+        }
+        Ok((columns, notes))
+    }
+}
+
+/// The unit normal in a mesh's coordinates that is `normal` in the link's: by the transpose, which is the inverse of what a
+/// reader takes it by, but for its length.
+fn in_mesh(link_from_mesh: glam::DAffine3, normal: DVec3) -> DVec3 {
+    (link_from_mesh.matrix3.transpose() * normal).normalize_or(normal)
+}
