@@ -60,7 +60,7 @@ proptest! {
 #[test]
 fn a_gate_that_steps_aside_and_comes_back_changes_nothing() {
     // Wholly touched for long enough that it steps aside, then idle, then touched in one place.
-    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched].map(|coverage| large(coverage));
+    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched].map(large);
     let mut frame = engines[0].frame(0.0);
     for turn in 0..200_usize {
         frame.t_s = turn as f64 * 0.01;
