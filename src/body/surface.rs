@@ -77,11 +77,13 @@ impl Body {
     /// The surface in the frame of `link`, searchable. With `reach`, only triangles that touch the ball (centre, radius).
     #[must_use]
     pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
-        let near = |triangle: &Triangle| {
-            reach.is_none_or(|(centre, radius)| triangle.box_distance_squared(centre) <= radius * radius)
-        };
-        let sound = |triangle: &Triangle| near(triangle) && triangle.unit_normal().is_some();
-        SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
+        match reach {
+            Some((centre, radius)) => Nearest::new(self).around(link, centre, radius),
+            None => {
+                let sound = |triangle: &Triangle| triangle.unit_normal().is_some();
+                SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
+            }
+        }
     }
 
     /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
@@ -137,17 +139,31 @@ impl<'a> Nearest<'a> {
         Self { body, longest: longest.collect() }
     }
 
+    pub(crate) fn body(&self) -> &'a Body {
+        self.body
+    }
+
+    /// The surface within about `radius` of `centre`, m, in the frame of `link`.
+    pub(crate) fn around(&self, link: usize, centre: DVec3, radius: f64) -> SurfaceIndex {
+        let mut near = Vec::new();
+        for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
+            let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
+            // Most triangles are told to be far by one corner.
+            let within = (radius + slack(&link_from_mesh, *longest)).powi(2);
+            let close = surface.corners_through(link_from_mesh);
+            let close = close.filter(|[a, ..]| a.distance_squared(centre) <= within).map(Triangle);
+            let sound = |triangle: &Triangle| triangle.unit_normal().is_some();
+            near.extend(close.filter(|t| t.box_distance_squared(centre) <= radius * radius).filter(sound));
+        }
+        SurfaceIndex::new(near)
+    }
+
     /// The surface point nearest to `p`, in the frame of `link`.
     pub(crate) fn in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
         let (mut nearest, mut least) = (None, f64::INFINITY);
         for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
             let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
-            // A corner lies at most this much farther away than the triangle's nearest point.
-            let stretch = {
-                let [x, y, z] = [0, 1, 2].map(|axis| link_from_mesh.matrix3.col(axis).length_squared());
-                (x + y + z).sqrt()
-            };
-            let slack = stretch * longest * (1.0 + 1e-9);
+            let slack = slack(&link_from_mesh, *longest);
             let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
             let mut within: f64 = (least.sqrt() + slack).powi(2);
             for &[a, b, c] in &surface.triangles {
@@ -168,6 +184,13 @@ impl<'a> Nearest<'a> {
         }
         nearest
     }
+}
+
+/// By how much a corner lies farther away than the nearest point of its triangle's box, at most, where no edge is longer
+/// than `longest` in the mesh: the box is as wide as its longest edge along each axis.
+fn slack(link_from_mesh: &DAffine3, longest: f64) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|axis| link_from_mesh.matrix3.col(axis).length_squared());
+    (x + y + z).sqrt() * longest * 3.0_f64.sqrt() * (1.0 + 1e-9)
 }
 
 /// Three corners, counter-clockwise seen from outside.

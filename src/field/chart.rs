@@ -163,7 +163,7 @@ pub(super) fn complete(
     let (origin_in_anchor, frame) = match (refusal, mean_normal, anchor) {
         (None, _, Some(anchor)) if kind == ChartKind::Geodesic => {
             let origin = wanted_origin.unwrap_or(mean_position);
-            let normal = normal_at(body, anchor, origin, &in_anchor);
+            let normal = normal_at(nearest, anchor, origin, &in_anchor);
             (origin, Ok(frame(normal, wanted_u)))
         }
         (None, Some(normal), Some(anchor)) => {
@@ -195,12 +195,12 @@ pub(super) fn complete(
 }
 
 /// The surface's normal at `origin`, or where there is none that of the nearest member.
-fn normal_at(body: &Body, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
+fn normal_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
     let radius = members.iter().map(|(position, _)| position.distance(origin)).fold(0.0, f64::max);
-    let surface = body.surface_in_link(anchor, Some((origin, radius * 0.1 + 1e-6)));
+    let surface = nearest.around(anchor, origin, radius * 0.1 + 1e-6);
     let around = |hit: Hit| surface.normal_around(hit.position, radius * 1e-6 + 1e-9);
-    let nearest = members.iter().min_by(|a, b| a.0.distance(origin).total_cmp(&b.0.distance(origin)));
-    surface.nearest(origin).and_then(around).or(nearest.map(|(_, normal)| *normal)).unwrap_or(DVec3::Z)
+    let closest = members.iter().min_by(|a, b| a.0.distance(origin).total_cmp(&b.0.distance(origin)));
+    surface.nearest(origin).and_then(around).or(closest.map(|(_, normal)| *normal)).unwrap_or(DVec3::Z)
 }
 
 /// (u, v, normal) with u along `wanted_u` as far as it is tangential, or along the default.

@@ -12,7 +12,7 @@ use rstar::primitives::GeomWithData;
 
 use super::curved::Curved;
 use super::{Chart, Field, anchor_from_link};
-use crate::body::{Body, ChartKind, SurfaceIndex};
+use crate::body::{Body, ChartKind, Nearest, SurfaceIndex};
 
 /// A field's grid has at most this many nodes a side.
 const MOST_NODES: f64 = 96.0;
@@ -33,6 +33,12 @@ impl Lift {
     /// The surface over `field`'s chart, or `None` where it has no chart.
     #[must_use]
     pub fn new(body: &Body, field: &Field) -> Option<Self> {
+        Self::on(&Nearest::new(body), field)
+    }
+
+    /// The same, for many fields of a body.
+    pub(crate) fn on(nearest: &Nearest<'_>, field: &Field) -> Option<Self> {
+        let body = nearest.body();
         let chart = field.chart.as_ref().ok()?;
         let anchor = field.anchor?;
         let places: Vec<DVec2> = field.members.iter().map(|m| m.place.truncate()).collect();
@@ -51,7 +57,7 @@ impl Lift {
         let (columns, rows) = (cells.x as usize + 1, cells.y as usize + 1);
 
         let reach = 2.0 * field.radius_m() + 1e-3;
-        let surface = body.surface_in_link(anchor, Some((field.origin_in_anchor, reach)));
+        let surface = nearest.around(anchor, field.origin_in_anchor, reach);
         let uvs = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
         let uvs = uvs.map(|(column, row)| low + cell_m * DVec2::new(column as f64, row as f64));
         let nodes = match chart.kind {

@@ -7,7 +7,7 @@ use globset::{GlobBuilder, GlobSetBuilder};
 
 use super::curves::Curves;
 use super::{Coverage, Scene};
-use crate::body::Body;
+use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
@@ -176,6 +176,7 @@ impl Plan {
             body_taxels: Vec::new(),
         };
         let first_slots = plan.lay_out_slots(calibration)?;
+        let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
@@ -201,7 +202,7 @@ impl Plan {
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
-                lift: plan.stages().position.then(|| Lift::new(body, field)).flatten(),
+                lift: plan.stages().position.then(|| Lift::on(&nearest, field)).flatten(),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
