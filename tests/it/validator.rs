@@ -6,6 +6,10 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use serde_json::Value;
+use somatic::author::{Recipe, author};
+use somatic::body::Original;
+
+use crate::common::data;
 
 /// The folder with the installed validator, or why there is none.
 fn installed() -> Result<PathBuf, String> {
@@ -58,6 +62,30 @@ fn the_validator_has_no_complaint_about_the_bundled_bodies() {
     assert_eq!(reports.len(), files.len());
     for report in reports {
         assert_eq!((&report["errors"], &report["warnings"]), (&0.into(), &0.into()), "{report:#}");
+    }
+}
+
+#[test]
+fn the_validator_finds_no_error_in_what_is_authored_on_other_tools_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = Recipe::simple(Some(200), None, &[]).unwrap();
+    let mut files = Vec::new();
+    for part in [
+        "meshes/webxr/generic-hand_left.glb",
+        "meshes/blender_io/02_suzanne/02_suzanne.gltf",
+        "meshes/blender_io/03_skinned_cylinder/03_skinned_cylinder.gltf",
+        "meshes/blender_io/06_parent-inverse-anim/06_parent-inverse-anim.gltf",
+    ] {
+        let Some(path) = data(part) else { return };
+        let made = author(Original::open(path).unwrap(), &recipe, |_| {}).unwrap();
+        let file = folder.path().join(format!("{}.glb", files.len()));
+        std::fs::write(&file, made.file.to_glb().unwrap()).unwrap();
+        files.push(file);
+    }
+    let Some(reports) = reports(&files) else { return };
+    assert_eq!(reports.len(), files.len());
+    for report in reports {
+        assert_eq!(report["errors"], 0, "{report:#}");
     }
 }
 
