@@ -45,6 +45,23 @@ pub fn data(part: &str) -> Option<PathBuf> {
     None
 }
 
+/// Every glTF in the folder of meshes, real and hostile, or `None`, said aloud, where that is not there.
+pub fn meshes() -> Option<Vec<PathBuf>> {
+    let (mut open, mut files) = (vec![data("meshes")?], Vec::new());
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.extension().and_then(|e| e.to_str()) {
+                _ if path.is_dir() => open.push(path),
+                Some("glb" | "gltf") => files.push(path),
+                _ => {}
+            }
+        }
+    }
+    files.sort();
+    Some(files)
+}
+
 /// A flat skin of taxels at `uv`, looking along +y, in a body of one link; ids count up from 0.
 pub struct Flat {
     pub glb: Glb,

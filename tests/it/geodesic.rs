@@ -9,7 +9,7 @@ use somatic::body::{ChartKind, FieldSpec, Glb, MemberSpec, MeshData, Modality, T
 use somatic::field::{FieldSet, NoChart, Unroller};
 use somatic::{Body, Percept};
 
-use crate::common::{backends, data, engine, frame};
+use crate::common::{backends, engine, frame, meshes};
 
 const RADIUS: f64 = 0.04;
 const LENGTH: f64 = 0.12;
@@ -184,20 +184,7 @@ fn where_no_chart_can_be_the_reason_says_why() {
 
 #[test]
 fn real_and_hostile_meshes_are_survived() {
-    let Some(folder) = data("meshes") else { return };
-    let mut files = Vec::new();
-    let mut open = vec![folder];
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            match path.extension().and_then(|e| e.to_str()) {
-                _ if path.is_dir() => open.push(path),
-                Some("glb" | "gltf") => files.push(path),
-                _ => {}
-            }
-        }
-    }
-    files.sort();
+    let Some(files) = meshes() else { return };
     let (mut surfaces, mut charts, mut reasons) = (0, 0, Vec::new());
     for path in files {
         let Ok(mut body) = Body::load(&path) else { continue };

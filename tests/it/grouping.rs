@@ -10,7 +10,7 @@ use somatic::body::{ChartKind, FieldSpec, Glb, MeshData, Modality, Taxel};
 use somatic::field::{FieldSet, NoChart};
 use somatic::{Body, Result, bundled};
 
-use crate::common::data;
+use crate::common::meshes;
 
 #[derive(serde::Deserialize)]
 struct Recipe {
@@ -468,19 +468,7 @@ fn rules_that_make_no_sense_are_named() {
 
 #[test]
 fn real_and_hostile_meshes_are_grouped_or_named() {
-    let Some(folder) = data("meshes") else { return };
-    let (mut open, mut files) = (vec![folder], Vec::new());
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            match path.extension().and_then(|e| e.to_str()) {
-                _ if path.is_dir() => open.push(path),
-                Some("glb" | "gltf") => files.push(path),
-                _ => {}
-            }
-        }
-    }
-    files.sort();
+    let Some(files) = meshes() else { return };
     let mut seen = 0;
     for path in files {
         let Ok(mut body) = Body::load(&path) else { continue };
