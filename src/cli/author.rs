@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
-use console::{Term, style};
+use comfy_table::Cell;
+use console::style;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport, Recipe, author};
 use somatic::body::Original;
@@ -12,6 +12,7 @@ use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
 use super::bar::Bar;
+use super::table::{plain, right, shown};
 use super::words::{bullet, count, millimetres};
 use super::{DONE, print};
 
@@ -178,17 +179,9 @@ fn text(output: &Path, authored: &Authored) -> String {
 }
 
 fn table(places: &[PlaceReport]) -> String {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
-    let term = Term::stdout();
-    if term.is_term() {
-        table.set_width(term.size().1);
-    }
-    table.set_header(["place", "taxels", "least mm", "mean mm", "ids", "links"]);
+    let mut table = plain(["place", "taxels", "least mm", "mean mm", "ids", "links"]);
     for column in 1..4 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
+        right(&mut table, column);
     }
     for place in places {
         let length = |metres: Option<f64>| Cell::new(metres.map_or_else(|| "–".to_owned(), millimetres));
@@ -205,13 +198,7 @@ fn table(places: &[PlaceReport]) -> String {
             Cell::new(listed(&links)),
         ]);
     }
-    let mut text = String::new();
-    for (index, line) in table.lines().enumerate() {
-        let line = line.trim_end();
-        text += &if index == 0 { style(line).dim().to_string() } else { line.to_owned() };
-        text += "\n";
-    }
-    text
+    shown(&table)
 }
 
 fn listed(words: &[String]) -> String {
