@@ -15,6 +15,12 @@ use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::{Frame, RawValue};
 
+/// How backend `cpu` computes on this machine, in words: its arithmetic, instructions and threads.
+#[must_use]
+pub fn processor() -> String {
+    cpu::describe()
+}
+
 /// Which backend is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BackendKind {

@@ -4,6 +4,7 @@ mod author;
 mod bar;
 mod bench;
 mod completions;
+mod devices;
 mod feed;
 mod input;
 mod inspect;
@@ -45,6 +46,7 @@ Examples:
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
+  somatic devices                               which GPUs and serial ports it has
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
 
@@ -70,6 +72,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
+    Devices(devices::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -85,6 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
+        Command::Devices(arguments) => devices::devices(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }
 }

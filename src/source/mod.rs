@@ -4,11 +4,15 @@
 
 mod csv;
 mod ndjson;
+#[cfg(feature = "cli")]
+mod ports;
 mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
 pub use ndjson::NdjsonSource;
+#[cfg(feature = "cli")]
+pub use ports::{PortSummary, serial_ports};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 

@@ -133,13 +133,22 @@ fn instructions(level: Level) -> &'static str {
     known.into_iter().find(|(start, _)| name.starts_with(start)).map_or("scalar code", |(_, name)| name)
 }
 
+/// How this machine's processor is used.
+pub(crate) fn describe() -> String {
+    describe_with(Level::new())
+}
+
+fn describe_with(level: Level) -> String {
+    format!("single precision, {}, {} threads", instructions(level), rayon::current_num_threads())
+}
+
 impl Backend for Cpu {
     fn name(&self) -> &'static str {
         "cpu"
     }
 
     fn describe(&self) -> String {
-        format!("single precision, {}, {} threads", instructions(self.level), rayon::current_num_threads())
+        describe_with(self.level)
     }
 
     fn restart(&mut self) {

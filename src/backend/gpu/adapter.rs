@@ -51,6 +51,10 @@ pub struct AdapterSummary {
     pub kind: &'static str,
     /// Driver and version.
     pub driver: String,
+    /// The maker's number on the PCI bus, where it is one.
+    pub vendor: u32,
+    /// Why it cannot run the GPU backend: a limit that every WebGPU device reaches and this one does not.
+    pub unfit: Option<String>,
 }
 
 /// Opening devices in parallel has crashed drivers: one at a time, and the first is kept for all.
@@ -114,12 +118,19 @@ fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Devic
     Ok(Device { device, queue, info, trouble })
 }
 
-/// Every adapter that could run the GPU backend.
+/// Every adapter that has a driver.
 #[must_use]
 pub fn adapters() -> Vec<AdapterSummary> {
     let backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
     let found = pollster::block_on(instance(backends).enumerate_adapters(backends));
-    found.iter().map(|adapter| summary(&adapter.get_info())).collect()
+    let unfit = |adapter: &wgpu::Adapter| {
+        let mut first = None;
+        wgpu::Limits::default().check_limits_with_fail_fn(&adapter.limits(), false, |name, needed, there| {
+            first.get_or_insert_with(|| format!("its {name} is {there}, and {needed} is needed"));
+        });
+        first
+    };
+    found.iter().map(|adapter| AdapterSummary { unfit: unfit(adapter), ..summary(&adapter.get_info()) }).collect()
 }
 
 pub(crate) fn summary(info: &wgpu::AdapterInfo) -> AdapterSummary {
@@ -134,6 +145,8 @@ pub(crate) fn summary(info: &wgpu::AdapterInfo) -> AdapterSummary {
             wgpu::DeviceType::Other => "other",
         },
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        vendor: info.vendor,
+        unfit: None,
     }
 }
 

@@ -7,6 +7,7 @@
 //! read neighbouring words.
 
 pub(crate) mod adapter;
+mod bus;
 mod columns;
 #[cfg(feature = "cli")]
 pub(crate) mod raster;
@@ -20,6 +21,7 @@ mod unpack;
 mod tests;
 
 pub use adapter::{AdapterSummary, adapters};
+pub use bus::{SilentGpu, silent_gpus};
 use bytemuck::cast_slice;
 pub use report::{Bandwidth, DeviceTime, bandwidth, device_time};
 

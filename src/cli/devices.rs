@@ -1,0 +1,120 @@
+//! `somatic devices`: what there is to compute on and to read from, and what is missing.
+
+use std::thread::available_parallelism;
+
+use clap::Args;
+use serde_json::{Value, json};
+use somatic::error::Result;
+use somatic::source::{PortSummary, serial_ports};
+
+use super::table::{plain, shown};
+use super::words::{bullet, count};
+use super::{DONE, print};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic devices
+  somatic devices --json | jq -r '.ports[] | select(.trouble == null) | .name'
+
+Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all the same.";
+
+/// Say which GPUs and serial ports there are, what each can do, and what it lacks.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn devices(arguments: &Arguments) -> Result<u8> {
+    let found = Found { cpu: somatic::backend::processor(), gpus: gpus(), ports: serial_ports()? };
+    print(&if arguments.json { format!("{:#}\n", found.json()) } else { found.text() })?;
+    Ok(DONE)
+}
+
+/// What this machine has.
+struct Found {
+    cpu: String,
+    gpus: Gpus,
+    ports: Vec<PortSummary>,
+}
+
+/// The GPUs, as far as they matter here.
+#[derive(Default)]
+struct Gpus {
+    /// Name, kind, API and driver of each, and why it does not serve.
+    answering: Vec<([String; 4], Option<String>)>,
+    /// What is missing, each with its remedy.
+    missing: Vec<String>,
+}
+
+#[cfg(feature = "gpu")]
+fn gpus() -> Gpus {
+    use somatic::backend::gpu::{adapters, silent_gpus};
+
+    let adapters = adapters();
+    let mut missing: Vec<String> = silent_gpus(&adapters)
+        .into_iter()
+        .map(|gpu| format!("no driver answers for the {}: {}", gpu.name, gpu.remedy))
+        .collect();
+    if adapters.is_empty() && missing.is_empty() {
+        missing.push(
+            "no GPU driver answers; backend gpu needs one (on Debian, mesa-vulkan-drivers runs its shaders on the CPU)"
+                .to_owned(),
+        );
+    }
+    let answering = adapters.into_iter().map(|gpu| ([gpu.name, gpu.kind.to_owned(), gpu.api, gpu.driver], gpu.unfit));
+    Gpus { answering: answering.collect(), missing }
+}
+
+#[cfg(not(feature = "gpu"))]
+fn gpus() -> Gpus {
+    Gpus { missing: vec!["this build has no GPU backend; build with feature gpu".to_owned()], ..Gpus::default() }
+}
+
+impl Found {
+    fn text(&self) -> String {
+        let cores = available_parallelism().map_or(1, usize::from);
+        let mut text = format!("cpu     {}, {}\n\n", self.cpu, count(cores as u64, "core"));
+        if !self.gpus.answering.is_empty() {
+            let mut table = plain(["gpu", "kind", "through", "driver", "backend gpu"]);
+            for ([name, kind, api, driver], unfit) in &self.gpus.answering {
+                let serves = unfit.as_ref().map_or_else(|| "runs".to_owned(), |why| format!("does not run: {why}"));
+                table.add_row([name, kind, api, driver, &serves]);
+            }
+            text += &shown(&table);
+        }
+        for line in &self.gpus.missing {
+            text += &format!("{}\n", bullet(line));
+        }
+        text += "\n";
+        if self.ports.is_empty() {
+            text +=
+                &format!("{}\n", bullet("no serial port; plug a board in, or make a virtual one with `somatic board`"));
+            return text;
+        }
+        let mut table = plain(["port", "what", "can be opened", "steady name"]);
+        for port in &self.ports {
+            let steady = port.steady.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+            table.add_row([&port.name, &port.what, port.trouble.as_deref().unwrap_or("yes"), &steady]);
+        }
+        text + &shown(&table)
+    }
+
+    fn json(&self) -> Value {
+        let gpus = self.gpus.answering.iter().map(|([name, kind, api, driver], unfit)| {
+            json!({"name": name, "kind": kind, "api": api, "driver": driver, "unfit": unfit})
+        });
+        let ports = self
+            .ports
+            .iter()
+            .map(|port| json!({"name": port.name, "what": port.what, "steady": port.steady, "trouble": port.trouble}));
+        json!({
+            "cpu": self.cpu,
+            "gpus": gpus.collect::<Vec<_>>(),
+            "missing": self.gpus.missing,
+            "ports": ports.collect::<Vec<_>>(),
+        })
+    }
+}
