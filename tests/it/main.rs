@@ -8,6 +8,7 @@ mod change;
 mod common;
 mod draft;
 mod edited;
+mod endurance;
 mod extremes;
 mod filter;
 mod gate;
