@@ -28,3 +28,4 @@ mod simulated;
 mod touch;
 mod upkeep;
 mod validator;
+mod worst;
