@@ -10,8 +10,8 @@ use crate::common::{Flat, backends, frame};
 /// Unit roundoff of single precision.
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// What an arctangent may lose: lavapipe's, which is the worst of those met.
-const ATAN2: f64 = 3.3e-6;
+/// What the arctangent of both single-precision backends may lose, rad.
+const ATAN2: f64 = 16.0 * U;
 
 /// How far apart two angles of lines are.
 fn between_lines(a: f64, b: f64) -> f64 {
