@@ -3,6 +3,7 @@
 mod author;
 mod bar;
 mod bench;
+mod calibrate;
 mod completions;
 mod devices;
 mod feed;
@@ -72,6 +73,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
+    Calibrate(calibrate::Arguments),
     Devices(devices::Arguments),
     Completions(completions::Arguments),
 }
@@ -88,6 +90,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
+        Command::Calibrate(arguments) => calibrate::calibrate(arguments),
         Command::Devices(arguments) => devices::devices(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }

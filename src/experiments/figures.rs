@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::plot::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 use super::trial::{self, Moment, Signal, Trial};
 use crate::body::Body;
 use crate::error::Result;
 use crate::field::FieldSet;
+use crate::ink::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 use crate::signal::FsrCircuit;
 
 /// Both stand for users to run, too.

@@ -5,7 +5,6 @@ pub mod dump;
 mod figures;
 mod metric;
 mod npy;
-mod plot;
 pub mod shape;
 mod table;
 mod trial;

@@ -2,6 +2,7 @@
 
 mod author;
 mod bench;
+mod calibrate;
 mod devices;
 mod fields;
 mod inspect;

@@ -1,4 +1,4 @@
-//! Draws figures as SVG and PNG. The only user of plotters; no font of the system is needed.
+//! Figures of panels with axes and a legend, as SVG and PNG.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::{FAMILY, cannot};
 use crate::error::Result;
-use crate::ink::{self, FAMILY, cannot};
 
 /// Dots drawn for each pixel of a size below: plotters has whole dots only, and small figures would show it.
 const SCALE: u32 = 2;
 
 /// Red, green, blue.
-pub(super) type Colour = [u8; 3];
-pub(super) type Point = (f64, f64);
+pub(crate) type Colour = [u8; 3];
+pub(crate) type Point = (f64, f64);
 
 /// A shape in a panel's coordinates; what is called a width, radius or size is in pixels.
 #[derive(Clone, Debug)]
-pub(super) enum Mark {
+pub(crate) enum Mark {
     /// Lines, each through some points.
     Lines {
         runs: Vec<Vec<Point>>,
@@ -50,42 +50,42 @@ pub(super) enum Mark {
 
 /// A mark, and what the legend calls it.
 #[derive(Clone, Debug)]
-pub(super) struct Layer {
-    pub(super) mark: Mark,
-    pub(super) colour: Colour,
-    pub(super) name: Option<&'static str>,
+pub(crate) struct Layer {
+    pub(crate) mark: Mark,
+    pub(crate) colour: Colour,
+    pub(crate) name: Option<&'static str>,
 }
 
 /// An axis with ticks at chosen places.
 #[derive(Clone, Debug)]
-pub(super) struct Axis {
-    pub(super) label: &'static str,
-    pub(super) range: [f64; 2],
-    pub(super) ticks: Vec<f64>,
+pub(crate) struct Axis {
+    pub(crate) label: &'static str,
+    pub(crate) range: [f64; 2],
+    pub(crate) ticks: Vec<f64>,
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Panel {
-    pub(super) title: String,
-    pub(super) x: Axis,
-    pub(super) y: Axis,
-    pub(super) layers: Vec<Layer>,
+pub(crate) struct Panel {
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) layers: Vec<Layer>,
 }
 
 /// How a figure's panels stand, and the size of what each of them plots into, pixels.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Arrangement {
+pub(crate) enum Arrangement {
     Stacked { width: u32, height: u32 },
     SideBySide { side: u32 },
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Figure {
-    pub(super) title: &'static str,
-    pub(super) panels: Vec<Panel>,
+pub(crate) struct Figure {
+    pub(crate) title: &'static str,
+    pub(crate) panels: Vec<Panel>,
     /// What the legend has before the panels' named layers.
-    pub(super) key: Vec<Layer>,
-    pub(super) arrangement: Arrangement,
+    pub(crate) key: Vec<Layer>,
+    pub(crate) arrangement: Arrangement,
 }
 
 const TITLE: u32 = 30;
@@ -137,7 +137,7 @@ impl Figure {
     }
 
     /// As SVG, text being text.
-    pub(super) fn svg(&self) -> Result<String> {
+    pub(crate) fn svg(&self) -> Result<String> {
         let mut text = String::new();
         let (width, height) = self.size();
         self.draw(&SVGBackend::with_string(&mut text, (SCALE * width, SCALE * height)).into_drawing_area())?;
@@ -145,16 +145,16 @@ impl Figure {
     }
 
     /// As PNG.
-    pub(super) fn png(&self) -> Result<Vec<u8>> {
+    pub(crate) fn png(&self) -> Result<Vec<u8>> {
         let (width, height) = self.size();
         let (width, height) = (SCALE * width, SCALE * height);
         let mut pixels = vec![0; (3 * width * height) as usize];
         self.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area())?;
-        ink::png(&pixels, [width, height])
+        super::png(&pixels, [width, height])
     }
 
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
-        ink::font()?;
+        super::font()?;
         area.fill(&WHITE).map_err(cannot)?;
         let (width, height) = self.size();
         let title = text(16, HPos::Center);

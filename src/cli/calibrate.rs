@@ -1,0 +1,239 @@
+//! `somatic calibrate`: from a rest and a press to a calibration file.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use clap::Args;
+use console::style;
+use serde_json::json;
+use somatic::source::{Source, SourceSpec};
+use somatic::survey::{Findings, Found, Survey, Wishes};
+use somatic::{Body, Calibration, Error, Result};
+
+use super::feed::{Arrival, Feed, Manner};
+use super::run::stop_on_signal;
+use super::table::{plain, right, shown};
+use super::words::{bullet, count};
+use super::{DONE, load_body, print, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic calibrate --body robot.glb --source session.csv --rest 5 -o robot.toml --plot robot.svg
+  robot-driver | somatic calibrate --body robot.glb --source - --bits 10 -o robot.toml
+  somatic run --body robot.glb --source session.csv --calibration robot.toml
+
+First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one after the other or many at
+once, until the recording ends, --press seconds are over, or Ctrl-C. docs/calibration.md describes the file.";
+
+/// Find baselines, noise, direction and range of a robot's sensors, and write them down as its calibration.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    #[arg(long, value_name = "BODY")]
+    body: String,
+
+    /// Where frames come from: as for `somatic run`.
+    #[arg(long, value_name = "SOURCE")]
+    source: String,
+
+    /// The calibration to write, TOML.
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: PathBuf,
+
+    /// Draw every sensor's rest and range too, as .svg or .png.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// How long nothing touches the robot, from the first frame on, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    rest: f64,
+
+    /// How long sensors are pressed after that, in seconds [default: to the end of a recording; else until Ctrl-C].
+    #[arg(long, value_name = "S")]
+    press: Option<f64>,
+
+    /// Bits of the sensors' converter: tells where their range ends [default: where many of them stop].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=24))]
+    bits: Option<u8>,
+
+    /// Give each sensor the gain that makes all the presses equal: for sensors that were all pressed alike.
+    #[arg(long)]
+    equalise: bool,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Replace the calibration that is there.
+    #[arg(long)]
+    force: bool,
+
+    /// Print what was found as JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
+    let output = &arguments.output;
+    if output.exists() && !arguments.force {
+        return Err(Error::failed("is there already; --force replaces it").at(output.display()));
+    }
+    if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
+        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+    }
+    let draw = arguments.plot.as_deref().map(picture).transpose()?;
+    let body = load_body(&arguments.body)?;
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let spec: SourceSpec = arguments.source.parse()?;
+    let source = spec.open(&ids, arguments.rate)?;
+    let is_live = matches!(spec, SourceSpec::Stdin | SourceSpec::Serial { .. });
+    let mut survey = Survey::new(&in_body(&body, &*source)?);
+    let lost = gather(&mut survey, source, arguments, is_live)?;
+    let findings = survey.finish(Wishes { bits: arguments.bits, equalise: arguments.equalise })?;
+
+    let text = findings.calibration(&name_of(&body));
+    // What is written must be what `run` takes; if it were not, nothing is written.
+    let known: Vec<u32> =
+        ids.iter().copied().filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
+    Calibration::parse(&text, &known).map_err(|e| e.at("the calibration that follows from this survey"))?;
+    somatic::survey::write(output, text.as_bytes())?;
+    if let (Some(path), Some(draw)) = (&arguments.plot, draw) {
+        somatic::survey::write(path, &draw(&findings)?)?;
+    }
+    print(&if arguments.json { json_of(&findings) } else { table_of(&findings) })?;
+    for loss in &lost {
+        say(&format!("never processed: {loss}"));
+    }
+    say(&format!("wrote {}", output.display()));
+    Ok(if lost.is_empty() { DONE } else { super::LOST })
+}
+
+/// The ids that `source` delivers, each of which `body` must have.
+fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
+    match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
+        Some(id) => Err(Error::failed(format!(
+            "the source has taxel {id}, and the body has none of that number; is it for another body?"
+        ))
+        .at(&body.name)),
+        None => Ok(source.taxels().to_vec()),
+    }
+}
+
+/// What a calibration calls `body`: its file's name without folder and ending.
+fn name_of(body: &Body) -> String {
+    Path::new(&body.name).file_stem().map_or_else(|| body.name.clone(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Takes rest and press from `source`; gives what of it was lost.
+fn gather(
+    survey: &mut Survey,
+    source: Box<dyn Source + Send>,
+    arguments: &Arguments,
+    is_live: bool,
+) -> Result<Vec<String>> {
+    let stop = stop_on_signal()?;
+    let mut feed = Feed::start(source, Manner { most: 64, gather: !is_live, speed: None });
+    let guide = |what: &str| {
+        if is_live {
+            say(what);
+        }
+    };
+    guide(&format!("leave the robot alone for {} s", arguments.rest));
+    let mut begin = None;
+    let mut is_pressing = false;
+    while !stop.load(Ordering::Relaxed) {
+        match feed.next(Duration::from_millis(40)) {
+            Some(Arrival::Frames(frames, _)) => {
+                for frame in &frames {
+                    let since_s = frame.t_s - *begin.get_or_insert(frame.t_s);
+                    if since_s < arguments.rest {
+                        survey.rest(&frame.values);
+                        continue;
+                    }
+                    if !is_pressing {
+                        is_pressing = true;
+                        guide(match arguments.press {
+                            Some(_) => "now press every sensor firmly",
+                            None => "now press every sensor firmly; Ctrl-C when all are done",
+                        });
+                    }
+                    if arguments.press.is_some_and(|press| since_s >= arguments.rest + press) {
+                        return Ok(Vec::new());
+                    }
+                    survey.press(&frame.values);
+                }
+                feed.give_back(frames);
+            }
+            Some(Arrival::End(losses)) => return Ok(losses),
+            Some(Arrival::Failed(error)) => return Err(error),
+            None => {}
+        }
+    }
+    Ok(Vec::new())
+}
+
+type Draw = fn(&Findings) -> Result<Vec<u8>>;
+
+/// How the picture at `path` is drawn, by its ending.
+fn picture(path: &Path) -> Result<Draw> {
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("svg") => Ok(|findings| findings.svg().map(String::into_bytes)),
+        Some("png") => Ok(Findings::png),
+        _ => Err(Error::usage("a plot ends in .svg or .png").at(path.display())),
+    }
+}
+
+fn table_of(findings: &Findings) -> String {
+    /// More sensors than this are summed up.
+    const LISTED: usize = 48;
+    let mut text = format!(
+        "{}; raw values {} when pressed\n",
+        count(findings.sensors.len() as u64, "sensor"),
+        if findings.invert { "fall" } else { "rise" }
+    );
+    let mut table = plain(["taxel", "at rest", "noise", "dead band", "travel", "full at", "gain"]);
+    // Four digits, and no zeros after the point: most sensors count in whole numbers.
+    let number =
+        |value: f64| format!("{value:.3e}").parse().map_or_else(|_| value.to_string(), |short: f64| short.to_string());
+    let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), number);
+    let row = |found: &Found| {
+        let Found { id, baseline, noise, dead_band, travel, full, gain } = *found;
+        [
+            id.to_string(),
+            or_dash(baseline),
+            number(noise),
+            number(dead_band),
+            or_dash(travel),
+            or_dash(full),
+            number(gain),
+        ]
+    };
+    for found in findings.sensors.iter().take(LISTED) {
+        table.add_row(row(found));
+    }
+    for column in 0..7 {
+        right(&mut table, column);
+    }
+    text += &shown(&table);
+    if let Some(more) = findings.sensors.len().checked_sub(LISTED).filter(|&more| more > 0) {
+        text += &format!("{}\n", style(format!(" and {more} more; --json has all")).dim());
+    }
+    findings.remarks().iter().for_each(|remark| text += &format!("{}\n", bullet(remark)));
+    text
+}
+
+fn json_of(findings: &Findings) -> String {
+    let sensors = findings.sensors.iter().map(|found| {
+        json!({
+            "taxel": found.id, "baseline": found.baseline, "noise": found.noise, "dead_band": found.dead_band,
+            "travel": found.travel, "full": found.full, "gain": found.gain,
+        })
+    });
+    let json = json!({
+        "invert": findings.invert, "raw_range": findings.raw_range, "sensors": sensors.collect::<Vec<_>>(),
+        "remarks": findings.remarks(),
+    });
+    format!("{json:#}\n")
+}

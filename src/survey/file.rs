@@ -1,0 +1,107 @@
+//! A survey's findings as a calibration file.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::{Findings, Found};
+
+impl Findings {
+    /// The calibration, as `docs/calibration.md` describes it, for the body called `body`. What most sensors share stands
+    /// under `[all]`, the rest under each taxel.
+    #[must_use]
+    pub fn calibration(&self, body: &str) -> String {
+        let sound = || self.sensors.iter().filter(|found| !self.is_lost(found));
+        let baseline = commonest(sound().filter_map(|found| found.baseline));
+        let dead_band = commonest(sound().map(|found| found.dead_band));
+        let p_max = commonest(sound().filter_map(p_max));
+        let mut text = format!(
+            "# From a survey of {} sensors: baselines are medians at rest, dead bands 1.5 times what one value in a\n\
+             # thousand strays from them.\n\n[all]\nbaseline = {baseline}\ndead_band = {dead_band}\ninvert = {}\n",
+            self.sensors.len(),
+            self.invert
+        );
+        text = format!("body = {}\n\n{text}", quoted(body));
+        let mut line = |name: &str, value: String| {
+            let _ = writeln!(text, "{name} = {value}");
+        };
+        if sound().any(|found| found.full.is_some()) {
+            line("p_max", p_max.to_string());
+        }
+        if let Some([low, high]) = self.raw_range {
+            line("raw_range", format!("[{low}, {high}]"));
+        }
+        for found in &self.sensors {
+            let mut own: Vec<(&str, String)> = Vec::new();
+            if self.is_lost(found) {
+                own.push(("mask", "true".to_owned()));
+            } else {
+                let all = [
+                    ("baseline", found.baseline.unwrap_or(baseline), baseline),
+                    ("gain", found.gain, 1.0),
+                    ("dead_band", found.dead_band * found.gain, dead_band),
+                    ("p_max", self::p_max(found).unwrap_or(p_max), p_max),
+                ];
+                own.extend(all.iter().filter(|(_, own, all)| own != all).map(|(name, own, _)| (*name, number(*own))));
+            }
+            if !own.is_empty() {
+                let _ = write!(text, "\n[taxel.{}]\n", found.id);
+                for (name, value) in own {
+                    let _ = writeln!(text, "{name} = {value}");
+                }
+            }
+        }
+        text
+    }
+}
+
+/// Above which P a sensor is at the end of its range.
+fn p_max(found: &Found) -> Option<f64> {
+    found.full.map(|full| full * found.gain)
+}
+
+/// With six significant digits: more than a converter has.
+fn number(value: f64) -> String {
+    let value: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    value.to_string()
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+/// The value that occurs most often, the lowest of several; 0 where there is none.
+fn commonest(values: impl Iterator<Item = f64>) -> f64 {
+    let mut counts: BTreeMap<u64, (f64, usize)> = BTreeMap::new();
+    for value in values {
+        counts.entry(value.to_bits()).or_insert((value, 0)).1 += 1;
+    }
+    let best = counts.into_values().max_by(|(a, count_a), (b, count_b)| count_a.cmp(count_b).then(b.total_cmp(a)));
+    best.map_or(0.0, |(value, _)| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::Calibration;
+
+    fn found(id: u32, baseline: Option<f64>) -> Found {
+        let full = baseline.map(|baseline| baseline - 0.5);
+        Found { id, baseline, noise: 1.0, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0 }
+    }
+
+    #[test]
+    fn what_is_written_is_read_as_what_was_found() {
+        let mut sensors = vec![found(4, Some(250.0)), found(5, Some(250.0)), found(6, Some(243.0)), found(7, None)];
+        (sensors[2].gain, sensors[2].dead_band) = (1.25, 5.0);
+        let findings = Findings { sensors, invert: true, raw_range: Some([0.0, 255.0]) };
+        let text = findings.calibration("the \"left\" hand");
+        let read = Calibration::parse(&text, &[4, 5, 6, 7]).unwrap();
+        assert_eq!(read.body.as_deref(), Some("the \"left\" hand"));
+        let [a, b, c, d] = &read.taxels[..] else { panic!("four were written") };
+        assert_eq!((a.baseline, a.gain, a.dead_band, a.p_max), (250.0, -1.0, 2.0, 249.5));
+        assert_eq!((a, a.raw_range), (b, [0.0, 255.0]));
+        assert_eq!((c.baseline, c.gain, c.dead_band, c.p_max), (243.0, -1.25, 6.25, 303.125));
+        assert!(d.mask && !a.mask && !c.mask);
+    }
+}

@@ -1,0 +1,79 @@
+//! From a rest and a press to a calibration that `somatic run` takes.
+
+use serde_json::Value;
+
+use crate::{done, fails, frames, output, stderr};
+
+const SURVEY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/simulations/survey.toml");
+
+#[test]
+fn a_survey_becomes_a_calibration_under_which_rest_is_nothing_and_a_press_is_felt() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (csv, toml, svg) = (at("survey.csv"), at("hand.toml"), at("hand.svg"));
+    done(&["simulate", SURVEY, "-o", &csv]);
+    let calibrate = ["calibrate", "--body", "hand", "--source", &csv, "--bits", "10", "-o", &toml];
+    let found: Value = serde_json::from_str(&done(&[&calibrate[..], &["--plot", &svg, "--json"]].concat())).unwrap();
+    assert_eq!((&found["invert"], &found["raw_range"]), (&true.into(), &serde_json::json!([0.0, 1023.0])));
+    let sensors = found["sensors"].as_array().unwrap();
+    assert_eq!(sensors.len(), 40);
+    let sensor = |id: u64| sensors.iter().find(|sensor| sensor["taxel"] == id).unwrap();
+    // The simulation's noise has σ = 1.5; below the end of the range it is cut off, so that the median is the end itself.
+    for id in [0, 18, 25] {
+        let number = |key: &str| sensor(id)[key].as_f64().unwrap();
+        assert_eq!(number("baseline"), 1023.0);
+        assert!((2.0..=8.0).contains(&number("noise")) && number("travel") > 500.0, "{}", sensor(id));
+    }
+    // It is dead, by the simulation; and the remark says so.
+    assert!(sensor(17)["travel"].is_null());
+    assert!(found["remarks"][0].as_str().unwrap().contains("were not pressed, and so have no travel: 17"), "{found}");
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("raw values falling when pressed"));
+
+    let run = done(&[
+        "run",
+        "--body",
+        "hand",
+        "--source",
+        &csv,
+        "--calibration",
+        &toml,
+        "--backend",
+        "cpu",
+        "--outputs",
+        "total",
+    ]);
+    let touched = |from_s: f64, to_s: f64| {
+        let within = frames(&run).into_iter().filter(|frame| (from_s..to_s).contains(&frame["t"].as_f64().unwrap()));
+        let touched: Vec<bool> = within.map(|frame| !frame["fields"].as_array().unwrap().is_empty()).collect();
+        (touched.iter().filter(|touched| **touched).count(), touched.len())
+    };
+    let (at_rest, of) = touched(0.0, 4.0);
+    // One value in a thousand is over the noise, and less over 1.5 times that.
+    assert!(at_rest * 20 <= of, "touched in {at_rest} of {of} frames at rest");
+    assert_eq!(touched(5.0, 5.6), (30, 30));
+
+    // What is there stays, unless it is to be replaced.
+    let before = std::fs::read_to_string(&toml).unwrap();
+    assert!(fails(1, &calibrate).contains("--force replaces it"));
+    assert_eq!(std::fs::read_to_string(&toml).unwrap(), before);
+    done(&[&calibrate[..], &["--force"]].concat());
+}
+
+#[test]
+fn a_survey_that_says_nothing_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let still: String = (0..100).fold("t,0,1\n".to_owned(), |text, n| text + &format!("{},5,7\n", f64::from(n) * 0.1));
+    std::fs::write(at("still.csv"), still).unwrap();
+    let (source, toml) = (at("still.csv"), at("hand.toml"));
+    let refused = |more: &[&str], what: &str, code: i32| {
+        let first = ["calibrate", "--body", "hand", "--source", &source, "-o", &toml];
+        let output = output(&[&first[..], more].concat());
+        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
+        assert!(stderr(&output).contains(what), "{}", stderr(&output));
+        assert!(!std::path::Path::new(&toml).exists());
+    };
+    refused(&[], "no sensor left its rest", 1);
+    refused(&["--rest=-1"], "times over 0", 2);
+    refused(&["--plot", "a.gif"], "ends in .svg or .png", 2);
+}
