@@ -71,6 +71,7 @@ pub mod sink;
 pub mod source;
 mod stage;
 mod whole;
+pub mod wire;
 
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, Comparison};

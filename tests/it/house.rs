@@ -23,6 +23,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("engine", [&below_backend[..], &["backend"]].concat()),
         ("source", vec!["error", "keys", "signal", "body", "field", "bundled", "whole"]),
         ("sink", vec!["error", "percept"]),
+        ("wire", vec!["error"]),
         ("ink", vec!["error"]),
         ("picture", vec!["error", "body", "field", "backend", "ink", "whole"]),
         (
@@ -98,6 +99,8 @@ fn each_heavy_dependency_has_one_door() {
         ("wgpu", "backend/gpu"),
         ("pollster", "backend/gpu"),
         ("gltf", "body"),
+        ("cobs", "wire"),
+        ("crc", "wire/format.rs|wire/encode.rs|wire/decode.rs"),
         ("csv", "source|author/points.rs"),
         ("clap", "cli"),
         ("comfy_table", "cli"),

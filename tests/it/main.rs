@@ -27,3 +27,4 @@ mod simulated;
 mod touch;
 mod upkeep;
 mod validator;
+mod wire;
