@@ -2,7 +2,7 @@
 //!
 //! Nothing here does I/O or looks at a clock. [`encode`] writes packets into memory that the caller brings and needs
 //! neither allocation nor `std`; a [`Decoder`] turns bytes, however they come, into [`Event`]s; a [`Dialogue`] asks a
-//! board for something until it answers; `somatic board` is a board made of software, to try all this with.
+//! board for something until it answers; [`board`] is a board made of software, to try all this with.
 //!
 //! `docs/wire.md` specifies the format for those who write firmware, `examples/firmware/` has it in C.
 //!
@@ -21,6 +21,7 @@
 //! });
 //! ```
 
+pub mod board;
 mod books;
 mod decode;
 mod dialogue;

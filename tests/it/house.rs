@@ -13,7 +13,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("whole", vec!["error"]),
         ("keys", vec!["error"]),
         ("length", vec![]),
-        ("signal", vec!["error"]),
+        ("signal", vec!["error", "keys"]),
         ("body", vec!["error", "whole"]),
         ("field", vec!["error", "body"]),
         ("author", vec!["error", "keys", "length", "body", "field", "whole"]),
