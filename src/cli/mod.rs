@@ -3,6 +3,8 @@
 mod author;
 mod bar;
 mod bench;
+#[cfg(unix)]
+mod board;
 mod completions;
 mod feed;
 mod input;
@@ -44,6 +46,7 @@ Examples:
   somatic render robot.glb -o robot.png         where they are
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
+  somatic board --link /tmp/hand                a hand on a serial line, made of software
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
@@ -69,6 +72,8 @@ enum Command {
     Plan(Box<plan::Arguments>),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
+    #[cfg(unix)]
+    Board(Box<board::Arguments>),
     Bench(bench::Arguments),
     Completions(completions::Arguments),
 }
@@ -84,6 +89,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
+        #[cfg(unix)]
+        Command::Board(arguments) => board::run(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }

@@ -184,6 +184,12 @@ impl VirtualBoard {
         self.leaving.extend(&line[..length]);
     }
 
+    /// Sends no more frames, and says unasked how many there were.
+    pub fn finish(&mut self, now: Duration) {
+        self.running = false;
+        self.say_identity(0, now);
+    }
+
     /// Whether a frame is due at `now`: the line is free, and so long has passed since the last as the rate says.
     #[must_use]
     pub fn is_due(&self, now: Duration) -> bool {
