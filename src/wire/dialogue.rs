@@ -158,3 +158,64 @@ impl Dialogue {
         Some(Ended { ticket, command, outcome })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::books::Placed;
+    use super::super::format::{Answer, Head};
+    use super::*;
+
+    const PATIENCE: Patience = Patience { wait: Duration::from_millis(100), tries: 3 };
+
+    fn answer(board: u16, request: u8, command: Command, status: Status) -> Event<'static> {
+        let head = Head { board, boot: 0, sequence: 0, time_us: 0 };
+        let answer = Answer { request, command: command.kind(), status, value: 5 };
+        Event::Answer { head, placed: Placed::default(), answer }
+    }
+
+    fn at(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn a_command_is_sent_again_until_it_is_answered_and_the_next_waits() {
+        let mut dialogue = Dialogue::new(7, PATIENCE, 254);
+        assert_eq!((dialogue.due(), dialogue.send(at(0))), (None, None));
+        let first = dialogue.ask(Command::Start).unwrap();
+        let second = dialogue.ask(Command::Stop).unwrap();
+        let sent = dialogue.send(at(0)).unwrap().to_vec();
+        assert_eq!((dialogue.send(at(99)), dialogue.due()), (None, Some(at(100))));
+        assert_eq!(dialogue.send(at(100)), Some(&sent[..]), "the same request");
+        for other in [
+            answer(8, 255, Command::Start, Status::Done),
+            answer(7, 254, Command::Start, Status::Done),
+            answer(7, 255, Command::Stop, Status::Done),
+        ] {
+            assert_eq!(dialogue.hear(&other), None);
+        }
+        let ended = dialogue.hear(&answer(7, 255, Command::Start, Status::Done)).unwrap();
+        assert_eq!((ended.ticket, ended.outcome), (first, Outcome::Done { value: 5 }));
+        assert_eq!(dialogue.hear(&answer(7, 255, Command::Start, Status::Done)), None, "once is enough");
+        assert_ne!(dialogue.send(at(101)).unwrap(), sent);
+        let ended = dialogue.hear(&answer(7, 1, Command::Stop, Status::Bad)).unwrap();
+        assert_eq!((ended.ticket, ended.outcome), (second, Outcome::Refused(Status::Bad)), "0 is no request");
+        assert!(dialogue.is_idle());
+    }
+
+    #[test]
+    fn what_is_never_answered_is_given_up_after_its_last_wait() {
+        let mut dialogue = Dialogue::new(ANY_BOARD, PATIENCE, 0);
+        dialogue.ask(Command::Identify).unwrap();
+        let mut sent = 0;
+        for ms in (0..=300).step_by(10) {
+            assert_eq!((sent == 3 && ms == 300, dialogue.is_idle()), (ms == 300, false));
+            match dialogue.give_up(at(ms)) {
+                Some(ended) => assert_eq!((ms, ended.outcome), (300, Outcome::Unanswered)),
+                None => sent += u32::from(dialogue.send(at(ms)).is_some()),
+            }
+        }
+        assert!(dialogue.is_idle());
+        assert!((0..Dialogue::MOST).all(|_| dialogue.ask(Command::Start).is_some()));
+        assert_eq!(dialogue.ask(Command::Start), None, "too many");
+    }
+}

@@ -2,6 +2,8 @@
 
 mod author;
 mod bench;
+#[cfg(unix)]
+mod board;
 mod fields;
 mod inspect;
 mod live;

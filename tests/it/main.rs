@@ -10,6 +10,7 @@ mod draft;
 mod edited;
 mod extremes;
 mod filter;
+mod firmware;
 mod gate;
 mod geodesic;
 mod grouping;

@@ -407,7 +407,7 @@ fn harmed(packets: &[Packet], harms: &[Harm]) -> (Vec<u8>, Vec<bool>) {
     (line.into_iter().map(|(byte, _)| byte).collect(), whole)
 }
 
-fn frames_of_a_board() -> impl Strategy<Value = Vec<Packet>> {
+pub(crate) fn frames_of_a_board() -> impl Strategy<Value = Vec<Packet>> {
     let bits = prop::sample::select(vec![Bits::Eight, Bits::Ten, Bits::Twelve, Bits::Sixteen]);
     let values = prop::collection::vec(prop::option::weighted(0.8, any::<u16>()), 1..=80);
     prop::collection::vec((bits, values, any::<bool>()), 1..12).prop_map(|frames| {

@@ -117,7 +117,9 @@ pub(super) struct Arguments {
 }
 
 /// So long a board answers when it has sent everything, and the other side has time to read.
-const LINGER: Duration = Duration::from_millis(400);
+const LINGER: Duration = Duration::from_millis(500);
+/// So often it says meanwhile that it has.
+const TELL_EVERY: Duration = Duration::from_millis(50);
 /// A byte at 57600 baud takes 0.17 ms; the other side sees some at once, as from any USB adapter.
 const STEP: Duration = Duration::from_millis(2);
 
@@ -133,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 
     let mut feed = None;
     let (mut row, mut before, mut readings) = (0, Duration::ZERO, vec![None; play.taxels.len()]);
-    let mut ending: Option<Duration> = None;
+    let (mut ending, mut told_again): (Option<Duration>, _) = (None, Duration::ZERO);
     while !stop.load(Ordering::Relaxed) {
         let now = start.elapsed();
         if ending.is_none() {
@@ -165,9 +167,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         {
             break;
         }
-        if ending == Some(now) {
-            // Who listens learns how many frames there were.
+        if ending.is_some() && now >= told_again {
+            // Who listens learns how many frames there were; more than once, as its line may be bad.
             stations.iter_mut().for_each(|station| station.board.finish(now));
+            told_again = now + TELL_EVERY;
         }
         pty::wait(stations.iter().filter_map(|station| station.plug.as_ref()), STEP);
     }

@@ -76,11 +76,11 @@ impl Station {
     }
 
     pub(super) fn pull_out(&mut self) {
-        if self.plug.take().is_some()
-            && let Some(link) = &self.link
-        {
+        // The link first: the terminal's name may at once be another's.
+        if let (Some(_), Some(link)) = (&self.plug, &self.link) {
             let _ = std::fs::remove_file(link);
         }
+        self.plug = None;
     }
 
     /// Whether it has sent all that it will.

@@ -184,10 +184,12 @@ impl VirtualBoard {
         self.leaving.extend(&line[..length]);
     }
 
-    /// Sends no more frames, and says unasked how many there were.
+    /// Sends no more frames, and says unasked, where its line is free, how many there were.
     pub fn finish(&mut self, now: Duration) {
         self.running = false;
-        self.say_identity(0, now);
+        if self.leaving.is_empty() {
+            self.say_identity(0, now);
+        }
     }
 
     /// Whether a frame is due at `now`: the line is free, and so long has passed since the last as the rate says.
