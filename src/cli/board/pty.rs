@@ -38,7 +38,7 @@ impl Pty {
     pub(super) fn is_open(&self) -> bool {
         let mut ask = [PollFd::new(&self.end, PollFlags::IN)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
-        matches!(poll(&mut ask, Some(&now)), Ok(_) if !ask[0].revents().contains(PollFlags::HUP))
+        poll(&mut ask, Some(&now)).is_ok() && !ask[0].revents().contains(PollFlags::HUP)
     }
 
     /// What the other side sent since; nothing where nobody is there.

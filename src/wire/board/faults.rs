@@ -82,7 +82,7 @@ impl Faults {
                 self.drift = believable.ok_or("write millionths, up to 100000ppm, such as drift=50ppm")? * 1e-6;
             }
             "silence" => {
-                self.silence.push(window(value).ok_or("write silence=2s@10s, or silence=2s/10s for every 10 s")?)
+                self.silence.push(window(value).ok_or("write silence=2s@10s, or silence=2s/10s for every 10 s")?);
             }
             "unplug" => self.unplug.push(window(value).ok_or("write unplug=1s@20s, or unplug=1s/20s for every 20 s")?),
             "reset" => self.reset.push(window(value).ok_or("write reset@30s, or reset/30s for every 30 s")?),
