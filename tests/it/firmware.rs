@@ -104,7 +104,7 @@ fn the_sketch_in_c_writes_and_hears_the_documented_vectors() {
         })
         .skip(8)
         .collect();
-    assert!(says(&program, &turned).iter().all(|said| said.is_empty()));
+    assert!(says(&program, &turned).iter().all(String::is_empty));
     let said = says(&program, &[format!("hear 05aa{}{start}", "ff".repeat(3000))]);
     assert_eq!(said, ["19 3 4 0 0 0 "]);
 }
@@ -121,6 +121,6 @@ fn frames_from_c_are_what_rust_reads() {
     let said = says(&program, &lines);
     assert!(packets.len() > 200 && said.len() == packets.len());
     for (packet, said) in packets.iter().zip(&said) {
-        assert_eq!(decoded(&unhex(said)), [packet.clone()]);
+        assert_eq!(decoded(&unhex(said)), std::slice::from_ref(packet));
     }
 }
