@@ -73,6 +73,7 @@ mod stage;
 #[cfg(feature = "cli")]
 pub mod survey;
 mod whole;
+pub mod wire;
 
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, Comparison};

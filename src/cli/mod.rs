@@ -3,6 +3,8 @@
 mod author;
 mod bar;
 mod bench;
+#[cfg(unix)]
+mod board;
 mod calibrate;
 mod completions;
 mod devices;
@@ -46,6 +48,7 @@ Examples:
   somatic render robot.glb -o robot.png         where they are
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
+  somatic board --link /tmp/hand                a hand on a serial line, made of software
   somatic bench --sensors 1000 --fields 100     how fast this machine is
   somatic devices                               which GPUs and serial ports it has
 
@@ -72,6 +75,8 @@ enum Command {
     Plan(Box<plan::Arguments>),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
+    #[cfg(unix)]
+    Board(Box<board::Arguments>),
     Bench(bench::Arguments),
     Calibrate(calibrate::Arguments),
     Devices(devices::Arguments),
@@ -89,6 +94,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
+        #[cfg(unix)]
+        Command::Board(arguments) => board::run(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(arguments),
         Command::Devices(arguments) => devices::devices(arguments),

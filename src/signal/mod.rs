@@ -7,6 +7,7 @@ mod fsr;
 mod intake;
 mod letter;
 mod upkeep;
+mod wiring;
 
 pub use calibration::{
     Calibration, ChangeCalibration, Checks, ContactThresholds, FsrResponse, FsrSignal, Response, TaxelCalibration,
@@ -19,3 +20,4 @@ pub(crate) use intake::Intake;
 pub use letter::{Letter, Mark, Receptor};
 pub(crate) use upkeep::{Kept, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};
+pub use wiring::{WiredBoard, Wiring};

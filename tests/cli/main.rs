@@ -2,6 +2,8 @@
 
 mod author;
 mod bench;
+#[cfg(unix)]
+mod board;
 mod calibrate;
 mod devices;
 mod fields;

@@ -1,0 +1,305 @@
+//! `somatic board`: boards made of software, each on a pseudo-terminal of its own.
+
+mod pty;
+mod station;
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use somatic::signal::Wiring;
+use somatic::source::{CsvSource, Source, SourceSpec};
+use somatic::wire::board::{Faults, Make, VirtualBoard};
+use somatic::wire::{Bits, layout_hash};
+use somatic::{Error, Frame, Result, bundled};
+
+use self::station::{Common, Station};
+use super::feed::{Arrival, Feed, Manner};
+use super::run::stop_on_signal;
+use super::{DONE, load_body, print, words};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic board --link /tmp/hand --loop           a hand that is touched again and again, at /tmp/hand
+  somatic board --wiring hand.toml --source sim:rod.toml --frames 500
+  somatic board --boards 4 --for 10s --faults noise=1e-4,drop=1e-4,unplug=1s@5s
+
+Faults, with commas between them: noise=P and drop=P, the chance of a byte; flip=P, of a bit; drift=50ppm;
+silence=2s@10s, for 2 s once after 10 s; unplug=1s/20s, for 1 s every 20 s; reset@30s.
+docs/wire.md describes the format, the wiring and the board.";
+
+/// What a sensor that nobody touches reads.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Rest {
+    /// Readings rise when pressed.
+    Low,
+    /// Readings fall when pressed.
+    High,
+}
+
+/// Play boards on pseudo-terminals: the live path without hardware.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// What they play: csv:FILE, sim:FILE.toml, or - for NDJSON [default: a touch on the bundled hand].
+    #[arg(long, value_name = "SOURCE")]
+    source: Option<String>,
+
+    /// The body whose taxels NDJSON speaks of.
+    #[arg(long, value_name = "BODY", default_value = "hand")]
+    body: String,
+
+    /// Begin again at the end.
+    #[arg(long = "loop", conflicts_with = "frames")]
+    again: bool,
+
+    /// Which taxel hangs on which channel, TOML [default: in ascending order of their ids].
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["board", "boards"])]
+    wiring: Option<PathBuf>,
+
+    /// The id of the board, or of the first.
+    #[arg(long, value_name = "ID", default_value_t = 1)]
+    board: u16,
+
+    /// So many boards share the taxels.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    boards: usize,
+
+    /// A link to the pseudo-terminal, so that it has a steady name; of several boards, each has PATH-ID.
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+
+    /// Speed of the line.
+    #[arg(long, default_value_t = 57_600, value_parser = clap::value_parser!(u32).range(50..=50_000_000))]
+    baud: u32,
+
+    /// Bits of a value: 8, 10, 12 or 16 [default: the wiring's, or 10].
+    #[arg(long)]
+    bits: Option<u8>,
+
+    /// Frames a second [default: each that the source has, as far as the line takes them].
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Send only the channels that changed, and all once a second.
+    #[arg(long)]
+    partial: bool,
+
+    /// Send nothing before the host says start.
+    #[arg(long)]
+    wait: bool,
+
+    /// What an untouched sensor reads, which matters to the taps.
+    #[arg(long, value_enum, default_value = "low")]
+    rest: Rest,
+
+    /// What is to go wrong.
+    #[arg(long, value_name = "FAULTS", default_value = "")]
+    faults: String,
+
+    /// Whose luck it is: the same seed, the same faults.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// End when each board has sent so many frames; what is played begins again meanwhile.
+    #[arg(long, value_name = "N")]
+    frames: Option<u64>,
+
+    /// End after so many seconds, such as 2s.
+    #[arg(long = "for", value_name = "TIME")]
+    lasts: Option<String>,
+
+    /// Say where the boards are, and in the end what they sent, as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// So long a board answers when it has sent everything, and the other side has time to read.
+const LINGER: Duration = Duration::from_millis(500);
+/// So often it says meanwhile that it has.
+const TELL_EVERY: Duration = Duration::from_millis(50);
+/// A byte at 57600 baud takes 0.17 ms; the other side sees some at once, as from any USB adapter.
+const STEP: Duration = Duration::from_millis(2);
+
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    let (mut stations, common, play) = open(arguments)?;
+    let lasts = arguments.lasts.as_deref().map(seconds).transpose()?;
+    let stop = stop_on_signal()?;
+    let start = Instant::now();
+    for station in &mut stations {
+        station.plug_in()?;
+    }
+    tell_where(arguments, &stations)?;
+
+    let mut feed = None;
+    let (mut row, mut before, mut readings) = (0, Duration::ZERO, vec![None; play.taxels.len()]);
+    let (mut ending, mut told_again): (Option<Duration>, _) = (None, Duration::ZERO);
+    while !stop.load(Ordering::Relaxed) {
+        let now = start.elapsed();
+        if ending.is_none() {
+            let running = stations.iter().any(|station| station.board.is_running());
+            if feed.is_none() && running {
+                feed = Some(play.start()?);
+            }
+            match feed.as_mut().and_then(|feed| feed.next(Duration::ZERO)) {
+                Some(Arrival::Frames(frames, _)) => {
+                    row += 1;
+                    frames.iter().for_each(|frame| play.read(frame, &mut readings));
+                }
+                Some(Arrival::End(_)) if play.again => feed = None,
+                Some(Arrival::End(_)) => ending = Some(now),
+                Some(Arrival::Failed(error)) => return Err(error),
+                None => {}
+            }
+        }
+        for station in &mut stations {
+            station.go_on(now, now.saturating_sub(before), &common, row, &readings)?;
+        }
+        before = now;
+        let over = stations.iter_mut().all(|station| station.is_done(&common)) || lasts.is_some_and(|most| now >= most);
+        if over && ending.is_none() {
+            ending = Some(now);
+        }
+        if let Some(since) = ending
+            && now >= since + LINGER
+        {
+            break;
+        }
+        if ending.is_some() && now >= told_again {
+            // Who listens learns how many frames there were; more than once, as its line may be bad.
+            stations.iter_mut().for_each(|station| station.board.finish(now));
+            told_again = now + TELL_EVERY;
+        }
+        pty::wait(stations.iter().filter_map(|station| station.plug.as_ref()), STEP);
+    }
+    tell_what(arguments, &stations, start.elapsed())
+}
+
+/// What is played.
+struct Play {
+    spec: Option<SourceSpec>,
+    ids: Vec<u32>,
+    taxels: Vec<u32>,
+    most: f64,
+    again: bool,
+}
+
+impl Play {
+    fn open(spec: Option<&SourceSpec>, ids: &[u32]) -> Result<Box<dyn Source + Send>> {
+        match spec {
+            Some(spec) => spec.open(ids, None),
+            None => Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?)),
+        }
+    }
+
+    fn start(&self) -> Result<Feed> {
+        let speed = (self.spec != Some(SourceSpec::Stdin)).then_some(1.0);
+        Ok(Feed::start(Self::open(self.spec.as_ref(), &self.ids)?, Manner { most: 1, gather: false, speed }))
+    }
+
+    /// Whole counts within the bits of a value. What is missing or no number is no reading.
+    fn read(&self, frame: &Frame, readings: &mut [Option<u16>]) {
+        for (reading, value) in readings.iter_mut().zip(&frame.values) {
+            *reading = value.number().map(|value| value.round().clamp(0.0, self.most) as u16);
+        }
+    }
+}
+
+fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
+    let faults: Faults = arguments.faults.parse()?;
+    let spec = arguments.source.as_deref().map(str::parse::<SourceSpec>).transpose()?;
+    let again = arguments.again || arguments.frames.is_some();
+    let live = spec == Some(SourceSpec::Stdin);
+    if live && arguments.again {
+        return Err(Error::usage("standard input cannot be read twice; leave out --loop"));
+    }
+    let wiring = arguments.wiring.as_ref().map(Wiring::load).transpose()?;
+    let ids: Vec<u32> =
+        if live { load_body(&arguments.body)?.taxels.iter().map(|taxel| taxel.id).collect() } else { Vec::new() };
+    let taxels = Play::open(spec.as_ref(), &ids)?.taxels().to_vec();
+    let wiring = match wiring {
+        Some(wiring) => wiring,
+        None => Wiring::in_order(&taxels, arguments.board, arguments.boards)?,
+    };
+    let rate_mhz = match arguments.rate {
+        None => 0,
+        Some(hz) if (0.001..=1e6).contains(&hz) => (hz * 1e3).round() as u32,
+        Some(hz) => return Err(Error::usage(format!("--rate {hz} is no rate; give 0.001 to 1000000 Hz"))),
+    };
+    let mut stations = Vec::new();
+    let mut most = 0;
+    for wired in wiring.boards() {
+        let count = arguments.bits.or(wired.bits).unwrap_or(10);
+        let bits = Bits::new(count)
+            .ok_or_else(|| Error::usage(format!("--bits {count} is not possible; give 8, 10, 12 or 16")))?;
+        most = most.max(bits.most());
+        let place = |taxel: &Option<u32>| taxels.iter().position(|id| Some(id) == taxel.as_ref());
+        let make = Make {
+            board: wired.id,
+            channels: wired.taxels.len() as u16,
+            bits,
+            layout: layout_hash(wired.taxels.iter().copied()),
+            rate_mhz,
+            running: !arguments.wait,
+            partial: arguments.partial,
+            falls: arguments.rest == Rest::High,
+            drift: faults.drift,
+        };
+        let link = arguments.link.as_ref().map(|link| match wiring.boards() {
+            [_] => link.clone(),
+            _ => PathBuf::from(format!("{}-{}", link.display(), wired.id)),
+        });
+        let places = wired.taxels.iter().map(place).collect();
+        stations.push(Station::new(wired.id, VirtualBoard::new(make, Duration::ZERO), places, link, arguments.seed));
+    }
+    let common = Common { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
+    Ok((stations, common, Play { spec, ids, taxels, most: most.into(), again: again && !live }))
+}
+
+/// `2s`, `500ms`, `10min`.
+fn seconds(text: &str) -> Result<Duration> {
+    let unit = |suffix: &str, factor: f64| Some(text.strip_suffix(suffix)?.trim().parse::<f64>().ok()? * factor);
+    let span = unit("ms", 1e-3).or_else(|| unit("min", 60.0)).or_else(|| unit("s", 1.0));
+    span.and_then(|s| Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| Error::usage(format!("--for `{text}` is no time; write 2s, 500ms or 10min")))
+}
+
+fn tell_where(arguments: &Arguments, stations: &[Station]) -> Result<()> {
+    let about = |station: &Station| {
+        json!({"board": station.id, "port": station.port(), "link": station.link, "baud": arguments.baud,
+            "channels": station.places.len()})
+    };
+    if arguments.json {
+        let boards: Vec<Value> = stations.iter().map(about).collect();
+        return print(&format!("{}\n", json!({"playing": boards})));
+    }
+    let line = |station: &Station| {
+        let link = station.link.as_ref().map(|link| format!(" ({})", link.display())).unwrap_or_default();
+        let channels = words::count(station.places.len() as u64, "channel");
+        format!("board {} at {}{link}: {channels}, {} baud\n", station.id, station.port(), arguments.baud)
+    };
+    print(&stations.iter().map(line).collect::<String>())
+}
+
+fn tell_what(arguments: &Arguments, stations: &[Station], time: Duration) -> Result<u8> {
+    let accounts: Vec<Value> = stations.iter().map(Station::account).collect();
+    if arguments.json {
+        print(&format!("{}\n", json!({"seconds": time.as_secs_f64(), "sent": accounts})))?;
+        return Ok(DONE);
+    }
+    let mut text = String::new();
+    for account in &accounts {
+        let number = |key: &str| account[key].as_u64().unwrap_or(0);
+        let (frames, bytes) = (words::count(number("frames"), "frame"), words::count(number("bytes"), "byte"));
+        text += &format!("board {}: {frames}, {bytes} sent", number("board"));
+        let happened = account["faults"].as_object().into_iter().flatten();
+        for (name, count) in happened.filter(|(_, count)| count.as_u64() > Some(0)) {
+            text += &format!(", {count} {}", name.replace('_', " "));
+        }
+        text += "\n";
+    }
+    print(&text)?;
+    Ok(DONE)
+}

@@ -1,0 +1,96 @@
+//! A pseudo-terminal: a serial line whose one end is this process. The only user of `rustix`.
+
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{ControlModes, tcgetattr};
+use somatic::{Error, Result};
+
+/// This process's end.
+pub(super) struct Pty {
+    end: OwnedFd,
+    /// What the other side opens.
+    pub(super) path: PathBuf,
+}
+
+fn failed(what: &str, error: Errno) -> Error {
+    Error::failed(format!("{what}: {}", std::io::Error::from(error))).at("pseudo-terminal")
+}
+
+impl Pty {
+    pub(super) fn open() -> Result<Self> {
+        let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).map_err(|e| failed("cannot open one", e))?;
+        let ready = grantpt(&end).and_then(|()| unlockpt(&end)).and_then(|()| rustix::io::ioctl_fionbio(&end, true));
+        ready.map_err(|e| failed("cannot set it up", e))?;
+        let name = ptsname(&end, Vec::new()).map_err(|e| failed("it has no name", e))?;
+        let path = PathBuf::from(name.to_string_lossy().into_owned());
+        // Opened and closed once, it knows that nobody is there.
+        drop(rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty()));
+        Ok(Self { end, path })
+    }
+
+    /// Whether somebody has opened the other end.
+    pub(super) fn is_open(&self) -> bool {
+        let mut ask = [PollFd::new(&self.end, PollFlags::IN)];
+        let now = Timespec { tv_sec: 0, tv_nsec: 0 };
+        poll(&mut ask, Some(&now)).is_ok() && !ask[0].revents().contains(PollFlags::HUP)
+    }
+
+    /// What the other side sent since; nothing where nobody is there.
+    pub(super) fn read<'a>(&self, buffer: &'a mut [u8]) -> &'a [u8] {
+        let count = rustix::io::read(&self.end, &mut *buffer).unwrap_or(0);
+        &buffer[..count]
+    }
+
+    /// Gives `bytes` to the other side; how many it had room for.
+    pub(super) fn write(&self, bytes: &[u8]) -> usize {
+        let mut written = 0;
+        while written < bytes.len() {
+            match rustix::io::write(&self.end, &bytes[written..]) {
+                Ok(count) if count > 0 => written += count,
+                Err(Errno::INTR) => {}
+                _ => break,
+            }
+        }
+        written
+    }
+
+    /// The speed that the other side has set, over `baud`: 1 within the 2 % that a UART bears. With another parity,
+    /// number of bits or of stop bits, it is not 1.
+    pub(super) fn heard_at(&self, baud: u32) -> f64 {
+        let Ok(set) = tcgetattr(&self.end) else { return 1.0 };
+        let ratio = f64::from(set.output_speed()) / f64::from(baud);
+        let framing = set.control_modes & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);
+        match (ratio - 1.0).abs() <= 0.02 {
+            true if framing == ControlModes::CS8 => 1.0,
+            true => 0.98,
+            false => ratio,
+        }
+    }
+}
+
+/// Sleeps until one of `ends` has something to read, or for `most`.
+pub(super) fn wait<'a>(ends: impl Iterator<Item = &'a Pty>, most: Duration) {
+    // An end that nobody has opened is always ready.
+    let mut ask: Vec<PollFd<'_>> =
+        ends.filter(|pty| pty.is_open()).map(|pty| PollFd::new(&pty.end, PollFlags::IN)).collect();
+    let most = Timespec { tv_sec: 0, tv_nsec: most.subsec_nanos().into() };
+    let _ = poll(&mut ask, Some(&most));
+}
+
+/// A symbolic link `link` to `path`, in the place of a link that was there.
+pub(super) fn link(path: &Path, link: &Path) -> Result<()> {
+    if std::fs::symlink_metadata(link).is_ok_and(|there| !there.is_symlink()) {
+        return Err(Error::failed("there is a file of this name; give --link another").at(link.display()));
+    }
+    let mut beside = link.as_os_str().to_owned();
+    beside.push(".new");
+    let _ = std::fs::remove_file(&beside);
+    let made = std::os::unix::fs::symlink(path, &beside).and_then(|()| std::fs::rename(&beside, link));
+    made.map_err(|e| Error::io(link, &e))
+}

@@ -1,0 +1,179 @@
+//! A board with its line: paced to its speed, with the faults it is to have.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use somatic::Result;
+use somatic::wire::board::{BadLine, Faults, VirtualBoard, Window};
+
+use super::pty::{self, Pty};
+
+/// A line that was not looked after for so long has not sent meanwhile.
+const MOST_AT_ONCE: Duration = Duration::from_millis(50);
+
+/// What all boards of a command have in common.
+pub(super) struct Common {
+    pub(super) baud: u32,
+    pub(super) faults: Faults,
+    /// Frames that a board sends at most.
+    pub(super) frames: u64,
+}
+
+pub(super) struct Station {
+    pub(super) id: u16,
+    pub(super) board: VirtualBoard,
+    /// Per channel, its place in a row of readings.
+    pub(super) places: Vec<Option<usize>>,
+    pub(super) plug: Option<Pty>,
+    pub(super) link: Option<PathBuf>,
+    to_host: BadLine,
+    from_host: BadLine,
+    /// Bytes that the line has had time for.
+    credit: f64,
+    row: u64,
+    resets: u64,
+    unplugs: u64,
+    bytes: u64,
+    unheard: u64,
+    overrun: u64,
+}
+
+impl Station {
+    pub(super) fn new(
+        id: u16,
+        board: VirtualBoard,
+        places: Vec<Option<usize>>,
+        link: Option<PathBuf>,
+        seed: u64,
+    ) -> Self {
+        let seed = seed.wrapping_mul(0x1_0001).wrapping_add(id.into());
+        Self {
+            id,
+            board,
+            places,
+            plug: None,
+            link,
+            to_host: BadLine::new(seed),
+            from_host: BadLine::new(!seed),
+            credit: 0.0,
+            row: 0,
+            resets: 0,
+            unplugs: 0,
+            bytes: 0,
+            unheard: 0,
+            overrun: 0,
+        }
+    }
+
+    pub(super) fn plug_in(&mut self) -> Result<()> {
+        let pty = Pty::open()?;
+        if let Some(link) = &self.link {
+            pty::link(&pty.path, link)?;
+        }
+        self.plug = Some(pty);
+        Ok(())
+    }
+
+    pub(super) fn pull_out(&mut self) {
+        // The link first: the terminal's name may at once be another's.
+        if let (Some(_), Some(link)) = (&self.plug, &self.link) {
+            let _ = std::fs::remove_file(link);
+        }
+        self.plug = None;
+    }
+
+    /// Whether it has sent all that it will.
+    pub(super) fn is_done(&mut self, common: &Common) -> bool {
+        self.board.frames() >= common.frames && self.board.leaving().is_empty()
+    }
+
+    /// Does what happens between `now` − `step` and `now`. `row` numbers the `readings`.
+    pub(super) fn go_on(
+        &mut self,
+        now: Duration,
+        step: Duration,
+        common: &Common,
+        row: u64,
+        readings: &[Option<u16>],
+    ) -> Result<()> {
+        let faults = &common.faults;
+        let begun = |windows: &[Window]| windows.iter().map(|window| window.at(now).0).sum::<u64>();
+        let lasts = |windows: &[Window]| windows.iter().any(|window| window.at(now).1);
+        self.unplugs = begun(&faults.unplug);
+        match (lasts(&faults.unplug), &self.plug) {
+            (true, Some(_)) => self.pull_out(),
+            (false, None) => self.plug_in()?,
+            _ => {}
+        }
+        if begun(&faults.reset) > self.resets {
+            self.resets = begun(&faults.reset);
+            self.board.start_again(now);
+        }
+        let heard_at = self.plug.as_ref().filter(|plug| plug.is_open()).map(|plug| plug.heard_at(common.baud));
+        if let (Some(plug), Some(heard_at)) = (&self.plug, heard_at) {
+            let (mut buffer, mut arrives) = ([0; 1024], Vec::new());
+            for &byte in plug.read(&mut buffer) {
+                self.from_host.pass(byte, faults, 1.0 / heard_at, &mut arrives);
+            }
+            self.board.hear(&arrives, now);
+        }
+        self.credit += step.min(MOST_AT_ONCE).as_secs_f64() * f64::from(common.baud) / 10.0;
+        let (silent, mut arrives) = (lasts(&faults.silence), Vec::new());
+        while self.credit >= 1.0 {
+            if self.board.leaving().is_empty() {
+                let fresh = row > self.row || (row > 0 && !self.board.has_no_rate());
+                let may = !silent && fresh && self.board.frames() < common.frames;
+                if !may || !self.board.is_due(now) {
+                    self.credit = 0.0;
+                    break;
+                }
+                let own: Vec<Option<u16>> = self.places.iter().map(|place| readings[(*place)?]).collect();
+                self.board.send(&own, now);
+                self.row = row;
+            }
+            let Some(byte) = self.board.leaving().pop_front() else { break };
+            self.credit -= 1.0;
+            self.bytes += 1;
+            match heard_at {
+                Some(heard_at) => self.to_host.pass(byte, faults, heard_at, &mut arrives),
+                None => self.unheard += 1,
+            }
+        }
+        if let Some(plug) = &self.plug {
+            self.overrun += (arrives.len() - plug.write(&arrives)) as u64;
+        }
+        Ok(())
+    }
+
+    pub(super) fn port(&self) -> String {
+        self.plug.as_ref().map_or_else(|| "unplugged".to_owned(), |plug| plug.path.display().to_string())
+    }
+
+    /// What it did.
+    pub(super) fn account(&self) -> Value {
+        let (out, back) = (self.to_host.done, self.from_host.done);
+        json!({
+            "board": self.id,
+            "frames": self.board.frames(),
+            "bytes": self.bytes,
+            "commands": self.board.commands(),
+            "faults": {
+                "noise_bytes": out.noise_bytes + back.noise_bytes,
+                "dropped_bytes": out.dropped_bytes + back.dropped_bytes,
+                "flipped_bits": out.flipped_bits + back.flipped_bits,
+                "garbled_bytes": out.garbled_bytes + back.garbled_bytes,
+                "unplugs": self.unplugs,
+                "resets": self.resets,
+            },
+            "unheard_bytes": self.unheard,
+            "overrun_bytes": self.overrun,
+        })
+    }
+}
+
+impl Drop for Station {
+    fn drop(&mut self) {
+        self.pull_out();
+    }
+}

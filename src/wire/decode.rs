@@ -1,0 +1,367 @@
+//! From bytes, in whatever pieces they come, to packets.
+//!
+//! A [`Decoder`] takes anything: what is no packet is told as [`Event::Corrupt`] and costs no more than itself, as a zero
+//! byte ends every packet and stands nowhere else. It remembers one packet's worth of bytes and a few numbers a board,
+//! whatever comes in.
+
+use super::books::{Books, Placed};
+use super::format::{
+    Answer, Bits, CHECKSUM, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, HEAD_BYTES, Head, Identity, MOST_CHANNELS,
+    MOST_ON_LINE, Status, VERSION, kind,
+};
+
+/// What came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event<'a> {
+    /// Values of a board's channels.
+    Frame {
+        /// Who sent it, and when.
+        head: Head,
+        /// The board's clock since it was first heard or last started, unwrapped, µs, and what is missing before it.
+        placed: Placed,
+        /// The values.
+        values: Values<'a>,
+    },
+    /// A board says who it is.
+    Identity {
+        /// Who sent it, and when.
+        head: Head,
+        /// As for a frame.
+        placed: Placed,
+        /// What it says.
+        identity: Identity<'a>,
+    },
+    /// A board answers a command.
+    Answer {
+        /// Who sent it, and when.
+        head: Head,
+        /// As for a frame.
+        placed: Placed,
+        /// What it says.
+        answer: Answer,
+    },
+    /// A command, as boards hear it.
+    Command {
+        /// To whom; [`ANY_BOARD`](super::ANY_BOARD) is to whoever hears it.
+        board: u16,
+        /// Its number.
+        request: u8,
+        /// What is asked.
+        command: Command,
+    },
+    /// Bytes that are no packet.
+    Corrupt {
+        /// What is wrong with them.
+        why: Corruption,
+        /// How many they are, the zero that ended them included.
+        bytes: usize,
+    },
+}
+
+/// Why bytes are no packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Corruption {
+    /// The first bytes after listening began, which may be the end of a whole packet.
+    Joined,
+    /// Fewer bytes than the shortest packet has.
+    Short,
+    /// No zero within the bytes that the longest packet has.
+    Long,
+    /// The COBS code is broken.
+    Code,
+    /// The checksum does not agree.
+    Checksum,
+    /// A whole packet of another version of the format.
+    Version(u8),
+    /// A whole packet of a kind that this version does not know.
+    Kind(u8),
+    /// A whole packet whose contents do not fit its kind.
+    Contents,
+}
+
+impl std::fmt::Display for Corruption {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Joined => f.write_str("the end of a packet"),
+            Self::Short => f.write_str("too short for a packet"),
+            Self::Long => f.write_str("too long for a packet"),
+            Self::Code => f.write_str("a broken code"),
+            Self::Checksum => f.write_str("a wrong checksum"),
+            Self::Version(version) => write!(f, "a packet of version {version}; this one reads version {VERSION}"),
+            Self::Kind(kind) => write!(f, "a packet of the unknown kind {kind:#04x}"),
+            Self::Contents => f.write_str("a packet whose contents do not fit its kind"),
+        }
+    }
+}
+
+/// The values of a frame, as they are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Values<'a> {
+    bits: Bits,
+    /// Which channels have a value, a bit each; `None` is all.
+    channels: Option<&'a [u8]>,
+    packed: &'a [u8],
+}
+
+impl<'a> Values<'a> {
+    /// The bits of a value.
+    #[must_use]
+    pub fn bits(&self) -> Bits {
+        self.bits
+    }
+
+    /// Whether only some channels have a value. The others have kept what they had in the frame before.
+    #[must_use]
+    pub fn is_partial(&self) -> bool {
+        self.channels.is_some()
+    }
+
+    /// How many values there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self.channels {
+            None => self.bits.values(self.packed.len()),
+            Some(channels) => channels.iter().map(|byte| byte.count_ones() as usize).sum(),
+        }
+    }
+
+    /// Whether there are none: nothing changed.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The number of channels that the frame speaks of: one more than the last with a value.
+    #[must_use]
+    pub fn reach(&self) -> usize {
+        self.iter().last().map_or(0, |(channel, _)| usize::from(channel) + 1)
+    }
+
+    /// Channels, in order, with their values.
+    pub fn iter(&self) -> impl Iterator<Item = (u16, u16)> + use<'a> {
+        let (count, bits, packed) = (self.len(), usize::from(self.bits.count()), self.packed);
+        let mut channels = ChannelsOf { channels: self.channels, next: 0 };
+        (0..count).map(move |index| (channels.step(), value(packed, index * bits, bits)))
+    }
+}
+
+/// `bits` bits of `packed` from bit `start` on.
+fn value(packed: &[u8], start: usize, bits: usize) -> u16 {
+    let first = start / 8;
+    let bytes = [0, 1, 2].map(|more| packed.get(first + more).copied().unwrap_or(0));
+    let three = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], 0]);
+    ((three >> (start % 8)) & ((1 << bits) - 1)) as u16
+}
+
+struct ChannelsOf<'a> {
+    channels: Option<&'a [u8]>,
+    next: u16,
+}
+
+impl ChannelsOf<'_> {
+    fn step(&mut self) -> u16 {
+        if let Some(set) = self.channels {
+            let at = |channel: u16| set.get(usize::from(channel / 8)).map(|byte| byte >> (channel % 8) & 1);
+            while at(self.next) == Some(0) {
+                self.next += 1;
+            }
+        }
+        self.next += 1;
+        self.next - 1
+    }
+}
+
+/// What has come so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// Bytes of any sort.
+    pub bytes: u64,
+    /// Whole packets of this version that were understood.
+    pub packets: u64,
+    /// Times that bytes were no packet, [`Corruption::Joined`] left out.
+    pub corrupt: u64,
+}
+
+/// From bytes to events.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    waiting: Vec<u8>,
+    /// Bytes of a packet that is too long, which are forgotten until it ends.
+    skipped: usize,
+    joined: bool,
+    heard: Heard,
+    books: Books,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+static CHECKSUM_TABLE: crc::Crc<u32> = CHECKSUM;
+
+impl Decoder {
+    /// A decoder that begins to listen, as it may be, in the middle of a packet.
+    #[must_use]
+    pub fn new() -> Self {
+        let waiting = Vec::with_capacity(MOST_ON_LINE);
+        Self { waiting, skipped: 0, joined: true, heard: Heard::default(), books: Books::default() }
+    }
+
+    /// Forgets the packet that has begun, as when a line was closed; what was counted stays.
+    pub fn rejoin(&mut self) {
+        self.waiting.clear();
+        self.skipped = 0;
+        self.joined = true;
+    }
+
+    /// What has come so far.
+    #[must_use]
+    pub fn heard(&self) -> Heard {
+        self.heard
+    }
+
+    /// What came of what each board sent.
+    #[must_use]
+    pub fn books(&self) -> &Books {
+        &self.books
+    }
+
+    /// Takes the bytes that came next and tells `on` what they bring, in order.
+    pub fn push(&mut self, bytes: &[u8], mut on: impl FnMut(Event<'_>)) {
+        self.heard.bytes += bytes.len() as u64;
+        let mut rest = bytes;
+        while let Some(end) = rest.iter().position(|&byte| byte == 0) {
+            self.take(&rest[..end]);
+            rest = &rest[end + 1..];
+            self.finish(&mut on);
+        }
+        self.take(rest);
+    }
+
+    /// Remembers `bytes` as far as a packet can go.
+    fn take(&mut self, bytes: &[u8]) {
+        // The longest packet's last byte is the zero.
+        if self.skipped > 0 || self.waiting.len() + bytes.len() >= MOST_ON_LINE {
+            self.skipped += self.waiting.len() + bytes.len();
+            self.waiting.clear();
+        } else {
+            self.waiting.extend_from_slice(bytes);
+        }
+    }
+
+    /// A zero came.
+    fn finish(&mut self, on: &mut impl FnMut(Event<'_>)) {
+        let length = self.waiting.len() + self.skipped;
+        let joined = std::mem::take(&mut self.joined);
+        let long = std::mem::take(&mut self.skipped) > 0;
+        // A zero after a zero is an idle line, or a sender that makes sure.
+        if length == 0 {
+            return;
+        }
+        let understood = if long { Err(Corruption::Long) } else { understand(&mut self.waiting) };
+        match understood {
+            Ok(packet) => {
+                self.heard.packets += 1;
+                on(self.books.enter(packet));
+            }
+            Err(why) => {
+                let whole = matches!(why, Corruption::Version(_) | Corruption::Kind(_) | Corruption::Contents);
+                let why = if joined && !whole { Corruption::Joined } else { why };
+                self.heard.corrupt += u64::from(why != Corruption::Joined);
+                on(Event::Corrupt { why, bytes: length + 1 });
+            }
+        }
+        self.waiting.clear();
+    }
+}
+
+/// The packet in `coded`, without its place in the books.
+fn understand(coded: &mut [u8]) -> Result<Event<'_>, Corruption> {
+    let length = cobs::decode_in_place(coded).map_err(|_| Corruption::Code)?;
+    if length < COMMAND_HEAD_BYTES + CHECKSUM_BYTES {
+        return Err(Corruption::Short);
+    }
+    let (packet, checksum) = coded[..length].split_at(length - CHECKSUM_BYTES);
+    if CHECKSUM_TABLE.checksum(packet).to_le_bytes() != checksum {
+        return Err(Corruption::Checksum);
+    }
+    if packet[0] != VERSION {
+        return Err(Corruption::Version(packet[0]));
+    }
+    match packet[1] {
+        kind::IDENTIFY..=kind::STOP => command(packet).ok_or(Corruption::Contents),
+        kind::FRAME..=kind::ANSWER => from_board(packet).ok_or(Corruption::Contents),
+        other => Err(Corruption::Kind(other)),
+    }
+}
+
+fn command(packet: &[u8]) -> Option<Event<'_>> {
+    let (head, body) = packet.split_first_chunk::<COMMAND_HEAD_BYTES>()?;
+    let command = match (head[1], body) {
+        (kind::IDENTIFY, []) => Command::Identify,
+        (kind::RATE, &[a, b, c, d]) => Command::Rate { rate_mhz: u32::from_le_bytes([a, b, c, d]) },
+        (kind::TAP, &[a, b, tap]) => Command::Tap { channel: u16::from_le_bytes([a, b]), tap },
+        (kind::START, []) => Command::Start,
+        (kind::STOP, []) => Command::Stop,
+        _ => return None,
+    };
+    Some(Event::Command { board: u16::from_le_bytes([head[2], head[3]]), request: head[4], command })
+}
+
+fn from_board(packet: &[u8]) -> Option<Event<'_>> {
+    let (bytes, body) = packet.split_first_chunk::<HEAD_BYTES>()?;
+    let &[_, kind, b0, b1, boot, s0, s1, s2, s3, t0, t1, t2, t3] = bytes;
+    let head = Head {
+        board: u16::from_le_bytes([b0, b1]),
+        boot,
+        sequence: u32::from_le_bytes([s0, s1, s2, s3]),
+        time_us: u32::from_le_bytes([t0, t1, t2, t3]),
+    };
+    let placed = Placed::default();
+    match kind {
+        kind::FRAME | kind::PARTIAL => Some(Event::Frame { head, placed, values: values(kind, body)? }),
+        kind::IDENTITY => {
+            let (bytes, text) = body.split_first_chunk::<13>()?;
+            let &[request, running, c0, c1, bits, l0, l1, l2, l3, r0, r1, r2, r3] = bytes;
+            let identity = Identity {
+                request,
+                running: running & 1 == 1,
+                channels: u16::from_le_bytes([c0, c1]),
+                bits: Bits::new(bits)?,
+                layout: u32::from_le_bytes([l0, l1, l2, l3]),
+                rate_mhz: u32::from_le_bytes([r0, r1, r2, r3]),
+                firmware: std::str::from_utf8(text).unwrap_or(""),
+            };
+            let fits = (1..=MOST_CHANNELS).contains(&usize::from(identity.channels));
+            fits.then_some(Event::Identity { head, placed, identity })
+        }
+        _ => {
+            let &[request, command, status, v0, v1, v2, v3] = body else { return None };
+            let status = Status::of(status);
+            let answer = Answer { request, command, status, value: u32::from_le_bytes([v0, v1, v2, v3]) };
+            Some(Event::Answer { head, placed, answer })
+        }
+    }
+}
+
+/// The values in a frame's body, if it is as long as they say.
+fn values(kind: u8, body: &[u8]) -> Option<Values<'_>> {
+    let (&bits, rest) = body.split_first()?;
+    let bits = Bits::new(bits)?;
+    let (channels, packed) = if kind == kind::FRAME {
+        (None, rest)
+    } else {
+        let (&bytes, rest) = rest.split_first()?;
+        let (channels, packed) = rest.split_at_checked(bytes.into())?;
+        (Some(channels), packed)
+    };
+    let values = Values { bits, channels, packed };
+    let count = values.len();
+    let some = channels.is_some() || count > 0;
+    let few = count <= MOST_CHANNELS && channels.is_none_or(|set| set.len() <= MOST_CHANNELS / 8);
+    let spare = bits.bytes(count) * 8 - count * usize::from(bits.count());
+    let padded = packed.last().is_none_or(|last| u32::from(*last) >> (8 - spare) == 0);
+    (some && few && packed.len() == bits.bytes(count) && padded).then_some(values)
+}
