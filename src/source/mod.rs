@@ -4,11 +4,15 @@
 
 mod csv;
 mod ndjson;
+#[cfg(feature = "mcap")]
+mod recorded;
+mod replay;
 mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
 pub use ndjson::NdjsonSource;
+pub use replay::{Cut, Replay};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 
@@ -30,6 +34,9 @@ pub trait Source {
     fn progress(&self) -> Option<f64> {
         None
     }
+
+    /// Says that nothing before `t_s` is wanted: a source that can pass over it without reading it does so.
+    fn skip_to(&mut self, _t_s: f64) {}
 
     /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.
     fn losses(&self) -> Vec<String> {
