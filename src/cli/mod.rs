@@ -5,7 +5,9 @@ mod author;
 mod bar;
 mod bench;
 mod completions;
+mod convert;
 mod feed;
+mod info;
 mod input;
 mod inspect;
 mod live;
@@ -45,6 +47,7 @@ Examples:
   somatic render robot.glb -o robot.png         where they are
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
+  somatic info touch.mcap                       how long a recording is, and what is in it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
@@ -69,6 +72,8 @@ enum Command {
     Render(render::Arguments),
     Plan(Box<plan::Arguments>),
     Simulate(simulate::Arguments),
+    Info(info::Arguments),
+    Convert(convert::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
     Completions(completions::Arguments),
@@ -84,6 +89,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Render(arguments) => render::render(arguments),
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Info(arguments) => info::info(arguments),
+        Command::Convert(arguments) => convert::convert(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
         Command::Completions(arguments) => completions::completions(arguments),

@@ -367,10 +367,12 @@ impl Reader {
     }
 
     fn tell_cut(&mut self, bytes: u64) {
-        let after = after(self.last_s);
         let what = if bytes > 0 { format!("; {bytes} bytes of a chunk begun") } else { String::new() };
-        self.losses
-            .push(format!("{}: it was never ended, so that up to a second {after} may be missing{what}", self.name));
+        let missing = match self.last_s {
+            Some(t_s) => format!("what came after t = {t_s} s is missing"),
+            None => "no frame of it is whole".to_owned(),
+        };
+        self.losses.push(format!("{}: it was never ended: {missing}{what}", self.name));
     }
 
     /// Says what is to be said when nothing more comes; once.

@@ -3,6 +3,7 @@
 //! A source knows the taxel ids it delivers and nothing of engines; of bodies only the simulated one does.
 
 mod csv;
+mod csv_file;
 mod ndjson;
 #[cfg(feature = "mcap")]
 mod recorded;
@@ -11,6 +12,7 @@ mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
+pub use csv_file::CsvFile;
 pub use ndjson::NdjsonSource;
 pub use replay::{Cut, Replay};
 pub use simulated::{SimulatedSource, Truth, write_recording};

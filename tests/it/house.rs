@@ -21,8 +21,9 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("scene", vec!["error", "length", "percept", "signal", "body", "field", "stage"]),
         ("backend", below_backend.to_vec()),
         ("engine", [&below_backend[..], &["backend"]].concat()),
-        ("source", vec!["error", "keys", "signal", "body", "field", "bundled", "whole"]),
-        ("sink", vec!["error", "percept"]),
+        ("recording", vec!["error", "signal", "body"]),
+        ("source", vec!["error", "keys", "signal", "body", "field", "bundled", "whole", "recording"]),
+        ("sink", vec!["error", "percept", "signal", "body", "recording"]),
         ("ink", vec!["error"]),
         ("picture", vec!["error", "body", "field", "backend", "ink", "whole"]),
         (
@@ -107,6 +108,8 @@ fn each_heavy_dependency_has_one_door() {
         ("fearless_simd", "backend/cpu"),
         ("plotters", "ink|experiments/plot.rs|picture/words.rs"),
         ("png", "ink"),
+        ("mcap", "recording"),
+        ("crc32fast", "recording"),
     ];
     for (dependency, door) in doors {
         let mut seen = false;
