@@ -46,14 +46,13 @@ impl Recorder {
     /// The file is there, or cannot be made.
     pub fn create(path: impl AsRef<Path>, ids: &[u32], force: bool) -> Result<Self> {
         let path = path.as_ref();
-        let mut options = File::options();
-        options.write(true);
-        if force {
-            options.create(true).truncate(true)
-        } else {
-            options.create_new(true)
+        let made = File::options().write(true).create_new(true).open(path);
+        let is_there = made.as_ref().is_err_and(|e| e.kind() == ErrorKind::AlreadyExists);
+        let file = match made {
+            Err(_) if is_there && force => File::options().write(true).truncate(true).open(path),
+            made => made,
         };
-        let file = options.open(path).map_err(|e| match e.kind() {
+        let file = file.map_err(|e| match e.kind() {
             ErrorKind::AlreadyExists => {
                 Error::failed("it is there already; choose another name, or say --force").at(path.display())
             }
@@ -79,7 +78,8 @@ impl Recorder {
             message: Vec::new(),
             flushed: Instant::now(),
             pending: false,
-            worth_keeping: false,
+            // What was there before, be it a device, is not ours to take away.
+            worth_keeping: is_there,
         };
         // Outside of any chunk and before all else: what every frame's meaning hangs on.
         let ids = BTreeMap::from([(TAXEL_IDS.to_owned(), recorder.taxels.clone())]);
