@@ -80,8 +80,11 @@ pub struct Heard<'a> {
     /// The frames.
     pub frames: &'a [Frame],
     /// Puts in place of what the list holds, for one of the frames, taxel ids and their pressures.
-    pub pressures: &'a dyn Fn(&Frame, &mut Vec<(u32, f64)>),
+    pub pressures: &'a Pressures<'a>,
 }
+
+/// Puts taxel ids and pressures of a frame into a list.
+pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
 
 /// What sinks are told before the first frame.
 #[derive(Clone, Debug, Default)]
