@@ -14,7 +14,7 @@ use crate::field::{FieldSet, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
-use crate::stage::{layout, motion::SHORTEST_STEP_S};
+use crate::stage::{calibrate, layout, motion::SHORTEST_STEP_S};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -235,6 +235,27 @@ impl Engine {
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
         self.advance(frames, None)?;
         Ok(&self.percepts)
+    }
+
+    /// What the last call gave.
+    #[must_use]
+    pub fn percepts(&self) -> &Percepts {
+        &self.percepts
+    }
+
+    /// Puts into `to`, in place of what it holds, the taxels of the plan by id and their pressures in `frame`, as far as
+    /// these are known: to look at, in double precision and without what only a run of frames can tell, such as values that
+    /// are held.
+    pub fn pressures(&self, frame: &Frame, to: &mut Vec<(u32, f64)>) {
+        to.clear();
+        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+            let Ok(channel) = self.plan.body_taxels.binary_search(&taxel) else { continue };
+            let curve = self.plan.curves.of(self.plan.taxels[channel].response);
+            let pressure = calibrate::reference(value, &self.plan.calibrations[channel], curve);
+            if pressure.status & calibrate::UNUSABLE == 0 {
+                to.push((self.ids[taxel], pressure.value));
+            }
+        }
     }
 
     /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds.

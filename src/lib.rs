@@ -65,6 +65,8 @@ mod length;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
+#[cfg(feature = "mcap")]
+pub mod recording;
 pub mod scene;
 pub mod signal;
 pub mod sink;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
-const RUN_ELSEWHERE: [&str; 14] = [
+const RUN_ELSEWHERE: [&str; 15] = [
     "cargo run --release -- run",
     "cargo run --release --example embed",
     "cargo run --example bodies",
@@ -21,6 +21,7 @@ const RUN_ELSEWHERE: [&str; 14] = [
     "cargo bench --bench activity",
     "cargo bench -- --max-time 5",
     "benches/peers/run",
+    "benches/recordings/run",
 ];
 
 /// Commands that take long, and the shorter form that is run for them.

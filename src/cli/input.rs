@@ -1,6 +1,6 @@
 //! What frames are read from.
 
-use somatic::source::{CsvSource, Source, SourceSpec};
+use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec};
 use somatic::{Error, Result, bundled};
 
 use super::scene::Asked;
@@ -39,6 +39,9 @@ impl Input {
         if asked.speed.is_some() && !input.is_recording() {
             return Err(Error::usage("--speed is for recordings; live frames come when they come"));
         }
+        if (asked.from.is_some() || asked.to.is_some() || asked.repeat.is_some()) && !input.is_recording() {
+            return Err(Error::usage("--from, --to and --loop are for recordings; live frames come when they come"));
+        }
         Ok(input)
     }
 
@@ -50,13 +53,26 @@ impl Input {
         !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
     }
 
-    pub(super) fn open(&self, ids: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
-        match &self.spec {
-            Some(spec) => spec.open(ids, rate_hz),
-            None => {
-                let length = Some(bundled::TOUCH.len() as u64);
-                Ok(Box::new(CsvSource::from_reader(&self.name, bundled::TOUCH, length, rate_hz)?))
+    /// Opens it, or the part of it that is asked for, for a body whose taxels have `ids`.
+    ///
+    /// # Errors
+    /// It cannot be opened; there is no such part.
+    pub(super) fn open(&self, ids: &[u32], asked: &Asked) -> Result<Box<dyn Source + Send>> {
+        let cut = Cut {
+            from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),
+            to_s: asked.to.unwrap_or(Cut::WHOLE.to_s),
+            times: asked.repeat.unwrap_or(Cut::WHOLE.times),
+        };
+        let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
+        let open = move || -> Result<Box<dyn Source + Send>> {
+            match &spec {
+                Some(spec) => spec.open(&ids, rate_hz),
+                None => {
+                    let length = Some(bundled::TOUCH.len() as u64);
+                    Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))
+                }
             }
-        }
+        };
+        if cut == Cut::WHOLE { open() } else { Ok(Box::new(Replay::new(open, cut)?)) }
     }
 }

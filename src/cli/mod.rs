@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, and what they share.
 
+mod attached;
 mod author;
 mod bar;
 mod bench;
@@ -7,8 +8,10 @@ mod bench;
 mod board;
 mod calibrate;
 mod completions;
+mod convert;
 mod devices;
 mod feed;
+mod info;
 mod input;
 mod inspect;
 mod live;
@@ -49,6 +52,7 @@ Examples:
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic board --link /tmp/hand                a hand on a serial line, made of software
+  somatic info touch.mcap                       how long a recording is, and what is in it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
   somatic devices                               which GPUs and serial ports it has
 
@@ -74,6 +78,8 @@ enum Command {
     Render(render::Arguments),
     Plan(Box<plan::Arguments>),
     Simulate(simulate::Arguments),
+    Info(info::Arguments),
+    Convert(convert::Arguments),
     Paper(paper::Arguments),
     #[cfg(unix)]
     Board(Box<board::Arguments>),
@@ -93,6 +99,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Render(arguments) => render::render(arguments),
         Command::Plan(arguments) => plan::plan(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
+        Command::Info(arguments) => info::info(arguments),
+        Command::Convert(arguments) => convert::convert(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         #[cfg(unix)]
         Command::Board(arguments) => board::run(arguments),

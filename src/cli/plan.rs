@@ -101,7 +101,7 @@ impl Bill {
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
         let options = asked.options(body, &ids, batch)?;
         let mut engine = Engine::new(body, options.clone())?;
-        let mut source = recorded.map(|input| input.open(&ids, asked.rate)).transpose()?;
+        let mut source = recorded.map(|input| input.open(&ids, asked)).transpose()?;
         let mut frames = Vec::new();
         if let (Some(source), Some(input)) = (&mut source, recorded) {
             engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;

@@ -8,9 +8,10 @@ use std::time::Duration;
 use clap::Args;
 use console::Term;
 use somatic::signal::Unfit;
-use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
-use somatic::{Agreement, BackendKind, Engine, Error, Plan, Result};
+use somatic::sink::{FieldNames, Flow, Heard, Session, Sink, SinkSpec};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
+use super::attached;
 use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
 use super::live::{About, View};
@@ -27,6 +28,8 @@ Examples:
   somatic run --outputs filtered_direction --filter-window 0.5mm.. --filter-time 0.2
   somatic run robot.scene.toml                           all of it from a file
   robot-driver | somatic run --body robot.glb --source - | controller
+  robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
+  somatic run --source mcap:touch.mcap --from 60 --to 90   that minute's half, with the body it was made on
   somatic run --body mat --source night.csv --backend gpu --verify
 
 A frame on standard input is a line such as {\"t\":0.5,\"values\":{\"7\":12.0}}.
@@ -70,7 +73,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         say(&format!("{}: {finding}", body.name));
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let source = input.open(&ids, asked.rate)?;
+    attached::check_apart(&input, &sinks)?;
+    let source = input.open(&ids, &asked)?;
 
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
@@ -90,10 +94,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let names = field_names(engine.plan());
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
-    let sinks = sinks.iter().map(|sink| sink.open(&names, asked.all_fields)).collect::<Result<_>>()?;
+    let records = sinks.iter().any(|sink| matches!(sink, SinkSpec::Mcap(_)));
+    let session = Session {
+        names,
+        all_fields: asked.all_fields,
+        taxels: source.taxels(),
+        body: Some(&body),
+        attached: if records { attached::files(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
+        parts: asked.record.clone(),
+        force: asked.force,
+    };
+    let sinks = sinks.iter().map(|sink| sink.open(&session)).collect::<Result<_>>()?;
     let feed = Feed::start(source, Manner { most: batch, gather, speed });
     let agreement = asked.verify.then(Agreement::default);
-    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new() };
+    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false };
     let losses = pump.run(feed, &stop)?;
     pump.finish(&losses)
 }
@@ -108,6 +122,8 @@ struct Pump {
     agreement: Option<Agreement>,
     /// Taxels that have been told to be left out.
     unfit: Vec<(u32, Unfit)>,
+    /// Whether a sink could not go on.
+    failed: bool,
 }
 
 impl Pump {
@@ -117,25 +133,13 @@ impl Pump {
         while !stop.load(Ordering::Relaxed) {
             match feed.next(Duration::from_millis(40)) {
                 Some(Arrival::Frames(frames, progress)) => {
-                    let percepts = match &mut self.agreement {
-                        None => self.engine.process(&frames)?,
-                        Some(sum) => {
-                            let (percepts, agreement) = self.engine.process_and_compare(&frames)?;
-                            sum.merge(agreement);
-                            percepts
-                        }
-                    };
-                    self.view.see(percepts, progress);
-                    let mut open = Vec::with_capacity(self.sinks.len());
-                    for mut sink in self.sinks.drain(..) {
-                        let flow = sink.write(percepts)?;
-                        let flow = if flow == Flow::Open && self.flush { sink.flush()? } else { flow };
-                        match flow {
-                            Flow::Open => open.push(sink),
-                            Flow::Closed => sink.finish()?,
-                        }
+                    if let Some(sum) = &mut self.agreement {
+                        sum.merge(self.engine.process_and_compare(&frames)?.1);
+                    } else {
+                        self.engine.process(&frames)?;
                     }
-                    self.sinks = open;
+                    self.view.see(self.engine.percepts(), progress);
+                    self.pass_on(&frames)?;
                     if self.sinks.is_empty() && !watched {
                         break;
                     }
@@ -146,11 +150,24 @@ impl Pump {
                 }
                 Some(Arrival::End(losses)) => return Ok(losses),
                 Some(Arrival::Failed(error)) => return Err(error),
+                // Nothing comes, but something may be held back.
+                None if self.flush => self.each_sink(|sink| sink.flush())?,
                 None => {}
             }
             self.view.draw();
         }
         Ok(Vec::new())
+    }
+
+    /// Gives `frames`, and what the engine made of them, to every sink.
+    fn pass_on(&mut self, frames: &[Frame]) -> Result<()> {
+        let Self { engine, sinks, flush, failed, .. } = self;
+        let heard = Heard { frames, pressures: &|frame, to| engine.pressures(frame, to) };
+        serve(sinks, *flush, failed, |sink| give(sink, &heard, engine.percepts(), *flush))
+    }
+
+    fn each_sink(&mut self, act: impl FnMut(&mut dyn Sink) -> Result<Flow>) -> Result<()> {
+        serve(&mut self.sinks, self.flush, &mut self.failed, act)
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
@@ -169,8 +186,45 @@ impl Pump {
                 return Ok(FAILED);
             }
         }
-        Ok(if losses.is_empty() { DONE } else { LOST })
+        Ok(match (self.failed, losses.is_empty()) {
+            (true, _) => FAILED,
+            (_, true) => DONE,
+            (_, false) => LOST,
+        })
     }
+}
+
+/// Does something with each sink that somebody reads. While somebody waits for every frame, a sink that fails is told and
+/// left out, and the others go on; the last one that fails is an error.
+fn serve(
+    sinks: &mut Vec<Box<dyn Sink + Send>>,
+    live: bool,
+    failed: &mut bool,
+    mut act: impl FnMut(&mut dyn Sink) -> Result<Flow>,
+) -> Result<()> {
+    let mut index = 0;
+    while index < sinks.len() {
+        match act(&mut *sinks[index]) {
+            Ok(Flow::Open) => index += 1,
+            Ok(Flow::Closed) => sinks.remove(index).finish()?,
+            Err(error) if live && sinks.len() > 1 => {
+                say(&format!("{error}; going on without it"));
+                *failed = true;
+                drop(sinks.remove(index));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn give(sink: &mut dyn Sink, heard: &Heard<'_>, percepts: &Percepts, flush: bool) -> Result<Flow> {
+    for flow in [sink.hear(heard)?, sink.write(percepts)?] {
+        if flow == Flow::Closed {
+            return Ok(flow);
+        }
+    }
+    if flush { sink.flush() } else { Ok(Flow::Open) }
 }
 
 /// Says which taxels are left out from now on and which are used again, where that differs from what was `told`.

@@ -12,13 +12,13 @@ use somatic::error::nearest;
 use somatic::keys;
 use somatic::scene::{Coverage, FilterBy, MotionFilter};
 use somatic::signal::{FsrSignal, Letter, Receptor};
-use somatic::sink::SinkSpec;
+use somatic::sink::{Part, SinkSpec};
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 use super::input::Input;
-use super::load_body;
+use super::{attached, load_body};
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -27,17 +27,18 @@ use super::load_body;
 #[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do; docs/scenes.md")]
 pub(super) struct Asked {
     /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand, or a
-    /// simulation's own].
+    /// simulation's or a recording's own].
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where frames come from: csv:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled touch].
+    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled
+    /// touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, or - for NDJSON on standard output; may be several.
+    /// Where percepts go: ndjson:FILE, mcap:FILE, or - for NDJSON on standard output; may be several.
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -67,7 +68,8 @@ pub(super) struct Asked {
     #[arg(long)]
     pub(super) all_fields: bool,
 
-    /// The robot's calibration, a TOML file; without one, pressures are the raw values.
+    /// The robot's calibration, a TOML file; without one, pressures are the raw values [default: what lies in the recording
+    /// beside the body, if that is used].
     #[arg(long, value_name = "FILE")]
     pub(super) calibration: Option<PathBuf>,
 
@@ -105,6 +107,32 @@ pub(super) struct Asked {
     /// Play a recording at this many times the speed it was made at [default: as fast as possible].
     #[arg(long, value_name = "X")]
     pub(super) speed: Option<f64>,
+
+    /// Play a recording from this time on, in seconds after its start [default: 0].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "from_s")]
+    pub(super) from: Option<f64>,
+
+    /// Play a recording up to this time, in seconds after its start [default: its end].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "to_s")]
+    pub(super) to: Option<f64>,
+
+    /// Play a recording so many times, or without N until interrupted; its time goes on.
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    #[serde(rename = "loop")]
+    pub(super) repeat: Option<u64>,
+
+    /// What mcap:FILE holds: frames as they came, percepts, and what viewers show (view) [default: all].
+    #[arg(long, value_name = "PART,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<Part>()))]
+    #[serde(deserialize_with = "words")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) record: Vec<Part>,
+
+    /// Replace the file of mcap:FILE if it is there.
+    #[arg(long)]
+    pub(super) force: bool,
 
     /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing [default: 0].
     #[arg(long, value_name = "S")]
@@ -233,6 +261,11 @@ impl Asked {
             rate: self.rate.or(file.rate),
             batch: self.batch.or(file.batch),
             speed: self.speed.or(file.speed),
+            from: self.from.or(file.from),
+            to: self.to.or(file.to),
+            repeat: self.repeat.or(file.repeat),
+            record: list(&self.record, file.record),
+            force: self.force || file.force,
             max_age: self.max_age.or(file.max_age),
             max_gap: self.max_gap.or(file.max_gap),
             filter_window: self.filter_window.clone().or(file.filter_window),
@@ -294,8 +327,21 @@ impl Asked {
             (Some(body), _) => load_body(body),
             // A simulation says what body it is on.
             (None, Some(SourceSpec::Sim(path))) => Ok(SimulatedSource::open(path)?.body().clone()),
+            (None, Some(SourceSpec::Mcap(path))) => match attached::body(path)? {
+                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
+                None => load_body("hand"),
+            },
             (None, _) => load_body("hand"),
         }
+    }
+
+    /// The recording whose body and calibration are used, which is so where no body is named.
+    ///
+    /// # Errors
+    /// What is to be read is no source.
+    pub(super) fn recording(&self) -> Result<Option<PathBuf>> {
+        let spec = self.sources.first().filter(|_| self.body.is_none()).map(|text| text.parse()).transpose()?;
+        Ok(if let Some(SourceSpec::Mcap(path)) = spec { Some(path) } else { None })
     }
 
     /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
@@ -320,7 +366,13 @@ impl Asked {
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
             Ok(calibration)
         };
-        let calibration = self.calibration.as_ref().map(load).transpose()?;
+        let calibration = match (&self.calibration, self.recording()?) {
+            (Some(path), _) => Some(load(path)?),
+            (None, Some(recording)) => attached::calibration(&recording)?
+                .map(|text| Calibration::parse(&text, ids).map_err(|e| e.at(recording.display())))
+                .transpose()?,
+            (None, None) => None,
+        };
         Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
     }
 }

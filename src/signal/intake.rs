@@ -45,6 +45,11 @@ impl Intake {
         self.taxel_of_value = taxel_of_value;
     }
 
+    /// Per value of a frame, the taxel it belongs to.
+    pub(crate) fn taxel_of_value(&self) -> &[usize] {
+        &self.taxel_of_value
+    }
+
     /// Number of values a frame must have.
     pub(crate) fn width(&self) -> usize {
         self.taxel_of_value.len()

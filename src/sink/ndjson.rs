@@ -7,11 +7,10 @@ use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
+use super::line::Composer;
 use super::{FieldNames, Flow, Sink};
 use crate::error::{Error, Result};
-use crate::percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
+use crate::percept::Percepts;
 
 /// Writes percepts as NDJSON.
 pub struct NdjsonSink {
@@ -19,33 +18,9 @@ pub struct NdjsonSink {
     // Dropped before `part`, so that the file is closed when it is renamed or removed.
     writer: BufWriter<Box<dyn Write + Send>>,
     part: Option<Part>,
-    heads: Vec<Head>,
-    flags: Vec<(Flags, String)>,
-    all_fields: bool,
+    composer: Composer,
     line: Vec<u8>,
     closed: bool,
-}
-
-/// How a field's object begins, up to the value of `contact`.
-struct Head {
-    in_anchor: String,
-    in_world: String,
-}
-
-impl Head {
-    fn new(names: &FieldNames) -> Self {
-        let begin = |link: &str| {
-            let text = |text: &str| serde_json::Value::from(text).to_string();
-            let mut head = format!("{{\"field\":{},\"link\":{}", text(&names.field), text(link));
-            for (key, value) in [("letter", &names.letter), ("signal", &names.signal)] {
-                if let Some(value) = value {
-                    head += &format!(",\"{key}\":{}", text(value));
-                }
-            }
-            head + ",\"contact\":"
-        };
-        Self { in_anchor: begin(&names.link), in_world: begin("world") }
-    }
 }
 
 impl NdjsonSink {
@@ -93,49 +68,10 @@ impl NdjsonSink {
             name,
             writer: BufWriter::with_capacity(1 << 16, writer),
             part,
-            heads: names.iter().map(Head::new).collect(),
-            flags: Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
-            all_fields,
+            composer: Composer::new(names, all_fields),
             line: Vec::new(),
             closed: false,
         }
-    }
-
-    /// Puts the line of the batch's frame `frame` into `self.line`.
-    fn compose(&mut self, percepts: &Percepts, frame: usize) {
-        let Self { heads, flags, all_fields, line, .. } = self;
-        line.clear();
-        line.extend_from_slice(b"{\"t\":");
-        print(line, &percepts.t_s(frame));
-        line.extend_from_slice(b",\"frame\":");
-        print(line, &percepts.frame_number(frame));
-        line.extend_from_slice(b",\"fields\":[");
-        let mut first = true;
-        for percept in percepts.frame(frame).filter(|percept| *all_fields || percept.contact) {
-            if !std::mem::take(&mut first) {
-                line.push(b',');
-            }
-            let head = &heads[percept.field];
-            let head = if percept.in_world { &head.in_world } else { &head.in_anchor };
-            line.extend_from_slice(head.as_bytes());
-            print(line, &percept.contact);
-            print_quantities(line, &percept, percepts.precision());
-            if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
-                print_touches(line, percepts.touches(frame, percept.field));
-            }
-            line.extend_from_slice(b",\"flags\":[");
-            let mut first = true;
-            for (_, name) in flags.iter().filter(|(flag, _)| percept.flags.contains(*flag)) {
-                if !std::mem::take(&mut first) {
-                    line.push(b',');
-                }
-                line.push(b'"');
-                line.extend_from_slice(name.as_bytes());
-                line.push(b'"');
-            }
-            line.extend_from_slice(b"]}");
-        }
-        line.extend_from_slice(b"]}\n");
     }
 
     fn settle(&mut self, written: io::Result<()>) -> Result<Flow> {
@@ -152,12 +88,14 @@ impl NdjsonSink {
 
 impl Sink for NdjsonSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        assert_eq!(percepts.fields(), self.heads.len(), "a sink is told the name of every field");
+        assert_eq!(percepts.fields(), self.composer.fields(), "a sink is told the name of every field");
         for frame in 0..percepts.frames() {
             if self.closed {
                 return Ok(Flow::Closed);
             }
-            self.compose(percepts, frame);
+            self.line.clear();
+            self.composer.compose(percepts, frame, &mut self.line);
+            self.line.push(b'\n');
             let written = self.writer.write_all(&self.line);
             if self.settle(written)? == Flow::Closed {
                 return Ok(Flow::Closed);
@@ -218,101 +156,12 @@ impl Drop for Part {
     }
 }
 
-fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision) {
-    let scalar = |line: &mut Vec<u8>, value: f64| match precision {
-        Precision::F32 => print(line, &(value as f32)),
-        Precision::F64 => print(line, &value),
-    };
-    let named = |line: &mut Vec<u8>, name: &str, value: Option<f64>| {
-        if let Some(value) = value {
-            key(line, name);
-            scalar(line, value);
-        }
-    };
-    named(line, "total", percept.total);
-    named(line, "peak", percept.peak);
-    if let Some(active) = percept.active {
-        key(line, "active");
-        print(line, &active);
-    }
-    named(line, "area", percept.area);
-    let pair = |line: &mut Vec<u8>, name: &str, value: Option<[f64; 2]>| {
-        if let Some([u, v]) = value {
-            key(line, name);
-            line.push(b'[');
-            scalar(line, u);
-            line.push(b',');
-            scalar(line, v);
-            line.push(b']');
-        }
-    };
-    pair(line, "centroid", percept.centroid);
-    for (name, vector) in [("position", percept.position), ("normal", percept.normal)] {
-        if let Some(vector) = vector {
-            key(line, name);
-            print(line, &vector);
-        }
-    }
-    named(line, "orientation", percept.orientation);
-    named(line, "axis", percept.axis);
-    named(line, "anisotropy", percept.anisotropy);
-    pair(line, "displacement", percept.displacement);
-    named(line, "direction", percept.direction);
-    named(line, "distance", percept.distance);
-    named(line, "radial_distance", percept.radial_distance);
-    named(line, "speed", percept.speed);
-    named(line, "radial_speed", percept.radial_speed);
-    // Made by the host, in double precision whatever the backend.
-    if let Some(displacement) = percept.filtered_displacement {
-        key(line, "filtered_displacement");
-        print(line, &displacement);
-    }
-    let filtered = [("filtered_direction", percept.filtered_direction), ("filtered_speed", percept.filtered_speed)];
-    for (name, value) in filtered {
-        if let Some(value) = value {
-            key(line, name);
-            print(line, &value);
-        }
-    }
-}
-
-fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
-    key(line, "touches");
-    line.push(b'[');
-    for (index, touch) in touches.iter().enumerate() {
-        line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
-        print(line, &touch.id);
-        key(line, "total");
-        print(line, &touch.total);
-        key(line, "active");
-        print(line, &touch.active);
-        if let Some(centroid) = touch.centroid {
-            key(line, "centroid");
-            print(line, &centroid);
-        }
-        key(line, "position");
-        print(line, &touch.position);
-        line.push(b'}');
-    }
-    line.push(b']');
-}
-
-fn key(line: &mut Vec<u8>, name: &str) {
-    line.extend_from_slice(b",\"");
-    line.extend_from_slice(name.as_bytes());
-    line.extend_from_slice(b"\":");
-}
-
-fn print(line: &mut Vec<u8>, value: &impl Serialize) {
-    serde_json::to_writer(line, value).expect("plain data prints into memory");
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::percept::{Outputs, Values};
+    use crate::percept::{Flags, Outputs, Precision, Values};
 
     fn names() -> Vec<FieldNames> {
         [("hand/palm", "hand"), ("say \"hi\"", "arm")]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{FieldNames, NdjsonSink, Sink};
+use super::{NdjsonSink, Session, Sink};
 use crate::error::{Error, Result, nearest};
 
 const FORMS: &str = "ndjson:FILE, mcap:FILE, or - for NDJSON on standard output";
@@ -14,7 +14,7 @@ const FORMS: &str = "ndjson:FILE, mcap:FILE, or - for NDJSON on standard output"
 pub enum SinkSpec {
     /// `ndjson:FILE`, or a bare `FILE.ndjson`: a line of JSON a frame.
     Ndjson(PathBuf),
-    /// `mcap:FILE`: a recording in MCAP.
+    /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
     /// `-`: NDJSON on standard output.
     Stdout,
@@ -36,6 +36,9 @@ impl FromStr for SinkSpec {
             _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("ndjson")) => {
                 Ok(Self::Ndjson(text.into()))
             }
+            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) => {
+                Ok(Self::Mcap(text.into()))
+            }
             kind => match nearest(kind, ["ndjson", "mcap"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
@@ -45,18 +48,22 @@ impl FromStr for SinkSpec {
 }
 
 impl SinkSpec {
-    /// Opens the sink for fields called `names`. Fields without contact are written only with `all_fields`.
+    /// Opens the sink for `session`.
     ///
     /// # Errors
-    /// It cannot be opened, or this version does not write it.
-    pub fn open(&self, names: &[FieldNames], all_fields: bool) -> Result<Box<dyn Sink + Send>> {
+    /// It cannot be opened.
+    pub fn open(&self, session: &Session<'_>) -> Result<Box<dyn Sink + Send>> {
+        let (names, all_fields) = (&session.names, session.all_fields);
         match self {
             Self::Ndjson(path) => Ok(Box::new(NdjsonSink::to_file(path, names, all_fields)?)),
             Self::Stdout => {
                 Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
             }
+            #[cfg(feature = "mcap")]
+            Self::Mcap(path) => Ok(Box::new(super::RecordingSink::create(path, session)?)),
+            #[cfg(not(feature = "mcap"))]
             Self::Mcap(path) => {
-                Err(Error::failed("this version does not write MCAP yet; use ndjson:FILE").at(path.display()))
+                Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(path.display()))
             }
         }
     }
@@ -81,7 +88,6 @@ mod tests {
         assert!(why("json:a").contains("did you mean `ndjson:`"));
         assert!(why("ndjson:").contains("nothing follows"));
         assert!(why("a.csv").contains("ndjson:FILE"));
-        let error = parsed("mcap:a.mcap").open(&[], false).err().unwrap().to_string();
-        assert_eq!(error, "a.mcap: this version does not write MCAP yet; use ndjson:FILE");
+        assert_eq!(parsed("a.mcap"), SinkSpec::Mcap("a.mcap".into()));
     }
 }

@@ -3,16 +3,22 @@
 //! A source knows the taxel ids it delivers and nothing of engines; of bodies only the simulated one does.
 
 mod csv;
+mod csv_file;
 mod ndjson;
 #[cfg(feature = "cli")]
 mod ports;
+#[cfg(feature = "mcap")]
+mod recorded;
+mod replay;
 mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
+pub use csv_file::CsvFile;
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "cli")]
 pub use ports::{PortSummary, serial_ports};
+pub use replay::{Cut, Replay};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 
@@ -34,6 +40,9 @@ pub trait Source {
     fn progress(&self) -> Option<f64> {
         None
     }
+
+    /// Says that nothing before `t_s` is wanted: a source that can pass over it without reading it does so.
+    fn skip_to(&mut self, _t_s: f64) {}
 
     /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.
     fn losses(&self) -> Vec<String> {

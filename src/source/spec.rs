@@ -22,7 +22,7 @@ pub enum SourceSpec {
         /// Its speed, where one is given.
         baud: Option<u32>,
     },
-    /// `mcap:FILE`: a recording in MCAP.
+    /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
     /// `sim:FILE.toml`: simulated touches.
     Sim(PathBuf),
@@ -56,6 +56,9 @@ impl FromStr for SourceSpec {
             _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) => {
                 Ok(Self::Csv(text.into()))
             }
+            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) => {
+                Ok(Self::Mcap(text.into()))
+            }
             kind => match nearest(kind, ["csv", "serial", "mcap", "sim"]) {
                 Some(near) => bad(format!("there is no source `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a source is one of {FORMS}")),
@@ -83,7 +86,10 @@ impl SourceSpec {
                 let reader = BufReader::with_capacity(1 << 16, std::io::stdin());
                 Ok(Box::new(NdjsonSource::new("stdin", reader, taxels.to_vec())))
             }
-            Self::Mcap(path) => not_yet("MCAP", path.display().to_string()),
+            #[cfg(feature = "mcap")]
+            Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
+            #[cfg(not(feature = "mcap"))]
+            Self::Mcap(path) => not_yet("MCAP without the feature `mcap`", path.display().to_string()),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
             Self::Serial { port, .. } => not_yet(&format!("serial lines ({})", ports()), port.clone()),
         }
@@ -138,7 +144,7 @@ mod tests {
     fn what_is_not_read_yet_says_so() {
         let why = |text: &str| text.parse::<SourceSpec>().unwrap().open(&[1], None).err().unwrap().to_string();
         assert!(why("serial:/dev/ttyX").starts_with("/dev/ttyX: this version does not read serial lines"));
-        assert!(why("mcap:a.mcap").contains("does not read MCAP yet"));
+        assert!(SourceSpec::Mcap("no/such.mcap".into()).open(&[1], None).is_err());
         assert!(SourceSpec::Sim("no/such.toml".into()).open(&[1], None).err().unwrap().is_not_found());
         assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());
         assert!(SourceSpec::Csv("no/such.csv".into()).open(&[1], None).err().unwrap().is_not_found());

@@ -11,6 +11,7 @@ mod inspect;
 mod live;
 mod paper;
 mod plan;
+mod recording;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;

@@ -8,7 +8,7 @@ use tempfile::NamedTempFile;
 use super::{SimulatedSource, Truth};
 use crate::error::{Error, Result};
 use crate::signal::Frame;
-use crate::source::Source as _;
+use crate::source::{Source as _, csv_file::put_value};
 use crate::whole::beside;
 
 /// The truth's columns.
@@ -59,11 +59,10 @@ fn write(
     while simulation.next_frame(&mut frame)? {
         row.clear();
         row.push(frame.t_s.to_string());
-        // The shortest words that read back as the same single-precision value.
-        row.extend(frame.values.iter().map(|value| match value.number() {
-            Some(value) => (value as f32).to_string(),
-            None if value.is_missing() => String::new(),
-            None => "nan".to_owned(),
+        row.extend(frame.values.iter().map(|&value| {
+            let mut word = String::new();
+            put_value(value, &mut word);
+            word
         }));
         frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
         for touch in simulation.truth() {

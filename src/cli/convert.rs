@@ -1,0 +1,156 @@
+//! `somatic convert`: recordings from one kind of file to another.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
+use somatic::source::{CsvFile, Source, SourceSpec};
+use somatic::{Error, Frame, Result};
+
+use super::attached::{body_bytes, file_name};
+use super::bar::Bar;
+use super::run::stop_on_signal;
+use super::words::count;
+use super::{DONE, LOST, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic convert touch.csv touch.mcap --body robot.glb --calibration robot.toml
+  somatic convert touch.mcap touch.csv
+  somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
+
+Frames come through bit for bit. A CSV has no place for poses, body and calibration, an MCAP gets no percepts: make them
+with `somatic run`.";
+
+/// Turn a recording into one of another kind: CSV and MCAP, either way.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv or .mcap.
+    #[arg(value_name = "IN")]
+    from: String,
+
+    /// What it is to become: csv:FILE or mcap:FILE, or just a .csv or .mcap.
+    #[arg(value_name = "OUT")]
+    to: String,
+
+    /// The robot to put into an MCAP, a .glb or .gltf file, or one of the bundled bodies [default: the recording's own].
+    #[arg(long, value_name = "BODY")]
+    body: Option<String>,
+
+    /// The calibration to put into an MCAP [default: the recording's own].
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Replace OUT if it is there.
+    #[arg(long)]
+    force: bool,
+}
+
+enum Target {
+    Csv(CsvFile),
+    Mcap(Recorder),
+}
+
+pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
+    let from: SourceSpec = arguments.from.parse()?;
+    let to: SourceSpec = arguments.to.parse()?;
+    let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
+        return Err(Error::usage("a recording becomes csv:FILE or mcap:FILE").at(&arguments.to));
+    };
+    if !matches!(from, SourceSpec::Csv(_) | SourceSpec::Mcap(_) | SourceSpec::Sim(_)) {
+        return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
+            .at(&arguments.from));
+    }
+    if let SourceSpec::Csv(path) | SourceSpec::Mcap(path) = &from
+        && std::fs::canonicalize(path).ok().is_some_and(|path| std::fs::canonicalize(to_path).ok() == Some(path))
+    {
+        return Err(Error::usage("it is read and would be written; name another file").at(to_path.display()));
+    }
+    let mut source = from.open(&[], arguments.rate)?;
+    let attached = files(arguments, &from)?;
+    let mut target = match &to {
+        SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
+            return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
+        }
+        SourceSpec::Csv(path) => Target::Csv(CsvFile::create(path, source.taxels(), arguments.force)?),
+        _ => {
+            let mut recorder = Recorder::create(to_path, source.taxels(), arguments.force)?;
+            for (name, media_type, bytes) in &attached {
+                recorder.attach(name, media_type, bytes)?;
+            }
+            Target::Mcap(recorder)
+        }
+    };
+    let (frames, posed) = copy(&mut *source, &mut target)?;
+    let is_csv = matches!(target, Target::Csv(_));
+    match target {
+        Target::Csv(file) => file.finish()?,
+        Target::Mcap(recorder) => recorder.finish()?,
+    }
+    say(&format!("{} in {}", count(frames, "frame"), to_path.display()));
+    if is_csv && posed > 0 {
+        say(&format!("a CSV has no place for poses: those of {} are left out", count(posed, "frame")));
+    }
+    if is_csv && !attached.is_empty() {
+        let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();
+        say(&format!("a CSV has no place for what is attached: {} left out", names.join(", ")));
+    }
+    let losses = source.losses();
+    for loss in &losses {
+        say(&format!("never processed: {loss}"));
+    }
+    Ok(if losses.is_empty() { DONE } else { LOST })
+}
+
+/// Copies all frames; gives how many there were, and how many had poses.
+fn copy(source: &mut dyn Source, target: &mut Target) -> Result<(u64, u64)> {
+    let stop = stop_on_signal()?;
+    let mut bar = Bar::new("converting");
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    let (mut frames, mut posed) = (0, 0);
+    while source.next_frame(&mut frame)? {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::failed("interrupted"));
+        }
+        match target {
+            Target::Csv(file) => file.frame(&frame)?,
+            Target::Mcap(recorder) => recorder.frame(&frame)?,
+        }
+        frames += 1;
+        posed += u64::from(!frame.pose.is_empty());
+        bar.show(source.progress().unwrap_or(0.0));
+    }
+    Ok((frames, posed))
+}
+
+/// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording has.
+fn files(arguments: &Arguments, from: &SourceSpec) -> Result<Vec<(String, String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    if let Some(body) = &arguments.body {
+        files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
+    }
+    if let Some(path) = &arguments.calibration {
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
+    }
+    if let SourceSpec::Mcap(path) = from {
+        let mut reader = Reader::open(path)?;
+        for attached in reader.attached().to_vec() {
+            let given = match attached.media_type.as_str() {
+                BODY => arguments.body.is_some(),
+                _ => attached.name == CALIBRATION && arguments.calibration.is_some(),
+            };
+            if !given {
+                let bytes = reader.bytes_of(&attached)?;
+                files.push((attached.name, attached.media_type, bytes));
+            }
+        }
+    }
+    Ok(files)
+}

@@ -1,0 +1,180 @@
+//! `somatic info`: what is in a recording.
+
+use clap::Args;
+use console::style;
+use serde_json::{Value, json};
+use somatic::recording::{Attached, Reader, Rhythm, Survey};
+use somatic::source::{CsvSource, Source as _, SourceSpec};
+use somatic::{Error, Frame, Result};
+
+use super::bar::Bar;
+use super::table::{plain, right, shown};
+use super::words::{number, span};
+use super::{DONE, LOST, print, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic info touch.mcap
+  somatic info touch.csv --json | jq .rate_hz
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
+
+/// Say how long a recording is, how fast and how evenly its frames came, and what else it holds.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The recording: mcap:FILE or csv:FILE, or just the file.
+    #[arg(value_name = "FILE")]
+    recording: String,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Print JSON: times in seconds, sizes in bytes.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is known of a recording.
+struct Known {
+    kind: &'static str,
+    bytes: u64,
+    taxels: usize,
+    survey: Survey,
+    attached: Vec<Attached>,
+    has_end: bool,
+    losses: Vec<String>,
+}
+
+pub(super) fn info(arguments: &Arguments) -> Result<u8> {
+    let mut bar = Bar::new("reading");
+    let known = match arguments.recording.parse()? {
+        SourceSpec::Mcap(path) => {
+            if arguments.rate.is_some() {
+                return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
+            }
+            let mut reader = Reader::open(&path)?;
+            let survey = Survey::of(&mut reader, |share| bar.show(share))?;
+            Known {
+                kind: "MCAP",
+                bytes: size(&path),
+                taxels: reader.taxels().len(),
+                attached: reader.attached().to_vec(),
+                has_end: reader.has_end(),
+                losses: reader.losses(),
+                survey,
+            }
+        }
+        SourceSpec::Csv(path) => {
+            let mut source = CsvSource::open(&path, arguments.rate)?;
+            let mut rhythm = Rhythm::default();
+            let mut frame = Frame::missing(0.0, source.taxels().len());
+            while source.next_frame(&mut frame)? {
+                rhythm.see(frame.t_s);
+                bar.show(source.progress().unwrap_or(0.0));
+            }
+            rhythm.finish();
+            let losses = source.losses();
+            Known {
+                kind: "CSV",
+                bytes: size(&path),
+                taxels: source.taxels().len(),
+                survey: Survey { rhythm, ..Survey::default() },
+                attached: Vec::new(),
+                has_end: losses.is_empty(),
+                losses,
+            }
+        }
+        _ => {
+            return Err(
+                Error::usage("`somatic info` is for recordings, mcap:FILE and csv:FILE").at(&arguments.recording)
+            );
+        }
+    };
+    drop(bar);
+    print(&if arguments.json { format!("{}\n", as_json(&known)) } else { text(&arguments.recording, &known) })?;
+    for loss in &known.losses {
+        say(loss);
+    }
+    Ok(if known.losses.is_empty() { DONE } else { LOST })
+}
+
+fn size(path: &std::path::Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |metadata| metadata.len())
+}
+
+fn duration_s(rhythm: &Rhythm) -> Option<f64> {
+    rhythm.span_s.map(|[first, last]| last - first)
+}
+
+fn as_json(known: &Known) -> Value {
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
+    let rhythm = &survey.rhythm;
+    let topics: Vec<Value> = survey
+        .topics
+        .iter()
+        .map(|t| json!({"topic": t.name, "encoding": t.encoding, "messages": t.messages, "bytes": t.bytes}))
+        .collect();
+    let attached: Vec<Value> =
+        attached.iter().map(|a| json!({"name": a.name, "media_type": a.media_type, "bytes": a.bytes})).collect();
+    json!({
+        "kind": kind, "bytes": bytes, "taxels": taxels, "frames": rhythm.frames,
+        "start": rhythm.span_s.map(|span| span[0]), "duration": duration_s(rhythm), "rate_hz": rhythm.rate_hz(),
+        "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({"seconds": gap[0], "after": gap[1]})),
+        "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
+        "ended": has_end, "losses": losses,
+    })
+}
+
+fn text(name: &str, known: &Known) -> String {
+    let Known { kind, bytes, taxels, survey, attached, has_end, .. } = known;
+    let rhythm = &survey.rhythm;
+    let mut text = format!("{}\n", style(name).bold());
+    let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
+    line("kind", format!("{kind}, {}{}", size_words(*bytes), if *has_end { "" } else { ", never ended" }));
+    let rate = rhythm.rate_hz().map_or(String::new(), |rate| format!(" at {} Hz", number(rate)));
+    line("frames", format!("{}{rate}", rhythm.frames));
+    if let (Some(duration), Some([start, _])) = (duration_s(rhythm), rhythm.span_s) {
+        line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
+    }
+    line("taxels", taxels.to_string());
+    line(
+        "gaps",
+        match rhythm.longest_gap_s {
+            Some([longest, after]) => {
+                format!("{}, the longest {} after t = {after} s", rhythm.gaps, span(longest))
+            }
+            None => "none".to_owned(),
+        },
+    );
+    if rhythm.backwards > 0 {
+        line("backwards", format!("time does not go on {} times", rhythm.backwards));
+    }
+    if survey.posed > 0 {
+        line("poses", format!("in {} frames", survey.posed));
+    }
+    for file in attached {
+        line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
+    }
+    if !survey.topics.is_empty() {
+        let mut table = plain(["topic", "encoding", "messages", "size"]);
+        for topic in &survey.topics {
+            table.add_row([&topic.name, &topic.encoding, &topic.messages.to_string(), &size_words(topic.bytes)]);
+        }
+        right(&mut table, 2);
+        right(&mut table, 3);
+        text += "\n";
+        text += &shown(&table);
+    }
+    text
+}
+
+fn size_words(bytes: u64) -> String {
+    match bytes as f64 {
+        size if size < 1e3 => format!("{size} B"),
+        size if size < 1e6 => format!("{:.1} kB", size / 1e3),
+        size if size < 1e9 => format!("{:.1} MB", size / 1e6),
+        size => format!("{:.1} GB", size / 1e9),
+    }
+}

@@ -1,0 +1,101 @@
+//! Recordings in MCAP: frames bit for bit as they came, percepts, and what viewers show, with body and calibration beside.
+//!
+//! `docs/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
+//! read record by record here, so that a damaged one gives what is whole in it and memory stays bounded.
+
+mod frames;
+mod proto;
+mod reader;
+mod recorder;
+mod records;
+mod schemas;
+mod survey;
+mod view;
+
+pub use self::reader::{Attached, Reader};
+pub use self::recorder::Recorder;
+pub use self::survey::{Rhythm, Survey, Topic};
+pub(crate) use self::view::{Arrow, Cloud, Scene, Transforms};
+
+/// The topic of the frames.
+pub const FRAMES: &str = "/somatic/frames";
+/// The topic of the percepts.
+pub const PERCEPTS: &str = "/somatic/percepts";
+/// The topic of the taxels as points with their pressures.
+pub const TAXELS: &str = "/somatic/taxels";
+/// The topic of the touched fields as spheres and arrows.
+pub const TOUCHES: &str = "/somatic/touches";
+/// The topic of where links are.
+pub const LINKS: &str = "/somatic/links";
+
+/// Media type of the attached body.
+pub const BODY: &str = "model/gltf-binary";
+/// Name of the attached calibration.
+pub const CALIBRATION: &str = "calibration.toml";
+/// Name of the attached scene.
+pub const SCENE: &str = "scene.toml";
+
+/// The word before the taxels in the metadata that every recording begins with.
+const METADATA: &str = "somatic";
+const TAXEL_IDS: &str = "taxels";
+
+/// A time as MCAP has it, ns from 0; what is before 0 is at 0, and frames have theirs to the last bit.
+pub(crate) fn nanoseconds(t_s: f64) -> u64 {
+    // Seconds and the rest by themselves: their product would lose digits that clocks since 1970 have.
+    let whole = t_s.floor().clamp(0.0, 1.8e10);
+    let rest = ((t_s - whole) * 1e9).round().clamp(0.0, 1e9);
+    whole as u64 * 1_000_000_000 + rest as u64
+}
+
+/// Ids in few characters, in their order: `0-35,64-103`.
+fn words_of(ids: &[u32]) -> String {
+    let mut words = String::new();
+    let mut start = 0;
+    for end in 1..=ids.len() {
+        if end == ids.len() || ids[end - 1].checked_add(1) != Some(ids[end]) {
+            if start > 0 {
+                words.push(',');
+            }
+            let (first, last) = (ids[start], ids[end - 1]);
+            words += &if first == last { first.to_string() } else { format!("{first}-{last}") };
+            start = end;
+        }
+    }
+    words
+}
+
+/// The ids that [`words_of`] wrote; `None` where it did not, or where there are more than a body can have.
+fn ids_of(words: &str) -> Option<Vec<u32>> {
+    let mut ids = Vec::new();
+    for word in words.split(',').filter(|word| !word.is_empty()) {
+        let (first, last) = word.split_once('-').unwrap_or((word, word));
+        let (first, last): (u32, u32) = (first.parse().ok()?, last.parse().ok()?);
+        if last < first || last > crate::body::MAX_TAXEL_ID || ids.len() > crate::body::MAX_TAXEL_ID as usize {
+            return None;
+        }
+        ids.extend(first..=last);
+    }
+    Some(ids)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_come_back_from_their_words() {
+        for ids in [vec![], vec![7], vec![0, 1, 2, 5, 9, 10], vec![3, 2, 1, 1, 2]] {
+            assert_eq!(ids_of(&words_of(&ids)), Some(ids));
+        }
+        assert_eq!(words_of(&[0, 1, 2, 5]), "0-2,5");
+        for odd in ["a", "5-3", "1-", "0-4294967295", "-4"] {
+            assert_eq!(ids_of(odd), None, "{odd}");
+        }
+    }
+
+    #[test]
+    fn a_time_is_to_the_nanosecond_whatever_its_size() {
+        assert_eq!([0.0, 1.5, -3.0, 0.1].map(nanoseconds), [0, 1_500_000_000, 0, 100_000_000]);
+        assert_eq!(nanoseconds(1_800_000_000.25), 1_800_000_000_250_000_000);
+    }
+}

@@ -1,0 +1,449 @@
+//! A recording being read: what is whole in the file, in its order; what is not is counted and told.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+use super::records::{ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, MESSAGE, METADATA, Next, Parts, Record, Records};
+use super::{FRAMES, TAXEL_IDS, frames, ids_of, nanoseconds};
+use crate::error::{Error, Result};
+use crate::signal::Frame;
+
+/// Bytes of an attachment's record that hold its name and kind; names are not longer.
+const ATTACHMENT_HEAD: u64 = 4096;
+
+/// A file that lies beside the frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Attached {
+    /// Its name.
+    pub name: String,
+    /// What it is, such as [`super::BODY`].
+    pub media_type: String,
+    /// Its length.
+    pub bytes: u64,
+    at: u64,
+    record: u64,
+}
+
+/// A channel of messages.
+#[derive(Clone, Debug)]
+pub(super) struct Channel {
+    pub(super) topic: String,
+    pub(super) encoding: String,
+}
+
+/// A message as it lies in its chunk.
+pub(super) struct Message {
+    pub(super) channel: u16,
+    pub(super) log_time: u64,
+    /// Where its data are, in [`Reader::chunk`].
+    data: std::ops::Range<usize>,
+}
+
+/// Reads a recording from its first frame to its last.
+pub struct Reader {
+    name: String,
+    records: Records<File>,
+    taxels: Vec<u32>,
+    attached: Vec<Attached>,
+    pub(super) channels: HashMap<u16, Channel>,
+    chunk: Vec<u8>,
+    /// What of the chunk is still to be read.
+    left: std::ops::Range<usize>,
+    /// Chunks that end before this are passed over, ns.
+    from: u64,
+    has_end: bool,
+    ended: bool,
+    /// The time of the last frame.
+    last_s: Option<f64>,
+    damage: Damage,
+    losses: Vec<String>,
+}
+
+/// What could not be read.
+#[derive(Default)]
+struct Damage {
+    places: u64,
+    bytes: u64,
+    /// After which time it was first found.
+    after_s: Option<f64>,
+    first: bool,
+}
+
+impl Reader {
+    /// Opens the recording at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no MCAP, or holds no frames of touch.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+        let opened = Self::of(&name, file).map_err(|e| match e {
+            Opening::Io(e) => Error::io(path, &e),
+            Opening::Wrong(what) => Error::failed(what).at(&name),
+        })?;
+        Ok(opened)
+    }
+
+    fn of(name: &str, file: File) -> Result<Self, Opening> {
+        let wrong = |what: &str| Opening::Wrong(what.to_owned());
+        let Some(mut records) = Records::of(file)? else {
+            return Err(wrong("this is no MCAP file; its first bytes are others"));
+        };
+        let has_end = records.has_end()?;
+        let mut reader = Self {
+            name: name.to_owned(),
+            records,
+            taxels: Vec::new(),
+            attached: Vec::new(),
+            channels: HashMap::new(),
+            chunk: Vec::new(),
+            left: 0..0,
+            from: 0,
+            has_end,
+            ended: false,
+            last_s: None,
+            damage: Damage::default(),
+            losses: Vec::new(),
+        };
+        let taxels = reader.read_head()?;
+        reader.taxels = taxels.ok_or_else(|| {
+            wrong("it holds no frames of touch, which `somatic run --sink mcap:FILE` and `somatic convert` write")
+        })?;
+        Ok(reader)
+    }
+
+    /// Reads what comes before the first chunk; gives the taxels, if they are told.
+    fn read_head(&mut self) -> Result<Option<Vec<u32>>, Opening> {
+        let mut taxels = None;
+        let mut body = Vec::new();
+        loop {
+            let start = self.records.at;
+            let Next::Record(record) = self.records.next()? else {
+                self.records.go_to(start)?;
+                return Ok(taxels);
+            };
+            match record.kind {
+                METADATA => {
+                    self.records.body(record, u64::MAX, &mut body)?;
+                    taxels = taxels.or(metadata(&body));
+                }
+                ATTACHMENT => {
+                    self.records.body(record, ATTACHMENT_HEAD, &mut body)?;
+                    self.attached.extend(attached(&body, record));
+                }
+                CHUNK | MESSAGE | DATA_END | FOOTER => {
+                    self.records.go_to(start)?;
+                    return Ok(taxels);
+                }
+                _ => self.records.skip(record.length)?,
+            }
+        }
+    }
+
+    /// The taxel ids of a frame's values, in their order.
+    #[must_use]
+    pub fn taxels(&self) -> &[u32] {
+        &self.taxels
+    }
+
+    /// The files beside the frames.
+    #[must_use]
+    pub fn attached(&self) -> &[Attached] {
+        &self.attached
+    }
+
+    /// The bytes of one of [`Reader::attached`].
+    ///
+    /// # Errors
+    /// They cannot be read, or are damaged.
+    pub fn bytes_of(&mut self, attached: &Attached) -> Result<Vec<u8>> {
+        let back = self.records.at;
+        let mut body = Vec::new();
+        let record = Record { kind: ATTACHMENT, at: attached.at, length: attached.record };
+        let read = self.records.go_to(record.at).and_then(|()| self.records.body(record, u64::MAX, &mut body));
+        read.and_then(|()| self.records.go_to(back)).map_err(|e| Error::failed(e.to_string()).at(&self.name))?;
+        data_of(&body).map(<[u8]>::to_vec).ok_or_else(|| {
+            Error::failed(format!(
+                "the attached `{}` is damaged; name the file with --body and --calibration",
+                attached.name
+            ))
+            .at(&self.name)
+        })
+    }
+
+    /// Whether the file has its end, which one that was being written when its process was killed has not.
+    #[must_use]
+    pub fn has_end(&self) -> bool {
+        self.has_end
+    }
+
+    /// Passes over what is before `t_s` as far as that can be done without reading it.
+    pub fn skip_to(&mut self, t_s: f64) {
+        self.from = nanoseconds(t_s);
+    }
+
+    /// How much of the file has been read, in 0..=1.
+    #[must_use]
+    pub fn progress(&self) -> f64 {
+        self.records.at as f64 / self.records.length.max(1) as f64
+    }
+
+    /// What of the file was not read, in a line each; complete once the last frame is.
+    #[must_use]
+    pub fn losses(&self) -> Vec<String> {
+        self.losses.clone()
+    }
+
+    /// Reads the next frame into `frame`. `false` at the end.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is compressed.
+    pub fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        loop {
+            let Some(message) = self.next_message()? else { return Ok(false) };
+            let is_frame = self.channels.get(&message.channel).is_some_and(|channel| channel.topic == FRAMES);
+            if !is_frame {
+                continue;
+            }
+            if frames::decode(&self.chunk[message.data.clone()], self.taxels.len(), frame).is_some() {
+                self.last_s = Some(frame.t_s);
+                return Ok(true);
+            }
+            self.damaged(message.data.len() as u64);
+        }
+    }
+
+    /// The next message, whatever it says.
+    pub(super) fn next_message(&mut self) -> Result<Option<Message>> {
+        loop {
+            if let Some(message) = self.message_in_chunk() {
+                return Ok(Some(message));
+            }
+            if self.ended || !self.next_chunk()? {
+                self.end();
+                return Ok(None);
+            }
+        }
+    }
+
+    pub(super) fn data(&self, message: &Message) -> &[u8] {
+        &self.chunk[message.data.clone()]
+    }
+
+    fn message_in_chunk(&mut self) -> Option<Message> {
+        while !self.left.is_empty() {
+            let mut parts = Parts(&self.chunk[self.left.clone()]);
+            let Some((kind, body)) = parts.record() else {
+                let bytes = self.left.len() as u64;
+                self.left = 0..0;
+                self.damaged(bytes);
+                return None;
+            };
+            let end = self.left.end - parts.0.len();
+            self.left.start = end;
+            let mut parts = Parts(body);
+            match kind {
+                CHANNEL => {
+                    if let Some((id, channel)) = channel(&mut parts) {
+                        self.channels.insert(id, channel);
+                    }
+                }
+                MESSAGE => {
+                    let head = (|| Some((parts.u16()?, parts.u32()?, parts.u64()?, parts.u64()?)))();
+                    if let Some((channel, _, log_time, _)) = head {
+                        return Some(Message { channel, log_time, data: end - parts.0.len()..end });
+                    }
+                }
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Reads the next chunk that is whole, or a message outside of any. `false` at the end.
+    fn next_chunk(&mut self) -> Result<bool> {
+        self.look_for_chunk().map_err(|e| match e {
+            Opening::Io(e) => Error::failed(e.to_string()).at(&self.name),
+            Opening::Wrong(what) => Error::failed(what).at(&self.name),
+        })
+    }
+
+    fn look_for_chunk(&mut self) -> Result<bool, Opening> {
+        loop {
+            let start = self.records.at;
+            let record = match self.records.next()? {
+                Next::Record(record) => record,
+                Next::Cut if !self.has_end => {
+                    let bytes = self.records.length - start;
+                    self.tell_cut(bytes);
+                    return Ok(false);
+                }
+                Next::Cut | Next::Damaged => {
+                    let found = self.records.resume_after(start)?;
+                    let until = if found { self.records.at } else { self.records.length };
+                    self.damaged(until - start);
+                    if !found {
+                        return Ok(false);
+                    }
+                    continue;
+                }
+            };
+            match record.kind {
+                CHUNK => {
+                    if self.read_chunk(record)? {
+                        return Ok(true);
+                    }
+                }
+                CHANNEL | MESSAGE => {
+                    // Without a chunk around them, as other programs may write.
+                    self.records.go_to(start)?;
+                    let whole = Record { at: start, length: record.length + (record.at - start), ..record };
+                    let mut chunk = std::mem::take(&mut self.chunk);
+                    self.records.body(whole, u64::MAX, &mut chunk)?;
+                    self.records.at = whole.at + whole.length;
+                    self.left = 0..chunk.len();
+                    self.chunk = chunk;
+                    return Ok(true);
+                }
+                DATA_END | FOOTER => return Ok(false),
+                _ => self.records.skip(record.length)?,
+            }
+        }
+    }
+
+    /// Reads the chunk whose record this is. `false` where it is passed over.
+    fn read_chunk(&mut self, record: Record) -> Result<bool, Opening> {
+        let mut chunk = std::mem::take(&mut self.chunk);
+        // Two times first: a chunk before the time that is wanted is not read.
+        if self.from > 0 && record.length >= 16 {
+            let times = Record { length: 16, ..record };
+            self.records.body(times, 16, &mut chunk)?;
+            let mut parts = Parts(&chunk);
+            let (_, end) = (parts.u64(), parts.u64());
+            if end.is_some_and(|end| end < self.from) {
+                self.chunk = chunk;
+                self.records.skip(record.length - 16)?;
+                return Ok(false);
+            }
+            let after = self.records.at;
+            self.records.go_to(record.at)?;
+            self.records.at = after;
+        }
+        let read = self.records.body(record, u64::MAX, &mut chunk);
+        self.chunk = chunk;
+        read?;
+        let mut parts = Parts(&self.chunk);
+        let head = (|| {
+            let (_, _, _) = (parts.u64()?, parts.u64()?, parts.u64()?);
+            Some((parts.u32()?, parts.text()?, parts.u64()?))
+        })();
+        let Some((crc, compression, length)) = head.filter(|(_, _, length)| *length == parts.0.len() as u64) else {
+            self.damaged(record.length);
+            return Ok(false);
+        };
+        // The format lets a checksum be 0 for none; then nothing could be told from damage.
+        if crc32fast::hash(parts.0) != crc {
+            self.damaged(record.length);
+            return Ok(false);
+        }
+        if !compression.is_empty() {
+            return Err(Opening::Wrong(format!(
+                "its chunks are compressed ({}), which this version does not read; decompress it: mcap decompress IN -o OUT",
+                compression.chars().take(10).collect::<String>()
+            )));
+        }
+        self.left = self.chunk.len() - length as usize..self.chunk.len();
+        Ok(true)
+    }
+
+    fn damaged(&mut self, bytes: u64) {
+        self.damage.places += 1;
+        self.damage.bytes += bytes;
+        if !std::mem::replace(&mut self.damage.first, true) {
+            self.damage.after_s = self.last_s;
+        }
+    }
+
+    fn tell_cut(&mut self, bytes: u64) {
+        let what = if bytes > 0 { format!("; {bytes} bytes of a chunk begun") } else { String::new() };
+        let missing = match self.last_s {
+            Some(t_s) => format!("what came after t = {t_s} s is missing"),
+            None => "no frame of it is whole".to_owned(),
+        };
+        self.losses.push(format!("{}: it was never ended: {missing}{what}", self.name));
+    }
+
+    /// Says what is to be said when nothing more comes; once.
+    fn end(&mut self) {
+        if std::mem::replace(&mut self.ended, true) || self.damage.places == 0 {
+            return;
+        }
+        let Damage { places, bytes, after_s, .. } = self.damage;
+        let places = if places == 1 { "one place".to_owned() } else { format!("{places} places") };
+        self.losses.push(format!(
+            "{}: damaged in {places}, the first {}: {bytes} bytes not read",
+            self.name,
+            after(after_s)
+        ));
+    }
+}
+
+fn after(time_s: Option<f64>) -> String {
+    time_s.map_or_else(|| "before the first frame".to_owned(), |t_s| format!("after t = {t_s} s"))
+}
+
+/// Why a file is not read.
+enum Opening {
+    Io(io::Error),
+    Wrong(String),
+}
+
+impl From<io::Error> for Opening {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+/// The taxels that the metadata in `body` tell of.
+fn metadata(body: &[u8]) -> Option<Vec<u32>> {
+    let mut parts = Parts(body);
+    if parts.text()? != super::METADATA {
+        return None;
+    }
+    let length = parts.u32()?;
+    let mut pairs = Parts(parts.bytes(length.into())?);
+    while !pairs.0.is_empty() {
+        let (key, value) = (pairs.text()?, pairs.text()?);
+        if key == TAXEL_IDS {
+            return ids_of(value);
+        }
+    }
+    None
+}
+
+fn attached(head: &[u8], record: Record) -> Option<Attached> {
+    let mut parts = Parts(head);
+    let _times = (parts.u64()?, parts.u64()?);
+    let (name, media_type) = (parts.text()?.to_owned(), parts.text()?.to_owned());
+    Some(Attached { name, media_type, bytes: parts.u64()?, at: record.at, record: record.length })
+}
+
+/// The data of a whole attachment's record, if its checksum is right.
+fn data_of(body: &[u8]) -> Option<&[u8]> {
+    let (checked, crc) = body.split_at_checked(body.len().checked_sub(4)?)?;
+    let crc = u32::from_le_bytes(crc.try_into().ok()?);
+    let mut parts = Parts(checked);
+    let _times = (parts.u64()?, parts.u64()?);
+    let _names = (parts.text()?, parts.text()?);
+    let length = parts.u64()?;
+    let data = parts.bytes(length)?;
+    (crc32fast::hash(checked) == crc).then_some(data)
+}
+
+fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
+    let (id, _schema) = (parts.u16()?, parts.u16()?);
+    Some((id, Channel { topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))
+}

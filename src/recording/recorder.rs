@@ -1,0 +1,201 @@
+//! A recording being written.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use mcap::McapError;
+use mcap::records::MessageHeader;
+use mcap::write::{Metadata, NoSeek};
+
+use super::{FRAMES, LINKS, METADATA, PERCEPTS, TAXEL_IDS, TAXELS, TOUCHES, frames, nanoseconds, schemas, words_of};
+use crate::error::{Error, Result};
+use crate::signal::Frame;
+
+/// The longest that anything is held back, so that a process that is killed loses less than a second.
+const HELD_BACK: Duration = Duration::from_millis(500);
+/// Bytes of messages after which a chunk is closed.
+const CHUNK: u64 = 1 << 20;
+
+/// Writes frames, and messages about them, to a file that can be read however the writing ends.
+pub struct Recorder {
+    name: String,
+    path: PathBuf,
+    /// `None` once the end is written.
+    writer: Option<Writer>,
+    /// By topic, in the order in which they came up.
+    channels: Vec<(&'static str, u16, u32)>,
+    taxels: String,
+    message: Vec<u8>,
+    flushed: Instant,
+    /// Whether anything waits to be flushed.
+    pending: bool,
+    /// Whether there is anything in the file that is worth keeping.
+    worth_keeping: bool,
+}
+
+type Writer = mcap::Writer<NoSeek<BufWriter<File>>>;
+
+impl Recorder {
+    /// Begins a recording at `path` of the taxels `ids`, in the order of a frame's values. A file that is there is
+    /// replaced only with `force`.
+    ///
+    /// # Errors
+    /// The file is there, or cannot be made.
+    pub fn create(path: impl AsRef<Path>, ids: &[u32], force: bool) -> Result<Self> {
+        let path = path.as_ref();
+        let made = File::options().write(true).create_new(true).open(path);
+        let is_there = made.as_ref().is_err_and(|e| e.kind() == ErrorKind::AlreadyExists);
+        let file = match made {
+            Err(_) if is_there && force => File::options().write(true).truncate(true).open(path),
+            made => made,
+        };
+        let file = file.map_err(|e| match e.kind() {
+            ErrorKind::AlreadyExists => {
+                Error::failed("it is there already; choose another name, or say --force").at(path.display())
+            }
+            _ => Error::io(path, &e),
+        })?;
+        let name = path.display().to_string();
+        let options = mcap::WriteOptions::new()
+            .compression(None)
+            .library(concat!("somatic ", env!("CARGO_PKG_VERSION")))
+            .chunk_size(Some(CHUNK))
+            // A chunk is put together in memory: on disk it is whole, or the last thing there.
+            .disable_seeking(true)
+            // Every chunk has its own.
+            .calculate_data_section_crc(false);
+        let file = NoSeek::new(BufWriter::with_capacity(1 << 16, file));
+        let writer = options.create(file).map_err(|e| explained(&name, e))?;
+        let mut recorder = Self {
+            name,
+            path: path.to_owned(),
+            writer: Some(writer),
+            channels: Vec::new(),
+            taxels: words_of(ids),
+            message: Vec::new(),
+            flushed: Instant::now(),
+            pending: false,
+            // What was there before, be it a device, is not ours to take away.
+            worth_keeping: is_there,
+        };
+        // Outside of any chunk and before all else: what every frame's meaning hangs on.
+        let ids = BTreeMap::from([(TAXEL_IDS.to_owned(), recorder.taxels.clone())]);
+        recorder.with(|writer| writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata: ids }))?;
+        Ok(recorder)
+    }
+
+    /// Puts a file beside the frames.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn attach(&mut self, name: &str, media_type: &str, bytes: &[u8]) -> Result<()> {
+        let (name, media_type) = (name.to_owned(), media_type.to_owned());
+        let attachment = mcap::Attachment { log_time: 0, create_time: 0, name, media_type, data: bytes.into() };
+        self.with(|writer| writer.attach(&attachment))
+    }
+
+    /// Adds a frame.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn frame(&mut self, frame: &Frame) -> Result<()> {
+        let mut message = std::mem::take(&mut self.message);
+        frames::encode(frame, &mut message);
+        let written = self.write(FRAMES, frame.t_s, &message);
+        self.message = message;
+        written
+    }
+
+    /// Adds a message on one of the topics of a recording.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(crate) fn write(&mut self, topic: &'static str, t_s: f64, message: &[u8]) -> Result<()> {
+        let index = match self.channels.iter().position(|(known, ..)| *known == topic) {
+            Some(index) => index,
+            None => {
+                let id = self.add_channel(topic)?;
+                self.channels.push((topic, id, 0));
+                self.channels.len() - 1
+            }
+        };
+        let (_, channel_id, sequence) = &mut self.channels[index];
+        let log_time = nanoseconds(t_s);
+        let header = MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time, publish_time: log_time };
+        *sequence = sequence.wrapping_add(1);
+        self.pending = true;
+        self.worth_keeping = true;
+        self.with(|writer| writer.write_to_known_channel(&header, message))
+    }
+
+    fn add_channel(&mut self, topic: &'static str) -> Result<u16> {
+        let (schema, encoding, message_encoding, data) = match topic {
+            FRAMES => ("somatic.Frame", "protobuf", "protobuf", schemas::somatic()),
+            PERCEPTS => ("somatic.Percepts", "jsonschema", "json", schemas::PERCEPTS.as_bytes().to_vec()),
+            TAXELS => ("foxglove.PointCloud", "protobuf", "protobuf", schemas::foxglove()),
+            TOUCHES => ("foxglove.SceneUpdate", "protobuf", "protobuf", schemas::foxglove()),
+            LINKS => ("foxglove.FrameTransforms", "protobuf", "protobuf", schemas::foxglove()),
+            _ => unreachable!("a recording has no topic {topic}"),
+        };
+        let metadata = match topic {
+            FRAMES => BTreeMap::from([(TAXEL_IDS.to_owned(), self.taxels.clone())]),
+            _ => BTreeMap::new(),
+        };
+        self.with(|writer| {
+            let schema = writer.add_schema(schema, encoding, &data)?;
+            writer.add_channel(schema, topic, message_encoding, &metadata)
+        })
+    }
+
+    /// Hands to the system what has been held back, where that was for half a second.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn tick(&mut self) -> Result<()> {
+        if !self.pending || self.flushed.elapsed() < HELD_BACK {
+            return Ok(());
+        }
+        self.pending = false;
+        let flushed = self.with(mcap::Writer::flush);
+        self.flushed = Instant::now();
+        flushed
+    }
+
+    /// Writes the end: indexes that let readers jump.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(mut self) -> Result<()> {
+        self.worth_keeping = true;
+        self.with(|writer| writer.finish().map(drop))?;
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        writer.into_inner().flush().map_err(|e| explained(&self.name, e.into()))
+    }
+
+    /// Does something with the writer.
+    fn with<T>(&mut self, something: impl FnOnce(&mut Writer) -> Result<T, McapError>) -> Result<T> {
+        let writer = self.writer.as_mut().expect("it is there until the recording is finished");
+        something(writer).map_err(|e| explained(&self.name, e))
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // The writer ends the file on its own, as well as it still can.
+        self.writer = None;
+        if !self.worth_keeping {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn explained(name: &str, error: McapError) -> Error {
+    let what = match error {
+        McapError::Io(e) => e.to_string(),
+        other => other.to_string(),
+    };
+    Error::failed(format!("cannot write: {what}")).at(name)
+}

@@ -1,0 +1,154 @@
+//! What viewers show: messages of the well-known package `foxglove`.
+
+use glam::{DAffine3, DQuat, DVec3};
+
+use super::proto::Writer;
+
+/// Bytes of a point: x, y, z and the pressure, single precision each.
+const STRIDE: u32 = 16;
+/// `FLOAT32` of `PackedElementField.NumericType`.
+const FLOAT32: u64 = 7;
+/// `ALL` of `SceneEntityDeletion.Type`.
+const ALL: u64 = 1;
+
+fn vector(writer: &mut Writer<'_>, field: u32, [x, y, z]: [f64; 3]) {
+    writer.message(field, |vector| {
+        vector.double(1, x);
+        vector.double(2, y);
+        vector.double(3, z);
+    });
+}
+
+fn quaternion(writer: &mut Writer<'_>, field: u32, rotation: DQuat) {
+    writer.message(field, |writer| {
+        for (field, value) in (1..).zip(rotation.to_array()) {
+            writer.double(field, value);
+        }
+    });
+}
+
+fn pose(writer: &mut Writer<'_>, field: u32, place: [f64; 3], rotation: DQuat) {
+    writer.message(field, |writer| {
+        vector(writer, 1, place);
+        quaternion(writer, 2, rotation);
+    });
+}
+
+fn colour(writer: &mut Writer<'_>, field: u32, rgba: [f64; 4]) {
+    writer.message(field, |writer| {
+        for (field, value) in (1..).zip(rgba) {
+            writer.double(field, value);
+        }
+    });
+}
+
+/// Taxels as points, m in the world, each with its pressure.
+#[derive(Default)]
+pub(crate) struct Cloud {
+    data: Vec<u8>,
+}
+
+impl Cloud {
+    pub(crate) fn push(&mut self, place: DVec3, pressure: f64) {
+        let [x, y, z] = place.as_vec3().to_array();
+        for value in [x, y, z, pressure as f32] {
+            self.data.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+
+    /// The message `foxglove.PointCloud`, appended to `to`; afterwards there are no points.
+    pub(crate) fn finish(&mut self, time_ns: u64, to: &mut Vec<u8>) {
+        let mut writer = Writer(to);
+        writer.time(1, time_ns);
+        writer.text(2, "world");
+        pose(&mut writer, 3, [0.0; 3], DQuat::IDENTITY);
+        writer.fixed32(4, STRIDE);
+        for (offset, name) in (0..).step_by(4).zip(["x", "y", "z", "pressure"]) {
+            writer.message(5, |field| {
+                field.text(1, name);
+                field.fixed32(2, offset);
+                field.number(3, FLOAT32);
+            });
+        }
+        writer.bytes(6, &self.data);
+        self.data.clear();
+    }
+}
+
+/// Where links are in the world: `foxglove.FrameTransforms`.
+pub(crate) struct Transforms<'a>(Writer<'a>);
+
+impl<'a> Transforms<'a> {
+    pub(crate) fn new(to: &'a mut Vec<u8>) -> Self {
+        Self(Writer(to))
+    }
+
+    pub(crate) fn push(&mut self, time_ns: u64, link: &str, world_from_link: &DAffine3) {
+        let (_, rotation, translation) = world_from_link.to_scale_rotation_translation();
+        self.0.message(1, |transform| {
+            transform.time(1, time_ns);
+            transform.text(2, "world");
+            transform.text(3, link);
+            vector(transform, 4, translation.to_array());
+            quaternion(transform, 5, rotation);
+        });
+    }
+}
+
+/// A touched field: a sphere where it is touched, and an arrow that presses it.
+pub(crate) struct Arrow<'a> {
+    pub(crate) field: &'a str,
+    pub(crate) link: &'a str,
+    /// In the link's frame, m.
+    pub(crate) position: [f64; 3],
+    /// The outward unit normal there, where it is known.
+    pub(crate) normal: Option<[f64; 3]>,
+    /// Diameter of the sphere, m.
+    pub(crate) diameter_m: f64,
+    /// Length of the arrow, m.
+    pub(crate) length_m: f64,
+}
+
+/// The touched fields: `foxglove.SceneUpdate`, in place of whatever was shown before.
+pub(crate) struct Scene<'a> {
+    writer: Writer<'a>,
+    time_ns: u64,
+}
+
+impl<'a> Scene<'a> {
+    pub(crate) fn new(time_ns: u64, to: &'a mut Vec<u8>) -> Self {
+        let mut writer = Writer(to);
+        writer.message(1, |deletion| {
+            deletion.time(1, time_ns);
+            deletion.number(2, ALL);
+        });
+        Self { writer, time_ns }
+    }
+
+    pub(crate) fn push(&mut self, arrow: &Arrow<'_>) {
+        self.writer.message(2, |entity| {
+            entity.time(1, self.time_ns);
+            entity.text(2, arrow.link);
+            entity.text(3, arrow.field);
+            entity.number(5, 1);
+            if let Some(normal) = arrow.normal {
+                let normal = DVec3::from_array(normal);
+                let tail = DVec3::from_array(arrow.position) + normal * arrow.length_m;
+                entity.message(7, |primitive| {
+                    // An arrow lies along +x.
+                    pose(primitive, 1, tail.to_array(), DQuat::from_rotation_arc(DVec3::X, -normal));
+                    primitive.double(2, 0.7 * arrow.length_m);
+                    primitive.double(3, 0.1 * arrow.length_m);
+                    primitive.double(4, 0.3 * arrow.length_m);
+                    primitive.double(5, 0.2 * arrow.length_m);
+                    colour(primitive, 6, [0.95, 0.35, 0.1, 1.0]);
+                });
+            }
+            entity.message(9, |sphere| {
+                pose(sphere, 1, arrow.position, DQuat::IDENTITY);
+                vector(sphere, 2, [arrow.diameter_m; 3]);
+                colour(sphere, 3, [0.95, 0.35, 0.1, 0.6]);
+            });
+        });
+    }
+}

@@ -1,0 +1,175 @@
+//! Percepts of a frame as one line of JSON. What is absent is left out.
+
+use serde::Serialize;
+
+use super::FieldNames;
+use crate::percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
+
+/// Composes lines for fields of some names.
+pub(super) struct Composer {
+    heads: Vec<Head>,
+    flags: Vec<(Flags, String)>,
+    all_fields: bool,
+}
+
+/// How a field's object begins, up to the value of `contact`.
+struct Head {
+    in_anchor: String,
+    in_world: String,
+}
+
+impl Head {
+    fn new(names: &FieldNames) -> Self {
+        let begin = |link: &str| {
+            let text = |text: &str| serde_json::Value::from(text).to_string();
+            let mut head = format!("{{\"field\":{},\"link\":{}", text(&names.field), text(link));
+            for (key, value) in [("letter", &names.letter), ("signal", &names.signal)] {
+                if let Some(value) = value {
+                    head += &format!(",\"{key}\":{}", text(value));
+                }
+            }
+            head + ",\"contact\":"
+        };
+        Self { in_anchor: begin(&names.link), in_world: begin("world") }
+    }
+}
+
+impl Composer {
+    /// For fields called `names`; those without contact are listed only with `all_fields`.
+    pub(super) fn new(names: &[FieldNames], all_fields: bool) -> Self {
+        Self {
+            heads: names.iter().map(Head::new).collect(),
+            flags: Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
+            all_fields,
+        }
+    }
+
+    pub(super) fn fields(&self) -> usize {
+        self.heads.len()
+    }
+
+    /// Appends the batch's frame `frame` to `line`.
+    pub(super) fn compose(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
+        let Self { heads, flags, all_fields } = self;
+        line.extend_from_slice(b"{\"t\":");
+        print(line, &percepts.t_s(frame));
+        line.extend_from_slice(b",\"frame\":");
+        print(line, &percepts.frame_number(frame));
+        line.extend_from_slice(b",\"fields\":[");
+        let mut first = true;
+        for percept in percepts.frame(frame).filter(|percept| *all_fields || percept.contact) {
+            if !std::mem::take(&mut first) {
+                line.push(b',');
+            }
+            let head = &heads[percept.field];
+            let head = if percept.in_world { &head.in_world } else { &head.in_anchor };
+            line.extend_from_slice(head.as_bytes());
+            print(line, &percept.contact);
+            print_quantities(line, &percept, percepts.precision());
+            if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
+                print_touches(line, percepts.touches(frame, percept.field));
+            }
+            line.extend_from_slice(b",\"flags\":[");
+            let mut first = true;
+            for (_, name) in flags.iter().filter(|(flag, _)| percept.flags.contains(*flag)) {
+                if !std::mem::take(&mut first) {
+                    line.push(b',');
+                }
+                line.push(b'"');
+                line.extend_from_slice(name.as_bytes());
+                line.push(b'"');
+            }
+            line.extend_from_slice(b"]}");
+        }
+        line.extend_from_slice(b"]}");
+    }
+}
+
+fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision) {
+    let scalar = |line: &mut Vec<u8>, value: f64| match precision {
+        Precision::F32 => print(line, &(value as f32)),
+        Precision::F64 => print(line, &value),
+    };
+    let named = |line: &mut Vec<u8>, name: &str, value: Option<f64>| {
+        if let Some(value) = value {
+            key(line, name);
+            scalar(line, value);
+        }
+    };
+    named(line, "total", percept.total);
+    named(line, "peak", percept.peak);
+    if let Some(active) = percept.active {
+        key(line, "active");
+        print(line, &active);
+    }
+    named(line, "area", percept.area);
+    let pair = |line: &mut Vec<u8>, name: &str, value: Option<[f64; 2]>| {
+        if let Some([u, v]) = value {
+            key(line, name);
+            line.push(b'[');
+            scalar(line, u);
+            line.push(b',');
+            scalar(line, v);
+            line.push(b']');
+        }
+    };
+    pair(line, "centroid", percept.centroid);
+    for (name, vector) in [("position", percept.position), ("normal", percept.normal)] {
+        if let Some(vector) = vector {
+            key(line, name);
+            print(line, &vector);
+        }
+    }
+    named(line, "orientation", percept.orientation);
+    named(line, "axis", percept.axis);
+    named(line, "anisotropy", percept.anisotropy);
+    pair(line, "displacement", percept.displacement);
+    named(line, "direction", percept.direction);
+    named(line, "distance", percept.distance);
+    named(line, "radial_distance", percept.radial_distance);
+    named(line, "speed", percept.speed);
+    named(line, "radial_speed", percept.radial_speed);
+    // Made by the host, in double precision whatever the backend.
+    if let Some(displacement) = percept.filtered_displacement {
+        key(line, "filtered_displacement");
+        print(line, &displacement);
+    }
+    let filtered = [("filtered_direction", percept.filtered_direction), ("filtered_speed", percept.filtered_speed)];
+    for (name, value) in filtered {
+        if let Some(value) = value {
+            key(line, name);
+            print(line, &value);
+        }
+    }
+}
+
+fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
+    key(line, "touches");
+    line.push(b'[');
+    for (index, touch) in touches.iter().enumerate() {
+        line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+        print(line, &touch.id);
+        key(line, "total");
+        print(line, &touch.total);
+        key(line, "active");
+        print(line, &touch.active);
+        if let Some(centroid) = touch.centroid {
+            key(line, "centroid");
+            print(line, &centroid);
+        }
+        key(line, "position");
+        print(line, &touch.position);
+        line.push(b'}');
+    }
+    line.push(b']');
+}
+
+fn key(line: &mut Vec<u8>, name: &str) {
+    line.extend_from_slice(b",\"");
+    line.extend_from_slice(name.as_bytes());
+    line.extend_from_slice(b"\":");
+}
+
+fn print(line: &mut Vec<u8>, value: &impl Serialize) {
+    serde_json::to_writer(line, value).expect("plain data prints into memory");
+}

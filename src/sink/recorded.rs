@@ -1,0 +1,79 @@
+//! A sink that records: frames, the percepts made of them, and what viewers show.
+
+use std::path::Path;
+
+use super::line::Composer;
+use super::scenery::Scenery;
+use super::{Flow, Heard, Part, Session, Sink};
+use crate::error::Result;
+use crate::percept::Percepts;
+use crate::recording::{PERCEPTS, Recorder};
+
+/// Records to MCAP.
+pub struct RecordingSink {
+    recorder: Recorder,
+    frames: bool,
+    percepts: Option<Composer>,
+    scenery: Option<Scenery>,
+    line: Vec<u8>,
+}
+
+impl RecordingSink {
+    /// Begins a recording at `path`.
+    ///
+    /// # Errors
+    /// The file is there and is not to be replaced, or it cannot be written.
+    pub fn create(path: impl AsRef<Path>, session: &Session<'_>) -> Result<Self> {
+        let mut recorder = Recorder::create(path, session.taxels, session.force)?;
+        for (name, media_type, bytes) in &session.attached {
+            recorder.attach(name, media_type, bytes)?;
+        }
+        let holds = |part| session.parts.is_empty() || session.parts.contains(&part);
+        Ok(Self {
+            recorder,
+            frames: holds(Part::Frames),
+            percepts: holds(Part::Percepts).then(|| Composer::new(&session.names, session.all_fields)),
+            scenery: session.body.filter(|_| holds(Part::View)).map(|body| Scenery::new(body, &session.names)),
+            line: Vec::new(),
+        })
+    }
+}
+
+impl Sink for RecordingSink {
+    fn hear(&mut self, heard: &Heard<'_>) -> Result<Flow> {
+        if self.frames {
+            for frame in heard.frames {
+                self.recorder.frame(frame)?;
+            }
+        }
+        if let Some(scenery) = &mut self.scenery {
+            scenery.hear(heard, &mut self.recorder)?;
+        }
+        Ok(Flow::Open)
+    }
+
+    fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
+        if let Some(composer) = &self.percepts {
+            assert_eq!(percepts.fields(), composer.fields(), "a sink is told the name of every field");
+            for frame in 0..percepts.frames() {
+                self.line.clear();
+                composer.compose(percepts, frame, &mut self.line);
+                self.recorder.write(PERCEPTS, percepts.t_s(frame), &self.line)?;
+            }
+        }
+        if let Some(scenery) = &mut self.scenery {
+            scenery.see(percepts, &mut self.recorder)?;
+        }
+        self.recorder.tick()?;
+        Ok(Flow::Open)
+    }
+
+    fn flush(&mut self) -> Result<Flow> {
+        self.recorder.tick()?;
+        Ok(Flow::Open)
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.recorder.finish()
+    }
+}

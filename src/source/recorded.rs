@@ -1,0 +1,28 @@
+//! Recordings in MCAP as a source.
+
+use super::Source;
+use crate::error::Result;
+use crate::recording::Reader;
+use crate::signal::Frame;
+
+impl Source for Reader {
+    fn taxels(&self) -> &[u32] {
+        Self::taxels(self)
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        Self::next_frame(self, frame)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(Self::progress(self))
+    }
+
+    fn skip_to(&mut self, t_s: f64) {
+        Self::skip_to(self, t_s);
+    }
+
+    fn losses(&self) -> Vec<String> {
+        Self::losses(self)
+    }
+}

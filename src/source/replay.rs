@@ -1,0 +1,207 @@
+//! Part of a recording, once or again and again.
+
+use super::Source;
+use crate::error::{Error, Result};
+use crate::signal::Frame;
+
+/// Which part of a recording is played, and how often.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    /// From this many seconds after its first frame.
+    pub from_s: f64,
+    /// Up to this many, that frame not included.
+    pub to_s: f64,
+    /// How many times; 0 is without end.
+    pub times: u64,
+}
+
+impl Cut {
+    /// All of it, once.
+    pub const WHOLE: Self = Self { from_s: 0.0, to_s: f64::INFINITY, times: 1 };
+}
+
+type Open = Box<dyn FnMut() -> Result<Box<dyn Source + Send>> + Send>;
+
+/// Plays part of a source. Time goes on where it is played again: the first frame comes as long after the last one as the
+/// last one came after the one before it.
+pub struct Replay {
+    open: Open,
+    source: Box<dyn Source + Send>,
+    taxels: Vec<u32>,
+    cut: Cut,
+    played: u64,
+    /// When this turn's recording began.
+    start_s: Option<f64>,
+    /// What is added to its times, s.
+    shift_s: f64,
+    /// The last frame's time as it was given, and the step that led to it, s.
+    last_s: Option<f64>,
+    step_s: f64,
+    /// Whether this turn gave anything.
+    gave: bool,
+    /// Whether the next frame is the first of a turn that is not the first.
+    again: bool,
+    losses: Vec<String>,
+}
+
+impl Replay {
+    /// Plays `cut` of the source that `open` opens, each time anew.
+    ///
+    /// # Errors
+    /// It cannot be opened; the part is none.
+    pub fn new(mut open: impl FnMut() -> Result<Box<dyn Source + Send>> + Send + 'static, cut: Cut) -> Result<Self> {
+        let Cut { from_s, to_s, .. } = cut;
+        if !from_s.is_finite() || from_s < 0.0 || to_s.is_nan() || to_s <= from_s {
+            return Err(Error::usage(format!(
+                "from {from_s} s to {to_s} s is no part of a recording; give seconds from its start, the first below the second"
+            )));
+        }
+        let source = open()?;
+        Ok(Self {
+            taxels: source.taxels().to_vec(),
+            open: Box::new(open),
+            source,
+            cut,
+            played: 0,
+            start_s: None,
+            shift_s: 0.0,
+            last_s: None,
+            step_s: 0.0,
+            gave: false,
+            again: false,
+            losses: Vec::new(),
+        })
+    }
+
+    /// Begins another turn, if there is to be one.
+    fn turn(&mut self) -> Result<bool> {
+        for loss in self.source.losses() {
+            if !self.losses.contains(&loss) {
+                self.losses.push(loss);
+            }
+        }
+        self.played += 1;
+        if self.played == self.cut.times || !self.gave {
+            return Ok(false);
+        }
+        self.source = (self.open)()?;
+        (self.start_s, self.gave, self.again) = (None, false, true);
+        Ok(true)
+    }
+}
+
+impl Source for Replay {
+    fn taxels(&self) -> &[u32] {
+        &self.taxels
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        loop {
+            if !self.source.next_frame(frame)? {
+                if self.turn()? {
+                    continue;
+                }
+                return Ok(false);
+            }
+            let start_s = match self.start_s {
+                Some(start_s) => start_s,
+                None => {
+                    if self.cut.from_s > 0.0 {
+                        self.source.skip_to(frame.t_s + self.cut.from_s);
+                    }
+                    *self.start_s.insert(frame.t_s)
+                }
+            };
+            let since_s = frame.t_s - start_s;
+            if since_s < self.cut.from_s {
+                continue;
+            }
+            if since_s >= self.cut.to_s {
+                if self.turn()? {
+                    continue;
+                }
+                // The rest is not wanted, so nothing of it is lost either.
+                self.cut.times = self.played;
+                self.gave = false;
+                return Ok(false);
+            }
+            if std::mem::take(&mut self.again) {
+                self.shift_s = self.last_s.unwrap_or(0.0) + self.step_s - frame.t_s;
+            }
+            // Adding nothing could still make −0 of 0.
+            if self.shift_s != 0.0 {
+                frame.t_s += self.shift_s;
+            }
+            if let Some(last_s) = self.last_s {
+                self.step_s = frame.t_s - last_s;
+            }
+            self.last_s = Some(frame.t_s);
+            self.gave = true;
+            return Ok(true);
+        }
+    }
+
+    fn progress(&self) -> Option<f64> {
+        if self.cut.times == 0 {
+            return None;
+        }
+        let done = self.played as f64 + self.source.progress().unwrap_or(0.0);
+        Some((done / self.cut.times as f64).min(1.0))
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.losses.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::CsvSource;
+
+    const ROWS: &str = "t,4\n10,1\n10.5,2\n11,3\n11.5,4\n";
+
+    fn played(text: &'static str, cut: Cut, most: usize) -> (Vec<(f64, f64)>, Vec<String>) {
+        let open = move || -> Result<Box<dyn Source + Send>> {
+            Ok(Box::new(CsvSource::from_reader("a", text.as_bytes(), None, None)?))
+        };
+        let mut replay = Replay::new(open, cut).unwrap();
+        let mut frame = Frame::missing(0.0, 1);
+        let mut frames = Vec::new();
+        while frames.len() < most && replay.next_frame(&mut frame).unwrap() {
+            frames.push((frame.t_s, frame.values[0].number().unwrap()));
+        }
+        (frames, replay.losses())
+    }
+
+    #[test]
+    fn a_part_is_from_one_time_up_to_another() {
+        let all = [(10.0, 1.0), (10.5, 2.0), (11.0, 3.0), (11.5, 4.0)];
+        assert_eq!(played(ROWS, Cut::WHOLE, 99).0, all);
+        assert_eq!(played(ROWS, Cut { from_s: 0.5, to_s: 1.5, times: 1 }, 99).0, all[1..3]);
+        assert_eq!(played(ROWS, Cut { from_s: 9.0, to_s: 10.0, times: 0 }, 99).0, []);
+    }
+
+    #[test]
+    fn time_goes_on_where_it_is_played_again() {
+        let twice = played(ROWS, Cut { to_s: 1.0, times: 2, ..Cut::WHOLE }, 99).0;
+        assert_eq!(twice, [(10.0, 1.0), (10.5, 2.0), (11.0, 1.0), (11.5, 2.0)]);
+        assert_eq!(played(ROWS, Cut { times: 0, ..Cut::WHOLE }, 9).0.len(), 9, "without end");
+    }
+
+    #[test]
+    fn a_loss_is_told_once() {
+        let (frames, losses) = played("t,4\n0,1\n1,2\n2", Cut { times: 3, ..Cut::WHOLE }, 99);
+        assert_eq!((frames.len(), losses.len()), (6, 1), "{losses:?}");
+    }
+
+    #[test]
+    fn no_part_is_refused() {
+        for (from_s, to_s) in [(2.0, 1.0), (-1.0, 3.0), (f64::NAN, 3.0), (1.0, 1.0)] {
+            let open = || -> Result<Box<dyn Source + Send>> {
+                Ok(Box::new(CsvSource::from_reader("a", ROWS.as_bytes(), None, None)?))
+            };
+            assert!(Replay::new(open, Cut { from_s, to_s, times: 1 }).err().unwrap().is_usage());
+        }
+    }
+}

@@ -1,0 +1,518 @@
+//! Recordings in MCAP: what goes in comes out, whatever happens to the file meanwhile.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use somatic::recording::{Reader, Recorder};
+use somatic::{Frame, RawValue};
+
+use super::{code_of, done, fails, files_in, frames, output, somatic, stderr, text_of};
+
+const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+const CALIBRATION: &str = "[all]\nbaseline = 10.5\ngain = 0.25\ndead_band = 1\n";
+
+/// Numbers that look like chance, the same in every run: splitmix64.
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+}
+
+/// Taxels of the bundled hand, and the order that a driver may give them in.
+fn ids() -> Vec<u32> {
+    [32..=38, 0..=8].into_iter().flatten().collect()
+}
+
+/// Makes a recording of `count` frames at 50 Hz of 16 taxels at `path`, and gives its frames if asked to.
+fn recorded(path: &Path, count: u64, keep: bool) -> Vec<Frame> {
+    let ids = ids();
+    let mut recorder = Recorder::create(path, &ids, false).unwrap();
+    recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
+    let mut chance = Chance(7);
+    let mut kept = Vec::new();
+    let mut frame = Frame::missing(0.0, ids.len());
+    for index in 0..count {
+        frame.t_s = index as f64 / 50.0;
+        for value in &mut frame.values {
+            *value = match chance.next() % 64 {
+                0 => RawValue::MISSING,
+                1 => RawValue::FAULTY,
+                number => RawValue::new(number as f64 / 3.0),
+            };
+        }
+        recorder.frame(&frame).unwrap();
+        if keep {
+            kept.push(frame.clone());
+        }
+    }
+    recorder.finish().unwrap();
+    kept
+}
+
+fn source(path: &Path) -> String {
+    format!("mcap:{}", text_of(path))
+}
+
+fn json(path: &Path) -> (Option<i32>, Value) {
+    let output = output(&["info", text_of(path), "--json"]);
+    let said = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", stderr(&output)));
+    (output.status.code(), said)
+}
+
+#[test]
+fn a_recording_replays_alone_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    std::fs::write(place("hand.toml"), CALIBRATION).unwrap();
+    let (mcap, calibration) = (source(&place("a.mcap")), place("hand.toml"));
+    let direct = done(&[
+        "run",
+        "--body",
+        "hand",
+        "--source",
+        TOUCH,
+        "--calibration",
+        text_of(&calibration),
+        "--backend",
+        "cpu",
+        "--sink",
+        &mcap,
+        "--sink",
+        "-",
+    ]);
+    std::fs::remove_file(&calibration).unwrap();
+    let replayed = done(&["run", "--source", &mcap, "--backend", "cpu"]);
+    assert!(direct == replayed, "with the body and the calibration that lie in it");
+    let bare = done(&["run", "--source", &mcap, "--backend", "cpu", "--body", "hand"]);
+    assert!(bare != replayed, "a body that is named brings nothing of the recording's");
+    // A recording of a replay has all that the first one had.
+    let again = source(&place("b.mcap"));
+    done(&["run", "--source", &mcap, "--backend", "cpu", "--sink", &again]);
+    assert!(done(&["run", "--source", &again, "--backend", "cpu"]) == direct);
+    let (code, info) = json(&place("a.mcap"));
+    assert_eq!((code, &info["ended"], &info["frames"]), (Some(0), &true.into(), &280.into()));
+    let names: Vec<&str> = info["attached"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["hand", "calibration.toml"]);
+    assert!(done(&["info", text_of(&place("a.mcap"))]).contains("280 at 50"));
+}
+
+#[test]
+fn poses_and_gaps_in_live_frames_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("live.mcap");
+    let lines = [
+        r#"{"t":-0.5,"values":{"4":512,"5":300.25}}"#,
+        r#"{"t":0.02,"values":{"4":500,"5":"nan","6":null,"7":1e-3},"pose":{"hand":[0.1,-2,0.3,0,0,0.6,0.8]}}"#,
+        r#"{"t":0.01,"values":{}}"#,
+        r#"{"t":1700000000.123456,"values":{"4":-0.0,"8":1e38}}"#,
+    ];
+    let run = |source: &str, sink: &str| {
+        let mut child =
+            somatic(&["run", "--body", "hand", "--source", source, "--sink", "-", "--sink", sink, "--all-fields"])
+                .args(["--backend", "cpu"])
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped())
+                .spawn()
+                .unwrap();
+        child.stdin.take().unwrap().write_all((lines.join("\n") + "\n").as_bytes()).unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let direct = run("-", &source(&path));
+    assert!(direct.contains(r#""link":"world""#));
+    let again = folder.path().join("again.mcap");
+    assert_eq!(run(&source(&path), &source(&again)), direct);
+    let (_, info) = json(&path);
+    assert_eq!((&info["posed_frames"], &info["backwards"], &info["frames"]), (&1.into(), &1.into(), &4.into()));
+    // A CSV has no place for the pose, and says so; the rest of it is there.
+    let csv = folder.path().join("live.csv");
+    let said = stderr(&output(&["convert", text_of(&path), text_of(&csv)]));
+    assert!(said.contains("no place for poses") && said.contains("no place for what is attached: hand"), "{said}");
+    let text = std::fs::read_to_string(&csv).unwrap();
+    assert!(text.contains("nan") && text.contains("\n-0.5,"), "{text}");
+}
+
+#[test]
+fn conversion_comes_back_with_every_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let (mcap, csv, twice) = (place("a.mcap"), place("b.csv"), place("c.mcap"));
+    let kept = recorded(&mcap, 500, true);
+    done(&["convert", text_of(&mcap), text_of(&csv)]);
+    done(&["convert", text_of(&csv), text_of(&twice), "--body", "hand"]);
+    let mut reader = Reader::open(&twice).unwrap();
+    let mut frame = Frame::missing(0.0, 16);
+    for (index, wanted) in kept.iter().enumerate() {
+        assert!(reader.next_frame(&mut frame).unwrap());
+        assert_eq!(&frame, wanted, "frame {index}");
+    }
+    assert!(!reader.next_frame(&mut frame).unwrap());
+    assert_eq!(json(&csv).1["rate_hz"], json(&twice).1["rate_hz"]);
+    let why = fails(1, &["convert", text_of(&csv), text_of(&mcap)]);
+    assert!(why.contains("--force"), "{why}");
+    done(&["convert", text_of(&csv), text_of(&mcap), "--force"]);
+    assert!(fails(2, &["convert", text_of(&csv), text_of(&csv), "--force"]).contains("name another file"));
+    assert!(fails(2, &["convert", "-", text_of(&csv)]).contains("only a recording"));
+    assert!(fails(2, &["info", "-"]).contains("recordings"));
+    assert_eq!(files_in(folder.path()), ["a.mcap", "b.csv", "c.mcap"]);
+}
+
+#[test]
+fn a_part_of_a_recording_is_played_as_often_as_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    recorded(&path, 60_000, false);
+    let times = |arguments: &[&str]| -> Vec<f64> {
+        let mcap = source(&path);
+        let text = done(&[&["run", "--source", &mcap, "--outputs", "total", "--backend", "cpu"], arguments].concat());
+        frames(&text).iter().map(|line| line["t"].as_f64().unwrap()).collect()
+    };
+    assert_eq!(times(&["--from", "1199.9"]), [1199.9, 1199.92, 1199.94, 1199.96, 1199.98]);
+    assert_eq!(times(&["--from", "600", "--to", "600.03"]), [600.0, 600.02]);
+    let looped = times(&["--from", "0.5", "--to", "0.53", "--loop=3"]);
+    assert_eq!(looped.len(), 6);
+    assert!(looped.windows(2).all(|pair| (pair[1] - pair[0] - 0.02).abs() < 1e-9), "{looped:?}");
+    assert!(fails(2, &["run", "--source", &source(&path), "--from", "2", "--to", "1"]).contains("no part"));
+    assert!(fails(2, &["run", "--source", "-", "--from", "2"]).contains("recordings"));
+}
+
+#[test]
+fn what_is_in_the_way_of_a_recording_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    std::fs::write(&path, "mine").unwrap();
+    let why = fails(1, &["run", "--sink", &source(&path)]);
+    assert!(why.contains("it is there already") && why.contains("--force"), "{why}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+    done(&["run", "--sink", &source(&path), "--force", "--record", "percepts"]);
+    let why = fails(1, &["run", "--source", &source(&folder.path().join("no/a.mcap"))]);
+    assert!(why.contains("no such file"), "{why}");
+    assert!(fails(1, &["run", "--sink", "mcap:/proc/a.mcap"]).contains("/proc/a.mcap"));
+    let why = fails(2, &["run", "--source", &source(&path), "--sink", &source(&path), "--force"]);
+    assert!(why.contains("name another file"), "{why}");
+    std::fs::write(&path, "no MCAP at all").unwrap();
+    assert!(fails(1, &["run", "--source", &source(&path)]).contains("no MCAP file"));
+    assert_eq!(files_in(folder.path()), ["a.mcap"]);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_ends_a_recording_and_not_what_is_live() {
+    let folder = tempfile::tempdir().unwrap();
+    let why = fails(1, &["run", "--sink", "mcap:/dev/full", "--force"]);
+    assert!(!std::fs::metadata("/dev/full").unwrap().is_file(), "what was there before stays");
+    let last = why.lines().last().unwrap();
+    assert!(last.contains("/dev/full: cannot write") && last.contains("space"), "{why}");
+    // In the middle of it: the system lets no file grow beyond 400 or 800 KB, by the shell, which is more than the body.
+    let sink = source(&folder.path().join("a.mcap"));
+    let program = env!("CARGO_BIN_EXE_somatic");
+    let script =
+        format!("trap '' XFSZ; ulimit -f 800; exec {program} run --body hand --source - --sink {sink} --sink -");
+    let mut child = Command::new("sh")
+        .args(["-c", &script])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut to = child.stdin.take().unwrap();
+    let reader = std::thread::spawn(move || child.wait_with_output().unwrap());
+    for index in 0..600 {
+        writeln!(to, r#"{{"t":{index},"values":{{"4":{index},"5":300,"35":9}}}}"#).unwrap();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    drop(to);
+    let output = reader.join().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = stderr(&output);
+    assert_eq!(said.lines().filter(|line| line.contains("a.mcap")).count(), 1, "{said}");
+    assert!(said.contains("cannot write") && said.contains("going on without it"), "{said}");
+    assert_eq!(frames(&String::from_utf8(output.stdout).unwrap()).len(), 600);
+    // What fitted is there.
+    let (code, info) = json(&folder.path().join("a.mcap"));
+    assert_eq!((code, &info["ended"]), (Some(3), &false.into()));
+}
+
+#[test]
+fn a_process_that_is_killed_loses_less_than_a_second() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut chance = Chance(u64::from(std::process::id()));
+    for round in 0..4 {
+        let path = folder.path().join(format!("{round}.mcap"));
+        let mut child =
+            somatic(&["run", "--body", "hand", "--source", TOUCH, "--speed", "1", "--loop", "--backend", "cpu"])
+                .args(["--sink", &source(&path), "--sink", "-"])
+                .stdout(Stdio::piped())
+                .spawn()
+                .unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        // Long enough for something to lose; when exactly is left to chance.
+        let until = Duration::from_millis(1200 + chance.below(1500) as u64);
+        let mut delivered = frames(&lines.next().unwrap().unwrap());
+        let start = Instant::now();
+        while start.elapsed() < until {
+            delivered.extend(frames(&lines.next().unwrap().unwrap()));
+        }
+        child.kill().unwrap();
+        assert_eq!(code_of(&mut child), None, "ended by a signal");
+        let rest: Vec<String> = lines.map_while(Result::ok).collect();
+        delivered.extend(rest.iter().filter_map(|line| serde_json::from_str::<Value>(line).ok()));
+        let last_s = delivered.last().unwrap()["t"].as_f64().unwrap();
+        let (code, info) = json(&path);
+        assert_eq!((code, &info["ended"]), (Some(3), &false.into()));
+        let kept_s = info["start"].as_f64().unwrap() + info["duration"].as_f64().unwrap();
+        assert!(last_s - kept_s < 1.0, "delivered up to {last_s} s, kept up to {kept_s} s");
+        // What is there replays, with its body, and what it gives is what was given.
+        let replay = output(&["run", "--source", &source(&path), "--backend", "cpu"]);
+        assert_eq!(replay.status.code(), Some(3));
+        let said = stderr(&replay);
+        assert_eq!(said.lines().filter(|line| line.contains("never ended")).count(), 1, "{said}");
+        let replayed = frames(&String::from_utf8(replay.stdout).unwrap());
+        assert!(!replayed.is_empty() && replayed[..] == delivered[..replayed.len()]);
+        // And it can be given an end.
+        let whole = folder.path().join(format!("{round}.whole.mcap"));
+        fails(3, &["convert", text_of(&path), text_of(&whole)]);
+        let (code, mended) = json(&whole);
+        assert_eq!((code, &mended["ended"], &mended["frames"]), (Some(0), &true.into(), &info["frames"]));
+    }
+}
+
+/// Does to `bytes` what disks, cables and programs do.
+fn damage(bytes: &mut Vec<u8>, chance: &mut Chance) {
+    for _ in 0..=chance.below(3) {
+        if bytes.is_empty() {
+            return;
+        }
+        let at = chance.below(bytes.len());
+        let length = chance.below(200).min(bytes.len() - at);
+        match chance.below(6) {
+            0 => bytes[at] ^= 1 << chance.below(8),
+            1 => bytes[at..at + length].fill(0),
+            2 => bytes[at..at + length].fill_with(|| chance.next() as u8),
+            3 => drop(bytes.drain(at..at + length)),
+            4 => bytes.truncate(at),
+            _ => {
+                let copy = bytes[at..at + length].to_vec();
+                bytes.splice(at..at, copy);
+            }
+        }
+    }
+}
+
+/// Damages a recording `rounds` times, or until `end`, and reads what is left of it.
+fn survive(rounds: u64, end: Option<Instant>, seed: u64) -> u64 {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    // Three chunks and some.
+    let kept = recorded(&path, 30_000, true);
+    let whole = std::fs::read(&path).unwrap();
+    let ids = ids();
+    let mut read_in_part = 0;
+    let mut round = 0;
+    while round < rounds && end.is_none_or(|end| Instant::now() < end) {
+        round += 1;
+        let mut chance = Chance(seed ^ round);
+        let mut bytes = whole.clone();
+        damage(&mut bytes, &mut chance);
+        std::fs::write(&path, &bytes).unwrap();
+        let Ok(mut reader) = Reader::open(&path) else { continue };
+        let mut frame = Frame::missing(0.0, reader.taxels().len());
+        let mut count = 0;
+        let done = loop {
+            match reader.next_frame(&mut frame) {
+                Ok(true) => count += 1,
+                end => break end,
+            }
+            // A frame is as it was, or it is not there.
+            let index = (frame.t_s * 50.0).round() as usize;
+            assert!(reader.taxels() != ids || kept.get(index) == Some(&frame), "round {round} of {seed}: {frame:?}");
+        };
+        if let Err(e) = &done {
+            assert!(e.to_string().lines().count() == 1, "{e}");
+        }
+        let lossless = done.is_ok() && reader.losses().is_empty() && reader.taxels() == ids;
+        assert!(!lossless || count >= kept.len(), "round {round} of {seed}: {count} frames, and no loss told");
+        assert!(reader.losses().iter().all(|loss| loss.lines().count() == 1));
+        read_in_part += u64::from(count > 0 && count < kept.len());
+        let attached = reader.attached().to_vec();
+        for file in attached {
+            if let Ok(bytes) = reader.bytes_of(&file) {
+                assert!(file.media_type != somatic::recording::BODY || bytes == somatic::bundled::HAND);
+            }
+        }
+    }
+    eprintln!("{round} damaged recordings, {read_in_part} of them read in part");
+    read_in_part
+}
+
+#[test]
+fn damage_costs_what_it_hit_and_never_more_than_a_line() {
+    assert!(survive(120, None, 1) > 10, "damage must leave something to read");
+}
+
+/// `SOMATIC_FUZZ_SECONDS=300 cargo test --test cli recording -- --ignored`
+#[test]
+#[ignore = "runs for SOMATIC_FUZZ_SECONDS"]
+fn damage_for_as_long_as_one_likes() {
+    let seconds = std::env::var("SOMATIC_FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(60);
+    let seed = std::process::id().into();
+    survive(u64::MAX, Some(Instant::now() + Duration::from_secs(seconds)), seed);
+}
+
+/// The most memory that the command had while it replayed the recording at `path`, bytes.
+fn peak_of_replay(path: &Path) -> u64 {
+    let mut child =
+        somatic(&["run", "--source", &source(path), "--backend", "cpu", "--sink", "ndjson:/dev/null"]).spawn().unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    loop {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kilobytes = line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+        peak = peak.max(kilobytes.unwrap_or(0) * 1024);
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success());
+            return peak;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_long_recording_needs_no_more_memory_than_a_short_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    recorded(&place("short.mcap"), 10_000, false);
+    recorded(&place("long.mcap"), 100_000, false);
+    let [short, long] = ["short.mcap", "long.mcap"].map(|name| peak_of_replay(&place(name)));
+    assert!(short > 0 && long < short + (16 << 20), "{short} bytes, then {long}");
+    assert!(std::fs::metadata(place("long.mcap")).unwrap().len() > 12 << 20, "or it would fit in there");
+}
+
+/// `SOMATIC_LONG_HOURS=10 cargo test --release --test cli recording -- --ignored`
+#[test]
+#[cfg(target_os = "linux")]
+#[ignore = "writes hundreds of megabytes: SOMATIC_LONG_HOURS of 16 taxels at 50 Hz"]
+fn ten_hours_replay_in_two_hundred_megabytes() {
+    let hours = std::env::var("SOMATIC_LONG_HOURS").ok().and_then(|s| s.parse().ok()).unwrap_or(10);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.mcap");
+    recorded(&path, hours * 3600 * 50, false);
+    let peak = peak_of_replay(&path);
+    eprintln!("{hours} h, {} bytes: at most {peak} bytes of memory", std::fs::metadata(&path).unwrap().len());
+    assert!(peak > 0 && peak < 200 << 20, "{peak} bytes");
+}
+
+/// Python with the format's own library, or why there is none.
+fn python() -> Result<PathBuf, String> {
+    static ONCE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let install = || {
+        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mcap");
+        let python = place.join("bin/python");
+        let works = || {
+            Command::new(&python).args(["-c", "import mcap, mcap_protobuf"]).output().is_ok_and(|o| o.status.success())
+        };
+        if works() {
+            return Ok(python);
+        }
+        let run = |command: &mut Command| match command.output() {
+            Err(e) => Err(format!("python cannot be run: {e}")),
+            Ok(output) if !output.status.success() => Err(stderr(&output)),
+            Ok(_) => Ok(()),
+        };
+        run(Command::new("python3").args(["-m", "venv"]).arg(&place))?;
+        let requirements = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mcap/requirements.txt");
+        run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--requirement", requirements]))?;
+        if works() { Ok(python) } else { Err("it does not import mcap".to_owned()) }
+    };
+    ONCE.get_or_init(install).clone()
+}
+
+#[test]
+fn another_library_reads_the_same() {
+    let python = match python() {
+        Ok(python) => python,
+        Err(why) if std::env::var_os("SOMATIC_REQUIRE_MCAP").is_none() => {
+            eprintln!("SKIPPED: no other reader of MCAP: {why}");
+            return;
+        }
+        Err(why) => panic!("no other reader of MCAP: {why}"),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let percepts = done(&["run", "--sink", &source(&path), "--sink", "-", "--backend", "cpu"]);
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mcap/read.py");
+    let output = Command::new(python).arg(script).arg(&path).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // Percepts are the lines of the other sink; frames the rows of the recording.
+    assert!(said["percepts"].as_array().unwrap()[..] == frames(&percepts)[..]);
+    let text = std::fs::read_to_string(TOUCH).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let read = said["frames"].as_array().unwrap();
+    assert_eq!(read.len(), rows.len());
+    for (frame, row) in read.iter().zip(&rows) {
+        assert_eq!(frame["t"].as_f64().unwrap(), row[0].parse::<f64>().unwrap());
+        for (index, cell) in row[1..].iter().enumerate().filter(|(_, cell)| !cell.is_empty()) {
+            let value = frame["values"][index.to_string()].as_f64().unwrap();
+            assert_eq!(value as f32, cell.parse::<f32>().unwrap());
+        }
+    }
+    // Viewers know their schemas by these names.
+    let schemas = &said["schemas"];
+    assert_eq!(schemas["/somatic/taxels"], serde_json::json!(["foxglove.PointCloud", "protobuf"]));
+    assert_eq!(schemas["/somatic/touches"], serde_json::json!(["foxglove.SceneUpdate", "protobuf"]));
+    assert_eq!(schemas["/somatic/links"], serde_json::json!(["foxglove.FrameTransforms", "protobuf"]));
+    // All taxels ten times a second over 5.58 s; their pressures are the raw values, where the body's taxels are.
+    let clouds = said["taxels"].as_array().unwrap();
+    assert!((54..=57).contains(&clouds.len()), "{}", clouds.len());
+    let body = somatic::Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
+    let first = &read[0]["values"];
+    for (index, point) in clouds[0]["points"].as_array().unwrap().iter().enumerate() {
+        let taxel = &body.taxels[index];
+        let place = body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link);
+        for (name, wanted) in [("x", place.x), ("y", place.y), ("z", place.z)] {
+            assert_eq!(point[name].as_f64().unwrap() as f32, wanted as f32);
+        }
+        assert_eq!(point["pressure"], first[index.to_string()]);
+    }
+    // What is touched is where the percepts say, in the frame that they say.
+    let shown: Vec<&Value> =
+        said["touches"].as_array().unwrap().iter().flat_map(|scene| scene.as_array().unwrap()).collect();
+    let lines = frames(&percepts);
+    let felt: Vec<&Value> = lines.iter().flat_map(|line| line["fields"].as_array().unwrap()).collect();
+    assert!(shown.len() > 20 && shown.len() <= felt.len());
+    for entity in shown {
+        let known = felt.iter().any(|f| {
+            let arrows = u64::from(!f["normal"].is_null());
+            f["field"] == entity["id"]
+                && f["link"] == entity["frame_id"]
+                && f["position"] == entity["sphere"]
+                && entity["arrows"] == arrows
+        });
+        assert!(known, "{entity}");
+    }
+    let links = said["links"][0].as_array().unwrap();
+    assert_eq!(links.len(), body.links.len());
+    assert!(links.iter().all(|link| link["parent"] == "world"));
+    assert!(said["attached"]["hand"][1].as_u64().unwrap() > 1000);
+    let (_, info) = json(&path);
+    let counted: u64 = info["topics"].as_array().unwrap().iter().map(|t| t["messages"].as_u64().unwrap()).sum();
+    assert_eq!(said["statistics"].as_u64(), Some(counted));
+}
