@@ -70,6 +70,8 @@ pub mod signal;
 pub mod sink;
 pub mod source;
 mod stage;
+#[cfg(feature = "cli")]
+pub mod tradeoff;
 mod whole;
 
 pub use backend::BackendKind;

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
-use somatic::scene::{Coverage, FilterBy, MotionFilter};
+use somatic::scene::{Coverage, FilterBy, Knobs, MotionFilter};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::SinkSpec;
 use somatic::source::{SimulatedSource, SourceSpec};
@@ -313,7 +313,7 @@ impl Asked {
             max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
             letters: Letter::all_of(letters, &self.signal),
             filter: self.filter(outputs)?,
-            coverage: self.coverage.unwrap_or_default(),
+            knobs: Knobs { coverage: self.coverage.unwrap_or_default(), ..Knobs::default() },
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

@@ -105,7 +105,7 @@ fn each_heavy_dependency_has_one_door() {
         ("rayon", "backend/cpu|experiments|author/crowd.rs"),
         ("globset", "scene|author/glob.rs"),
         ("fearless_simd", "backend/cpu"),
-        ("plotters", "ink|experiments/plot.rs|picture/words.rs"),
+        ("plotters", "ink|experiments/plot.rs|picture/words.rs|tradeoff/plot.rs"),
         ("png", "ink"),
     ];
     for (dependency, door) in doors {
