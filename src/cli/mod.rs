@@ -18,6 +18,7 @@ mod scene;
 mod screen;
 mod simulate;
 mod table;
+mod tradeoff;
 mod words;
 
 use std::io::{self, Write as _};
@@ -44,6 +45,7 @@ Examples:
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         where they are
   somatic plan --outputs centroid               what that computes, what not, and what it costs
+  somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs that are so true, here
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
   somatic devices                               which GPUs and serial ports it has
@@ -69,6 +71,7 @@ enum Command {
     #[cfg(feature = "gpu")]
     Render(render::Arguments),
     Plan(Box<plan::Arguments>),
+    Tradeoff(Box<tradeoff::Arguments>),
     Simulate(simulate::Arguments),
     Paper(paper::Arguments),
     Bench(bench::Arguments),
@@ -85,6 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         #[cfg(feature = "gpu")]
         Command::Render(arguments) => render::render(arguments),
         Command::Plan(arguments) => plan::plan(arguments),
+        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         Command::Bench(arguments) => bench::bench(arguments),

@@ -105,6 +105,7 @@ pub fn measure(
         body: body.name.clone(),
         source: played.source.clone(),
         frames: played.frames.len(),
+        asked_by: asked_by(&options.scene).word().to_owned(),
         touched: 0,
         ties: 0,
         truth: false,
@@ -167,6 +168,15 @@ pub fn measure(
     report.rows = trials.into_iter().map(|trial| trial.row(report.truth)).collect();
     report.find_front();
     Ok(report)
+}
+
+/// What `scene` asks for when it asks for an orientation.
+fn asked_by(scene: &Scene) -> OrientationBy {
+    match scene.knobs.orientation_by {
+        OrientationBy::AsAsked if scene.outputs.contains(Outputs::ORIENTATION) => OrientationBy::TwoPoints,
+        OrientationBy::AsAsked if scene.outputs.contains(Outputs::AXIS) => OrientationBy::SecondMoments,
+        given => given,
+    }
 }
 
 /// A ruler for each kind of charts that is measured.

@@ -209,6 +209,9 @@ pub struct Report {
     pub source: String,
     /// How many frames.
     pub frames: usize,
+    /// The way to orientation that the scene asks for by name, see [`OrientationBy`]: without a truth nothing tells
+    /// whether another would do.
+    pub asked_by: String,
     /// Field-frames that were compared at most, and of these how many the reference itself calls too close to call: a tie
     /// between two orientations, which are compared by nobody.
     pub touched: u64,
@@ -280,6 +283,7 @@ mod tests {
             body: "hand".into(),
             source: "touch".into(),
             frames: 10,
+            asked_by: "as-asked".into(),
             touched: 10,
             ties: 0,
             truth: false,

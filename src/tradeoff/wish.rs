@@ -139,7 +139,8 @@ impl Wish {
     /// none does, the one that misses by least.
     #[must_use]
     pub fn pick<'a>(&self, report: &'a Report, way: Way) -> Option<Pick<'a>> {
-        let rows = report.of(way);
+        let mut rows = report.of(way);
+        rows.retain(|row| report.truth || row.orientation_by == report.asked_by);
         let granted = |row: &&&Row| self.misses(row).iter().all(|times| *times <= 1.0);
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
         let true_to = |row: &Row| {
