@@ -113,7 +113,6 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     // A run that was cut short, or with knobs that are held, is not what others would measure.
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
-        && options.backend == BackendKind::Auto
         && let Some(store) = Store::of_user()
         && let Err(e) = store.keep(&body, &options, &settled::driver(), &report)
     {
@@ -231,7 +230,7 @@ fn text(report: &Report, all: bool) -> String {
     let frames = count(report.frames as u64, "frame");
     let mut text = format!("{}, {frames} of {}\n", style(&report.body).bold(), report.source);
     text += &format!(
-        "  {} of touched fields, {} ties left out of orientations; errors are what 99 % do not exceed, and the worst\n",
+        "  {} of touched fields, {} ties left out of orientations\n",
         count(report.touched, "percept"),
         report.ties
     );
@@ -252,44 +251,31 @@ fn text(report: &Report, all: bool) -> String {
             rows.len()
         );
         let truth = report.truth;
+        let of_truth = |what| if truth { what } else { "" };
         let mut table = plain([
             "µs",
             "p99",
-            "mm",
+            "mm: rms",
+            "p99",
             "worst",
-            "°",
+            "°: rms",
+            "p99",
             "worst",
-            if truth { "mm true" } else { "" },
-            if truth { "° true" } else { "" },
-            "backend",
-            "arithmetic",
-            "charts",
-            "orientation",
-            "coverage",
-            "cadence",
+            of_truth("true mm: p99"),
+            of_truth("°: p99"),
+            "combination",
         ]);
-        (0..8).for_each(|column| right(&mut table, column));
+        (0..10).for_each(|column| right(&mut table, column));
         for row in listed {
             let said = |value: f64, errors: &Errors| if errors.compared > 0 { number(value) } else { "–".to_owned() };
-            let (centroid, turned) = (&row.centroid_mm, &row.orientation_deg);
             let of_truth = |errors: &Option<Errors>| errors.map_or(String::new(), |errors| said(errors.p99, &errors));
-            let cells = [
-                number(row.p50_us),
-                number(row.p99_us),
-                said(centroid.p99, centroid),
-                said(centroid.worst, centroid),
-                said(turned.p99, turned),
-                said(turned.worst, turned),
-                of_truth(&row.true_centroid_mm),
-                of_truth(&row.true_orientation_deg),
-                row.backend.clone(),
-                row.arithmetic.clone(),
-                row.charts.clone(),
-                row.orientation_by.clone(),
-                row.coverage.clone(),
-                row.cadence.clone(),
-            ];
-            table.add_row(cells.map(|cell| if row.front { cell } else { style(cell).dim().to_string() }));
+            let mut cells = vec![number(row.p50_us), number(row.p99_us)];
+            for errors in [&row.centroid_mm, &row.orientation_deg] {
+                cells.extend([errors.rms, errors.p99, errors.worst].map(|value| said(value, errors)));
+            }
+            cells.extend([of_truth(&row.true_centroid_mm), of_truth(&row.true_orientation_deg)]);
+            cells.push(row.combination().map_or(String::new(), |combination| combination.to_string()));
+            table.add_row(cells.into_iter().map(|cell| if row.front { cell } else { style(cell).dim().to_string() }));
         }
         text += &shown(&table);
     }

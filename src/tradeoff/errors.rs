@@ -101,6 +101,11 @@ impl Ruler {
         self.field(field).spacing * f64::from(self.field(field).unit_m)
     }
 
+    /// Whether all fields have the charts that they have in `other`.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (0..self.plan.fields.len()).all(|field| self.has_same_chart(other, field))
+    }
+
     fn has_same_chart(&self, other: &Self, field: usize) -> bool {
         self.field(field).chart == other.field(field).chart
     }

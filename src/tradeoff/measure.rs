@@ -113,9 +113,15 @@ pub fn measure(
         left_out: Vec::new(),
         rows: Vec::new(),
     };
+    let authored = &rulers[Charts::AsAuthored.word()];
+    let another = |charts: Charts| charts == options.scene.knobs.charts || !rulers[charts.word()].is_like(authored);
+    for charts in Charts::ALL.iter().filter(|charts| rulers.contains_key(charts.word()) && !another(**charts)) {
+        report.left_out.push(format!("charts {charts}: they are the layout's own"));
+    }
     let mut trials = Vec::new();
     for &way in &manner.ways {
-        for combination in Combination::all(&options.scene, way, &manner.backends) {
+        let all = Combination::all(&options.scene, way, &manner.backends);
+        for combination in all.into_iter().filter(|combination| another(combination.knobs.charts)) {
             match Trial::new(body, options, played, way, combination, manner.batch) {
                 Ok(trial) => trials.push(trial),
                 Err(e) if combination.backend == BackendKind::Gpu => {
@@ -140,7 +146,7 @@ pub fn measure(
     let mut calls = [Calls::new(&played.frames, 1), Calls::new(&played.frames, manner.batch.max(1))];
     for (index, trial) in trials.iter_mut().enumerate() {
         let ruler = &rulers[&trial.combination.knobs.charts.word()];
-        trial.compare(&mut calls[trial.way as usize], ruler, &rulers[Charts::AsAuthored.word()], &right)?;
+        trial.compare(&mut calls[trial.way as usize], ruler, authored, &right)?;
         if !progress(FIRST_PART * (index + 1) as f64 / count as f64) {
             return Err(stopped());
         }
@@ -353,8 +359,13 @@ mod tests {
         })
         .unwrap();
         assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
-        let expected: usize =
-            Way::ALL.iter().map(|&way| Combination::all(&options.scene, way, &[BackendKind::Cpu]).len()).sum();
+        // The hand's own charts are planes.
+        let of_way = |&way: &Way| {
+            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu]);
+            all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
+        };
+        let expected: usize = Way::ALL.iter().map(of_way).sum();
+        assert!(report.left_out.iter().any(|left| left.starts_with("charts plane")), "{:?}", report.left_out);
         assert_eq!(report.rows.len(), expected);
         for row in &report.rows {
             assert!(row.p50_us > 0.0 && row.p99_us >= row.p50_us, "{row:?}");

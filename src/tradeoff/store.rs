@@ -130,7 +130,7 @@ impl Key {
 /// What is asked for, but for the knobs: all of these are measured.
 fn asked(options: &Options) -> String {
     let scene = crate::Scene { knobs: Knobs::default(), ..options.scene.clone() };
-    format!("{scene:?}")
+    format!("{:?} {scene:?}", options.backend)
 }
 
 /// The processor, and how many of its threads there are.
