@@ -49,6 +49,8 @@ struct Panel<'a> {
     way: Way,
     what: &'static str,
     unit: &'static str,
+    /// Whether errors are from the truth.
+    truth: bool,
     points: Vec<(&'a Row, &'a Errors)>,
 }
 
@@ -58,8 +60,10 @@ fn panels(report: &Report) -> Vec<Panel<'_>> {
         for (index, what, unit) in [(0, "centroid", "mm"), (1, "orientation", "degrees")] {
             let points = report.of(way).into_iter().map(|row| (row, row.judged()[index]));
             let points: Vec<_> = points.filter(|(_, errors)| errors.compared > 0).collect();
+            let knows = |row: &Row| [row.true_centroid_mm, row.true_orientation_deg][index].is_some();
             if !points.is_empty() {
-                panels.push(Panel { way, what, unit, points });
+                let truth = points.iter().any(|(row, _)| knows(row));
+                panels.push(Panel { way, what, unit, truth, points });
             }
         }
     }
@@ -88,7 +92,7 @@ fn draw<B: DrawingBackend>(report: &Report, area: &DrawingArea<B, Shift>) -> Res
     let (body, legend) = rest.split_vertically((height - TITLE - LEGEND) as i32);
     let panels = panels(report);
     for (panel, area) in panels.iter().zip(body.split_evenly(shape(&panels))) {
-        panel.draw(&area, report.truth)?;
+        panel.draw(&area)?;
     }
     draw_legend(report, &legend)
 }
@@ -126,8 +130,8 @@ fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
 }
 
 impl Panel<'_> {
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, truth: bool) -> Result<()> {
-        let from = if truth { "from the truth" } else { "from the reference" };
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
+        let from = if self.truth { "from the truth" } else { "from the reference" };
         let place = |(row, errors): &(&Row, &Errors)| (row.p50_us, errors.p99.max(LEAST));
         let places: Vec<(f64, f64)> = self.points.iter().map(place).collect();
         let x = decades(places.iter().map(|point| point.0));
