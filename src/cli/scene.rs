@@ -139,6 +139,7 @@ pub(super) struct Asked {
     pub(super) filter_time: Option<f64>,
 
     #[command(flatten)]
+    #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
     pub(super) accuracy: Accuracy,
 
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
