@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use somatic::body::MemberSpec;
 use somatic::experiments::shape::Shape;
-use somatic::scene::Coverage;
+use somatic::scene::{Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, Outputs, RawValue, Scene};
 
 const SENSORS: usize = 100_000;
@@ -40,7 +40,8 @@ fn main() {
     // Cargo passes `--bench`; a name may follow, as for other benches.
     let body = skin();
     let engine = |coverage| {
-        let scene = Scene { outputs: Outputs::CENTROID | Outputs::ORIENTATION, coverage, ..Scene::default() };
+        let knobs = Knobs { coverage, ..Knobs::default() };
+        let scene = Scene { outputs: Outputs::CENTROID | Outputs::ORIENTATION, knobs, ..Scene::default() };
         Engine::new(&body, Options { scene, backend: BackendKind::Cpu, ..Options::default() }).expect("the CPU is here")
     };
     let cases = [

@@ -1,20 +1,22 @@
 //! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
 
+mod cadence;
 mod host;
 
 use std::ops::Range;
 
-use self::host::{Host, Links, Memory};
+use self::cadence::{OnChange, step};
+use self::host::{Host, Links, Side};
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
-use crate::field::{FieldSet, neighbours};
+use crate::field::{FieldSet, NoChart, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
-use crate::scene::{Plan, Scene};
+use crate::scene::{Cadence, Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
-use crate::stage::{calibrate, layout, motion::SHORTEST_STEP_S};
+use crate::stage::{calibrate, layout};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -67,32 +69,39 @@ pub struct Engine {
     check: Option<Box<Check>>,
     /// What the calibration's upkeep does, if it does anything.
     upkeep: Option<KeptUp>,
-    /// Per field, what the host's stages remember.
-    memories: Vec<Memory>,
+    /// What is remembered of frames before.
+    side: Side,
+    /// Which fields changed, where that is looked at.
+    cadence: Option<OnChange>,
     /// Whether the first frame is still to be taken as the baselines.
     tare: bool,
     frames_done: u64,
     ids: Vec<u32>,
     links: Links,
+    /// Fields that could not have the kind of chart that is asked for.
+    kept_charts: Vec<(String, NoChart)>,
 }
 
 /// The reference's side of a comparison.
 struct Check {
     reference: Reference,
-    memories: Vec<Memory>,
+    side: Side,
     right: Percepts,
     bounds: Vec<CellBound>,
+    /// Those of the frame before, where percepts are kept.
+    last_bounds: Vec<CellBound>,
 }
 
 impl Check {
     fn new(plan: &Plan) -> Self {
         Self {
             reference: Reference::new(plan),
-            memories: vec![Memory::default(); plan.fields.len()],
+            side: Side::new(plan.fields.len()),
             right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
                 .with_columns(plan.columns, plan.kept_pressures())
                 .with_letters(plan.letters().len()),
             bounds: Vec::new(),
+            last_bounds: Vec::new(),
         }
     }
 }
@@ -125,6 +134,7 @@ impl Engine {
     /// was asked for cannot run here ([`Error::is_no_adapter`]).
     pub fn new(body: &Body, options: Options) -> Result<Self> {
         let Options { scene, calibration, backend: kind, tare, batch } = options;
+        let kind = kind.with(scene.knobs.arithmetic)?;
         let calibration = calibration.unwrap_or_else(|| Calibration::identity(body.taxels.len()));
         if calibration.taxels.len() != body.taxels.len() {
             return Err(Error::failed(format!(
@@ -133,8 +143,8 @@ impl Engine {
                 body.taxels.len()
             )));
         }
-        let fields = FieldSet::new(body)?;
-        let plan = Plan::new(body, &fields, &scene, &calibration)?;
+        let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;
+        let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         let upkeep = KeptUp::new(&plan, calibration.upkeep);
         if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(
@@ -152,7 +162,8 @@ impl Engine {
                 .with_letters(plan.letters().len()),
             check: None,
             upkeep,
-            memories: vec![Memory::default(); plan.fields.len()],
+            side: Side::new(plan.fields.len()),
+            cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
             backend: chosen.backend,
             why: chosen.why,
             intake: Intake::new(calibration, beside, scene.max_age_s),
@@ -166,6 +177,7 @@ impl Engine {
                 parent: body.links.iter().map(|link| link.parent).collect(),
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
             },
+            kept_charts: recharted.kept,
             plan,
         };
         engine.pick();
@@ -182,6 +194,12 @@ impl Engine {
     #[must_use]
     pub fn backend(&self) -> (&'static str, String, &str) {
         (self.backend.name(), self.backend.describe(), &self.why)
+    }
+
+    /// Fields that stay in the charts of the layout as they cannot have the kind that [`crate::scene::Knobs::charts`]
+    /// asks for, and why.
+    pub fn kept_charts(&self) -> impl ExactSizeIterator<Item = (&str, &NoChart)> {
+        self.kept_charts.iter().map(|(name, why)| (name.as_str(), why))
     }
 
     /// Says which taxels a source's frames hold, in their order. Until then, it is all of the body's, by ascending id.
@@ -328,6 +346,9 @@ impl Engine {
             *kept = KeptUp::new(&self.plan, kept.upkeep.keys()).unwrap_or_else(|| unreachable!("it was on before"));
         }
         self.backend.recalibrate(&self.plan);
+        if let Some(cadence) = &mut self.cadence {
+            cadence.forget();
+        }
         if let Some(check) = check {
             check.reference.recalibrate(&self.plan);
         }
@@ -345,11 +366,18 @@ impl Engine {
             rows: rows(self.picks.as_ref(), &self.raw, frames, channels).part(range.clone()),
             steps: &self.steps[range.clone()],
         };
-        let host = Host { plan: &self.plan, links: &self.links };
-        host.run(&mut *self.backend, &frames[range.clone()], &raw, &mut self.percepts, &mut self.memories)?;
+        if let Some(cadence) = &mut self.cadence {
+            cadence.look(&raw, &frames[range.clone()]);
+        }
+        let host = Host { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref() };
+        host.run(&mut *self.backend, &frames[range.clone()], &raw, &mut self.percepts, &mut self.side)?;
         if let Some(check) = check {
-            check.bounds.extend(check.reference.bounds(&raw));
-            host.run(&mut check.reference, &frames[range.clone()], &raw, &mut check.right, &mut check.memories)?;
+            let mut bounds = check.reference.bounds(&raw);
+            if let Some(cadence) = &self.cadence {
+                cadence.bounds(&mut bounds, raw.steps, &mut check.last_bounds);
+            }
+            check.bounds.extend(bounds);
+            host.run(&mut check.reference, &frames[range.clone()], &raw, &mut check.right, &mut check.side)?;
         }
         if let Some(kept) = &mut self.upkeep {
             let fields = self.plan.fields.len();
@@ -373,6 +401,9 @@ impl Engine {
                 self.plan.keep_up(channel, baseline, unfit.is_some(), &kept.made);
             }
             self.backend.recalibrate(&self.plan);
+            if let Some(cadence) = &mut self.cadence {
+                cadence.forget();
+            }
             if let Some(check) = check {
                 check.reference.recalibrate(&self.plan);
             }
@@ -413,15 +444,6 @@ fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], 
         Some(picks) => Rows::Picked { frames, picks },
         None => Rows::Packed { values: raw, channels },
     }
-}
-
-/// The time from the frame at `last_t_s` to the one at `t_s`, and whether motion can be measured over it.
-fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
-    let Some(last_t_s) = last_t_s else { return Step { dt_s: 0.0, flags: Flags::NO_PREVIOUS } };
-    let dt_s = t_s - last_t_s;
-    // A step too short for single precision is none.
-    let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
-    Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }
 }
 
 /// Ascending ids in few words: `0–35, 64–103`.

@@ -30,11 +30,32 @@ impl Text<'_> {
     /// The text is no TOML, or has other keys or values than a `T`.
     pub fn parse_to_the_column<T: DeserializeOwned>(self) -> Result<T> {
         toml::from_str(self.0).map_err(|e| {
-            let start = e.span().map_or(0, |span| span.start).min(self.0.len());
-            let before = self.0.as_bytes()[..start].rsplit(|&byte| byte == b'\n').next().unwrap_or_default();
-            let column = 1 + String::from_utf8_lossy(before).chars().count();
-            Error::failed(explain(e.message())).at(format!("line {}, column {column}", self.line(start)))
+            let (line, column) = self.place(e.span().map_or(0, |span| span.start));
+            Error::failed(explain(e.message())).at(format!("line {line}, column {column}"))
         })
+    }
+
+    /// Line and column, from 1, of byte `offset`.
+    fn place(self, offset: usize) -> (usize, usize) {
+        let start = offset.min(self.0.len());
+        let before = self.0.as_bytes()[..start].rsplit(|&byte| byte == b'\n').next().unwrap_or_default();
+        (self.line(start), 1 + String::from_utf8_lossy(before).chars().count())
+    }
+
+    /// Line and column, from 1, of the key at the end of `path`, through tables from the top; `None` where it is not.
+    #[must_use]
+    pub fn place_of(self, path: &[&str]) -> Option<(usize, usize)> {
+        let mut table = toml::de::DeTable::parse(self.0).ok()?.into_inner();
+        let (last, tables) = path.split_last()?;
+        for name in tables {
+            let (_, value) = table.into_iter().find(|(key, _)| key.get_ref() == name)?;
+            table = match value.into_inner() {
+                toml::de::DeValue::Table(table) => table,
+                _ => return None,
+            };
+        }
+        let key = table.keys().find(|key| key.get_ref() == last)?;
+        Some(self.place(key.span().start))
     }
 
     /// The error that `what` is wrong at `span`.
@@ -145,6 +166,14 @@ fn explain(message: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_is_found_where_it_stands() {
+        let text = Text("a = 1\n[b]\n  c.d = 2\n");
+        assert_eq!(text.place_of(&["a"]), Some((1, 1)));
+        assert_eq!(text.place_of(&["b", "c", "d"]), Some((3, 5)));
+        assert_eq!((text.place_of(&["b", "x"]), text.place_of(&["a", "c"]), text.place_of(&[])), (None, None, None));
+    }
 
     #[test]
     fn the_parsers_words_become_ours() {

@@ -74,6 +74,8 @@ pub mod source;
 mod stage;
 #[cfg(feature = "cli")]
 pub mod survey;
+#[cfg(feature = "cli")]
+pub mod tradeoff;
 mod whole;
 pub mod wire;
 

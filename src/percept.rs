@@ -5,6 +5,7 @@
 //! is ever NaN or infinite.
 
 mod batch;
+mod keep;
 
 use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};

@@ -149,6 +149,7 @@ fn main(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
+    var over = nothing_over();
     var said = vec4<u32>();
     for (var m = field.first; m < end; m++) {
         let member = members[m];
@@ -156,10 +157,22 @@ fn main(
         let pressure = unmarked(bits);
         let pull = member.weight * pressure;
         said |= bits;
-        sums = add_sums(sums, member, pressure, pull);
-        if CENTRED {
-            place = add_place(place, m, member, pull, charted);
+        if COMPENSATED {
+            let kept = add_with_care(sums.total, place, over, m, member, pull, charted);
+            sums = add_sums(sums, member, pressure, pull);
+            sums.total = kept.total;
+            place = kept.place;
+            over = kept.over;
+        } else {
+            sums = add_sums(sums, member, pressure, pull);
+            if CENTRED {
+                place = add_place(place, m, member, pull, charted);
+            }
         }
+    }
+    if COMPENSATED {
+        sums.total -= over.total;
+        place = less(place, over);
     }
     if is_marked(said) {
         sums = add_statuses(sums, field.first, end, 1u, first);
@@ -168,6 +181,7 @@ fn main(
     store_sums(index, quad, sums, found.place);
     var far = nobody_far();
     var moments = no_moments();
+    var over_moments = no_moments();
     if (ORIENTED || AXED) && charted {
         for (var m = field.first; m < end; m++) {
             let member = members[m];
@@ -177,9 +191,18 @@ fn main(
                 far = add_far(far, m, member, pressure, q, found.place);
             }
             if AXED {
-                moments = add_moments(moments, member, q, found.place);
+                if COMPENSATED {
+                    let kept = add_moments_with_care(moments, over_moments, member, q, found.place);
+                    moments = kept.sums;
+                    over_moments = kept.over;
+                } else {
+                    moments = add_moments(moments, member, q, found.place);
+                }
             }
         }
+    }
+    if COMPENSATED {
+        moments = less_moments(moments, over_moments);
     }
     finish_lines(index, quad, found, far, moments);
 }
@@ -267,6 +290,7 @@ fn wide(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
+    var over = nothing_over();
     var said = vec4<u32>();
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
@@ -274,10 +298,22 @@ fn wide(
         let pressure = unmarked(bits);
         let pull = member.weight * pressure;
         said |= bits;
-        sums = add_sums(sums, member, pressure, pull);
-        if CENTRED {
-            place = add_place(place, m, member, pull, charted);
+        if COMPENSATED {
+            let kept = add_with_care(sums.total, place, over, m, member, pull, charted);
+            sums = add_sums(sums, member, pressure, pull);
+            sums.total = kept.total;
+            place = kept.place;
+            over = kept.over;
+        } else {
+            sums = add_sums(sums, member, pressure, pull);
+            if CENTRED {
+                place = add_place(place, m, member, pull, charted);
+            }
         }
+    }
+    if COMPENSATED {
+        sums.total -= over.total;
+        place = less(place, over);
     }
     if is_marked(said) {
         sums = add_statuses(sums, field.first + local, end, GROUP, first);
@@ -299,6 +335,7 @@ fn wide(
     }
     var far = nobody_far();
     var moments = no_moments();
+    var over_moments = no_moments();
     if ORIENTED || AXED {
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
@@ -308,7 +345,13 @@ fn wide(
                 far = add_far(far, m, member, pressure, q, found.place);
             }
             if AXED {
-                moments = add_moments(moments, member, q, found.place);
+                if COMPENSATED {
+                    let kept = add_moments_with_care(moments, over_moments, member, q, found.place);
+                    moments = kept.sums;
+                    over_moments = kept.over;
+                } else {
+                    moments = add_moments(moments, member, q, found.place);
+                }
             }
         }
     }
@@ -324,6 +367,9 @@ fn wide(
         far = far_at(0u);
     }
     if AXED {
+        if COMPENSATED {
+            moments = less_moments(moments, over_moments);
+        }
         workgroupBarrier();
         put_moments(local, moments);
         for (var half = GROUP / 2u; half > 0u; half /= 2u) {

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::percept::{Flags, Percepts, Precision};
-use crate::scene::Plan;
+use crate::scene::{Arithmetic, Plan};
 use crate::signal::{Frame, RawValue};
 
 /// How backend `cpu` computes on this machine, in words: its arithmetic, instructions and threads.
@@ -53,6 +53,25 @@ impl FromStr for BackendKind {
             "cpu" => Ok(Self::Cpu),
             "gpu" => Ok(Self::Gpu),
             _ => Err(Error::usage(format!("there is no backend `{name}`; choose auto, reference, cpu or gpu"))),
+        }
+    }
+}
+
+impl BackendKind {
+    /// The backend that computes for `self` with `arithmetic`: where it is double, the reference.
+    ///
+    /// # Errors
+    /// The backend has no such arithmetic.
+    pub(crate) fn with(self, arithmetic: Option<Arithmetic>) -> Result<Self> {
+        match (self, arithmetic) {
+            (Self::Gpu, Some(Arithmetic::Double)) => {
+                Err(Error::usage("shaders have no double precision: take backend cpu, or arithmetic compensated"))
+            }
+            (_, Some(Arithmetic::Double)) => Ok(Self::Reference),
+            (Self::Reference, Some(arithmetic)) => Err(Error::usage(format!(
+                "the reference is always in double precision: take backend cpu or gpu for arithmetic {arithmetic}"
+            ))),
+            _ => Ok(self),
         }
     }
 }

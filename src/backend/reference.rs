@@ -152,7 +152,8 @@ impl Reference {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
         let pressed = self.pressed(field, pressures);
-        let sums = contact::bound(&pressed);
+        let how = self.plan.sums();
+        let sums = contact::bound(&pressed, how);
         let mut bound =
             CellBound { total: Some(sums.total), peak: Some(sums.peak), area: Some(sums.area), ..CellBound::default() };
         let total = contact::reference(&pressed).total;
@@ -167,7 +168,7 @@ impl Reference {
         }
         let unit = f64::from(field.unit_m);
         let c = centroid::reference(&pressed);
-        let c_bound = centroid::bound(&pressed);
+        let c_bound = centroid::bound(&pressed, how);
         bound.centroid = Some([c_bound.x * unit, c_bound.y * unit]);
         match &field.lift {
             Some(lift) => {
@@ -184,7 +185,7 @@ impl Reference {
                 bound.in_doubt |= line.in_doubt;
             }
             if self.plan.stages().axis {
-                let axis = axis::bound(&pressed, c, c_bound);
+                let axis = axis::bound(&pressed, how, c, c_bound);
                 (bound.axis, bound.anisotropy) = (axis.line.angle, axis.anisotropy);
                 bound.in_doubt |= axis.line.in_doubt;
             }

@@ -54,7 +54,7 @@ pub(super) struct Arguments {
 
 enum Target {
     Csv(CsvFile),
-    Mcap(Recorder),
+    Mcap(Box<Recorder>),
 }
 
 pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
@@ -84,7 +84,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
             for (name, media_type, bytes) in &attached {
                 recorder.attach(name, media_type, bytes)?;
             }
-            Target::Mcap(recorder)
+            Target::Mcap(Box::new(recorder))
         }
     };
     let (frames, posed) = copy(&mut *source, &mut target)?;

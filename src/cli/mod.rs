@@ -24,6 +24,7 @@ mod scene;
 mod screen;
 mod simulate;
 mod table;
+mod tradeoff;
 mod words;
 
 use std::io::{self, Write as _};
@@ -50,6 +51,7 @@ Examples:
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         where they are
   somatic plan --outputs centroid               what that computes, what not, and what it costs
+  somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs that are so true, here
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
   somatic board --link /tmp/hand                a hand on a serial line, made of software
   somatic info touch.mcap                       how long a recording is, and what is in it
@@ -77,6 +79,7 @@ enum Command {
     #[cfg(feature = "gpu")]
     Render(render::Arguments),
     Plan(Box<plan::Arguments>),
+    Tradeoff(Box<tradeoff::Arguments>),
     Simulate(simulate::Arguments),
     Info(info::Arguments),
     Convert(convert::Arguments),
@@ -98,6 +101,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         #[cfg(feature = "gpu")]
         Command::Render(arguments) => render::render(arguments),
         Command::Plan(arguments) => plan::plan(arguments),
+        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Info(arguments) => info::info(arguments),
         Command::Convert(arguments) => convert::convert(arguments),

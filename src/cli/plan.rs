@@ -9,12 +9,14 @@ use comfy_table::ColumnConstraint;
 use console::style;
 use serde_json::{Value, json};
 use somatic::scene::PlannedStage;
+use somatic::tradeoff::Combination;
 use somatic::{Agreement, BackendKind, Body, Engine, Error, Frame, Options, Outputs, RawValue, Result};
 
 use super::input::Input;
 use super::run::RECORDED_BATCH;
 use super::scene::Asked;
 use super::table::{plain, right, shown};
+use super::tradeoff::{Settled, settled};
 use super::words::count;
 use super::{DONE, print};
 
@@ -83,6 +85,11 @@ struct Bill {
     memberships: usize,
     bytes: [usize; 2],
     backend: (String, String, String),
+    knobs: Combination,
+    /// Fields that cannot have the charts that are asked for, and why.
+    kept_charts: Vec<String>,
+    /// What `somatic tradeoff` measured of this, and when.
+    kept: Option<String>,
     /// Frames a call.
     batch: usize,
     on: String,
@@ -99,7 +106,7 @@ impl Bill {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
-        let options = asked.options(body, &ids, batch)?;
+        let Settled { options, why: picked, measured: kept } = settled(asked, input, body, batch)?;
         let mut engine = Engine::new(body, options.clone())?;
         let mut source = recorded.map(|input| input.open(&ids, asked)).transpose()?;
         let mut frames = Vec::new();
@@ -119,7 +126,7 @@ impl Bill {
             frames = pressed(ids.len(), batch);
         }
         let (name, what, why) = engine.backend();
-        let backend = (name.to_owned(), what, why.to_owned());
+        let backend = (name.to_owned(), what, picked.unwrap_or_else(|| why.to_owned()));
         let kind: BackendKind = name.parse()?;
         let made = |scene_outputs: Outputs| -> Result<Engine> {
             let mut options = Options { backend: kind, ..options.clone() };
@@ -147,6 +154,8 @@ impl Bill {
             }
         }
         let fields = [plan.fields().len(), body.fields.len() * plan.letters().len()];
+        let knobs = Combination { backend: kind, knobs: plan.knobs() };
+        let kept_charts = engine.kept_charts().map(|(name, why)| format!("{name}: {why}")).collect();
         let (channels, memberships) = (plan.channels(), plan.memberships());
         let bytes = [plan.bytes_up(), plan.bytes_down()];
         let mut frames = Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() };
@@ -169,6 +178,9 @@ impl Bill {
             memberships,
             bytes,
             backend,
+            knobs,
+            kept_charts,
+            kept,
             batch,
             on,
             stages: stages.collect(),
@@ -189,6 +201,12 @@ impl Bill {
         );
         let (name, what, why) = &self.backend;
         line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
+        let [_, knobs @ ..] = self.knobs.words();
+        line("knobs", knobs.join(", "));
+        if let Some(kept) = &self.kept {
+            line("measured", kept.clone());
+        }
+        self.kept_charts.iter().for_each(|kept| line("kept chart", kept.clone()));
         if let Some(agreement) = &self.agreement {
             line("accuracy", accuracy(agreement));
         }
@@ -211,6 +229,17 @@ impl Bill {
             ]);
         }
         text + "\n" + &shown(&table)
+    }
+
+    fn knobs_json(&self) -> Value {
+        let [_, arithmetic, charts, orientation_by, coverage, cadence] = self.knobs.words();
+        json!({
+            "arithmetic": arithmetic,
+            "charts": charts,
+            "orientation_by": orientation_by,
+            "coverage": coverage,
+            "cadence": cadence,
+        })
     }
 
     fn json(&self) -> Value {
@@ -242,6 +271,9 @@ impl Bill {
             "backend": name,
             "adapter": what,
             "why": why,
+            "knobs": self.knobs_json(),
+            "kept_charts": self.kept_charts,
+            "measured": self.kept,
             "batch": self.batch,
             "us": rounded(self.whole_us),
             "stages": stages,
@@ -277,7 +309,7 @@ fn accuracy(agreement: &Agreement) -> String {
 }
 
 /// Frames in which every one of `taxels` is pressed, each time otherwise: enough for a call of `batch`, and for motion.
-fn pressed(taxels: usize, batch: usize) -> Vec<Frame> {
+pub(super) fn pressed(taxels: usize, batch: usize) -> Vec<Frame> {
     let frames = batch.max((VALUES / taxels.max(1)).clamp(2, 64));
     let value = |index: usize, frame: usize| RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64);
     let values = |frame| (0..taxels).map(|index| value(index, frame)).collect();

@@ -16,6 +16,7 @@ use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
 use super::live::{About, View};
 use super::scene::Asked;
+use super::tradeoff::{say_kept, settled};
 use super::{DONE, FAILED, LOST, say};
 
 const EXAMPLES: &str = "\
@@ -81,11 +82,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let speed = asked.speed.or((input.is_bundled() && at_terminal).then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
-    let mut engine = Engine::new(&body, asked.options(&body, &ids, batch)?)?;
+    let settled = settled(&asked, Some(&input), &body, batch)?;
+    let mut engine = Engine::new(&body, settled.options)?;
     engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if asked.backend.unwrap_or_default() == BackendKind::Auto && !asked.quiet {
         let (name, what, why) = engine.backend();
-        say(&format!("backend {name} ({what}): {why}"));
+        say(&format!("backend {name} ({what}): {}", settled.why.as_deref().unwrap_or(why)));
+    }
+    if !asked.quiet {
+        say_kept(&engine);
     }
 
     // From here on there is something to bring to a clean end.

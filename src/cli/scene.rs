@@ -1,5 +1,6 @@
 //! What is asked for: by the arguments of `somatic run` and `somatic plan`, and by scene files, which have the same words.
 
+mod accuracy;
 mod said;
 
 use std::path::{Path, PathBuf};
@@ -10,12 +11,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
-use somatic::scene::{Coverage, FilterBy, MotionFilter};
+use somatic::scene::{FilterBy, MotionFilter};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{Part, SinkSpec};
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
+use self::accuracy::Accuracy;
 use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 use super::input::Input;
 use super::{attached, load_body};
@@ -164,13 +166,9 @@ pub(super) struct Asked {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
-    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), or what pays (auto).
-    /// Percepts are the same [default: auto].
-    #[arg(long, value_name = "WHICH", value_parser = PossibleValuesParser::new(["auto", "all", "touched"])
-        .try_map(|name| name.parse::<Coverage>()))]
-    #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = ["auto", "all", "touched"]))]
-    pub(super) coverage: Option<Coverage>,
+    #[command(flatten)]
+    #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
+    pub(super) accuracy: Accuracy,
 
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
@@ -211,6 +209,7 @@ impl Asked {
     fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
         let mut asked: Self = keys::Text(&text).parse_to_the_column().map_err(|e| e.at(path.display()))?;
+        asked.check_accuracy().map_err(|(key, e)| Accuracy::placed(&text, key, e).at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let there = |file: &Path| folder.join(file).display().to_string();
         asked.calibration = asked.calibration.map(|file| folder.join(file));
@@ -271,7 +270,7 @@ impl Asked {
             filter_window: self.filter_window.clone().or(file.filter_window),
             filter_by: self.filter_by.or(file.filter_by),
             filter_time: self.filter_time.or(file.filter_time),
-            coverage: self.coverage.or(file.coverage),
+            accuracy: self.accuracy.or(file.accuracy),
             verify: self.verify || file.verify,
             quiet: self.quiet || file.quiet,
         };
@@ -279,7 +278,24 @@ impl Asked {
         Ok(asked)
     }
 
+    /// The outputs that are wanted.
+    pub(super) fn outputs(&self) -> Outputs {
+        self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
+    }
+
+    /// Whether accuracy, backend and outputs go together; if not, by which key.
+    fn check_accuracy(&self) -> Result<(), (&'static str, Error)> {
+        let backend = match self.backend.unwrap_or_default() {
+            BackendKind::Auto => None,
+            BackendKind::Reference => Some("reference"),
+            BackendKind::Cpu => Some("cpu"),
+            BackendKind::Gpu => Some("gpu"),
+        };
+        self.accuracy.check(backend, self.outputs())
+    }
+
     fn check(&self) -> Result<()> {
+        self.check_accuracy().map_err(|(_, e)| e)?;
         if self.sources.len() > 1 {
             return Err(Error::usage("this version reads one --source at a time; merge them, or run once for each"));
         }
@@ -349,7 +365,7 @@ impl Asked {
     /// # Errors
     /// What is asked for does not go together; the calibration cannot be read.
     pub(super) fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
-        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL);
+        let outputs = self.outputs();
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
         let scene = Scene {
@@ -359,7 +375,7 @@ impl Asked {
             max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
             letters: Letter::all_of(letters, &self.signal),
             filter: self.filter(outputs)?,
-            coverage: self.coverage.unwrap_or_default(),
+            knobs: self.accuracy.knobs(),
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
+use super::cadence::{self, OnChange};
 use crate::backend::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts, Touch, Values};
@@ -26,10 +27,27 @@ pub(super) struct Memory {
     filter: filter::Memory,
 }
 
+/// What is remembered from call to call.
+pub(super) struct Side {
+    /// Per field.
+    memories: Vec<Memory>,
+    /// The percepts of the frame before, where some may be kept.
+    last: Option<Percepts>,
+}
+
+impl Side {
+    /// Of `fields` fields.
+    pub(super) fn new(fields: usize) -> Self {
+        Self { memories: vec![Memory::default(); fields], last: None }
+    }
+}
+
 /// What the host does for every backend alike.
 pub(super) struct Host<'a> {
     pub(super) plan: &'a Plan,
     pub(super) links: &'a Links,
+    /// Which fields changed, where the others keep their percepts.
+    pub(super) cadence: Option<&'a OnChange>,
 }
 
 impl Host<'_> {
@@ -40,17 +58,27 @@ impl Host<'_> {
         frames: &[Frame],
         raw: &RawBatch<'_>,
         percepts: &mut Percepts,
-        memories: &mut [Memory],
+        side: &mut Side,
     ) -> Result<()> {
         backend.run(raw, percepts)?;
         let stages = self.plan.stages();
+        let Side { memories, last } = side;
         for ((index, frame), step) in (raw.first..).zip(frames).zip(raw.steps) {
             percepts.t_s[index] = frame.t_s;
-            if !(stages.position || stages.filter) {
+            if !(stages.position || stages.filter || self.cadence.is_some()) {
                 continue;
             }
             for (number, field) in self.plan.fields.iter().enumerate() {
                 let cell = index * self.plan.fields.len() + number;
+                if let Some(cadence) = self.cadence {
+                    match cadence.since(index - raw.first, number) {
+                        Some(since) => cadence::rates(percepts, cell, step, since),
+                        None => {
+                            self.keep(number, index, last.as_ref(), percepts);
+                            continue;
+                        }
+                    }
+                }
                 let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
                 let posed = contact && stages.position;
                 let world =
@@ -66,7 +94,25 @@ impl Host<'_> {
                 }
             }
         }
+        if self.cadence.is_some() && raw.frames > 0 {
+            let mut one = last.take().unwrap_or_else(|| percepts.clone());
+            one.reset(1);
+            let fields = 0..self.plan.fields.len();
+            fields.for_each(|field| one.take_over(percepts, raw.first + raw.frames - 1, field));
+            *last = Some(one);
+        }
         Ok(())
+    }
+
+    /// Keeps the percept of a field in frame `index` as it was in the frame before, which is in `last` where it was of
+    /// another call.
+    fn keep(&self, field: usize, index: usize, last: Option<&Percepts>, percepts: &mut Percepts) {
+        let (of, from) = if index > 0 { (None, index - 1) } else { (last, 0) };
+        percepts.keep(of, from, index, field);
+        if self.plan.stages().touches {
+            let touches = percepts.kept_touches(of, from, field);
+            percepts.push_touches(touches);
+        }
     }
 
     /// The point of the skin at `place` (m, in the field's chart or from its origin), and the normal there.

@@ -8,7 +8,7 @@ use crate::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Tax
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result};
 use crate::percept::Outputs;
-use crate::scene::{Coverage, Scene};
+use crate::scene::{Coverage, Knobs, Scene};
 use crate::signal::{Frame, RawValue};
 
 /// How many of what; the rest follows from it and the seed.
@@ -160,7 +160,7 @@ impl Shape {
     /// The backend cannot run here.
     pub fn engine(&self, body: &Body, backend: BackendKind, outputs: Outputs) -> Result<Engine> {
         // Its frames repeat, and what repeats is not to be left out of a measurement.
-        let scene = Scene { outputs, coverage: Coverage::All, ..Scene::default() };
+        let scene = Scene { outputs, knobs: Knobs { coverage: Coverage::All, ..Knobs::default() }, ..Scene::default() };
         Engine::new(body, Options { scene, backend, batch: self.frames, ..Options::default() })
     }
 }

@@ -9,6 +9,7 @@ mod distortion;
 pub mod geodesic;
 mod lift;
 mod neighbours;
+mod rechart;
 mod surfaces;
 mod unroll;
 
@@ -20,6 +21,7 @@ pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
 pub use lift::Lift;
 pub use neighbours::neighbours;
+pub(crate) use rechart::Recharted;
 pub(crate) use surfaces::Skin;
 pub use unroll::Unroller;
 
@@ -93,11 +95,16 @@ impl FieldSet {
     /// # Errors
     /// A field without any taxel, even through its children.
     pub fn new(body: &Body) -> Result<Self> {
-        let parents = parents(&body.fields);
-        let taxels = unions(&body.fields);
+        Self::of(body, &body.fields)
+    }
+
+    /// Completes the fields that `specs` outline on `body`.
+    fn of(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
+        let parents = parents(specs);
+        let taxels = unions(specs);
         let nearest = Nearest::new(body);
-        let mut fields = Vec::with_capacity(body.fields.len());
-        for (index, spec) in body.fields.iter().enumerate() {
+        let mut fields = Vec::with_capacity(specs.len());
+        for (index, spec) in specs.iter().enumerate() {
             let members: Vec<(usize, f64, Option<[f64; 2]>)> = taxels[index]
                 .iter()
                 .filter_map(|id| {

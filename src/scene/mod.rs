@@ -3,17 +3,16 @@
 mod curves;
 mod explain;
 mod filter;
+mod knobs;
 mod plan;
 mod slots;
 
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
+pub use knobs::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
 pub use plan::{Plan, choose_fields};
 pub(crate) use plan::{PlanField, Stages};
 
-use std::str::FromStr;
-
-use crate::error::{Error, Result};
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
@@ -33,33 +32,8 @@ pub struct Scene {
     pub letters: Vec<Letter>,
     /// Which motion counts, for [`Outputs::FILTERED`].
     pub filter: MotionFilter,
-    /// Which fields are computed in a frame.
-    pub coverage: Coverage,
-}
-
-/// Which fields are computed in a live frame; the others keep what they were, and percepts are the same to the last bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coverage {
-    /// Those that changed, where a gate pays: on large skins that are mostly idle.
-    #[default]
-    Auto,
-    /// All.
-    All,
-    /// Those that changed, always behind a gate.
-    Touched,
-}
-
-impl FromStr for Coverage {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "auto" => Ok(Self::Auto),
-            "all" => Ok(Self::All),
-            "touched" => Ok(Self::Touched),
-            _ => Err(Error::usage(format!("there is no coverage `{name}`; choose auto, all or touched"))),
-        }
-    }
+    /// What is traded for what.
+    pub knobs: Knobs,
 }
 
 impl Default for Scene {
@@ -71,7 +45,7 @@ impl Default for Scene {
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
             filter: MotionFilter::default(),
-            coverage: Coverage::default(),
+            knobs: Knobs::default(),
         }
     }
 }

@@ -1,19 +1,19 @@
 //! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use globset::{GlobBuilder, GlobSetBuilder};
 
 use super::curves::Curves;
-use super::{Coverage, Scene};
+use super::{Arithmetic, Knobs, Scene};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
-use crate::stage::{filter, layout, motion, touches};
+use crate::stage::{Sums, filter, layout, motion, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub struct Plan {
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
-    coverage: Coverage,
+    knobs: Knobs,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
@@ -85,6 +85,8 @@ pub(crate) struct PlanField {
     pub(crate) charted: bool,
     /// Whether another field of the plan has it as its parent.
     pub(crate) divided: bool,
+    /// The nearest field above it in the plan, in the same letter.
+    pub(crate) above: Option<usize>,
     pub(crate) area_known: bool,
     /// Whether every member's weight is 1.
     pub(crate) unweighted: bool,
@@ -140,6 +142,8 @@ impl Plan {
         calibration.check_body(&body.name)?;
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
         Letter::check(&scene.letters)?;
+        let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
+        scene.knobs.check(scene.outputs, has_changes)?;
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
@@ -160,12 +164,13 @@ impl Plan {
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
+        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
         let mut plan = Self {
-            outputs: scene.outputs,
-            stages: Stages::of(scene.outputs),
-            columns: scene.outputs,
+            outputs,
+            stages: Stages::of(outputs),
+            columns: outputs,
             letters: scene.letters.clone(),
-            coverage: scene.coverage,
+            knobs: scene.knobs,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -179,10 +184,14 @@ impl Plan {
         let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
+        let mut first_of = BTreeMap::new();
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
+            let above = std::iter::successors(field.parent, |&above| fields.fields[above].parent);
+            let above: Option<usize> = above.into_iter().find_map(|above| first_of.get(&above).copied());
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             let first = plan.fields.len();
+            first_of.insert(index, first);
             let still_within = motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32;
             plan.fields.push(PlanField {
                 name: field.name.clone(),
@@ -193,6 +202,7 @@ impl Plan {
                 count: field.members.len(),
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
+                above: None,
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
                 unit_m,
@@ -214,6 +224,7 @@ impl Plan {
             for (letter, &first_slot) in first_slots.iter().enumerate() {
                 let in_letter = &mut plan.fields[first + letter];
                 in_letter.first = plan.members.len();
+                in_letter.above = above.map(|above| above + letter);
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
                 plan.members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| {
                     layout::Member {
@@ -351,8 +362,22 @@ impl Plan {
         if self.stages().touches { self.slots() } else { 0 }
     }
 
-    pub(crate) fn coverage(&self) -> Coverage {
-        self.coverage
+    /// What is traded for what.
+    #[must_use]
+    pub fn knobs(&self) -> Knobs {
+        self.knobs
+    }
+
+    /// How single precision adds up, and so how far it may be off.
+    pub(crate) fn sums(&self) -> Sums {
+        match self.knobs.arithmetic {
+            Some(Arithmetic::Compensated) => Sums::Compensated,
+            _ => Sums::OnePass,
+        }
+    }
+
+    pub(crate) fn is_compensated(&self) -> bool {
+        self.sums() == Sums::Compensated
     }
 
     pub(crate) fn stages(&self) -> Stages {

@@ -9,7 +9,7 @@
 //!
 //! **Bound.** About another centre the moments are M + S·δc δcᵀ, exactly: the centroid's own error counts only squared.
 //! With δ = u‖x‖ + u‖x − c‖ for coordinate and difference, every entry of M is off by at most
-//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (n + 8)u Σ wP‖x − c‖², and Σ wε‖x − c‖² where pressures are off by ε more than
+//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (r + 9)u Σ wP‖x − c‖², with r of [`super::Sums`], and Σ wε‖x − c‖² where pressures are off by ε more than
 //! 2u, with P + ε for P; then |δ(a + d)| ≤ 1.5E, |δh| ≤ 2E + 12u·h (a square root
 //! may lose 9u), the quotient's error is (|δh| + κ|δ(a + d)|)/(a + d − |δ(a + d)|) + 8u, and the axis turns by at most
 //! ½ asin(δh/h).
@@ -18,7 +18,7 @@ use glam::DVec2;
 
 use super::angle::{ATAN2_ERROR, of_line};
 use super::orientation::{Line, LineBound};
-use super::{Pressed, SLACK, U};
+use super::{Pressed, SLACK, Sums, U};
 use crate::percept::Flags;
 
 /// 2⁻³⁰.
@@ -77,12 +77,12 @@ fn half_of(x: f64, y: f64) -> f64 {
 }
 
 /// How far a single-precision answer may be off, given the centroid's own bound.
-pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2) -> AxisBound {
+pub(crate) fn bound(pressed: &[Pressed], sums: Sums, centroid: DVec2, centroid_bound: DVec2) -> AxisBound {
     let undecided = |in_doubt| AxisBound { line: LineBound { angle: None, in_doubt }, anisotropy: None };
     if pressed.len() == 1 {
         return undecided(Flags::empty());
     }
-    let n = pressed.len() as f64;
+    let r_sum = sums.roundings(pressed.len());
     let total: f64 = pressed.iter().map(Pressed::pull).sum();
     let (a, b, d) = moments(pressed, centroid);
     let entry: f64 = pressed
@@ -92,13 +92,13 @@ pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2)
             let r = x.distance(centroid);
             let delta = U * x.length() + U * r;
             let (excess, around) = (taxel.pull_excess(), (delta + centroid_bound.length()).powi(2));
-            (taxel.pull() + excess) * (2.0 * r * delta + around + (n + 8.0) * U * r * r) + excess * r * r
+            (taxel.pull() + excess) * (2.0 * r * delta + around + (r_sum + 9.0) * U * r * r) + excess * r * r
         })
         .sum::<f64>()
         * SLACK;
     let (trace, h) = (a + d, (a - d).hypot(2.0 * b));
     let trace_error = 1.5 * entry;
-    let total_error = (n + 4.0) * U * total + pressed.iter().map(Pressed::pull_excess).sum::<f64>();
+    let total_error = (r_sum + 5.0) * U * total + pressed.iter().map(Pressed::pull_excess).sum::<f64>();
     if (trace - TOGETHER * total).abs() <= trace_error + TOGETHER * total_error || trace_error > 0.5 * trace {
         return undecided(Flags::COINCIDENT | Flags::ISOTROPIC);
     }

@@ -3,13 +3,13 @@
 //! In a field's chart x is (u, v); in a field without one it is the offset from its origin in three dimensions.
 //!
 //! **Bound.** With A = Σ wP|x| / S: a term of the numerator carries 2u (pressure), u (wP), u (x rounded), u (product)
-//! and n − 1 sums, the denominator (n + 2)u, the quotient 5u; |c| ≤ A. Together |δc| ≤ (2n + 11)u·A, each coordinate by
-//! itself. Pressures that are off by ε more than 2u move c by Σ wδ(x − c) / (S + Σ wδ), |δ| ≤ ε, exactly: at most
+//! and r of the sum ([`super::Sums`]; n − 1 in one pass), the denominator (r + 3)u, the quotient 5u; |c| ≤ A. Together
+//! |δc| ≤ (2r + 13)u·A, each coordinate by itself. Pressures that are off by ε more than 2u move c by Σ wδ(x − c) / (S + Σ wδ), |δ| ≤ ε, exactly: at most
 //! Σ wε|x − c| / (S − Σ wε), and never out of the taxels' midst. Products that fall under the smallest normal number add less than 2⁻⁴⁶ of the unit.
 
 use glam::DVec3;
 
-use super::{DIVISION, Pressed, SLACK, U};
+use super::{DIVISION, Pressed, SLACK, Sums, U};
 
 /// What is right, in f64; `pressed` is not empty.
 pub(crate) fn reference(pressed: &[Pressed]) -> DVec3 {
@@ -18,11 +18,11 @@ pub(crate) fn reference(pressed: &[Pressed]) -> DVec3 {
 }
 
 /// How far each coordinate of a single-precision centroid may be off.
-pub(crate) fn bound(pressed: &[Pressed]) -> DVec3 {
+pub(crate) fn bound(pressed: &[Pressed], sums: Sums) -> DVec3 {
     let total: f64 = pressed.iter().map(Pressed::pull).sum();
     let mean_size = pressed.iter().map(|taxel| taxel.pull() * taxel.place.abs()).sum::<DVec3>() / total;
-    let n = pressed.len() as f64;
-    SLACK * (((2.0 * n + 6.0) * U + DIVISION) * mean_size + DVec3::splat(UNDERFLOW) + moved_by_excess(pressed, total))
+    let r = sums.roundings(pressed.len());
+    SLACK * (((2.0 * r + 8.0) * U + DIVISION) * mean_size + DVec3::splat(UNDERFLOW) + moved_by_excess(pressed, total))
 }
 
 fn moved_by_excess(pressed: &[Pressed], total: f64) -> DVec3 {
@@ -62,8 +62,8 @@ mod tests {
                 taxel(-0.7, 0.2, 2.0, 1.0, 0.3 * share),
                 taxel(0.9, 0.8, 0.5, 7.0, 0.0),
             ];
-            let (c, c_bound) = (reference(&right), bound(&right));
-            let (sums, sums_bound) = (contact::reference(&right), contact::bound(&right));
+            let (c, c_bound) = (reference(&right), bound(&right, Sums::OnePass));
+            let (sums, sums_bound) = (contact::reference(&right), contact::bound(&right, Sums::OnePass));
             for signs in 0..4 {
                 let sign = |bit: usize| if signs >> bit & 1 == 1 { 1.0 } else { -0.999 };
                 let mut off = right;
@@ -80,7 +80,7 @@ mod tests {
             // Negative control: without its excess the bound would not hold.
             let mut off = right.map(|taxel| Pressed { excess: 0.0, ..taxel });
             off[0].pressure += right[0].excess;
-            assert_eq!((reference(&off) - c).abs().cmple(bound(&off)).all(), share == 0.0);
+            assert_eq!((reference(&off) - c).abs().cmple(bound(&off, Sums::OnePass)).all(), share == 0.0);
         }
     }
 }

@@ -3,11 +3,12 @@
 //! Weights are at least 2⁻²⁰ and pressures 0 or at least 2⁻⁶⁰, so that S > 0 exactly when a taxel is pressed: contact is
 //! the same on every backend.
 //!
-//! **Bound.** Each wP carries the pressure's 2u and one rounding, n − 1 sums one each: |δS| ≤ (n + 2)u·S.
+//! **Bound.** Each wP carries the pressure's 2u and one rounding, their sum r ([`super::Sums`]; n − 1 in one pass):
+//! |δS| ≤ (r + 3)u·S.
 //! To this comes what the pressures are off by more than 2u, ε each: Σ wε for S, the largest ε for the peak.
-//! The peak carries its pressure's error alone; n areas, rounded to f32 and summed: |δA| ≤ n·u·A.
+//! The peak carries its pressure's error alone; n areas, rounded to f32 and summed in one pass: |δA| ≤ n·u·A.
 
-use super::{Pressed, SLACK, U};
+use super::{Pressed, SLACK, Sums, U};
 
 /// A field's sums in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,11 +30,11 @@ pub(crate) fn reference(pressed: &[Pressed]) -> Contact {
 }
 
 /// How far single precision may be off; `active` is exact.
-pub(crate) fn bound(pressed: &[Pressed]) -> Contact {
+pub(crate) fn bound(pressed: &[Pressed], sums: Sums) -> Contact {
     let right = reference(pressed);
-    let n = pressed.len() as f64;
+    let (n, r) = (pressed.len() as f64, sums.roundings(pressed.len()));
     Contact {
-        total: SLACK * ((n + 2.0) * U * right.total + pressed.iter().map(Pressed::pull_excess).sum::<f64>()),
+        total: SLACK * ((r + 3.0) * U * right.total + pressed.iter().map(Pressed::pull_excess).sum::<f64>()),
         peak: SLACK * (2.0 * U * right.peak + pressed.iter().map(|taxel| taxel.excess).fold(0.0, f64::max)),
         active: 0,
         area: SLACK * (n + 1.0) * U * right.area,

@@ -34,6 +34,29 @@ pub(crate) const DIVISION: f64 = 5.0 * U;
 /// Room for the terms of second and higher order that the bounds leave out: n·u stays under 0.1 for 10⁶ members.
 pub(crate) const SLACK: f64 = 1.1;
 
+/// How a sum is made in single precision.
+///
+/// **Bound.** Added up one by one, in whatever order, each of n terms goes through at most n − 1 roundings. A compensated
+/// sum (Kahan) adds y = fl(x − c) and keeps exactly what the addition lost, so that s − c = Σ y: a term carries its own
+/// rounding, and one more where it is larger than the sum so far, of x and of c, which is at most u·Σ|x|. That is
+/// (2 + 2n·u)u·Σ|x|, one rounding for s − c, and one for each of up to six levels of the tree that joins 64 sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sums {
+    OnePass,
+    Compensated,
+}
+
+impl Sums {
+    /// How far the sum of `n` terms may be off, in u times the sum of their sizes.
+    pub(crate) fn roundings(self, n: usize) -> f64 {
+        let n = n as f64;
+        match self {
+            Self::OnePass => n - 1.0,
+            Self::Compensated => 9.0 + 2.0 * n * U,
+        }
+    }
+}
+
 /// One pressed taxel of a field in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pressed {

@@ -16,6 +16,7 @@ mod recording;
 mod render;
 mod run;
 mod simulate;
+mod tradeoff;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,8 @@ use tempfile::TempDir;
 fn somatic(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_somatic"));
     command.args(arguments).stdin(Stdio::null());
+    // What somebody has measured on this machine is no part of a test.
+    command.env("XDG_CACHE_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/no-cache"));
     for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
         command.env_remove(name);
     }

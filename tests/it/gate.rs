@@ -1,7 +1,7 @@
 //! A gate changes what is computed and nothing of what comes out.
 
 use proptest::prelude::*;
-use somatic::scene::Coverage;
+use somatic::scene::{Coverage, Knobs};
 use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percept, RawValue, Scene};
 
 use crate::common::Flat;
@@ -10,7 +10,7 @@ fn engine(coverage: Coverage, calibration: Option<&str>) -> Engine {
     let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = calibration.map(|text| Calibration::parse(text, &ids).unwrap());
-    let scene = Scene { outputs: Outputs::all(), coverage, ..Scene::default() };
+    let scene = Scene { outputs: Outputs::all(), knobs: Knobs { coverage, ..Knobs::default() }, ..Scene::default() };
     Engine::new(&body, Options { scene, calibration, backend: BackendKind::Cpu, ..Options::default() }).unwrap()
 }
 
@@ -44,6 +44,7 @@ proptest! {
         let calibration = calibrated.then_some(text);
         let mut whole = engine(Coverage::All, calibration);
         let mut gated = engine(Coverage::Touched, calibration);
+        let mut coarse = engine(Coverage::CoarseToFine, calibration);
         let mut frame = whole.frame(0.0);
         frame.values.fill(RawValue::new(0.0));
         for (turn, (from, count, value)) in steps.into_iter().enumerate() {
@@ -52,7 +53,9 @@ proptest! {
             for (index, at) in frame.values[from.min(to)..to].iter_mut().enumerate() {
                 *at = RawValue::new(value + index as f64);
             }
-            prop_assert_eq!(bits(&mut whole, &frame), bits(&mut gated, &frame));
+            let right = bits(&mut whole, &frame);
+            prop_assert_eq!(&right, &bits(&mut gated, &frame));
+            prop_assert_eq!(&right, &bits(&mut coarse, &frame));
         }
     }
 }
@@ -60,7 +63,7 @@ proptest! {
 #[test]
 fn a_gate_that_steps_aside_and_comes_back_changes_nothing() {
     // Wholly touched for long enough that it steps aside, then idle, then touched in one place.
-    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched].map(large);
+    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched, Coverage::CoarseToFine].map(large);
     let mut frame = engines[0].frame(0.0);
     for turn in 0..200_usize {
         frame.t_s = turn as f64 * 0.01;
@@ -93,7 +96,7 @@ fn large(coverage: Coverage) -> Engine {
     for patch in 0..400 {
         skin = skin.field(&format!("patch {patch}"), Some("whole"), patch * 16..(patch + 1) * 16);
     }
-    let scene = Scene { outputs: Outputs::USUAL, coverage, ..Scene::default() };
+    let scene = Scene { outputs: Outputs::USUAL, knobs: Knobs { coverage, ..Knobs::default() }, ..Scene::default() };
     let options = Options { scene, backend: BackendKind::Cpu, ..Options::default() };
     Engine::new(&skin.body(), options).unwrap()
 }

@@ -110,7 +110,7 @@ fn each_heavy_dependency_has_one_door() {
         ("rayon", "backend/cpu|experiments|author/crowd.rs"),
         ("globset", "scene|author/glob.rs"),
         ("fearless_simd", "backend/cpu"),
-        ("plotters", "ink|picture/words.rs"),
+        ("plotters", "ink|picture/words.rs|tradeoff/plot.rs"),
         ("png", "ink"),
         ("rustix", "cli/board/pty.rs|source/ports.rs"),
         ("mcap", "recording"),

@@ -17,6 +17,7 @@ mod geodesic;
 mod grouping;
 mod house;
 mod icub;
+mod knobs;
 mod legal;
 mod letters;
 mod lint;

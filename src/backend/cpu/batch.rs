@@ -148,7 +148,7 @@ fn answer<S: Simd>(
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
-    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults };
+    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let mut first = 0;
     for run in fields.chunk_by(|a, b| (a.is_wide(), a.unweighted) == (b.is_wide(), b.unweighted)) {
         let (between, answers) = (&mut between[first..][..run.len()], &mut answers[first..][..run.len()]);

@@ -12,7 +12,7 @@ use super::Tables;
 use super::calibrate::{self, Tile};
 use super::lines::{Aligned, Lines};
 use super::simd::{LANES, Row, load, load_u, read, width, with_widest};
-use crate::scene::{Coverage, Plan};
+use crate::scene::{Cadence, Coverage, Knobs, Plan};
 
 /// A plan of fewer values than this is computed before a gate has looked at it.
 const WORTH_IT: usize = 1 << 12;
@@ -45,9 +45,10 @@ pub(super) struct Gate {
 impl Gate {
     /// A gate before `units` units, where `reads` says which slots a unit reads; if the plan is to have one.
     pub(super) fn new(plan: &Plan, units: usize, reads: impl Fn(usize) -> Vec<u32>) -> Option<Self> {
-        let wanted = match plan.coverage() {
-            Coverage::All => false,
-            Coverage::Auto => plan.slots() >= WORTH_IT,
+        let Knobs { coverage, cadence, .. } = plan.knobs();
+        let wanted = match coverage {
+            Coverage::All | Coverage::CoarseToFine => false,
+            Coverage::Auto => plan.slots() >= WORTH_IT || cadence == Cadence::OnChange,
             Coverage::Touched => true,
         };
         // What changes also hangs on the time between frames.
@@ -77,7 +78,7 @@ impl Gate {
             readers: of_tile.concat(),
             stale: vec![true; units],
             known: false,
-            always: plan.coverage() == Coverage::Touched,
+            always: plan.knobs().coverage == Coverage::Touched,
             pause: 0,
             open: 0,
         })

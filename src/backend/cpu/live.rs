@@ -4,7 +4,7 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 use rayon::prelude::*;
 
-use super::super::{RawBatch, Rows, Step};
+use super::descent::{Descent, depth};
 use super::gate::Gate;
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
@@ -12,10 +12,9 @@ use super::put::{Run, Sixteen, write};
 use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
-use super::{Tables, calibrate, change, the_one_before};
+use super::{Moment, Tables, calibrate, change};
 use crate::percept::CellsMut;
-use crate::scene::Plan;
-use crate::signal::RawValue;
+use crate::scene::{Coverage, Plan};
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
@@ -190,20 +189,6 @@ struct Gathered {
     values: Values,
 }
 
-/// A frame, the one before it, and the time between them.
-pub(super) struct Moment<'a> {
-    now: (Rows<'a>, usize),
-    before: (Rows<'a>, usize),
-    step: &'a Step,
-}
-
-impl<'a> Moment<'a> {
-    /// Frame `frame` of `raw`; `before` has the values of the frame before the first.
-    pub(super) fn new(raw: &RawBatch<'a>, frame: usize, before: &'a [RawValue]) -> Self {
-        Self { now: (raw.rows, frame), before: the_one_before(raw.rows, frame, before), step: &raw.steps[frame] }
-    }
-}
-
 /// The plan laid out for one frame, and the memory for it.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
@@ -220,6 +205,7 @@ pub(super) struct Live {
     before: (Lines<f32>, Lines<u32>),
     gathered: Gathered,
     gate: Option<Gate>,
+    descent: Option<Descent>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
     shared: bool,
@@ -232,10 +218,13 @@ impl Live {
             (0..plan.fields.len()).partition(|&field| plan.fields[field].is_wide());
         // Fields of one size stay in their order.
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
+        if plan.knobs().coverage == Coverage::CoarseToFine {
+            narrow.sort_by_key(|&field| (depth(plan, field), plan.fields[field].above));
+        }
         let unpressed = tiles * LANES;
         let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
         let mut narrow: Vec<Narrow> = narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
-        let most_rows = narrow.first().map_or(0, |group| group.places.len());
+        let most_rows = narrow.iter().map(|group| group.places.len()).max().unwrap_or(0);
         let together = (GATHERED_ROWS / most_rows.max(1)).max(1);
         for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
             groups.iter_mut().for_each(Narrow::weigh);
@@ -245,7 +234,10 @@ impl Live {
             None => slots(wide[unit]).collect(),
             Some(group) => narrow[group].fields.iter().flat_map(|&field| slots(field)).collect(),
         });
+        let alone = wide.iter().map(std::slice::from_ref);
+        let units: Vec<&[usize]> = alone.chain(narrow.iter().map(|group| &group.fields[..])).collect();
         Self {
+            descent: Descent::new(plan, &units),
             gate,
             everything: vec![true; wide.len() + narrow.len()],
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
@@ -301,30 +293,35 @@ impl Live {
             statuses: self.statuses.as_flattened(),
             faults,
         };
-        let stale = gate.as_ref().map_or(&self.everything[..], |gate| gate.stale());
-        let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
-        let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
-        let together = self.together;
-        // What little is left behind a gate is done before others are awake.
-        let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
-        if self.shared && share * plan.memberships() as f64 >= SHARED as f64 {
-            let wide = self.wide.par_iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
-            let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
-            wide.for_each_init(Gathered::default, |gathered, (table, ((field, answer), _))| {
-                frame.wide(table, field, gathered, answer);
-            });
-            let narrow = narrow.zip(stale_narrow.par_chunks(together));
-            narrow.for_each_init(Gathered::default, |gathered, ((groups, answers), stale)| {
-                frame.stale(groups, stale, gathered, answers);
-            });
-        } else {
-            let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
-            for (table, ((field, answer), _)) in wide {
-                frame.wide(table, field, &mut self.gathered, answer);
-            }
-            let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
-            for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
-                frame.stale(groups, stale, &mut self.gathered, answers);
+        for pass in 0..self.descent.as_ref().map_or(1, Descent::passes) {
+            let stale = match (&mut self.descent, &gate) {
+                (Some(descent), _) => descent.stale(pass, &mut self.answers),
+                (None, gate) => gate.as_ref().map_or(&self.everything[..], |gate| gate.stale()),
+            };
+            let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
+            let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
+            let together = self.together;
+            // What little is left behind a gate is done before others are awake.
+            let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
+            if self.shared && share * plan.memberships() as f64 >= SHARED as f64 {
+                let wide = self.wide.par_iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+                let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
+                wide.for_each_init(Gathered::default, |gathered, (table, ((field, answer), _))| {
+                    frame.wide(table, field, gathered, answer);
+                });
+                let narrow = narrow.zip(stale_narrow.par_chunks(together));
+                narrow.for_each_init(Gathered::default, |gathered, ((groups, answers), stale)| {
+                    frame.stale(groups, stale, gathered, answers);
+                });
+            } else {
+                let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+                for (table, ((field, answer), _)) in wide {
+                    frame.wide(table, field, &mut self.gathered, answer);
+                }
+                let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
+                for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
+                    frame.stale(groups, stale, &mut self.gathered, answers);
+                }
             }
         }
         if !cells.pressures.is_empty() {
@@ -411,7 +408,12 @@ impl Frame<'_> {
         gathered: &mut Gathered,
         answers: &mut [Cells],
     ) {
-        let wanted = Wanted { stages: self.plan.stages(), outputs: self.plan.columns, faults: self.faults };
+        let wanted = Wanted {
+            stages: self.plan.stages(),
+            outputs: self.plan.columns,
+            faults: self.faults,
+            care: self.plan.is_compensated(),
+        };
         let Gathered { pressures, statuses, between, .. } = gathered;
         let lot = |index: usize| {
             let first: usize = groups[..index].iter().map(|group| group.places.len()).sum();

@@ -20,6 +20,8 @@ pub(super) struct Wanted {
     pub(super) outputs: Outputs,
     /// Whether calibration said something of any value.
     pub(super) faults: bool,
+    /// Whether sums are compensated.
+    pub(super) care: bool,
 }
 
 /// What a cell's stages leave for later ones, a row each.
@@ -50,7 +52,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     between: &mut [Between],
     cells: &mut [Cells],
 ) {
-    let Wanted { stages, .. } = wanted;
+    let Wanted { stages, care, .. } = wanted;
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
         for at in (0..lanes).step_by(width::<S>()) {
@@ -63,7 +65,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
         for at in (0..lanes).step_by(width::<S>()) {
-            find_centroid(simd, members, &kind, at, between, cells);
+            find_centroid(simd, members, &kind, care, at, between, cells);
         }
     }
     if stages.orientation {
@@ -94,7 +96,11 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let (members, kind) = lot(index);
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
-                    let axis::Moments { a, b, d } = members.moments(simd, at, &touch);
+                    let axis::Moments { a, b, d } = if care {
+                        members.moments_with_care(simd, at, &touch)
+                    } else {
+                        members.moments(simd, at, &touch)
+                    };
                     keep(simd, [a, b, d], at, between);
                 }
             }
@@ -125,8 +131,9 @@ fn sums<S: Simd, P: Sweep<S>>(
     between: &mut Between,
     cells: &mut Cells,
 ) {
-    let Wanted { stages, outputs, faults } = wanted;
-    let sums = members.sums(simd, at, stages.centroid);
+    let Wanted { stages, outputs, faults, care } = wanted;
+    let centroid = stages.centroid;
+    let sums = if care { members.sums_with_care(simd, at, centroid) } else { members.sums(simd, at, centroid) };
     let none = splat(simd, 0.0);
     let touched = sums.total.simd_gt(none);
     let mut flags = kind.always(simd, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
@@ -168,6 +175,7 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
     kind: &impl Kind<S>,
+    care: bool,
     at: usize,
     between: &mut Between,
     cells: &mut Cells,
@@ -190,7 +198,8 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     store(simd, v * unit, &mut cells.v, at);
     let depth = if kind.any_uncharted() {
         let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
-        let depth = members.depth(simd, at) / total;
+        let sum = if care { members.depth_with_care(simd, at) } else { members.depth(simd, at) };
+        let depth = sum / total;
         (touched & !charted).select(depth, none) * unit
     } else {
         none

@@ -10,7 +10,9 @@ mod batch;
 mod calibrate;
 mod centroid;
 mod change;
+mod compensated;
 mod contact;
+mod descent;
 mod gate;
 mod hysteresis;
 mod lines;
@@ -29,9 +31,8 @@ use std::sync::{Mutex, PoisonError};
 
 use fearless_simd::Level;
 
-use self::live::Moment;
 use self::simd::LANES;
-use super::{Backend, RawBatch, Rows};
+use super::{Backend, RawBatch, Rows, Step};
 use crate::error::Result;
 use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
@@ -123,6 +124,20 @@ fn the_one_before<'a>(rows: Rows<'a>, frame: usize, before: &'a [RawValue]) -> (
     match frame.checked_sub(1) {
         Some(last) => (rows, last),
         None => (Rows::Packed { values: before, channels: before.len() }, 0),
+    }
+}
+
+/// A frame, the one before it, and the time between them.
+struct Moment<'a> {
+    now: (Rows<'a>, usize),
+    before: (Rows<'a>, usize),
+    step: &'a Step,
+}
+
+impl<'a> Moment<'a> {
+    /// Frame `frame` of `raw`; `before` has the values of the frame before the first.
+    fn new(raw: &RawBatch<'a>, frame: usize, before: &'a [RawValue]) -> Self {
+        Self { now: (raw.rows, frame), before: the_one_before(raw.rows, frame, before), step: &raw.steps[frame] }
     }
 }
 

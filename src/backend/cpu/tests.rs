@@ -7,7 +7,7 @@ use crate::backend::Step;
 use crate::body::Body;
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
-use crate::scene::{PlanField, Scene};
+use crate::scene::{Arithmetic, Knobs, PlanField, Scene};
 use crate::signal::{Calibration, Letter, Receptor};
 
 const HAND: &[u8] = include_bytes!("../../../bodies/hand.glb");
@@ -66,10 +66,13 @@ fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
         let body = Body::from_bytes(name, bytes).unwrap();
         let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
         let scene = Scene { outputs: Outputs::all(), letters, ..Scene::default() };
+        let knobs = Knobs { arithmetic: Some(Arithmetic::Compensated), ..Knobs::default() };
+        let scenes = [scene.clone(), Scene { knobs, ..scene }];
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let calibration = Calibration::parse("[all]\nbaseline = 1\ngain = 0.7\np_max = 300", &ids).unwrap();
-        for calibration in [Calibration::identity(ids.len()), calibration] {
-            let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let calibrations = [Calibration::identity(ids.len()), calibration];
+        for (scene, calibration) in scenes.iter().flat_map(|scene| calibrations.iter().map(move |c| (scene, c))) {
+            let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), scene, calibration).unwrap();
             assert!(name == "hand" || plan.fields.iter().any(PlanField::is_wide));
             let raw = values(&plan, FRAMES);
             let right = run(&plan, Level::new(), &raw, FRAMES, FRAMES);

@@ -7,6 +7,7 @@ use fearless_simd::prelude::*;
 
 use super::axis::{self, Moments};
 use super::centroid;
+use super::compensated::Compensated;
 use super::contact::{self, Sums};
 use super::orientation::{self, Farthest};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u};
@@ -37,7 +38,7 @@ pub(super) trait Members<S: Simd>: Copy {
 }
 
 /// Goes over all members, once a quantity.
-pub(super) trait Sweep<S: Simd>: Copy {
+pub(super) trait Sweep<S: Simd>: Compensated<S> {
     /// S, how many are pressed, and the centroid's numerators where `centroid` says so.
     fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S>;
     /// The largest P, and the area of the pressed taxels, m².
@@ -124,6 +125,11 @@ impl OneKind {
             found: if field.charted { in_chart } else { Outputs::POSITION }.bits(),
             unit_m: field.unit_m,
         }
+    }
+
+    /// Flags and quantities of a field that nothing presses.
+    pub(super) fn untouched(&self) -> (u32, u32) {
+        (self.always | Flags::NO_CONTACT.bits(), self.sums)
     }
 }
 

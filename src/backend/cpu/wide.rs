@@ -134,7 +134,7 @@ impl<S: Simd> Members<S> for Wide<'_> {
 /// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
 #[inline(never)]
 pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, faults: bool, cells: &mut Cells) {
-    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults };
+    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
     let between = std::slice::from_mut(&mut between);
     with_widest!(level, simd => touch(simd, |_| (field, *kind), 1, wanted, between, cells));
@@ -149,7 +149,11 @@ const BLOCK: usize = 512;
 
 /// `K` sums over all members to which `add` adds one's part, each as sixteen that are then added up as a tree.
 #[inline(always)]
-fn in_sixteen<S: Simd, const K: usize>(simd: S, count: usize, add: impl Fn(usize, &mut [F<S>; K])) -> [F<S>; K] {
+pub(super) fn in_sixteen<S: Simd, const K: usize>(
+    simd: S,
+    count: usize,
+    add: impl Fn(usize, &mut [F<S>; K]),
+) -> [F<S>; K] {
     let mut sums = [[splat(simd, 0.0); K]; LANES];
     let mut start = 0;
     while start < count {
@@ -260,7 +264,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
 
 /// The sum of all lanes, as a tree.
 #[inline(always)]
-fn add_up(mut row: Row<f32>) -> f32 {
+pub(super) fn add_up(mut row: Row<f32>) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {

@@ -111,6 +111,7 @@ impl Columns {
         for (name, runs) in [("CENTRED", stages.centroid), ("ORIENTED", stages.orientation), ("AXED", stages.axis)] {
             overrides.push((name, if runs { 1.0 } else { 0.0 }));
         }
+        overrides.push(("COMPENSATED", if plan.is_compensated() { 1.0 } else { 0.0 }));
         overrides
     }
 

@@ -28,10 +28,10 @@ macro_rules! shader {
 pub(crate) const CALIBRATE: Shader = shader!("calibrate": "calibrate";);
 pub(crate) const CHANGE: Shader = shader!("change": "change";);
 pub(crate) const FIELDS: Shader = shader!(
-    "fields": "contact", "centroid", "orientation", "axis"; "members", "angle", "line", "over_fields");
+    "fields": "contact", "centroid", "orientation", "axis"; "members", "angle", "line", "over_fields", "compensated");
 /// The same for plans of at most [`crate::stage::layout::FEW`] memberships.
 pub(crate) const FEW_FIELDS: Shader = shader!(
-    "few fields": "contact", "centroid", "orientation", "axis"; "few_members", "angle", "line", "over_fields");
+    "few fields": "contact", "centroid", "orientation", "axis"; "few_members", "angle", "line", "over_fields", "compensated");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis": "hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion": "motion"; "angle");
 

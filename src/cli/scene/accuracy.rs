@@ -1,0 +1,201 @@
+//! What is asked for of accuracy: a tolerance, a budget, or the knobs themselves.
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
+use somatic::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
+use somatic::tradeoff::{Wish, angle, length, time};
+use somatic::{Error, Outputs, Result, keys};
+
+use super::said::word;
+
+/// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
+/// by measurement, or the knobs themselves.
+#[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(in crate::cli) struct Accuracy {
+    /// Tolerances by flag; in a file they are two keys.
+    #[arg(long, value_name = "LENGTH,ANGLE", value_parser = Wish::within,
+        help = "How far 99 % of the percepts may be off, centroid and orientation, as in \"0.5 mm, 2 deg\"; either may be \
+                left out. The knobs are then chosen by measurement")]
+    #[serde(skip)]
+    pub(in crate::cli) within: Option<Wish>,
+
+    /// How far 99 % of the centroids may be off, such as "0.5 mm".
+    #[arg(skip)]
+    #[serde(deserialize_with = "metres")]
+    #[schemars(with = "Option<String>")]
+    centroid: Option<f64>,
+
+    /// How far 99 % of the orientations may be turned, such as "2 deg".
+    #[arg(skip)]
+    #[serde(deserialize_with = "radians")]
+    #[schemars(with = "Option<String>")]
+    orientation: Option<f64>,
+
+    /// How long a frame may take in the median, such as 100us: the truest knobs within that are chosen by measurement.
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[serde(deserialize_with = "seconds")]
+    #[schemars(with = "Option<String>")]
+    pub(in crate::cli) budget: Option<f64>,
+
+    /// How sums are made: each term added once in single precision (one-pass), with what additions lose carried along
+    /// (compensated), or in double precision on the CPU (double) [default: one-pass; double on the reference].
+    #[arg(long, value_name = "HOW", value_parser = PossibleValuesParser::new(Arithmetic::WORDS)
+        .try_map(|name| name.parse::<Arithmetic>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS))]
+    pub(in crate::cli) arithmetic: Option<Arithmetic>,
+
+    /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest ways over the surface
+    /// (geodesic), where there can be such [default: as-authored].
+    #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(Charts::WORDS)
+        .try_map(|name| name.parse::<Charts>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
+    pub(in crate::cli) charts: Option<Charts>,
+
+    /// What is given for an orientation: outputs as they are named (as-asked), the line through the two farthest points
+    /// (two-points, output orientation), or the principal axis (second-moments, output axis) [default: as-asked].
+    #[arg(long, value_name = "WAY", value_parser = PossibleValuesParser::new(OrientationBy::WORDS)
+        .try_map(|name| name.parse::<OrientationBy>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS))]
+    pub(in crate::cli) orientation_by: Option<OrientationBy>,
+
+    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), those under touched ones
+    /// (coarse-to-fine), or what pays (auto). Percepts are the same [default: auto].
+    #[arg(long, value_name = "WHICH", value_parser = PossibleValuesParser::new(Coverage::WORDS)
+        .try_map(|name| name.parse::<Coverage>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Coverage::WORDS))]
+    pub(in crate::cli) coverage: Option<Coverage>,
+
+    /// When a field is looked at: in every-frame, or on-change of its values, from which to which motion is then measured
+    /// [default: every-frame].
+    #[arg(long, value_name = "WHEN", value_parser = PossibleValuesParser::new(Cadence::WORDS)
+        .try_map(|name| name.parse::<Cadence>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Cadence::WORDS))]
+    pub(in crate::cli) cadence: Option<Cadence>,
+}
+
+fn quantity<'de, D: Deserializer<'de>>(from: D, of: fn(&str) -> Result<f64>) -> Result<Option<f64>, D::Error> {
+    of(&String::deserialize(from)?).map(Some).map_err(serde::de::Error::custom)
+}
+
+fn metres<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    quantity(from, length)
+}
+
+fn radians<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    quantity(from, angle)
+}
+
+fn seconds<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    quantity(from, time)
+}
+
+impl Accuracy {
+    /// These arguments, and what `file` says where they say nothing. Knobs by flag take the place of a file's wish, and a
+    /// wish by flag that of a file's knobs.
+    pub(super) fn or(&self, file: Self) -> Self {
+        let file = match (self.wish().is_empty(), self.knob().is_none()) {
+            (true, false) => Self { centroid: None, orientation: None, budget: None, ..file },
+            (false, true) => {
+                Self { centroid: file.centroid, orientation: file.orientation, budget: file.budget, ..Self::default() }
+            }
+            _ => file,
+        };
+        Self {
+            within: self.within,
+            centroid: file.centroid,
+            orientation: file.orientation,
+            budget: self.budget.or(file.budget),
+            arithmetic: self.arithmetic.or(file.arithmetic),
+            charts: self.charts.or(file.charts),
+            orientation_by: self.orientation_by.or(file.orientation_by),
+            coverage: self.coverage.or(file.coverage),
+            cadence: self.cadence.or(file.cadence),
+        }
+    }
+
+    /// What is wished for, if anything is.
+    pub(in crate::cli) fn wish(&self) -> Wish {
+        let file = Wish { centroid_m: self.centroid, orientation_rad: self.orientation, budget_s: self.budget };
+        self.within.unwrap_or_default().or(file)
+    }
+
+    /// The first knob that is turned, by its key.
+    fn knob(&self) -> Option<&'static str> {
+        let given = [
+            ("arithmetic", self.arithmetic.is_some()),
+            ("charts", self.charts.is_some()),
+            ("orientation_by", self.orientation_by.is_some()),
+            ("coverage", self.coverage.is_some()),
+            ("cadence", self.cadence.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(key, _)| key)
+    }
+
+    pub(in crate::cli) fn knobs(&self) -> Knobs {
+        let usual = Knobs::default();
+        Knobs {
+            arithmetic: self.arithmetic,
+            charts: self.charts.unwrap_or(usual.charts),
+            orientation_by: self.orientation_by.unwrap_or(usual.orientation_by),
+            coverage: self.coverage.unwrap_or(usual.coverage),
+            cadence: self.cadence.unwrap_or(usual.cadence),
+        }
+    }
+
+    /// Refuses what contradicts itself, with the key where it is found out.
+    pub(super) fn check(&self, backend: Option<&str>, outputs: Outputs) -> Result<(), (&'static str, Error)> {
+        let wish = self.wish();
+        if let Some(knob) = self.knob().filter(|_| !wish.is_empty()) {
+            let what = format!(
+                "`{knob}` is a knob, and {} leaves the knobs to be chosen; give one or the other",
+                wish.words()
+            );
+            return Err((knob, Error::usage(what)));
+        }
+        if wish.centroid_m.is_some() && outputs.is_empty() {
+            return Err(("centroid", Error::usage("a tolerance needs outputs to hold for")));
+        }
+        if wish.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
+            let what = "a tolerance of orientation is for output `orientation` or `axis`, and neither is asked for";
+            return Err(("orientation", Error::usage(what)));
+        }
+        match (backend, self.arithmetic) {
+            (Some("gpu"), Some(Arithmetic::Double)) => {
+                let what =
+                    "`arithmetic` is double, and shaders have no double precision; take backend `cpu`, or compensated";
+                return Err(("arithmetic", Error::usage(what)));
+            }
+            (Some("reference"), Some(arithmetic @ (Arithmetic::OnePass | Arithmetic::Compensated))) => {
+                let what = format!(
+                    "`arithmetic` is {arithmetic}, and backend `reference` is always double; take `cpu` or `gpu`"
+                );
+                return Err(("arithmetic", Error::usage(what)));
+            }
+            _ => {}
+        }
+        let only_cpu = |coverage: &Coverage| !matches!(coverage, Coverage::Auto | Coverage::All);
+        if let Some(coverage) = self.coverage.filter(only_cpu)
+            && backend.is_some_and(|backend| backend == "gpu" || backend == "reference")
+        {
+            let what = format!("`coverage` is {coverage}, which only backend `cpu` has");
+            return Err(("coverage", Error::usage(what)));
+        }
+        Ok(())
+    }
+
+    /// `error` at the place of `[accuracy]` key `key` in the scene file's `text`.
+    pub(super) fn placed(text: &str, key: &str, error: Error) -> Error {
+        match keys::Text(text).place_of(&["accuracy", key]) {
+            Some((line, column)) => Error::failed(error.to_string()).at(format!("line {line}, column {column}")),
+            None => error,
+        }
+    }
+}

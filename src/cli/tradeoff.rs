@@ -1,0 +1,309 @@
+//! `somatic tradeoff`: what each knob costs and gives, on one's own body, recording and machine.
+
+mod settled;
+mod written;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use console::style;
+use somatic::signal::Frame;
+use somatic::source::{SimulatedSource, Source, SourceSpec};
+use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
+use somatic::{BackendKind, Body, Engine, Error, Options, Result};
+
+pub(super) use self::settled::{Settled, settled};
+use super::bar::Bar;
+use super::input::Input;
+use super::run::{RECORDED_BATCH, stop_on_signal};
+use super::scene::Asked;
+use super::table::{plain, right, shown};
+use super::words::{count, number};
+use super::{DONE, FAILED, print, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic tradeoff                                       the bundled touch on the bundled hand
+  somatic tradeoff --source sim:examples/simulations/rod.toml --plot rod.svg     against the truth
+  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write             the fastest that is so true
+  somatic tradeoff robot.scene.toml --budget 100us                               the truest that is so fast
+  somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
+
+Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is what no other combination
+beats: none is as true in both and faster. What is measured is kept, and `somatic run` and `somatic plan` choose by it where
+a scene leaves the backend or the knobs to be chosen. docs/tradeoff.md says what to conclude.";
+
+/// Frames that are measured on, unless told otherwise.
+const FRAMES: usize = 512;
+/// Values that these hold at most, about.
+const VALUES: usize = 1 << 24;
+
+/// Measure speed against accuracy, knob by knob, on your own body, recording and machine.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// What is asked for, a TOML file; docs/scenes.md [default: the flags alone].
+    #[arg(value_name = "SCENE")]
+    scene: Option<PathBuf>,
+
+    #[command(flatten)]
+    asked: Asked,
+
+    /// How long to measure, in seconds; more is steadier.
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    seconds: f64,
+
+    /// Measure on the source's first so many frames [default: 512, or as many as memory is well spent on].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: Option<u32>,
+
+    /// List every combination, also those that others beat.
+    #[arg(long)]
+    all: bool,
+
+    /// Draw time against error, a .svg or .png file.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+
+    /// Write the pick into the scene file, whose comments stay.
+    #[arg(long)]
+    write: bool,
+
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
+    let asked = arguments.asked.with(arguments.scene.as_deref())?;
+    let wish = asked.accuracy.wish();
+    if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
+        return Err(Error::usage(format!("--seconds {} is no time span; give seconds over 0", arguments.seconds)));
+    }
+    let drawn = arguments.plot.as_deref().map(Drawn::of).transpose()?;
+    let scene = match (&arguments.scene, arguments.write) {
+        (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
+        (Some(_), true) if wish.is_empty() => {
+            return Err(Error::usage("--write writes what is picked; say by what with --within or --budget"));
+        }
+        (scene, true) => scene.as_deref(),
+        _ => None,
+    };
+    let input = Input::named(&asked)?;
+    if !input.is_recording() {
+        return Err(Error::usage(
+            "a trade is measured on a recording or a simulation, again and again; name one as --source",
+        ));
+    }
+    let body = asked.body_for(&input)?;
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let options = asked.options(&body, &ids, 1)?;
+    let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
+    let played = played(&input, &asked, &ids, most)?;
+    let manner = manner(&asked, &options, arguments.seconds)?;
+    let stop = stop_on_signal()?;
+    let mut bar = Bar::new("measured");
+    let report = measure(&body, &options, &played, &manner, &mut |share| {
+        bar.show_with_time_left(share);
+        !stop.load(Ordering::Relaxed)
+    });
+    drop(bar);
+    let report = report?;
+    // A run that was cut short, or with knobs that are held, is not what others would measure.
+    if !stop.load(Ordering::Relaxed)
+        && options.scene.knobs == somatic::scene::Knobs::default()
+        && let Some(store) = Store::of_user()
+        && let Err(e) = store.keep(&body, &options, &settled::driver(), &report)
+    {
+        say(&format!("what was measured is not kept: {e}"));
+    }
+    let way = if asked.batch.is_some_and(|batch| batch > 1) { Way::Batch } else { Way::Live };
+    let pick = if wish.is_empty() { None } else { wish.pick(&report, way) };
+    if let (Some(path), Some(drawn)) = (&arguments.plot, drawn) {
+        drawn.write(path, &report)?;
+    }
+    print(&if arguments.json { json(&report, pick.as_ref())? } else { text(&report, arguments.all) })?;
+    let Some(pick) = pick else { return Ok(DONE) };
+    let combination = pick.row.combination()?;
+    if !pick.missed.is_empty() {
+        say(&missed(&wish, &pick)?);
+        return Ok(FAILED);
+    }
+    say(&format!("{} for {}: {combination}; {:.2} µs a frame", picked(way), wish.words(), pick.row.p50_us));
+    if let Some(path) = scene {
+        written::write(path, &settled::of_row(pick.row, &report)?, &wish)?;
+        say(&format!("written into {}", path.display()));
+    }
+    Ok(DONE)
+}
+
+fn picked(way: Way) -> String {
+    format!("picked ({})", way.word())
+}
+
+/// What `pick` misses of `wish`, which nothing grants.
+fn missed(wish: &Wish, pick: &Pick<'_>) -> Result<String> {
+    let combination = pick.row.combination()?;
+    Ok(format!("no knobs reach {}; nearest is {combination}: {}", wish.words(), pick.missed.join("; ")))
+}
+
+/// What is measured for `asked`.
+fn manner(asked: &Asked, options: &Options, seconds: f64) -> Result<Manner> {
+    let backends = match options.backend {
+        BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
+        BackendKind::Reference => {
+            return Err(Error::usage("the reference has no knobs to compare; take another backend, or auto"));
+        }
+        kind => vec![kind],
+    };
+    let batch = asked.batch.map_or(RECORDED_BATCH, |batch| batch as usize);
+    Ok(Manner { seconds, batch, ways: Way::ALL.to_vec(), backends })
+}
+
+/// The first frames of `input`, up to `most`, and the truth where it knows it.
+fn played(input: &Input, asked: &Asked, ids: &[u32], most: usize) -> Result<Played> {
+    let mut played = Played { source: input.name.clone(), ..Played::default() };
+    let mut take =
+        |source: &mut dyn Source, truth: &mut dyn FnMut() -> Option<Vec<somatic::source::Truth>>| -> Result<()> {
+            played.taxels = source.taxels().to_vec();
+            let mut frame = Frame::missing(0.0, played.taxels.len());
+            while played.frames.len() < most && source.next_frame(&mut frame)? {
+                played.frames.push(frame.clone());
+                played.truth.extend(truth());
+            }
+            Ok(())
+        };
+    if let Some(SourceSpec::Sim(path)) = &input.spec {
+        let mut source = SimulatedSource::open(path)?;
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        played.taxels = source.taxels().to_vec();
+        while played.frames.len() < most && source.next_frame(&mut frame)? {
+            played.frames.push(frame.clone());
+            played.truth.push(source.truth().to_vec());
+        }
+    } else {
+        take(&mut *input.open(ids, asked)?, &mut || None)?;
+    }
+    if played.frames.is_empty() {
+        return Err(Error::failed("there is no frame in it").at(&played.source));
+    }
+    Ok(played)
+}
+
+/// A picture's format.
+#[derive(Clone, Copy)]
+enum Drawn {
+    Svg,
+    Png,
+}
+
+impl Drawn {
+    fn of(path: &Path) -> Result<Self> {
+        match path.extension().and_then(|end| end.to_str()) {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::usage(format!("--plot {} is neither .svg nor .png", path.display()))),
+        }
+    }
+
+    fn write(self, path: &Path, report: &Report) -> Result<()> {
+        let bytes = match self {
+            Self::Svg => plot_svg(report)?.into_bytes(),
+            Self::Png => plot_png(report)?,
+        };
+        std::fs::write(path, bytes).map_err(|e| Error::io(path, &e))
+    }
+}
+
+fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {
+    let broken = |e: serde_json::Error| Error::failed(e.to_string());
+    let mut value = serde_json::to_value(report).map_err(broken)?;
+    if let Some(pick) = pick {
+        value["pick"] = serde_json::to_value(pick.row).map_err(broken)?;
+        value["missed"] = pick.missed.clone().into();
+    }
+    Ok(serde_json::to_string_pretty(&value).map_err(broken)? + "\n")
+}
+
+fn text(report: &Report, all: bool) -> String {
+    let frames = count(report.frames as u64, "frame");
+    let mut text = format!("{}, {frames} of {}\n", style(&report.body).bold(), report.source);
+    text += &format!(
+        "  {} of touched fields, {} ties left out of orientations\n",
+        count(report.touched, "percept"),
+        report.ties
+    );
+    for line in report.kept_charts.iter().chain(&report.left_out) {
+        text += &format!("  not measured  {line}\n");
+    }
+    for way in Way::ALL {
+        let rows = report.of(way);
+        if rows.is_empty() {
+            continue;
+        }
+        let listed: Vec<&&Row> = rows.iter().filter(|row| all || row.front).collect();
+        let beaten = rows.len() - rows.iter().filter(|row| row.front).count();
+        text += &format!(
+            "\n{}: {} of {} combinations, of which {beaten} are beaten\n",
+            way.word(),
+            listed.len(),
+            rows.len()
+        );
+        let truth = report.truth;
+        let of_truth = |what| if truth { what } else { "" };
+        let mut table = plain([
+            "µs",
+            "p99",
+            "mm: rms",
+            "p99",
+            "worst",
+            "°: rms",
+            "p99",
+            "worst",
+            of_truth("true mm: p99"),
+            of_truth("°: p99"),
+            "combination",
+        ]);
+        (0..10).for_each(|column| right(&mut table, column));
+        for row in listed {
+            let said = |value: f64, errors: &Errors| if errors.compared > 0 { number(value) } else { "–".to_owned() };
+            let of_truth = |errors: &Option<Errors>| errors.map_or(String::new(), |errors| said(errors.p99, &errors));
+            let mut cells = vec![number(row.p50_us), number(row.p99_us)];
+            for errors in [&row.centroid_mm, &row.orientation_deg] {
+                cells.extend([errors.rms, errors.p99, errors.worst].map(|value| said(value, errors)));
+            }
+            cells.extend([of_truth(&row.true_centroid_mm), of_truth(&row.true_orientation_deg)]);
+            cells.push(row.combination().map_or(String::new(), |combination| combination.to_string()));
+            table.add_row(cells.into_iter().map(|cell| if row.front { cell } else { style(cell).dim().to_string() }));
+        }
+        text += &shown(&table);
+    }
+    text
+}
+
+/// What `somatic plan` calls a row.
+pub(super) fn in_words(row: &Row) -> String {
+    let [centroid, orientation] = row.judged();
+    let mut words = vec![format!("{:.2} µs a frame, p99 {:.2} µs", row.p50_us, row.p99_us)];
+    if centroid.compared > 0 {
+        words.push(format!("centroid within {} mm", number(centroid.p99)));
+    }
+    if orientation.compared > 0 {
+        words.push(format!("orientation within {}°", number(orientation.p99)));
+    }
+    words.join(", ")
+}
+
+/// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
+pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> Played {
+    let frames = super::plan::pressed(body.taxels.len(), 32);
+    Played { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
+}
+
+/// Says once which fields stay in charts that the scene does not ask for.
+pub(super) fn say_kept(engine: &Engine) {
+    for (name, why) in engine.kept_charts() {
+        say(&format!("field `{name}` stays in the chart of the layout: {why}"));
+    }
+}

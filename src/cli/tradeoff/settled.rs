@@ -1,0 +1,138 @@
+//! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
+
+use somatic::scene::{Coverage, Knobs, OrientationBy};
+use somatic::tradeoff::{Combination, Found, Pick, Report, Row, Store, Way, day, measure};
+use somatic::{BackendKind, Body, Error, Options, Result};
+
+use super::{in_words, made_up, manner, missed, played};
+use crate::cli::input::Input;
+use crate::cli::say;
+use crate::cli::scene::Asked;
+
+/// Seconds of a brief measurement, and its frames.
+const BRIEF_S: f64 = 1.0;
+const BRIEF_FRAMES: usize = 64;
+
+/// Options with nothing left open, and what is to be said of them.
+pub(in crate::cli) struct Settled {
+    pub(in crate::cli) options: Options,
+    /// Why it is this backend, where a measurement said so.
+    pub(in crate::cli) why: Option<String>,
+    /// What was measured of it, if it was.
+    pub(in crate::cli) measured: Option<String>,
+}
+
+/// The GPU drivers of this machine, in words.
+pub(in crate::cli) fn driver() -> String {
+    #[cfg(feature = "gpu")]
+    return format!("{:?}", somatic::backend::gpu::adapters());
+    #[cfg(not(feature = "gpu"))]
+    return "none".to_owned();
+}
+
+/// The options of `asked` for `body` and calls of `batch` frames, with what it leaves open settled.
+///
+/// # Errors
+/// What is asked for makes no sense, or no knobs grant it.
+pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let options = asked.options(body, &ids, batch)?;
+    let wish = asked.accuracy.wish();
+    let way = if batch > 1 { Way::Batch } else { Way::Live };
+    let store = Store::of_user();
+    let kept = store.as_ref().filter(|store| store.file(body, &options).exists());
+    let found = kept.map_or(Found::Nothing, |store| store.find(body, &options, &driver()));
+    let (report, when) = match found {
+        Found::Fresh(stored) => {
+            let when = format!("on {}, on {}", day(stored.taken_at_s), stored.report.source);
+            (Some(stored.report), when)
+        }
+        Found::Useless(why) => {
+            say(&format!("{why}; measured anew"));
+            (None, String::new())
+        }
+        Found::Nothing => (None, String::new()),
+    };
+    if wish.is_empty() {
+        return Ok(match report {
+            Some(report) => without_wish(options, &report, way, &when),
+            None => Settled { options, why: None, measured: None },
+        });
+    }
+    let (report, when) = match report {
+        Some(report) => (report, when),
+        None => {
+            let again = input.filter(|input| input.is_recording());
+            let played = again.map(|input| played(input, asked, &ids, BRIEF_FRAMES)).transpose()?;
+            let played = played.unwrap_or_else(|| made_up(body, ids.clone()));
+            let brief = manner(asked, &options, BRIEF_S)?;
+            let measured = measure(body, &options, &played, &brief, &mut |_| true);
+            // The first frames of a recording may touch nothing.
+            let measured = measured.or_else(|_| measure(body, &options, &made_up(body, ids), &brief, &mut |_| true))?;
+            let when = format!("briefly, just now, on {}", measured.source);
+            (measured, when)
+        }
+    };
+    let Some(pick) = wish.pick(&report, way) else {
+        return Err(Error::failed(format!("nothing was measured that could grant {}", wish.words())));
+    };
+    if !pick.missed.is_empty() {
+        return Err(Error::failed(missed(&wish, &pick)?));
+    }
+    granted(options, &report, &pick, &when, &wish.words())
+}
+
+fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, wish: &str) -> Result<Settled> {
+    let Combination { backend, knobs } = of_row(pick.row, report)?;
+    let scene = somatic::Scene { knobs, ..options.scene };
+    Ok(Settled {
+        options: Options { scene, backend, ..options },
+        why: Some(format!("picked for {wish}, as measured {when}")),
+        measured: Some(format!("{}; {when}", in_words(pick.row))),
+    })
+}
+
+/// The combination of `row` as a scene would say it: an orientation that is asked for by name stays as it was asked for.
+pub(super) fn of_row(row: &Row, report: &Report) -> Result<Combination> {
+    let mut combination = row.combination()?;
+    if row.orientation_by == report.asked_by {
+        combination.knobs.orientation_by = OrientationBy::AsAsked;
+    }
+    Ok(combination)
+}
+
+/// `options` with the backend that `report` says is the fastest, where that is left open.
+fn without_wish(options: Options, report: &Report, way: Way, when: &str) -> Settled {
+    let knobs = options.scene.knobs;
+    let alike = |row: &&Row| {
+        let Ok(combination) = of_row(row, report) else { return false };
+        let kind = options.backend;
+        let other = combination.knobs;
+        let arithmetic = knobs.arithmetic.or(other.arithmetic.filter(|_| is_usual(&combination)));
+        let coverage =
+            if knobs.coverage == Coverage::Auto { usual_coverage(&combination, way) } else { knobs.coverage };
+        let wanted = Knobs { arithmetic, coverage, ..knobs };
+        (kind == BackendKind::Auto || kind == combination.backend) && other == wanted
+    };
+    let fastest = report.of(way).into_iter().find(alike);
+    let Some(row) = fastest else { return Settled { options, why: None, measured: None } };
+    let measured = Some(format!("{}; {when}", in_words(row)));
+    let Ok(combination) = row.combination() else { return Settled { options, why: None, measured } };
+    if options.backend != BackendKind::Auto {
+        return Settled { options, why: None, measured };
+    }
+    let why = Some(format!("the fastest of these knobs, as measured {when}"));
+    Settled { options: Options { backend: combination.backend, ..options }, why, measured }
+}
+
+/// Whether its arithmetic is what its backend has unless told otherwise.
+fn is_usual(combination: &Combination) -> bool {
+    use somatic::scene::Arithmetic;
+    combination.backend == BackendKind::Reference || combination.knobs.arithmetic == Some(Arithmetic::OnePass)
+}
+
+/// The coverage that stands for `auto` among those that are measured.
+fn usual_coverage(combination: &Combination, way: Way) -> Coverage {
+    let gated = combination.backend == BackendKind::Cpu && way == Way::Live;
+    if gated { Coverage::All } else { combination.knobs.coverage }
+}

@@ -1,0 +1,79 @@
+//! A pick, written into a scene file in place of the wish that it grants. Whatever else stands there stays, comments too.
+
+use std::path::Path;
+
+use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
+use somatic::tradeoff::{Combination, Wish};
+use somatic::{BackendKind, Error, Result};
+use toml_edit::{DocumentMut, Item, Table, value};
+
+/// Writes `combination` into the scene file at `path`.
+pub(super) fn write(path: &Path, combination: &Combination, wish: &Wish) -> Result<()> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let text = with(&text, combination, wish).map_err(|e| e.at(path.display()))?;
+    // Beside it first: a scene is there whole, or as it was.
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let beside = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))?;
+    std::fs::write(beside.path(), text).map_err(|e| Error::io(path, &e))?;
+    let like_before =
+        std::fs::metadata(path).and_then(|meta| std::fs::set_permissions(beside.path(), meta.permissions()));
+    like_before.map_err(|e| Error::io(path, &e))?;
+    beside.persist(path).map(|_| ()).map_err(|e| Error::io(path, &e.error))
+}
+
+/// `text` with `combination` in it.
+fn with(text: &str, combination: &Combination, wish: &Wish) -> Result<String> {
+    let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
+    let [backend, arithmetic, ..] = combination.words();
+    let Knobs { charts, orientation_by, coverage, cadence, .. } = combination.knobs;
+    let table = document.entry("accuracy").or_insert_with(|| Item::Table(Table::new()));
+    let Some(table) = table.as_table_like_mut() else { return Err(Error::failed("`accuracy` is no table")) };
+    for key in ["centroid", "orientation", "budget"] {
+        table.remove(key);
+    }
+    let mut knob = |key: &str, word: &str, usual: bool| {
+        if usual {
+            table.remove(key);
+        } else {
+            table.insert(key, value(word));
+        }
+    };
+    knob("arithmetic", arithmetic, combination.backend == BackendKind::Reference);
+    knob("charts", charts.word(), charts == Charts::AsAuthored);
+    knob("orientation_by", orientation_by.word(), orientation_by == OrientationBy::AsAsked);
+    knob("coverage", coverage.word(), coverage == Coverage::Auto);
+    knob("cadence", cadence.word(), cadence == Cadence::EveryFrame);
+    let first = table.iter().next().map(|(key, _)| key.to_owned());
+    if let Some(mut key) = first.and_then(|first| table.key_mut(&first)) {
+        key.leaf_decor_mut().set_prefix(format!("# Picked by `somatic tradeoff` for {}.\n", wish.words()));
+    }
+    let is_empty = table.is_empty();
+    if is_empty {
+        document.remove("accuracy");
+    }
+    document["backend"] = value(backend);
+    Ok(document.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use somatic::scene::Arithmetic;
+
+    #[test]
+    fn a_pick_takes_the_place_of_the_wish_and_comments_stay() {
+        let text = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\n\n[accuracy]\ncentroid = \
+                    \"0.5 mm\"\nbudget = \"1 ms\"\n";
+        let knobs = Knobs { arithmetic: Some(Arithmetic::OnePass), coverage: Coverage::Touched, ..Knobs::default() };
+        let wish = Wish::within("0.5 mm").unwrap();
+        let written = with(text, &Combination { backend: BackendKind::Cpu, knobs }, &wish).unwrap();
+        let right = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\nbackend = \"cpu\"\n\n\
+                     [accuracy]\n# Picked by `somatic tradeoff` for 0.5 mm.\narithmetic = \"one-pass\"\ncoverage = \
+                     \"touched\"\n";
+        assert_eq!(written, right);
+        // Again, otherwise: nothing piles up.
+        let again = with(&written, &Combination { backend: BackendKind::Reference, knobs: Knobs::default() }, &wish);
+        assert_eq!(again.unwrap(), right.split("\n[accuracy]").next().unwrap().replace("\"cpu\"", "\"reference\""));
+        assert!(with("accuracy = 3", &Combination { backend: BackendKind::Cpu, knobs }, &wish).is_err());
+    }
+}

@@ -1,0 +1,139 @@
+//! Cadence `on-change`: a field none of whose values has changed keeps its percept, motion too.
+//!
+//! A source that repeats values until its sensors have new ones would otherwise tell of touches that stand still, and then
+//! leap. What is measured from frame to frame is measured from change to change instead. Coverage `touched` leaves out work
+//! and changes no bit; this changes what motion says.
+
+use crate::backend::reference::CellBound;
+use crate::backend::{RawBatch, Step};
+use crate::percept::{Flags, Outputs, Percepts};
+use crate::scene::Plan;
+use crate::signal::{Frame, RawValue};
+use crate::stage::motion::SHORTEST_STEP_S;
+
+/// Which fields' values changed in each frame.
+pub(super) struct OnChange {
+    fields: usize,
+    /// By channel, where its fields begin in `readers`, and one beyond the last.
+    starts: Vec<usize>,
+    readers: Vec<usize>,
+    max_gap_s: f64,
+    /// The frame before, by channel; empty where there is none that counts.
+    before: Vec<RawValue>,
+    /// Per field, when it last changed.
+    changed_at_s: Vec<Option<f64>>,
+    /// By frame and field, of the frames looked at last: the time since the change before, for a field that has changed.
+    cells: Vec<Option<Step>>,
+}
+
+impl OnChange {
+    pub(super) fn new(plan: &Plan, max_gap_s: f64) -> Self {
+        let mut of_channel = vec![Vec::new(); plan.channels()];
+        for (index, field) in plan.fields.iter().enumerate() {
+            for member in plan.members_of(field) {
+                let readers: &mut Vec<usize> = &mut of_channel[plan.channel_of(member.slot as usize)];
+                if readers.last() != Some(&index) {
+                    readers.push(index);
+                }
+            }
+        }
+        let mut starts = vec![0];
+        starts.extend(of_channel.iter().scan(0, |end, readers| {
+            *end += readers.len();
+            Some(*end)
+        }));
+        Self {
+            fields: plan.fields.len(),
+            starts,
+            readers: of_channel.concat(),
+            max_gap_s,
+            before: Vec::new(),
+            changed_at_s: vec![None; plan.fields.len()],
+            cells: Vec::new(),
+        }
+    }
+
+    /// Takes all fields for changed in the next frame, as when values mean something else from then on.
+    pub(super) fn forget(&mut self) {
+        self.before.clear();
+    }
+
+    /// Looks at `raw`, whose frames are `frames`.
+    pub(super) fn look(&mut self, raw: &RawBatch<'_>, frames: &[Frame]) {
+        self.cells.clear();
+        self.cells.resize(raw.frames * self.fields, None);
+        for (index, frame) in frames.iter().enumerate() {
+            let cells = &mut self.cells[index * self.fields..][..self.fields];
+            let mut changed = |field: usize| {
+                cells[field].get_or_insert_with(|| {
+                    let since = step(self.changed_at_s[field], frame.t_s, self.max_gap_s);
+                    self.changed_at_s[field] = Some(frame.t_s);
+                    since
+                });
+            };
+            if self.before.is_empty() {
+                (0..self.fields).for_each(&mut changed);
+                self.before.extend(raw.rows.row(index));
+                continue;
+            }
+            for (channel, (before, now)) in self.before.iter_mut().zip(raw.rows.row(index)).enumerate() {
+                if before.to_bits() != now.to_bits() {
+                    *before = now;
+                    self.readers[self.starts[channel]..self.starts[channel + 1]].iter().copied().for_each(&mut changed);
+                }
+            }
+        }
+    }
+
+    /// The time since the change before, if field `field` has changed in frame `frame` of those looked at last.
+    pub(super) fn since(&self, frame: usize, field: usize) -> Option<&Step> {
+        self.cells[frame * self.fields + field].as_ref()
+    }
+
+    /// Gives `bounds`, which are those of frames looked at last, what kept percepts and their rates need; `last` are those
+    /// of the frame before, and become those of the last one.
+    pub(super) fn bounds(&self, bounds: &mut [CellBound], steps: &[Step], last: &mut Vec<CellBound>) {
+        for cell in 0..bounds.len() {
+            let (frame, field) = (cell / self.fields, cell % self.fields);
+            match self.cells[cell] {
+                None if frame > 0 => bounds[cell] = bounds[cell - self.fields],
+                None => bounds[cell] = last.get(field).copied().unwrap_or(bounds[cell]),
+                Some(since) => {
+                    let Some(times) = times(&steps[frame], &since) else { continue };
+                    let bound = &mut bounds[cell];
+                    // One rounding more, where a rate's bound has six.
+                    for rate in [&mut bound.speed, &mut bound.radial_speed] {
+                        *rate = rate.map(|rate| rate * times * 7.0 / 6.0);
+                    }
+                }
+            }
+        }
+        last.clear();
+        last.extend_from_slice(&bounds[bounds.len() - self.fields..]);
+    }
+}
+
+/// By how much a rate over `step` is to be multiplied to be one over `since`; `None` where it stays.
+fn times(step: &Step, since: &Step) -> Option<f64> {
+    (step.flags.is_empty() && since.flags.is_empty() && step.dt_s != since.dt_s).then(|| step.dt_s / since.dt_s)
+}
+
+/// Makes a cell's rates those over the time `since` its field's last change, where they are over `step`.
+pub(super) fn rates(percepts: &mut Percepts, cell: usize, step: &Step, since: &Step) {
+    let moved = percepts.present[cell].intersects(Outputs::MOTION);
+    if moved && step.flags.is_empty() && !since.flags.is_empty() {
+        percepts.present[cell] -= Outputs::MOTION;
+        percepts.flags[cell] = (percepts.flags[cell] - Flags::STILL) | since.flags;
+    } else if let Some(times) = times(step, since).filter(|_| moved) {
+        percepts.scale_speeds(cell, times);
+    }
+}
+
+/// The time from the frame at `last_t_s` to the one at `t_s`, and whether motion can be measured over it.
+pub(super) fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
+    let Some(last_t_s) = last_t_s else { return Step { dt_s: 0.0, flags: Flags::NO_PREVIOUS } };
+    let dt_s = t_s - last_t_s;
+    // A step too short for single precision is none.
+    let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
+    Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }
+}

@@ -1,0 +1,229 @@
+//! The knobs: where a user may trade speed for accuracy, and what each of them can be turned to.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::choose_fields;
+use crate::body::{Body, ChartKind};
+use crate::error::{Error, Result, nearest};
+use crate::field::{FieldSet, Recharted};
+use crate::percept::Outputs;
+
+/// What is traded for what; the default is as accurate as single precision is without pains, and as fast as it is.
+///
+/// `docs/tradeoff.md` has what each costs and gives, `somatic tradeoff` measures it on one's own body and machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Knobs {
+    /// How sums are made; `None` is what the backend is made for: one-pass, and double on the reference.
+    pub arithmetic: Option<Arithmetic>,
+    /// Which charts fields have.
+    pub charts: Charts,
+    /// What "the orientation" is.
+    pub orientation_by: OrientationBy,
+    /// Which fields are computed in a frame.
+    pub coverage: Coverage,
+    /// When a field is looked at.
+    pub cadence: Cadence,
+}
+
+/// An enum of words: read from them, shown as them, and all of them in order.
+macro_rules! words {
+    ($what:literal, $(#[$about:meta])* $name:ident { $($(#[$says:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $($(#[$says])* $variant,)+
+        }
+
+        impl $name {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+            /// What they are called, in the same order.
+            pub const WORDS: &'static [&'static str] = &[$($word),+];
+
+            /// What it is called.
+            #[must_use]
+            pub fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = Error;
+
+            fn from_str(word: &str) -> Result<Self> {
+                match word {
+                    $($word => Ok(Self::$variant),)+
+                    _ => Err(unknown($what, word, Self::WORDS)),
+                }
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.word())
+            }
+        }
+    };
+}
+
+fn unknown(what: &str, word: &str, known: &[&str]) -> Error {
+    let (last, others) = known.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
+    match nearest(word, known.iter().copied()) {
+        Some(near) => Error::usage(format!("there is no {what} `{word}`; did you mean `{near}`?")),
+        None => Error::usage(format!("there is no {what} `{word}`; choose {} or {last}", others.join(", "))),
+    }
+}
+
+words! {"arithmetic",
+    /// How sums over a field's taxels are made.
+    Arithmetic {
+        /// Single precision, each term added once: the total and the centroid's moments about the chart's origin in one
+        /// pass; second moments and farthest points about the centroid, in another.
+        OnePass = "one-pass",
+        /// Single precision, each sum with what it lost carried along: as exact for a million taxels as for ten.
+        Compensated = "compensated",
+        /// Double precision, by the reference, on the CPU.
+        Double = "double",
+    }
+}
+
+words! {"kind of charts",
+    /// Which charts fields have.
+    #[derive(Default)]
+    Charts {
+        /// Those of the layout.
+        #[default]
+        AsAuthored = "as-authored",
+        /// Tangent planes, wherever there can be one.
+        Plane = "plane",
+        /// Shortest ways over the surface, wherever they can be followed.
+        Geodesic = "geodesic",
+    }
+}
+
+words! {"way to orientation",
+    /// What is given to somebody who wants the orientation of a touch, and does not mind how it is found.
+    #[derive(Default)]
+    OrientationBy {
+        /// What is asked for by name: outputs `orientation`, `axis` or both.
+        #[default]
+        AsAsked = "as-asked",
+        /// The line through the two farthest points: output `orientation`.
+        TwoPoints = "two-points",
+        /// The principal axis of the second moments: output `axis`.
+        SecondMoments = "second-moments",
+    }
+}
+
+words! {"coverage",
+    /// Which fields are computed in a live frame on the CPU; percepts are the same to the last bit.
+    #[derive(Default)]
+    Coverage {
+        /// Those that changed, where a gate pays: on large skins that are mostly idle.
+        #[default]
+        Auto = "auto",
+        /// All.
+        All = "all",
+        /// Those that changed, always behind a gate.
+        Touched = "touched",
+        /// Those whose parents are touched, from the top of the hierarchy down.
+        CoarseToFine = "coarse-to-fine",
+    }
+}
+
+words! {"cadence",
+    /// When a field is looked at.
+    #[derive(Default)]
+    Cadence {
+        /// In every frame: a value that is delivered again is a touch that stands still.
+        #[default]
+        EveryFrame = "every-frame",
+        /// When one of its values changes. Until then it keeps its percept whole, motion too, and motion is measured from
+        /// change to change: for a source that repeats values until its sensors have new ones.
+        OnChange = "on-change",
+    }
+}
+
+impl Knobs {
+    /// Refuses what does not go together with `outputs` and with letters that are changes.
+    pub(super) fn check(self, outputs: Outputs, has_changes: bool) -> Result<()> {
+        let refuse = |what: &str| Err(Error::usage(format!("{what}; leave one of them out")));
+        let on_change = self.cadence == Cadence::OnChange;
+        if on_change && has_changes {
+            return refuse(
+                "cadence on-change keeps a field while its values stay, and letter `change` is how they do not",
+            );
+        }
+        if on_change && outputs.intersects(Outputs::FILTERED) {
+            return refuse("cadence on-change says which motion counts, and so do outputs filtered_*");
+        }
+        let either = Outputs::ORIENTATION | Outputs::AXIS;
+        if self.orientation_by != OrientationBy::AsAsked && !outputs.intersects(either) {
+            return Err(Error::usage(format!(
+                "{} is a way to an orientation, which is not asked for; add output `orientation`",
+                self.orientation_by
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl Charts {
+    /// `fields` of `body`, those that `globs` name in such charts; with it the names of those that cannot have one.
+    ///
+    /// # Errors
+    /// As [`choose_fields`].
+    pub(crate) fn applied(self, body: &Body, fields: FieldSet, globs: &[String]) -> Result<Recharted> {
+        let kind = match self {
+            Self::AsAuthored => return Ok(Recharted { fields, kept: Vec::new() }),
+            Self::Plane => ChartKind::Plane,
+            Self::Geodesic => ChartKind::Geodesic,
+        };
+        let which = choose_fields(&fields, globs).map_err(|e| e.at(&body.name))?;
+        fields.recharted(body, &which, kind)
+    }
+}
+
+impl OrientationBy {
+    /// `outputs`, with the one of `orientation` and `axis` that this stands for in the place of either.
+    #[must_use]
+    pub fn applied(self, outputs: Outputs) -> Outputs {
+        let either = Outputs::ORIENTATION | Outputs::AXIS;
+        match self {
+            Self::TwoPoints if outputs.intersects(either) => (outputs - Outputs::AXIS) | Outputs::ORIENTATION,
+            Self::SecondMoments if outputs.intersects(either) => (outputs - Outputs::ORIENTATION) | Outputs::AXIS,
+            _ => outputs,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_is_read_as_what_it_is_shown_as() {
+        for (knob, word) in Arithmetic::ALL.iter().zip(Arithmetic::WORDS) {
+            assert_eq!((knob.to_string().as_str(), word.parse::<Arithmetic>().unwrap()), (*word, *knob));
+        }
+        for (knob, word) in Coverage::ALL.iter().zip(Coverage::WORDS) {
+            assert_eq!((knob.to_string().as_str(), word.parse::<Coverage>().unwrap()), (*word, *knob));
+        }
+        let says = |error: Error| error.to_string();
+        assert!(says("onepass".parse::<Arithmetic>().unwrap_err()).contains("did you mean `one-pass`?"));
+        let wrong = says("quantum".parse::<Coverage>().unwrap_err());
+        assert!(wrong.contains("choose auto, all, touched or coarse-to-fine"), "{wrong}");
+    }
+
+    #[test]
+    fn an_orientation_that_is_not_asked_for_stays_away() {
+        let both = Outputs::ORIENTATION | Outputs::AXIS | Outputs::TOTAL;
+        assert_eq!(OrientationBy::AsAsked.applied(both), both);
+        assert_eq!(OrientationBy::TwoPoints.applied(both), Outputs::ORIENTATION | Outputs::TOTAL);
+        assert_eq!(OrientationBy::SecondMoments.applied(Outputs::ORIENTATION), Outputs::AXIS);
+        assert_eq!(OrientationBy::SecondMoments.applied(Outputs::TOTAL), Outputs::TOTAL);
+    }
+}

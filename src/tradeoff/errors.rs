@@ -1,0 +1,219 @@
+//! How far percepts are off: from the reference's, and from the truth.
+
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::body::Body;
+use crate::engine::Options;
+use crate::error::Result;
+use crate::field::FieldSet;
+use crate::percept::{Flags, Outputs, Percept};
+use crate::scene::{Charts, Knobs, Plan, PlanField, Scene};
+use crate::signal::{Calibration, Letter};
+use crate::source::Truth;
+use crate::stage::{angle, position};
+
+/// What is said of many errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// How many.
+    pub compared: u64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// What 1 % exceed.
+    pub p99: f64,
+    /// The largest.
+    pub worst: f64,
+}
+
+impl Errors {
+    pub(super) fn of(errors: &mut [f64]) -> Self {
+        if errors.is_empty() {
+            return Self::default();
+        }
+        errors.sort_by(f64::total_cmp);
+        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        Self {
+            compared: errors.len() as u64,
+            rms: (squares / errors.len() as f64).sqrt(),
+            p99: rank(errors, 0.99),
+            worst: errors[errors.len() - 1],
+        }
+    }
+}
+
+/// The least of `sorted` that a `share` of them do not exceed.
+pub(super) fn rank(sorted: &[f64], share: f64) -> f64 {
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted[rank.clamp(1, sorted.len()) - 1]
+}
+
+/// Fields in one kind of charts, with the skin under them: it makes places of different charts comparable.
+pub(super) struct Ruler {
+    plan: Plan,
+    /// Fields that could not have such a chart.
+    pub(super) kept: Vec<String>,
+}
+
+impl Ruler {
+    pub(super) fn new(body: &Body, options: &Options, charts: Charts) -> Result<Self> {
+        let made = charts.applied(body, FieldSet::new(body)?, &options.scene.fields)?;
+        let scene = Scene {
+            outputs: Outputs::CENTROID | Outputs::POSITION,
+            fields: options.scene.fields.clone(),
+            letters: vec![Letter::default()],
+            knobs: Knobs::default(),
+            ..Scene::default()
+        };
+        let plan = Plan::new(body, &made.fields, &scene, &Calibration::identity(body.taxels.len()))?;
+        let kept = made.kept.iter().map(|(name, why)| format!("{charts}: {name}: {why}")).collect();
+        Ok(Self { plan, kept })
+    }
+
+    /// Fields in all letters count the first one's.
+    fn field(&self, field: usize) -> &PlanField {
+        &self.plan.fields[field]
+    }
+
+    pub(super) fn index_of(&self, name: &str) -> Option<usize> {
+        self.plan.fields.iter().position(|field| field.name == name)
+    }
+
+    pub(super) fn link(&self, field: usize) -> &str {
+        &self.field(field).link
+    }
+
+    /// The point of the skin at `uv`, in the field's anchor, m.
+    fn point(&self, field: usize, uv: DVec2) -> Option<DVec3> {
+        let field = self.field(field);
+        let (chart, lift) = (field.chart.as_ref()?, field.lift.as_ref()?);
+        Some(position::on_surface(chart, lift, field.origin_in_anchor, uv).0)
+    }
+
+    /// The direction over the skin in which a line at `angle` leads from `uv`.
+    fn direction(&self, field: usize, uv: DVec2, angle: f64) -> Option<DVec3> {
+        let step = DVec2::new(libm::cos(angle), libm::sin(angle)) * (self.reach_m(field) / 2.0);
+        (self.point(field, uv + step)? - self.point(field, uv - step)?).try_normalize()
+    }
+
+    /// About how far taxels lie apart, m: over less, a skin that is sampled by them has no direction.
+    fn reach_m(&self, field: usize) -> f64 {
+        self.field(field).spacing * f64::from(self.field(field).unit_m)
+    }
+
+    /// Whether all fields have the charts that they have in `other`.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (0..self.plan.fields.len()).all(|field| self.has_same_chart(other, field))
+    }
+
+    fn has_same_chart(&self, other: &Self, field: usize) -> bool {
+        self.field(field).chart == other.field(field).chart
+    }
+}
+
+/// The errors of one combination so far.
+#[derive(Default)]
+pub(super) struct Sum {
+    /// mm, and degrees.
+    pub(super) centroid: Vec<f64>,
+    pub(super) orientation: Vec<f64>,
+    pub(super) true_centroid: Vec<f64>,
+    pub(super) true_orientation: Vec<f64>,
+}
+
+/// The orientation of a percept: by second moments if `by_moments`.
+fn orientation(percept: &Percept, by_moments: bool) -> Option<f64> {
+    if by_moments { percept.axis } else { percept.orientation }
+}
+
+/// The angle between two lines, degrees.
+fn between(a: DVec3, b: DVec3) -> f64 {
+    libm::atan2(a.cross(b).length(), a.dot(b).abs()).to_degrees()
+}
+
+impl Sum {
+    /// Adds how far `got`, in the charts of `ruler`, is off from `right`, in those of `authored`.
+    pub(super) fn add(&mut self, ruler: &Ruler, authored: &Ruler, got: &Percept, right: &Percept, by_moments: bool) {
+        let field = got.field;
+        let (Some(at), Some(right_at)) = (got.centroid, right.centroid) else { return };
+        let (at, right_at) = (DVec2::from_array(at), DVec2::from_array(right_at));
+        let same = ruler.has_same_chart(authored, field);
+        let off = if same {
+            Some(at.distance(right_at))
+        } else {
+            ruler.point(field, at).zip(authored.point(field, right_at)).map(|(a, b)| a.distance(b))
+        };
+        self.centroid.extend(off.map(|metres| metres * 1e3));
+        let tied = !by_moments && (got.flags | right.flags).contains(Flags::TIE);
+        let (Some(a), Some(b)) = (orientation(got, by_moments), orientation(right, by_moments)) else { return };
+        let turned = if same {
+            Some(angle::between_lines(a, b).to_degrees())
+        } else {
+            let directions = ruler.direction(field, at, a).zip(authored.direction(field, right_at, b));
+            directions.map(|(a, b)| between(a, b))
+        };
+        self.orientation.extend(turned.filter(|_| !tied));
+    }
+
+    /// Adds how far `got` is off from the `truth` of the one touch on its field.
+    pub(super) fn add_truth(
+        &mut self,
+        ruler: &Ruler,
+        authored: &Ruler,
+        got: &Percept,
+        truth: &Truth,
+        by_moments: bool,
+    ) {
+        let field = got.field;
+        let Some(at) = got.centroid.map(DVec2::from_array) else { return };
+        let off = ruler.point(field, at).map(|point| point.distance(truth.position_in_link));
+        self.true_centroid.extend(off.map(|metres| metres * 1e3));
+        let right = truth.angle.zip(truth.uv);
+        let right = right.and_then(|(angle, uv)| authored.direction(field, DVec2::from_array(uv), angle));
+        let got = orientation(got, by_moments).and_then(|angle| ruler.direction(field, at, angle));
+        self.true_orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+
+    #[test]
+    fn errors_are_counted_and_ranked() {
+        let mut errors: Vec<f64> = (1..=200).rev().map(f64::from).collect();
+        let of = Errors::of(&mut errors);
+        assert_eq!((of.compared, of.p99, of.worst), (200, 198.0, 200.0));
+        assert!((of.rms - (200.0 * 201.0 * 401.0 / 6.0 / 200.0_f64).sqrt()).abs() < 1e-9);
+        assert_eq!(Errors::of(&mut []), Errors::default());
+        assert_eq!(Errors::of(&mut [3.0]), Errors { compared: 1, rms: 3.0, p99: 3.0, worst: 3.0 });
+    }
+
+    #[test]
+    fn a_place_is_the_same_on_the_skin_whatever_chart_it_is_told_in() {
+        let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
+        let rulers =
+            [Charts::Plane, Charts::Geodesic].map(|charts| Ruler::new(&body, &Options::default(), charts).unwrap());
+        let [plane, geodesic] = &rulers;
+        let mut compared = 0;
+        for field in 0..plane.plan.fields.len() {
+            if plane.has_same_chart(geodesic, field) {
+                continue;
+            }
+            let members = plane.field(field).places.iter().zip(&geodesic.field(field).places);
+            let unit = f64::from(plane.field(field).unit_m);
+            let other = f64::from(geodesic.field(field).unit_m);
+            for (a, b) in members {
+                let a = plane.point(field, a.truncate() * unit);
+                let b = geodesic.point(field, b.truncate() * other);
+                // Some have a chart of one kind only.
+                let (Some(a), Some(b)) = (a, b) else { continue };
+                // Both are read off a grid over the skin, no finer than a part of the spacing.
+                assert!(a.distance(b) < 0.25 * plane.reach_m(field), "{}", plane.field(field).name);
+                compared += 1;
+            }
+        }
+        assert!(compared > 50, "{compared}");
+    }
+}

@@ -1,0 +1,390 @@
+//! Combinations of knobs, taking turns.
+
+use std::collections::BTreeMap;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use super::errors::{Errors, Ruler, Sum, rank};
+use super::{Combination, Report, Row, Way};
+use crate::backend::BackendKind;
+use crate::body::Body;
+use crate::engine::{Engine, Options};
+use crate::error::{Error, Result};
+use crate::percept::{Flags, Outputs, Percepts};
+use crate::scene::{Charts, Knobs, OrientationBy, Scene};
+use crate::signal::Frame;
+use crate::source::Truth;
+
+/// Frames, and what is true in each of them where that is known.
+#[derive(Clone, Debug, Default)]
+pub struct Played {
+    /// What they came from, for people.
+    pub source: String,
+    /// The ids of the taxels whose values they hold.
+    pub taxels: Vec<u32>,
+    /// The frames.
+    pub frames: Vec<Frame>,
+    /// Per frame; empty where nothing is known.
+    pub truth: Vec<Vec<Truth>>,
+}
+
+/// How long is measured, and what.
+#[derive(Clone, Debug)]
+pub struct Manner {
+    /// The time that turns take together, s.
+    pub seconds: f64,
+    /// Frames a call, of many.
+    pub batch: usize,
+    /// Live, in batches, or both.
+    pub ways: Vec<Way>,
+    /// On what.
+    pub backends: Vec<BackendKind>,
+}
+
+/// A turn of one combination, about.
+const TURN: Duration = Duration::from_micros(1500);
+/// Rounds at least: a first one that warms up, and some that count.
+const ROUNDS: usize = 4;
+
+/// A combination that is being measured.
+struct Trial {
+    way: Way,
+    combination: Combination,
+    engine: Engine,
+    /// Which call is next, and how often all have been gone through.
+    next: usize,
+    gone_through: u32,
+    times_us: Vec<f64>,
+    errors: Sum,
+}
+
+/// Calls, each some frames, that are gone through again and again in a time that goes on.
+struct Calls {
+    calls: Vec<Vec<Frame>>,
+    times_s: Vec<Vec<f64>>,
+    /// From the first frame to the first of the next time.
+    period_s: f64,
+}
+
+impl Calls {
+    fn new(frames: &[Frame], at_once: usize) -> Self {
+        let calls: Vec<Vec<Frame>> = frames.chunks(at_once).map(<[Frame]>::to_vec).collect();
+        let times_s = calls.iter().map(|call| call.iter().map(|frame| frame.t_s).collect()).collect();
+        let times = || frames.iter().map(|frame| frame.t_s);
+        let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+        let step = if frames.len() > 1 { (last - first) / (frames.len() - 1) as f64 } else { 0.0 };
+        Self { calls, times_s, period_s: last - first + if step > 0.0 { step } else { 0.01 } }
+    }
+
+    /// Call `index`, when all have been gone through so often.
+    fn at(&mut self, index: usize, gone_through: u32) -> &[Frame] {
+        let later = self.period_s * f64::from(gone_through);
+        for (frame, t_s) in self.calls[index].iter_mut().zip(&self.times_s[index]) {
+            frame.t_s = t_s + later;
+        }
+        &self.calls[index]
+    }
+}
+
+/// Measures all combinations of knobs that make sense for `options` on `body`, whose knobs that are turned stay as they are.
+///
+/// `progress` is told what share is done, and says whether to go on. Where it does not, what has been measured is the
+/// report, if every combination had its turn.
+///
+/// # Errors
+/// No frame touches a field; the scene makes no sense; it was stopped too early.
+pub fn measure(
+    body: &Body,
+    options: &Options,
+    played: &Played,
+    manner: &Manner,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<Report> {
+    let rulers = rulers(body, options)?;
+    let mut report = Report {
+        body: body.name.clone(),
+        source: played.source.clone(),
+        frames: played.frames.len(),
+        asked_by: asked_by(&options.scene).word().to_owned(),
+        touched: 0,
+        ties: 0,
+        truth: false,
+        kept_charts: rulers.values().flat_map(|ruler| ruler.kept.clone()).collect(),
+        left_out: Vec::new(),
+        rows: Vec::new(),
+    };
+    let authored = &rulers[Charts::AsAuthored.word()];
+    let another = |charts: Charts| charts == options.scene.knobs.charts || !rulers[charts.word()].is_like(authored);
+    for charts in Charts::ALL.iter().filter(|charts| rulers.contains_key(charts.word()) && !another(**charts)) {
+        report.left_out.push(format!("charts {charts}: they are the layout's own"));
+    }
+    let mut trials = Vec::new();
+    for &way in &manner.ways {
+        let all = Combination::all(&options.scene, way, &manner.backends);
+        for combination in all.into_iter().filter(|combination| another(combination.knobs.charts)) {
+            match Trial::new(body, options, played, way, combination, manner.batch) {
+                Ok(trial) => trials.push(trial),
+                Err(e) if combination.backend == BackendKind::Gpu => {
+                    let why = format!("gpu: {e}");
+                    if !report.left_out.contains(&why) {
+                        report.left_out.push(why);
+                    }
+                }
+                Err(e) => return Err(e),
+            }
+        }
+    }
+    const FIRST_PART: f64 = 0.3;
+    let stopped = || Error::failed("stopped before everything had been measured once");
+    // What they are off by, once.
+    let right = Right::new(body, options, played)?;
+    (report.touched, report.ties, report.truth) = (right.touched, right.ties, right.has_truth);
+    if report.touched == 0 {
+        return Err(Error::failed("no field with a chart is touched in these frames; give others").at(&played.source));
+    }
+    let count = trials.len();
+    let mut calls = [Calls::new(&played.frames, 1), Calls::new(&played.frames, manner.batch.max(1))];
+    for (index, trial) in trials.iter_mut().enumerate() {
+        let ruler = &rulers[&trial.combination.knobs.charts.word()];
+        trial.compare(&mut calls[trial.way as usize], ruler, authored, &right)?;
+        if !progress(FIRST_PART * (index + 1) as f64 / count as f64) {
+            return Err(stopped());
+        }
+    }
+    // What they take, in turns.
+    let start = Instant::now();
+    let mut rounds = 0;
+    loop {
+        for trial in &mut trials {
+            trial.turn(&mut calls[trial.way as usize])?;
+        }
+        rounds += 1;
+        if rounds == 1 {
+            trials.iter_mut().for_each(|trial| trial.times_us.clear());
+        }
+        let share = (start.elapsed().as_secs_f64() / manner.seconds).min(1.0);
+        let go_on = progress(FIRST_PART + (1.0 - FIRST_PART) * share);
+        if rounds < 2 && !go_on {
+            return Err(stopped());
+        }
+        if !go_on || (rounds >= ROUNDS && share >= 1.0) {
+            break;
+        }
+    }
+    report.rows = trials.into_iter().map(|trial| trial.row(report.truth)).collect();
+    report.find_front();
+    Ok(report)
+}
+
+/// What `scene` asks for when it asks for an orientation.
+fn asked_by(scene: &Scene) -> OrientationBy {
+    match scene.knobs.orientation_by {
+        OrientationBy::AsAsked if scene.outputs.contains(Outputs::ORIENTATION) => OrientationBy::TwoPoints,
+        OrientationBy::AsAsked if scene.outputs.contains(Outputs::AXIS) => OrientationBy::SecondMoments,
+        given => given,
+    }
+}
+
+/// A ruler for each kind of charts that is measured.
+fn rulers(body: &Body, options: &Options) -> Result<BTreeMap<&'static str, Ruler>> {
+    let given = options.scene.knobs.charts;
+    let kinds =
+        Charts::ALL.iter().filter(|&&kind| given == Charts::AsAuthored || kind == given || kind == Charts::AsAuthored);
+    kinds.map(|&charts| Ok((charts.word(), Ruler::new(body, options, charts)?))).collect()
+}
+
+/// What the reference says of all frames.
+struct Right {
+    percepts: Percepts,
+    touched: u64,
+    ties: u64,
+    has_truth: bool,
+    /// Per frame, the field and the truth of it where one touch alone is on it.
+    truth: Vec<Vec<(usize, Truth)>>,
+}
+
+impl Right {
+    fn new(body: &Body, options: &Options, played: &Played) -> Result<Self> {
+        let authored = Ruler::new(body, options, Charts::AsAuthored)?;
+        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
+        let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
+        let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
+        let mut engine = Engine::new(body, options)?;
+        engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
+        let percepts = engine.process(&played.frames)?.clone();
+        let letters = engine.plan().letters().len();
+        let (mut touched, mut ties) = (0, 0);
+        for frame in 0..percepts.frames() {
+            for percept in percepts.touched(frame).filter(|percept| percept.letter == 0 && percept.centroid.is_some()) {
+                touched += 1;
+                ties += u64::from(percept.flags.contains(Flags::TIE));
+            }
+        }
+        let of_frame = |truths: &Vec<Truth>| -> Vec<(usize, Truth)> {
+            let known = truths.iter().filter_map(|truth| {
+                let field = authored.index_of(truth.field.as_deref()?)?;
+                let alone = truths.iter().filter(|other| other.field == truth.field).count() == 1;
+                (alone && authored.link(field) == truth.link).then(|| (field * letters, truth.clone()))
+            });
+            known.collect()
+        };
+        let truth: Vec<Vec<(usize, Truth)>> = played.truth.iter().map(of_frame).collect();
+        Ok(Self { percepts, touched, ties, has_truth: truth.iter().any(|known| !known.is_empty()), truth })
+    }
+}
+
+impl Trial {
+    fn new(
+        body: &Body,
+        options: &Options,
+        played: &Played,
+        way: Way,
+        combination: Combination,
+        batch: usize,
+    ) -> Result<Self> {
+        let batch = if way == Way::Live { 1 } else { batch.max(1) };
+        let Combination { backend, mut knobs } = combination;
+        if backend == BackendKind::Reference {
+            knobs.arithmetic = None;
+        }
+        // An orientation is judged by the centroid that it is about.
+        let outputs = options.scene.outputs | Outputs::CENTROID;
+        let scene = Scene { knobs, outputs, ..options.scene.clone() };
+        let mut engine = Engine::new(body, Options { scene, backend, batch, ..options.clone() })?;
+        engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
+        let (times_us, errors) = (Vec::new(), Sum::default());
+        Ok(Self { way, combination, engine, next: 0, gone_through: 0, times_us, errors })
+    }
+
+    fn by_moments(&self) -> bool {
+        self.combination.knobs.orientation_by == OrientationBy::SecondMoments
+    }
+
+    /// Goes through all frames once, and finds out how far percepts are off.
+    fn compare(&mut self, calls: &mut Calls, ruler: &Ruler, authored: &Ruler, right: &Right) -> Result<()> {
+        let by_moments = self.by_moments();
+        let letters = self.engine.plan().letters().len();
+        let mut frame = 0;
+        for call in 0..calls.calls.len() {
+            let percepts = self.engine.process(calls.at(call, 0))?;
+            for index in 0..percepts.frames() {
+                for field in (0..percepts.fields()).step_by(letters) {
+                    let mut got = percepts.get(index, field);
+                    got.field = field / letters;
+                    self.errors.add(ruler, authored, &got, &right.percepts.get(frame, field), by_moments);
+                    let truths = right.truth.get(frame).into_iter().flatten();
+                    for (_, truth) in truths.filter(|(of, _)| *of == field && got.contact) {
+                        self.errors.add_truth(ruler, authored, &got, truth, by_moments);
+                    }
+                }
+                frame += 1;
+            }
+        }
+        self.gone_through = 1;
+        Ok(())
+    }
+
+    /// Goes on for about a turn.
+    fn turn(&mut self, calls: &mut Calls) -> Result<()> {
+        let start = Instant::now();
+        while start.elapsed() < TURN {
+            let call = calls.at(self.next, self.gone_through);
+            let began = Instant::now();
+            black_box(self.engine.process(black_box(call))?);
+            self.times_us.push(began.elapsed().as_secs_f64() * 1e6 / call.len() as f64);
+            self.next += 1;
+            if self.next == calls.calls.len() {
+                (self.next, self.gone_through) = (0, self.gone_through + 1);
+            }
+        }
+        Ok(())
+    }
+
+    fn row(mut self, truth: bool) -> Row {
+        let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
+            self.combination.words().map(str::to_owned);
+        self.times_us.sort_by(f64::total_cmp);
+        let errors = &mut self.errors;
+        Row {
+            way: self.way,
+            backend,
+            arithmetic,
+            charts,
+            orientation_by,
+            coverage,
+            cadence,
+            p50_us: rank(&self.times_us, 0.5),
+            p99_us: rank(&self.times_us, 0.99),
+            centroid_mm: Errors::of(&mut errors.centroid),
+            orientation_deg: Errors::of(&mut errors.orientation),
+            true_centroid_mm: truth.then(|| Errors::of(&mut errors.true_centroid)),
+            true_orientation_deg: (truth && !errors.true_orientation.is_empty())
+                .then(|| Errors::of(&mut errors.true_orientation)),
+            front: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use crate::source::{CsvSource, Source as _};
+
+    pub(crate) fn touch() -> Played {
+        let mut source = CsvSource::from_reader("touch", bundled::TOUCH, None, None).unwrap();
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        let mut frames = Vec::new();
+        while frames.len() < 80 && source.next_frame(&mut frame).unwrap() {
+            frames.push(frame.clone());
+        }
+        Played { source: "touch".into(), taxels: source.taxels().to_vec(), frames, truth: Vec::new() }
+    }
+
+    fn manner(seconds: f64) -> Manner {
+        Manner { seconds, batch: 32, ways: Way::ALL.to_vec(), backends: vec![BackendKind::Cpu] }
+    }
+
+    #[test]
+    fn every_combination_has_its_turns_and_errors_are_those_of_its_arithmetic() {
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let options = Options {
+            scene: Scene { outputs: Outputs::CENTROID | Outputs::ORIENTATION, ..Scene::default() },
+            ..Options::default()
+        };
+        let mut shares = Vec::new();
+        let report = measure(&body, &options, &touch(), &manner(0.05), &mut |share| {
+            shares.push(share);
+            true
+        })
+        .unwrap();
+        assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
+        // The hand's own charts are planes.
+        let of_way = |&way: &Way| {
+            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu]);
+            all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
+        };
+        let expected: usize = Way::ALL.iter().map(of_way).sum();
+        assert!(report.left_out.iter().any(|left| left.starts_with("charts plane")), "{:?}", report.left_out);
+        assert_eq!(report.rows.len(), expected);
+        for row in &report.rows {
+            assert!(row.p50_us > 0.0 && row.p99_us >= row.p50_us, "{row:?}");
+            let authored = row.charts == "as-authored";
+            assert!(!authored || row.centroid_mm.worst < 1e-4, "{row:?}");
+            // Negative control: double precision in the layout's charts is the reference, and single precision is not.
+            assert_eq!(authored && row.arithmetic == "double", row.centroid_mm.worst == 0.0, "{row:?}");
+            assert!(row.centroid_mm.compared > 0);
+        }
+        assert!(report.rows.iter().any(|row| row.front) && report.rows.iter().any(|row| !row.front));
+    }
+
+    #[test]
+    fn what_is_stopped_too_early_says_so() {
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let stopped = measure(&body, &Options::default(), &touch(), &manner(60.0), &mut |_| false);
+        assert!(stopped.unwrap_err().to_string().contains("stopped before"));
+        let nothing = Played { frames: touch().frames[..1].to_vec(), ..touch() };
+        let untouched = measure(&body, &Options::default(), &nothing, &manner(0.1), &mut |_| true);
+        assert!(untouched.unwrap_err().to_string().contains("no field with a chart is touched"));
+    }
+}

@@ -1,0 +1,344 @@
+//! What each knob costs and gives, measured on a body, a recording and a machine; and the pick for a tolerance or a budget.
+//!
+//! Combinations of knobs take turns, so that a machine that slows down slows all of them. Each one's percepts are compared
+//! with those of the reference in the layout's own charts, and with the truth where a source knows it.
+
+mod errors;
+mod measure;
+mod plot;
+mod store;
+mod wish;
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+pub use errors::Errors;
+pub use measure::{Manner, Played, measure};
+pub use plot::{plot_png, plot_svg};
+pub use store::{Found, Store, Stored, day};
+pub use wish::{Pick, Wish, angle, length, time};
+
+use crate::backend::BackendKind;
+use crate::percept::Outputs;
+use crate::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy, Scene};
+use crate::signal::Receptor;
+
+/// How frames come to an engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Way {
+    /// One frame a call.
+    Live,
+    /// Many frames a call.
+    Batch,
+}
+
+impl Way {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Live, Self::Batch];
+
+    /// What it is called.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Live => "live",
+            Self::Batch => "batch",
+        }
+    }
+}
+
+/// A backend with its knobs turned some way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Combination {
+    /// What computes.
+    pub backend: BackendKind,
+    /// How.
+    pub knobs: Knobs,
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [backend, arithmetic, charts, orientation, coverage, cadence] = self.words();
+        write!(f, "{backend}, {arithmetic}, {charts}, {orientation}, {coverage}, {cadence}")
+    }
+}
+
+impl Combination {
+    /// Backend, arithmetic, charts, way to orientation, coverage and cadence.
+    #[must_use]
+    pub fn words(&self) -> [&'static str; 6] {
+        let Knobs { arithmetic, charts, orientation_by, coverage, cadence } = self.knobs;
+        let backend = match self.backend {
+            BackendKind::Gpu => "gpu",
+            BackendKind::Reference => "reference",
+            BackendKind::Cpu | BackendKind::Auto => "cpu",
+        };
+        let usual = if self.backend == BackendKind::Reference { Arithmetic::Double } else { Arithmetic::OnePass };
+        let arithmetic = arithmetic.unwrap_or(usual).word();
+        [backend, arithmetic, charts.word(), orientation_by.word(), coverage.word(), cadence.word()]
+    }
+
+    /// The combinations that make sense for `scene`, called `way`, on `backends`; knobs of `scene` that are not as they are
+    /// by default stay as they are.
+    #[must_use]
+    pub fn all(scene: &Scene, way: Way, backends: &[BackendKind]) -> Vec<Self> {
+        let given = scene.knobs;
+        let usual = Knobs::default();
+        let live = way == Way::Live;
+        fn some<T: Copy + PartialEq>(given: T, usual: T, all: &[T]) -> Vec<T> {
+            if given == usual { all.to_vec() } else { vec![given] }
+        }
+        let charts = some(given.charts, usual.charts, Charts::ALL);
+        let orients = scene.outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS);
+        let ways = if orients { &OrientationBy::ALL[1..] } else { &OrientationBy::ALL[..1] };
+        let ways = some(given.orientation_by, usual.orientation_by, ways);
+        let arithmetics = match given.arithmetic {
+            Some(arithmetic) => vec![arithmetic],
+            None => Arithmetic::ALL.to_vec(),
+        };
+        let changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
+        let cadences = match given.cadence {
+            Cadence::EveryFrame if !live || changes || scene.outputs.intersects(Outputs::FILTERED) => {
+                vec![given.cadence]
+            }
+            cadence => some(cadence, usual.cadence, Cadence::ALL),
+        };
+        let mut all = Vec::new();
+        for &backend in backends {
+            for &arithmetic in &arithmetics {
+                // Double precision is the reference's alone.
+                let backend = match (backend, arithmetic) {
+                    (BackendKind::Cpu, Arithmetic::Double) => BackendKind::Reference,
+                    (BackendKind::Gpu, Arithmetic::Double) | (BackendKind::Reference | BackendKind::Auto, _) => {
+                        continue;
+                    }
+                    (backend, _) => backend,
+                };
+                // A gate is for live frames on the CPU.
+                let gated = backend == BackendKind::Cpu && live && !changes;
+                let coverages = if gated {
+                    some(given.coverage, usual.coverage, &Coverage::ALL[1..])
+                } else {
+                    vec![given.coverage]
+                };
+                for &charts in &charts {
+                    for &orientation_by in &ways {
+                        for &coverage in &coverages {
+                            for &cadence in &cadences {
+                                let arithmetic = Some(arithmetic);
+                                let knobs = Knobs { arithmetic, charts, orientation_by, coverage, cadence };
+                                all.push(Self { backend, knobs });
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        all
+    }
+}
+
+/// What a combination takes and how far it is off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// How frames came.
+    pub way: Way,
+    /// As [`Combination::words`]: what was measured.
+    pub backend: String,
+    /// See [`Arithmetic`].
+    pub arithmetic: String,
+    /// See [`Charts`].
+    pub charts: String,
+    /// See [`OrientationBy`].
+    pub orientation_by: String,
+    /// See [`Coverage`].
+    pub coverage: String,
+    /// See [`Cadence`].
+    pub cadence: String,
+    /// Time of a frame, µs: the median, and what 1 % exceed.
+    pub p50_us: f64,
+    /// The same.
+    pub p99_us: f64,
+    /// How far centroids lie from the reference's, mm.
+    pub centroid_mm: Errors,
+    /// How far orientations are turned from the reference's, by the same way to them, degrees.
+    pub orientation_deg: Errors,
+    /// The same from the truth, where the source knows it.
+    pub true_centroid_mm: Option<Errors>,
+    /// The same.
+    pub true_orientation_deg: Option<Errors>,
+    /// Whether no other combination of the same way is both faster and at least as true in both.
+    pub front: bool,
+}
+
+impl Row {
+    /// The combination that this is of.
+    ///
+    /// # Errors
+    /// Its words are of another version.
+    pub fn combination(&self) -> crate::Result<Combination> {
+        Ok(Combination {
+            backend: self.backend.parse()?,
+            knobs: Knobs {
+                arithmetic: (self.backend != "reference").then(|| self.arithmetic.parse()).transpose()?,
+                charts: self.charts.parse()?,
+                orientation_by: self.orientation_by.parse()?,
+                coverage: self.coverage.parse()?,
+                cadence: self.cadence.parse()?,
+            },
+        })
+    }
+
+    /// How far it is off, from the truth where that is known: centroid, mm, and orientation, degrees.
+    #[must_use]
+    pub fn judged(&self) -> [&Errors; 2] {
+        [
+            self.true_centroid_mm.as_ref().unwrap_or(&self.centroid_mm),
+            self.true_orientation_deg.as_ref().unwrap_or(&self.orientation_deg),
+        ]
+    }
+}
+
+/// What was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Name of the body.
+    pub body: String,
+    /// What frames came from.
+    pub source: String,
+    /// How many frames.
+    pub frames: usize,
+    /// The way to orientation that the scene asks for by name, see [`OrientationBy`]: without a truth nothing tells
+    /// whether another would do.
+    pub asked_by: String,
+    /// Field-frames that were compared at most, and of these how many the reference itself calls too close to call: a tie
+    /// between two orientations, which are compared by nobody.
+    pub touched: u64,
+    /// The same.
+    pub ties: u64,
+    /// Whether the truth was known.
+    pub truth: bool,
+    /// Fields that cannot have another kind of chart, `charts: field: why`.
+    pub kept_charts: Vec<String>,
+    /// Combinations that were not measured, and why.
+    pub left_out: Vec<String>,
+    /// One for each combination and way.
+    pub rows: Vec<Row>,
+}
+
+impl Report {
+    /// Marks the rows that no other beats.
+    fn find_front(&mut self) {
+        let beaten = |row: &Row, by: &Row| {
+            let (a, b) = (row.judged(), by.judged());
+            let no_worse = b[0].p99 <= a[0].p99 && b[1].p99 <= a[1].p99 && by.p50_us <= row.p50_us;
+            let better = b[0].p99 < a[0].p99 || b[1].p99 < a[1].p99 || by.p50_us < row.p50_us;
+            // Orientations that are found otherwise are another quantity where nobody knows the truth.
+            let alike = self.truth || row.orientation_by == by.orientation_by;
+            row.way == by.way && alike && no_worse && better
+        };
+        let fronts: Vec<bool> = self.rows.iter().map(|row| !self.rows.iter().any(|other| beaten(row, other))).collect();
+        self.rows.iter_mut().zip(fronts).for_each(|(row, front)| row.front = front);
+    }
+
+    /// The rows of frames that came `way`, the fastest first.
+    #[must_use]
+    pub fn of(&self, way: Way) -> Vec<&Row> {
+        let mut rows: Vec<&Row> = self.rows.iter().filter(|row| row.way == way).collect();
+        rows.sort_by(|a, b| a.p50_us.total_cmp(&b.p50_us));
+        rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn row(backend: &str, p50_us: f64, centroid: f64, orientation: f64) -> Row {
+        let errors = |p99: f64| Errors { compared: 10, rms: p99 / 2.0, p99, worst: p99 * 2.0 };
+        let knobs = Knobs { arithmetic: (backend != "reference").then_some(Arithmetic::OnePass), ..Knobs::default() };
+        let combination = Combination { backend: backend.parse().unwrap(), knobs };
+        let [backend, arithmetic, charts, orientation_by, coverage, cadence] = combination.words().map(str::to_owned);
+        Row {
+            way: Way::Live,
+            backend,
+            arithmetic,
+            charts,
+            orientation_by,
+            coverage,
+            cadence,
+            p50_us,
+            p99_us: 2.0 * p50_us,
+            centroid_mm: errors(centroid),
+            orientation_deg: errors(orientation),
+            true_centroid_mm: None,
+            true_orientation_deg: None,
+            front: false,
+        }
+    }
+
+    pub(super) fn report(rows: Vec<Row>) -> Report {
+        let mut report = Report {
+            body: "hand".into(),
+            source: "touch".into(),
+            frames: 10,
+            asked_by: "as-asked".into(),
+            touched: 10,
+            ties: 0,
+            truth: false,
+            kept_charts: Vec::new(),
+            left_out: Vec::new(),
+            rows,
+        };
+        report.find_front();
+        report
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let rows = vec![
+            row("cpu", 1.0, 3.0, 3.0),
+            row("cpu", 2.0, 1.0, 4.0),
+            row("cpu", 2.5, 1.0, 4.0),
+            row("cpu", 3.0, 3.0, 1.0),
+            row("reference", 9.0, 0.0, 0.0),
+            row("reference", 9.5, 0.0, 0.5),
+        ];
+        let fronts: Vec<bool> = report(rows).rows.iter().map(|row| row.front).collect();
+        assert_eq!(fronts, [true, true, false, true, true, false]);
+    }
+
+    #[test]
+    fn combinations_are_all_that_make_sense_and_none_that_does_not() {
+        let scene = Scene::default();
+        let live = Combination::all(&scene, Way::Live, &[BackendKind::Cpu, BackendKind::Gpu]);
+        let count = |backend| live.iter().filter(|c| c.backend == backend).count();
+        // Arithmetics, charts, ways to orientation, coverages, cadences.
+        assert_eq!(count(BackendKind::Cpu), 2 * 3 * 2 * 3 * 2);
+        assert_eq!(count(BackendKind::Gpu), 2 * 3 * 2 * 2);
+        assert_eq!(count(BackendKind::Reference), 3 * 2 * 2);
+        let batch = Combination::all(&scene, Way::Batch, &[BackendKind::Cpu]);
+        assert_eq!(batch.len(), 3 * 3 * 2);
+        for combination in live.iter().chain(&batch) {
+            assert!(combination.backend.with(combination.knobs.arithmetic).is_ok(), "{combination}");
+        }
+        let knobs = Knobs { charts: Charts::Plane, arithmetic: Some(Arithmetic::OnePass), ..Knobs::default() };
+        let some =
+            Combination::all(&Scene { knobs, outputs: Outputs::CENTROID, ..scene }, Way::Batch, &[BackendKind::Cpu]);
+        assert_eq!(some.iter().map(|c| c.knobs).collect::<Vec<_>>(), [knobs]);
+    }
+
+    #[test]
+    fn a_row_says_its_combination_again() {
+        for way in Way::ALL {
+            for combination in Combination::all(&Scene::default(), way, &[BackendKind::Cpu, BackendKind::Gpu]) {
+                let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
+                    combination.words().map(str::to_owned);
+                let row =
+                    Row { backend, arithmetic, charts, orientation_by, coverage, cadence, ..row("cpu", 1.0, 0.0, 0.0) };
+                assert_eq!(row.combination().unwrap().words(), combination.words());
+            }
+        }
+    }
+}

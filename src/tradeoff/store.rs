@@ -1,0 +1,213 @@
+//! Measurements that are kept, one file for each body and scene, and whether they still hold.
+
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::{Deserialize, Serialize};
+
+use super::Report;
+use crate::body::Body;
+use crate::engine::Options;
+use crate::error::{Error, Result};
+use crate::scene::Knobs;
+use crate::whole;
+
+/// What files are like; another is not read.
+const VERSION: u32 = 1;
+
+/// A folder of measurements.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// What a measurement hangs on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Key {
+    /// Of the file.
+    version: u32,
+    program: String,
+    machine: String,
+    driver: String,
+    body: String,
+    scene: String,
+}
+
+/// A measurement that was kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stored {
+    key: Key,
+    /// When it was made, s since 1970.
+    pub taken_at_s: u64,
+    /// What was measured.
+    pub report: Report,
+}
+
+/// What a look into a store finds.
+#[derive(Clone, Debug)]
+pub enum Found {
+    /// One that holds.
+    Fresh(Box<Stored>),
+    /// None.
+    Nothing,
+    /// One that is of no use, and why, in words.
+    Useless(String),
+}
+
+impl Store {
+    /// The user's: `somatic/tradeoff` in `$XDG_CACHE_HOME`, or in `~/.cache`. `None` where there is no such folder to be.
+    #[must_use]
+    pub fn of_user() -> Option<Self> {
+        let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let cache = set("XDG_CACHE_HOME").filter(|folder| folder.is_absolute());
+        let cache = cache.or_else(|| set("LOCALAPPDATA")).or_else(|| set("HOME").map(|home| home.join(".cache")))?;
+        Some(Self::at(cache.join("somatic").join("tradeoff")))
+    }
+
+    /// The one in `folder`.
+    #[must_use]
+    pub fn at(folder: PathBuf) -> Self {
+        Self { folder }
+    }
+
+    /// Where measurements of `options` on `body` are kept.
+    #[must_use]
+    pub fn file(&self, body: &Body, options: &Options) -> PathBuf {
+        self.folder.join(format!("{:016x}.json", hash(&[&body.name, &asked(options)])))
+    }
+
+    /// The measurement of `options` on `body`, if there is one that holds on this machine with this `driver`.
+    #[must_use]
+    pub fn find(&self, body: &Body, options: &Options, driver: &str) -> Found {
+        let path = self.file(body, options);
+        let Ok(text) = std::fs::read_to_string(&path) else { return Found::Nothing };
+        let useless = |why: &str| Found::Useless(format!("{}: kept measurements {why}", path.display()));
+        let Ok(stored) = serde_json::from_str::<Stored>(&text) else { return useless("are damaged") };
+        let now = Key::new(body, options, driver);
+        let differs = [
+            (stored.key.version != now.version || stored.key.program != now.program, "are of another version"),
+            (stored.key.machine != now.machine, "are of another machine"),
+            (stored.key.driver != now.driver, "are with other GPU drivers"),
+            (stored.key.body != now.body, "are of the body before it changed"),
+            (stored.key.scene != now.scene, "are of the scene before it changed"),
+            (stored.report.rows.iter().any(|row| row.combination().is_err()), "are damaged"),
+        ];
+        match differs.iter().find(|(differs, _)| *differs) {
+            Some((_, why)) => useless(why),
+            None => Found::Fresh(Box::new(stored)),
+        }
+    }
+
+    /// Keeps `report`, in place of any before.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn keep(&self, body: &Body, options: &Options, driver: &str, report: &Report) -> Result<()> {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        let stored = Stored { key: Key::new(body, options, driver), taken_at_s: now, report: report.clone() };
+        let path = self.file(body, options);
+        std::fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, &e))?;
+        let text = serde_json::to_string_pretty(&stored).map_err(|e| Error::failed(e.to_string()))?;
+        whole::write(&path, text.as_bytes())
+    }
+}
+
+impl Key {
+    fn new(body: &Body, options: &Options, driver: &str) -> Self {
+        let laid = format!("{:?} {:?} {:?}", body.taxels, body.fields, body.links);
+        let calibration = options.calibration.as_ref().map(|calibration| format!("{calibration:?}"));
+        Self {
+            version: VERSION,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            machine: machine(),
+            driver: driver.to_owned(),
+            body: format!("{:016x}", hash(&[&laid])),
+            scene: format!("{:016x}", hash(&[&asked(options), calibration.as_deref().unwrap_or_default()])),
+        }
+    }
+}
+
+/// What is asked for, but for the knobs: all of these are measured.
+fn asked(options: &Options) -> String {
+    let scene = crate::Scene { knobs: Knobs::default(), ..options.scene.clone() };
+    format!("{:?} {scene:?}", options.backend)
+}
+
+/// The processor, and how many of its threads there are.
+fn machine() -> String {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let name = name.map_or("", |(_, name)| name.trim());
+    format!("{} {} {name} {threads}", std::env::consts::OS, std::env::consts::ARCH)
+}
+
+/// FNV-1a: it has to be the same tomorrow, and no more.
+fn hash(texts: &[&str]) -> u64 {
+    let bytes = texts.iter().flat_map(|text| text.bytes().chain([0xff]));
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// The day of a time in s since 1970, UTC: `2026-11-20`.
+#[must_use]
+pub fn day(at_s: u64) -> String {
+    // Counted from 0000-03-01, so that a leap day ends its year; 146,097 days are four centuries.
+    let days = at_s / 86_400 + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (month, later) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
+    format!("{:04}-{month:02}-{day:02}", era * 400 + year + later)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{report, row};
+    use super::*;
+    use crate::bundled;
+    use crate::percept::Outputs;
+    use crate::scene::Scene;
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        let at = [0, 951_782_400, 951_868_800, 1_583_020_800, 1_798_675_199, 4_102_444_800];
+        assert_eq!(at.map(day), ["1970-01-01", "2000-02-29", "2000-03-01", "2020-03-01", "2026-12-30", "2100-01-01"]);
+    }
+
+    #[test]
+    fn what_is_kept_is_found_until_something_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path().join("new/folder"));
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let options = Options::default();
+        let why = |found: Found| match found {
+            Found::Useless(why) => why,
+            other => panic!("{other:?}"),
+        };
+        assert!(matches!(store.find(&body, &options, "a"), Found::Nothing));
+        let report = report(vec![row("cpu", 1.0, 2.0, 3.0)]);
+        store.keep(&body, &options, "a", &report).unwrap();
+        match store.find(&body, &options, "a") {
+            Found::Fresh(stored) => assert_eq!(stored.report, report),
+            other => panic!("{other:?}"),
+        }
+        assert!(why(store.find(&body, &options, "b")).contains("other GPU drivers"));
+        let mut moved = body.clone();
+        moved.taxels[0].position_in_link.x += 1e-3;
+        assert!(why(store.find(&moved, &options, "a")).contains("the body before it changed"));
+        // Another scene has another file; knobs are no part of it.
+        let other = |scene: Scene| Options { scene, ..options.clone() };
+        let total = other(Scene { outputs: Outputs::TOTAL, ..Scene::default() });
+        assert!(matches!(store.find(&body, &total, "a"), Found::Nothing));
+        let knobs = Knobs { coverage: crate::scene::Coverage::All, ..Knobs::default() };
+        assert!(matches!(store.find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
+        let path = store.file(&body, &options);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("\"version\": 1", "\"version\": 0")).unwrap();
+        assert!(why(store.find(&body, &options, "a")).contains("another version"));
+        std::fs::write(&path, &text[..text.len() / 2]).unwrap();
+        assert!(why(store.find(&body, &options, "a")).contains("damaged"));
+    }
+}

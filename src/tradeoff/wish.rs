@@ -1,0 +1,234 @@
+//! What somebody wishes of accuracy and time, and the combination that grants it.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Report, Row, Way};
+use crate::error::{Error, Result};
+
+/// A tolerance, a budget, or both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wish {
+    /// How far a centroid may be off, m.
+    pub centroid_m: Option<f64>,
+    /// How far an orientation may be turned, rad.
+    pub orientation_rad: Option<f64>,
+    /// How long a frame may take, s.
+    pub budget_s: Option<f64>,
+}
+
+/// What grants a wish, or misses it by least.
+#[derive(Clone, Debug)]
+pub struct Pick<'a> {
+    /// The combination, as measured.
+    pub row: &'a Row,
+    /// What it misses, in words; empty where it grants all.
+    pub missed: Vec<String>,
+}
+
+/// The number that `text` begins with, and its unit.
+fn number(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    let end = text.find(|c: char| !(c.is_ascii_digit() || ".eE+-".contains(c))).unwrap_or(text.len());
+    // `1e` of `1eon` is no number, and neither has a unit that begins with an e.
+    let value = text[..end].parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)?;
+    Some((value, text[end..].trim()))
+}
+
+fn quantity(text: &str, what: &str, example: &str, units: &[(&str, f64)]) -> Result<f64> {
+    let names: Vec<&str> = units.iter().map(|(name, _)| *name).collect();
+    let found = number(text).and_then(|(value, unit)| {
+        let (_, factor) = units.iter().find(|(name, _)| *name == unit)?;
+        Some(value * factor)
+    });
+    found.ok_or_else(|| {
+        let units = names.join(", ");
+        Error::usage(format!("`{text}` is no {what}; write a number over 0 and one of {units}, such as {example}"))
+    })
+}
+
+/// The length that `text` says, m.
+///
+/// # Errors
+/// It says none over 0.
+pub fn length(text: &str) -> Result<f64> {
+    quantity(text, "length", "0.5 mm", &[("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("cm", 1e-2), ("m", 1.0)])
+}
+
+/// The angle that `text` says, rad.
+///
+/// # Errors
+/// It says none over 0.
+pub fn angle(text: &str) -> Result<f64> {
+    let degree = std::f64::consts::PI / 180.0;
+    quantity(text, "angle", "2 deg", &[("deg", degree), ("°", degree), ("rad", 1.0)])
+}
+
+/// The time that `text` says, s.
+///
+/// # Errors
+/// It says none over 0.
+pub fn time(text: &str) -> Result<f64> {
+    quantity(text, "time", "100 us", &[("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("ns", 1e-9), ("s", 1.0)])
+}
+
+impl Wish {
+    /// The tolerance that `text` says: a length for centroids, an angle for orientations, or both with a comma between.
+    ///
+    /// # Errors
+    /// It says something else, or one of them twice.
+    pub fn within(text: &str) -> Result<Self> {
+        let mut wish = Self::default();
+        for part in text.split(',') {
+            let place = match (length(part), angle(part)) {
+                (Ok(length), _) => wish.centroid_m.replace(length),
+                (_, Ok(angle)) => wish.orientation_rad.replace(angle),
+                _ => {
+                    let what = "is neither a length nor an angle";
+                    return Err(Error::usage(format!("`{}` {what}; write such as \"0.5 mm, 2 deg\"", part.trim())));
+                }
+            };
+            if place.is_some() {
+                return Err(Error::usage(format!("`{text}` says one thing twice; write such as \"0.5 mm, 2 deg\"")));
+            }
+        }
+        Ok(wish)
+    }
+
+    /// Whether nothing is wished for.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// This, and of `other` what this leaves open.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            centroid_m: self.centroid_m.or(other.centroid_m),
+            orientation_rad: self.orientation_rad.or(other.orientation_rad),
+            budget_s: self.budget_s.or(other.budget_s),
+        }
+    }
+
+    /// It in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
+        let parts = [
+            self.centroid_m.map(|m| format!("{} mm", number(m * 1e3))),
+            self.orientation_rad.map(|rad| format!("{} deg", number(rad.to_degrees()))),
+            self.budget_s.map(|s| format!("{} us", number(s * 1e6))),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    /// By how many times `row` misses each part.
+    fn misses(&self, row: &Row) -> [f64; 3] {
+        let [centroid, orientation] = row.judged();
+        let over = |value: f64, limit: Option<f64>| limit.map_or(0.0, |limit| value / limit);
+        // What is never there is not within anything.
+        let of = |errors: &super::Errors| if errors.compared > 0 { errors.p99 } else { f64::INFINITY };
+        [
+            over(if self.centroid_m.is_some() { of(centroid) * 1e-3 } else { 0.0 }, self.centroid_m),
+            over(if self.orientation_rad.is_some() { of(orientation).to_radians() } else { 0.0 }, self.orientation_rad),
+            over(row.p50_us * 1e-6, self.budget_s),
+        ]
+    }
+
+    /// The fastest combination of `report` that grants it to frames that come `way`; of a budget alone, the truest. Where
+    /// none does, the one that misses by least.
+    #[must_use]
+    pub fn pick<'a>(&self, report: &'a Report, way: Way) -> Option<Pick<'a>> {
+        let mut rows = report.of(way);
+        rows.retain(|row| report.truth || row.orientation_by == report.asked_by);
+        let granted = |row: &&&Row| self.misses(row).iter().all(|times| *times <= 1.0);
+        let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
+        let true_to = |row: &Row| {
+            let [centroid, orientation] = row.judged();
+            // A degree is to an orientation what a millimetre is to a centroid, about: at 57 mm they are one.
+            centroid.p99.hypot(orientation.p99)
+        };
+        let picked = if tolerant || self.is_empty() {
+            rows.iter().find(granted)
+        } else {
+            rows.iter().filter(granted).min_by(|a, b| true_to(a).total_cmp(&true_to(b)))
+        };
+        if let Some(row) = picked {
+            return Some(Pick { row, missed: Vec::new() });
+        }
+        let worst = |row: &Row| self.misses(row).into_iter().fold(0.0, f64::max);
+        let row = rows.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
+        Some(Pick { row, missed: self.missed(row) })
+    }
+
+    /// What `row` misses, in words.
+    fn missed(&self, row: &Row) -> Vec<String> {
+        let [centroid, orientation] = row.judged();
+        let texts = [
+            format!("centroid {:.3} mm", centroid.p99),
+            format!("orientation {:.3}°", orientation.p99),
+            format!("{:.2} µs a frame", row.p50_us),
+        ];
+        let limits = [
+            Self { centroid_m: self.centroid_m, ..Self::default() },
+            Self { orientation_rad: self.orientation_rad, ..Self::default() },
+            Self { budget_s: self.budget_s, ..Self::default() },
+        ];
+        let misses = self.misses(row);
+        let over = |(((times, text), limit), never): (((f64, String), Self), bool)| {
+            let limit = limit.words();
+            match (times > 1.0, never) {
+                (false, _) => None,
+                (true, true) => Some(format!("nothing to compare with {limit}")),
+                (true, false) => Some(format!("{text}, {times:.3} times {limit}")),
+            }
+        };
+        let never = [centroid.compared == 0, orientation.compared == 0, false];
+        misses.into_iter().zip(texts).zip(limits).zip(never).filter_map(over).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{report, row};
+    use super::*;
+
+    #[test]
+    fn wishes_are_read_with_their_units() {
+        let near = |got: Option<f64>, right: f64| (got.unwrap() - right).abs() <= 1e-12 * right;
+        let wish = Wish::within("0.5 mm, 2 deg").unwrap();
+        assert!(near(wish.centroid_m, 5e-4) && near(wish.orientation_rad, 2_f64.to_radians()));
+        let wish = Wish::within("0.1rad,20um").unwrap();
+        assert!(near(wish.centroid_m, 2e-5) && near(wish.orientation_rad, 0.1));
+        assert_eq!(Wish::within("1e-3 m").unwrap().orientation_rad, None);
+        assert!(near(time("100us").ok(), 1e-4) && near(time("2 ms").ok(), 2e-3));
+        assert_eq!(Wish::within("0.5 mm, 2 deg").unwrap().words(), "0.5 mm, 2 deg");
+        for wrong in ["", "0.5", "0 mm", "-1 mm", "2 degrees", "1 mm, 2 mm", "nan mm", "1mm,"] {
+            assert!(Wish::within(wrong).unwrap_err().is_usage(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_pick_is_the_fastest_within_a_tolerance_and_the_truest_within_a_budget() {
+        let report = report(vec![
+            row("cpu", 1.0, 3.0, 3.0),
+            row("gpu", 2.0, 1.0, 4.0),
+            row("cpu", 3.0, 3.0, 1.0),
+            row("reference", 9.0, 0.0, 0.0),
+        ]);
+        let pick = |wish: Wish| wish.pick(&report, Way::Live).unwrap();
+        let within = |text: &str| Wish::within(text).unwrap();
+        assert_eq!(pick(within("3 mm")).row.p50_us, 1.0);
+        assert_eq!(pick(within("2 mm")).row.p50_us, 2.0);
+        assert_eq!(pick(within("2 mm, 2 deg")).row.p50_us, 9.0);
+        let budget = |us: f64| Wish { budget_s: Some(us * 1e-6), ..Wish::default() };
+        assert_eq!(pick(budget(10.0)).row.p50_us, 9.0);
+        assert_eq!(pick(budget(3.5)).row.p50_us, 3.0);
+        assert!(pick(budget(3.5)).missed.is_empty());
+        // What nothing grants is missed by so much.
+        let none = pick(within("2 mm, 2 deg").or(budget(5.0)));
+        assert!(!none.missed.is_empty() && none.missed[0].contains("times"), "{:?}", none.missed);
+        assert_eq!(pick(budget(0.5)).missed, ["1.00 µs a frame, 2.000 times 0.5 us"]);
+        assert!(Wish::default().pick(&report, Way::Batch).is_none());
+    }
+}

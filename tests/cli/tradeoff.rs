@@ -1,0 +1,113 @@
+//! The trade of speed against accuracy, at the process boundary.
+
+use std::path::Path;
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::{fails, somatic};
+
+const ROD: &str = concat!("sim:", env!("CARGO_MANIFEST_DIR"), "/examples/simulations/rod.toml");
+
+/// What the program does with a cache of its own in `folder`.
+fn with_cache(folder: &Path, arguments: &[&str]) -> Output {
+    somatic(arguments).env("XDG_CACHE_HOME", folder.join("cache")).output().unwrap()
+}
+
+fn done(folder: &Path, arguments: &[&str]) -> (String, String) {
+    let output = with_cache(folder, arguments);
+    let texts = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert!(output.status.success(), "{arguments:?}: {}", texts[1]);
+    let [out, err] = texts;
+    (out, err)
+}
+
+/// Few frames, little time, and no backend but the CPU's: as much as a test needs.
+const BRIEF: [&str; 4] = ["--seconds", "0.2", "--frames", "60"];
+
+fn scene(folder: &Path, text: &str) -> String {
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn a_simulation_is_held_against_its_truth_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let plot = folder.path().join("rod.svg").display().to_string();
+    let rest = ["--source", ROD, "--backend", "cpu", "--json", "--plot", &plot, "--fields", "hand/back"];
+    let (out, _) = done(folder.path(), &[&["tradeoff"][..], &BRIEF, &rest].concat());
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let rows = report["rows"].as_array().unwrap();
+    assert!(report["truth"] == true && rows.iter().any(|row| row["front"] == true));
+    for row in rows {
+        // A rod over taxels centimetres apart: far from the truth by far more than by any arithmetic.
+        let truth = row["true_centroid_mm"]["rms"].as_f64().unwrap();
+        assert!(truth > 0.01 && truth < 20.0, "{row}");
+        assert!(row["true_orientation_deg"]["compared"].as_u64().unwrap() > 0, "{row}");
+    }
+    let ways = |way: &str| rows.iter().filter(|row| row["orientation_by"] == way).count();
+    assert_eq!(ways("two-points"), ways("second-moments"));
+    let svg = std::fs::read_to_string(plot).unwrap();
+    assert!(svg.contains("from the truth") && svg.matches("<circle").count() > rows.len());
+}
+
+#[test]
+fn a_pick_is_written_into_the_scene_and_used_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text =
+        "# What I want.\noutputs = [\"centroid\", \"orientation\"] # no more\n\n[accuracy]\ncentroid = \"0.5 mm\"\n";
+    let path = scene(folder.path(), text);
+    let (_, said) = done(folder.path(), &[&["tradeoff", &path, "--write"][..], &BRIEF].concat());
+    assert!(said.contains("picked (live) for 0.5 mm"), "{said}");
+    let written = std::fs::read_to_string(&path).unwrap();
+    assert!(written.contains("# What I want.") && written.contains("# no more"), "{written}");
+    assert!(written.contains("backend = ") && !written.contains("centroid = "), "{written}");
+    // What was measured is kept, and told by a plan of the scene as it was.
+    let path = scene(folder.path(), text);
+    let (plan, said) = done(folder.path(), &["plan", &path, "--json"]);
+    let plan: Value = serde_json::from_str(&plan).unwrap();
+    assert!(plan["measured"].as_str().unwrap().contains("bundled touch"), "{plan}");
+    assert!(plan["why"].as_str().unwrap().contains("picked for 0.5 mm"), "{plan}");
+    assert!(said.is_empty(), "{said}");
+    // Damaged, it is told in a line, and measured anew.
+    let kept = std::fs::read_dir(folder.path().join("cache/somatic/tradeoff")).unwrap().next().unwrap().unwrap().path();
+    std::fs::write(&kept, "{").unwrap();
+    let (_, said) = done(folder.path(), &["plan", &path, "--json"]);
+    assert!(said.contains("damaged; measured anew") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn what_nothing_reaches_is_said_with_by_how_much() {
+    let folder = tempfile::tempdir().unwrap();
+    let rest = ["tradeoff", "--source", ROD, "--fields", "hand/back", "--backend", "cpu", "--within", "0.1 um"];
+    let output = with_cache(folder.path(), &[&rest[..], &BRIEF].concat());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("no knobs reach 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
+    let path = scene(folder.path(), "backend = \"cpu\"\n[accuracy]\nbudget = \"1 ns\"\n");
+    let output = with_cache(folder.path(), &["run", &path, "--quiet"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && said.contains("no knobs reach 0.001 us"), "{said}");
+}
+
+#[test]
+fn contradictions_are_found_where_they_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, place, what) in [
+        ("[accuracy]\ncentroid = \"0.5 mm\"\narithmetic = \"compensated\"\n", "line 3, column 1", "one or the other"),
+        ("backend = \"gpu\"\n[accuracy]\narithmetic = \"double\"\n", "line 3, column 1", "no double precision"),
+        ("backend = \"reference\"\n[accuracy]\narithmetic = \"one-pass\"", "line 3, column 1", "always double"),
+        ("backend = \"gpu\"\n[accuracy]\n  coverage = \"coarse-to-fine\"", "line 3, column 3", "only backend `cpu`"),
+        ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "neither is asked for"),
+        ("[accuracy]\ncentroid = \"0.5\"", "line 2, column 12", "is no length"),
+        ("[accuracy]\ncharts = \"geodesik\"", "line 2, column 10", "did you mean `geodesic`?"),
+        ("[accuracy]\ncentriod = \"1 mm\"", "line 2, column 1", "did you mean `centroid`?"),
+    ] {
+        let line = fails(1, &["run", &scene(folder.path(), text)]);
+        assert!(line.contains(place) && line.contains(what) && line.lines().count() == 1, "{text}: {line}");
+    }
+    assert!(fails(2, &["tradeoff", "--write", "--within", "1 mm"]).contains("name one"));
+    assert!(fails(2, &["tradeoff", "--plot", "a.gif"]).contains("neither .svg nor .png"));
+    assert!(fails(2, &["tradeoff", "--source", "-"]).contains("again and again"));
+}
