@@ -8,8 +8,7 @@
 // Their third coordinate, for fields without a chart.
 @group(0) @binding(3) var<storage, read> depths: array<f32>;
 @group(0) @binding(4) var<storage, read> taxels: array<Taxel>;
-@group(0) @binding(5) var<storage, read> pressures: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read> statuses: array<u32>;
+// 5, and 6 where there is one: what the taxels say.
 // Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
 @group(0) @binding(7) var<storage, read_write> results: array<u32>;
 @group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
@@ -58,11 +57,7 @@ fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Su
     var sums = so_far;
     sums.unusable = 0xffffffffu;
     for (var m = start; m < end; m += step) {
-        let here = first + (members[m].slot << batch.lanes_log2);
-        var status = 0u;
-        if is_marked(pressures[here]) {
-            status = statuses[here];
-        }
+        let status = status_at(first + (members[m].slot << batch.lanes_log2));
         sums.status |= status;
         sums.unusable &= status;
     }
@@ -152,10 +147,10 @@ fn main(
     var said = vec4<u32>();
     for (var m = field.first; m < end; m++) {
         let member = members[m];
-        let bits = pressures[first + (member.slot << batch.lanes_log2)];
-        let pressure = unmarked(bits);
+        let bits = bits_at(first + (member.slot << batch.lanes_log2));
+        let pressure = pressure_of(bits);
         let pull = member.weight * pressure;
-        said |= bits;
+        said |= said_by(bits);
         sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
@@ -171,7 +166,7 @@ fn main(
     if (ORIENTED || AXED) && charted {
         for (var m = field.first; m < end; m++) {
             let member = members[m];
-            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
+            let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
@@ -270,10 +265,10 @@ fn wide(
     var said = vec4<u32>();
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
-        let bits = pressures[first + (member.slot << batch.lanes_log2)];
-        let pressure = unmarked(bits);
+        let bits = bits_at(first + (member.slot << batch.lanes_log2));
+        let pressure = pressure_of(bits);
         let pull = member.weight * pressure;
-        said |= bits;
+        said |= said_by(bits);
         sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
@@ -302,7 +297,7 @@ fn wide(
     if ORIENTED || AXED {
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
-            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
+            let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
             let q = (member.weight * pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
