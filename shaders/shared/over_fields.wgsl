@@ -29,6 +29,15 @@ override ANISOTROPY_AT: u32 = NOWHERE;
 override CENTRED: bool = false;
 override ORIENTED: bool = false;
 override AXED: bool = false;
+// Whether every member's weight is 1.
+override UNWEIGHTED: bool = false;
+
+fn pull_of(member: Member, pressure: vec4<f32>) -> vec4<f32> {
+    if UNWEIGHTED {
+        return pressure;
+    }
+    return member.weight * pressure;
+}
 
 fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
     if column == NOWHERE {
@@ -144,19 +153,19 @@ fn main(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
-    var said = vec4<u32>();
+    var said = NOTHING_SAID;
     for (var m = field.first; m < end; m++) {
         let member = members[m];
         let bits = bits_at(first + (member.slot << batch.lanes_log2));
         let pressure = pressure_of(bits);
-        let pull = member.weight * pressure;
-        said |= said_by(bits);
+        let pull = pull_of(member, pressure);
+        said = hear(said, bits);
         sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
         }
     }
-    if is_marked(said) {
+    if is_said(said) {
         sums = add_statuses(sums, field.first, end, 1u, first);
     }
     let found = found_of(field, sums, place);
@@ -167,7 +176,7 @@ fn main(
         for (var m = field.first; m < end; m++) {
             let member = members[m];
             let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
-            let q = (member.weight * pressure) * found.scale;
+            let q = pull_of(member, pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
             }
@@ -262,19 +271,19 @@ fn wide(
     let charted = field.charted != 0u;
     var sums = no_sums();
     var place = no_place();
-    var said = vec4<u32>();
+    var said = NOTHING_SAID;
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
         let bits = bits_at(first + (member.slot << batch.lanes_log2));
         let pressure = pressure_of(bits);
-        let pull = member.weight * pressure;
-        said |= said_by(bits);
+        let pull = pull_of(member, pressure);
+        said = hear(said, bits);
         sums = add_sums(sums, member, pressure, pull);
         if CENTRED {
             place = add_place(place, m, member, pull, charted);
         }
     }
-    if is_marked(said) {
+    if is_said(said) {
         sums = add_statuses(sums, field.first + local, end, GROUP, first);
     }
     put_sums(local, sums, place);
@@ -298,7 +307,7 @@ fn wide(
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
             let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
-            let q = (member.weight * pressure) * found.scale;
+            let q = pull_of(member, pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
             }

@@ -10,9 +10,15 @@ fn pressure_of(bits: vec4<u32>) -> vec4<f32> {
     return unmarked(bits);
 }
 
-// Marked where there is a status.
-fn said_by(bits: vec4<u32>) -> vec4<u32> {
-    return bits;
+// What several of them say together, as far as it tells whether there is any status.
+const NOTHING_SAID = vec2<u32>();
+
+fn hear(said: vec2<u32>, bits: vec4<u32>) -> vec2<u32> {
+    return vec2<u32>(said.x | (bits.x | bits.y) | (bits.z | bits.w), 0u);
+}
+
+fn is_said(said: vec2<u32>) -> bool {
+    return said.x > NUMBER;
 }
 
 fn status_at(here: u32) -> u32 {

@@ -111,6 +111,8 @@ impl Columns {
         for (name, runs) in [("CENTRED", stages.centroid), ("ORIENTED", stages.orientation), ("AXED", stages.axis)] {
             overrides.push((name, if runs { 1.0 } else { 0.0 }));
         }
+        let unweighted = plan.fields.iter().all(|field| field.unweighted);
+        overrides.push(("UNWEIGHTED", if unweighted { 1.0 } else { 0.0 }));
         overrides
     }
 

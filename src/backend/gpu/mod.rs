@@ -69,6 +69,8 @@ pub(crate) struct Gpu {
     careful: (usize, Vec<Stage>),
     /// Whether fields read raw values, which go up four frames of a taxel side by side.
     direct: bool,
+    /// Where those go, if not into `raw`.
+    texture: Option<wgpu::Texture>,
     /// Number of wide fields.
     wide: u32,
     columns: Columns,
@@ -77,9 +79,9 @@ pub(crate) struct Gpu {
     pressures: Option<wgpu::Buffer>,
     /// Per field, the power of two that its lengths are counted in, m.
     units_m: Vec<f32>,
-    /// The batch's steps and a frame's values as the device reads them; kept so that a call allocates nothing.
+    /// The batch's steps and some values as the device reads them; kept so that a call allocates nothing.
     packed_steps: Vec<layout::Step>,
-    packed_row: Vec<RawValue>,
+    packed: Vec<RawValue>,
     /// What a restart sets to zero.
     memory: [wgpu::Buffer; 2],
 }
@@ -120,6 +122,8 @@ impl Gpu {
         let up = [false, direct].map(|direct| pack::raw_bytes(plan.channels(), capacity, direct));
         let up = up[0].max(up[1]) as u64;
         let raw = working("raw", up);
+        let on_processor = device.info.device_type == wgpu::DeviceType::Cpu;
+        let texture = (direct && on_processor).then(|| pack::texture(&device, up));
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
@@ -171,19 +175,26 @@ impl Gpu {
         }
         let told = columns.of_fields(plan);
         let over_fields = |direct: bool| {
-            let shader = match (direct, few) {
-                (false, false) => &shaders::FIELDS,
-                (false, true) => &shaders::FEW_FIELDS,
-                (true, false) => &shaders::RAW_FIELDS,
-                (true, true) => &shaders::FEW_RAW_FIELDS,
+            let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
+            let shader = match (direct, &texels, few) {
+                (false, _, false) => &shaders::FIELDS,
+                (false, _, true) => &shaders::FEW_FIELDS,
+                (true, None, false) => &shaders::RAW_FIELDS,
+                (true, None, true) => &shaders::FEW_RAW_FIELDS,
+                (true, Some(_), false) => &shaders::TEXTURE_FIELDS,
+                (true, Some(_), true) => &shaders::FEW_TEXTURE_FIELDS,
             };
-            let seen = if direct { &raw } else { &pressures };
-            let mut bound = vec![(0, &batch), (1, &field_table), (2, &members), (3, &depths), (4, &taxels), (5, seen)];
-            bound.extend((!direct).then_some((6, &statuses)));
-            bound.push((7, &results));
+            let tables = [&batch, &field_table, &members, &depths, &taxels];
+            let mut bound: Vec<_> = (0..).zip(tables.map(wgpu::Buffer::as_entire_binding)).collect();
+            match &texels {
+                Some(texels) => bound.push((5, wgpu::BindingResource::TextureView(texels))),
+                None if direct => bound.push((5, raw.as_entire_binding())),
+                None => bound.extend([(5, pressures.as_entire_binding()), (6, statuses.as_entire_binding())]),
+            }
+            bound.push((7, results.as_entire_binding()));
             let mut stages = vec![Stage::bound(&device, shader, "main", Over::Quads, &told, &bound)];
             if !wide.is_empty() {
-                bound.push((8, &wide_fields));
+                bound.push((8, wide_fields.as_entire_binding()));
                 stages.push(Stage::bound(&device, shader, "wide", Over::WideFields, &told, &bound));
             }
             stages
@@ -210,6 +221,7 @@ impl Gpu {
             let main = [&batch, &steps, &still, &results, &last];
             stages.push(Stage::new(&device, &shaders::MOTION, "main", Over::Cells, &told, &main));
             let keep = [(0, &batch), (3, &results), (4, &last)];
+            let keep = keep.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
             stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
         }
 
@@ -217,7 +229,7 @@ impl Gpu {
         let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < BLOCK { 1 } else { SETS };
-        let ring = (0..sets).map(|_| Set::new(&device, HEADER + frames * STEP + up, back)).collect();
+        let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
         device.check()?;
         Ok(Self {
             plan: plan.clone(),
@@ -232,13 +244,14 @@ impl Gpu {
             stages,
             careful,
             direct,
+            texture,
             wide: wide.len() as u32,
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             packed_steps: Vec::with_capacity(capacity),
-            packed_row: Vec::with_capacity(layout::padded_channels(plan.channels())),
+            packed: Vec::new(),
             memory: [touched, last],
         })
     }
@@ -247,15 +260,14 @@ impl Gpu {
     fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
         let header = header(&self.plan, raw.frames as u32, self.wide);
         self.pack(set, raw, &header)?;
-        let up = self.raw_bytes(raw.frames) as u64;
-        let set = &mut self.ring[set];
-        set.upload.unmap();
+        let (upload, readback) = (&self.ring[set].upload, &self.ring[set].readback);
+        upload.unmap();
         let frames = raw.frames as u64;
         let steps = frames * STEP;
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&set.upload, 0, &self.batch, 0, HEADER);
-        encoder.copy_buffer_to_buffer(&set.upload, HEADER, &self.steps, 0, steps);
-        encoder.copy_buffer_to_buffer(&set.upload, HEADER + steps, &self.raw, 0, up);
+        encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
+        encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
+        self.send_up(&mut encoder, upload, pack::values_at(raw.frames), raw.frames);
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
             let mut pass = encoder.begin_compute_pass(&descriptor);
@@ -271,13 +283,13 @@ impl Gpu {
             encoder.copy_buffer_to_buffer(&self.raw, (frames - 1) * row, before, 0, row);
         }
         let mut end = frames * self.plan.fields.len() as u64 * 4 * self.columns.read().len() as u64;
-        encoder.copy_buffer_to_buffer(&self.results, 0, &set.readback, 0, end);
+        encoder.copy_buffer_to_buffer(&self.results, 0, readback, 0, end);
         if let Some(pressures) = &self.pressures {
             let size = (layout::padded_quads(raw.frames) * self.plan.slots()) as u64 * 16;
-            encoder.copy_buffer_to_buffer(pressures, 0, &set.readback, end, size);
+            encoder.copy_buffer_to_buffer(pressures, 0, readback, end, size);
             end += size;
         }
-        set.submit(&self.device, encoder.finish(), (first, raw.frames), end);
+        self.ring[set].submit(&self.device, encoder.finish(), (first, raw.frames), end);
         Ok(())
     }
 
@@ -359,6 +371,7 @@ impl Backend for Gpu {
             let (replaced, careful) = std::mem::take(&mut self.careful);
             self.stages.splice(..replaced, careful);
             self.direct = false;
+            self.texture = None;
         }
     }
 

@@ -5,14 +5,18 @@ use std::array;
 
 use bytemuck::{bytes_of, cast_slice};
 
+use super::adapter::Device;
 use super::{Gpu, HEADER, STEP};
 use crate::backend::{RawBatch, Rows};
 use crate::error::Result;
 use crate::signal::RawValue;
 use crate::stage::layout;
 
-/// Quads whose vectors fill a cache line.
-const IN_LINE: usize = 4;
+/// Bytes of a row of the texture, 16 for each texel, as many as `shaders/shared/raw_texture.wgsl` says.
+const ROW: usize = 16 << 10;
+/// Frames and slots of a tile that is turned at once: what is read of a frame, and written of a slot, fills a line.
+const TOGETHER: usize = 16;
+const SLOTS: usize = 16;
 
 impl Gpu {
     /// Bytes that the raw values of `frames` frames go up in.
@@ -20,30 +24,68 @@ impl Gpu {
         raw_bytes(self.plan.channels(), frames, self.direct)
     }
 
+    /// Has the raw values of `frames` frames copied to where the programs read them, from byte `at` of `upload` on.
+    pub(super) fn send_up(&self, encoder: &mut wgpu::CommandEncoder, upload: &wgpu::Buffer, at: u64, frames: usize) {
+        let Some(texture) = &self.texture else {
+            encoder.copy_buffer_to_buffer(upload, at, &self.raw, 0, self.raw_bytes(frames) as u64);
+            return;
+        };
+        let from = wgpu::TexelCopyBufferInfo {
+            buffer: upload,
+            layout: wgpu::TexelCopyBufferLayout { offset: at, bytes_per_row: Some(ROW as u32), rows_per_image: None },
+        };
+        let height = self.raw_bytes(frames).div_ceil(ROW) as u32;
+        encoder.copy_buffer_to_texture(from, texture.as_image_copy(), size_of(height));
+    }
+
     /// Fills a set's upload buffer.
     pub(super) fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
         self.packed_steps.clear();
         self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let values = (HEADER + raw.frames as u64 * STEP) as usize;
+        let steps = HEADER as usize + cast_slice::<_, u8>(&self.packed_steps).len();
+        let values = values_at(raw.frames) as usize;
         let end = values + self.raw_bytes(raw.frames);
         let mapped = self.ring[set].upload.get_mapped_range_mut(0..end as u64);
         let mut mapped = mapped.map_err(|e| self.device.lost(&e))?;
         let mut mapped = mapped.slice(..);
         mapped.slice(..HEADER as usize).copy_from_slice(bytes_of(header));
-        mapped.slice(HEADER as usize..values).copy_from_slice(cast_slice(&self.packed_steps));
+        mapped.slice(HEADER as usize..steps).copy_from_slice(cast_slice(&self.packed_steps));
         let mapped = mapped.slice(values..);
         match self.direct {
-            true => pack_quads(raw, self.plan.channels(), mapped),
-            false => pack_rows(raw, self.plan.channels(), &mut self.packed_row, mapped),
+            true => pack_quads(raw, self.plan.channels(), &mut self.packed, mapped),
+            false => pack_rows(raw, self.plan.channels(), &mut self.packed, mapped),
         }
         Ok(())
     }
 }
 
-/// Bytes of `frames` frames in quads or in rows.
+/// Where in the upload buffer the raw values of `frames` frames begin: where a texel may.
+pub(super) fn values_at(frames: usize) -> u64 {
+    (HEADER + frames as u64 * STEP).next_multiple_of(16)
+}
+
+/// A texture that holds `bytes`, four frames of a taxel a texel.
+pub(super) fn texture(device: &Device, bytes: u64) -> wgpu::Texture {
+    device.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("raw"),
+        size: size_of(bytes.div_ceil(ROW as u64) as u32),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Uint,
+        usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::STORAGE_BINDING,
+        view_formats: &[],
+    })
+}
+
+fn size_of(height: u32) -> wgpu::Extent3d {
+    wgpu::Extent3d { width: (ROW / 16) as u32, height, depth_or_array_layers: 1 }
+}
+
+/// Bytes of `frames` frames in quads or in rows; whole rows of a texture.
 pub(super) fn raw_bytes(channels: usize, frames: usize, in_quads: bool) -> usize {
     match in_quads {
-        true => layout::padded_quads(frames) * channels * 16,
+        true => (layout::padded_quads(frames) * channels * 16).next_multiple_of(ROW),
         false => frames * layout::padded_channels(channels) * 4,
     }
 }
@@ -64,29 +106,40 @@ fn pack_rows(raw: &RawBatch<'_>, channels: usize, row: &mut Vec<RawValue>, mut m
     }
 }
 
-/// As `at` in `shaders/shared/layout.wgsl` says. A few quads at a time, so that whole lines of the cache are written.
-fn pack_quads(raw: &RawBatch<'_>, channels: usize, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
-    let lanes = layout::lanes(raw.frames) as usize;
-    let quads = lanes.min(IN_LINE);
-    for first in (0..raw.frames).step_by(4 * quads) {
-        let rows: [&[RawValue]; 4 * IN_LINE] = array::from_fn(|i| {
-            let frame = (first + i).min(raw.frames - 1);
-            match raw.rows {
-                Rows::Packed { values, channels } => &values[frame * channels..][..channels],
-                Rows::Picked { frames, .. } => &frames[frame].values[..],
-            }
-        });
-        let (block, lane) = (first / 4 / lanes, first / 4 % lanes);
-        let mut put = |slot: usize, place: usize| {
-            let line: [RawValue; 4 * IN_LINE] = array::from_fn(|i| rows[i][place]);
-            let at = ((block * channels + slot) * lanes + lane) * 16;
-            mapped.slice(at..at + 16 * quads).copy_from_slice(cast_slice(&line[..4 * quads]));
-        };
-        match raw.rows {
-            Rows::Packed { .. } => (0..channels).for_each(|slot| put(slot, slot)),
-            Rows::Picked { picks, .. } => {
-                picks.places[..channels].iter().enumerate().for_each(|(slot, &place)| put(slot, place as usize));
+/// As `at` in `shaders/shared/layout.wgsl` says, a block at a time: frames are read through, what is written scattered stays
+/// in caches, and goes to the device's memory in order.
+fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
+    let block = 4 * layout::lanes(raw.frames) as usize;
+    scratch.resize(block * channels, RawValue::new(0.0));
+    for (index, start) in (0..raw.frames).step_by(block).enumerate() {
+        let end = raw.frames.min(start + block);
+        for first in (start..end).step_by(TOGETHER) {
+            // The last quad is filled up with the last frame.
+            let count = (end - first).next_multiple_of(4).min(TOGETHER);
+            let rows: [&[RawValue]; TOGETHER] = array::from_fn(|i| {
+                let frame = (first + i).min(raw.frames - 1);
+                match raw.rows {
+                    Rows::Packed { values, channels } => &values[frame * channels..][..channels],
+                    Rows::Picked { frames, .. } => &frames[frame].values[..],
+                }
+            });
+            for some in (0..channels).step_by(SLOTS) {
+                let slots = some..channels.min(some + SLOTS);
+                for (lane, values) in (first - start..).zip(&rows[..count]) {
+                    let to = scratch[some * block..slots.end * block].chunks_exact_mut(block);
+                    match raw.rows {
+                        Rows::Packed { .. } => {
+                            to.zip(&values[slots.clone()]).for_each(|(to, &value)| to[lane] = value);
+                        }
+                        Rows::Picked { picks, .. } => {
+                            let places = &picks.places[slots.clone()];
+                            to.zip(places).for_each(|(to, &place)| to[lane] = values[place as usize]);
+                        }
+                    }
+                }
             }
         }
+        let bytes = block * channels * 4;
+        mapped.slice(index * bytes..(index + 1) * bytes).copy_from_slice(cast_slice(scratch));
     }
 }

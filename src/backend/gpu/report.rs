@@ -133,7 +133,9 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         let start = Instant::now();
         set.upload.unmap();
         let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&set.upload, 0, &gpu.raw, 0, up);
+        if up > 0 {
+            gpu.send_up(&mut encoder, &set.upload, 0, frames);
+        }
         {
             let timestamp_writes = clock.map(Clock::writes);
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes };
