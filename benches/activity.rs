@@ -19,7 +19,15 @@ const TURN: usize = 20;
 
 /// Patches of neighbours side by side, each sensor in one of them.
 fn skin() -> Body {
-    let shape = Shape { sensors: SENSORS, fields: SENSORS / MEMBERS, members: MEMBERS, wide: 0, frames: 1, seed: 1 };
+    let shape = Shape {
+        sensors: SENSORS,
+        fields: SENSORS / MEMBERS,
+        members: MEMBERS,
+        wide: 0,
+        local: false,
+        frames: 1,
+        seed: 1,
+    };
     let mut body = shape.body();
     for (index, field) in body.fields.iter_mut().enumerate() {
         let ids = (index * MEMBERS) as u32..((index + 1) * MEMBERS) as u32;

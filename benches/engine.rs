@@ -59,7 +59,7 @@ fn cases(frames: usize) -> Vec<Case> {
     let (has_gpu, in_hardware) = gpu();
     let mut cases = Vec::new();
     for (skin, sensors, fields, members) in SKINS {
-        let shape = Shape { sensors, fields, members, wide: 0, frames, seed: 1 };
+        let shape = Shape { sensors, fields, members, wide: 0, local: false, frames, seed: 1 };
         for (name, backend) in BACKENDS {
             let (runs, is_fast) = match backend {
                 BackendKind::Gpu => (has_gpu, in_hardware),
@@ -85,7 +85,7 @@ fn stages(frames: usize) -> Vec<Case> {
         ("4 all but touches", Outputs::USUAL),
     ];
     let (_, sensors, fields, members) = SKINS[2];
-    let shape = Shape { sensors, fields, members, wide: 0, frames, seed: 1 };
+    let shape = Shape { sensors, fields, members, wide: 0, local: false, frames, seed: 1 };
     let case = |(name, outputs): (&str, _)| Case { name: name.to_owned(), shape, backend: BackendKind::Cpu, outputs };
     named.map(case).into()
 }

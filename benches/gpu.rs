@@ -39,7 +39,7 @@ fn main() -> Result<()> {
     let bandwidth = bandwidth()?;
     let mut cases = Vec::new();
     for (sensors, fields, members, wide) in SKINS {
-        let one = Shape { sensors, fields, members, wide, frames: 1, seed: 1 };
+        let one = Shape { sensors, fields, members, wide, local: false, frames: 1, seed: 1 };
         let body = one.body();
         compare(&one, &body)?;
         for frames in FRAMES {

@@ -47,7 +47,7 @@ fn parse_csv(bencher: Bencher<'_, '_>, sensors: usize) {
 
 #[divan::bench(args = [9, 100, 600], max_time = 1)]
 fn write_ndjson(bencher: Bencher<'_, '_>, fields: usize) {
-    let shape = Shape { sensors: 1000, fields, members: 16, wide: 0, frames: FRAMES, seed: 1 };
+    let shape = Shape { sensors: 1000, fields, members: 16, wide: 0, local: false, frames: FRAMES, seed: 1 };
     let body = shape.body();
     let mut engine = shape.engine(&body, BackendKind::Cpu, Outputs::USUAL).unwrap();
     let name =

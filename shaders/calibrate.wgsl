@@ -11,11 +11,6 @@
 @group(0) @binding(5) var<storage, read> curves: array<Curve>;
 @group(0) @binding(6) var<storage, read> knots: array<Knot>;
 
-const MISSING = 0xffffffffu;
-const SIZE_BITS = 0x7fffffffu;
-const HUGE_BITS = 0x5d800000u;
-const TINY_BITS = 0x21800000u;
-
 // Quads that an invocation takes, where a block has as many: what it writes is a whole cache line then.
 const TURNS = 4u;
 

@@ -11,9 +11,6 @@
 @group(0) @binding(5) var<storage, read_write> pressures: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> statuses: array<u32>;
 
-const HUGE_BITS = 0x5d800000u;
-const TINY_BITS = 0x21800000u;
-
 // What is said of a quad whose pressures have these bits, and lie at `here`.
 fn heard_at(bits: vec4<u32>, here: u32) -> u32 {
     if is_marked(bits) {

@@ -93,6 +93,13 @@ const FIRST_CURVE = 2u;
 const STATUS = 6u;
 const UNUSABLE = 0x80u;
 
+// Raw values as bits: one that is not there; what a sign leaves; the largest that is believed, and the smallest but for 0
+// that is computed with.
+const MISSING = 0xffffffffu;
+const SIZE_BITS = 0x7fffffffu;
+const HUGE_BITS = 0x5d800000u;
+const TINY_BITS = 0x21800000u;
+
 // Invocations of a group.
 const GROUP = 64u;
 

@@ -8,8 +8,7 @@
 // Their third coordinate, for fields without a chart.
 @group(0) @binding(3) var<storage, read> depths: array<f32>;
 @group(0) @binding(4) var<storage, read> taxels: array<Taxel>;
-@group(0) @binding(5) var<storage, read> pressures: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read> statuses: array<u32>;
+// 5, and 6 where there is one: what the taxels say.
 // Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
 @group(0) @binding(7) var<storage, read_write> results: array<u32>;
 @group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
@@ -30,6 +29,15 @@ override ANISOTROPY_AT: u32 = NOWHERE;
 override CENTRED: bool = false;
 override ORIENTED: bool = false;
 override AXED: bool = false;
+// Whether every member's weight is 1.
+override UNWEIGHTED: bool = false;
+
+fn pull_of(member: Member, pressure: vec4<f32>) -> vec4<f32> {
+    if UNWEIGHTED {
+        return pressure;
+    }
+    return member.weight * pressure;
+}
 
 fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
     if column == NOWHERE {
@@ -58,11 +66,7 @@ fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Su
     var sums = so_far;
     sums.unusable = 0xffffffffu;
     for (var m = start; m < end; m += step) {
-        let here = first + (members[m].slot << batch.lanes_log2);
-        var status = 0u;
-        if is_marked(pressures[here]) {
-            status = statuses[here];
-        }
+        let status = status_at(first + (members[m].slot << batch.lanes_log2));
         sums.status |= status;
         sums.unusable &= status;
     }
@@ -150,13 +154,13 @@ fn main(
     var sums = no_sums();
     var place = no_place();
     var over = nothing_over();
-    var said = vec4<u32>();
+    var said = NOTHING_SAID;
     for (var m = field.first; m < end; m++) {
         let member = members[m];
-        let bits = pressures[first + (member.slot << batch.lanes_log2)];
-        let pressure = unmarked(bits);
-        let pull = member.weight * pressure;
-        said |= bits;
+        let bits = bits_at(first + (member.slot << batch.lanes_log2));
+        let pressure = pressure_of(bits);
+        let pull = pull_of(member, pressure);
+        said = hear(said, bits);
         if COMPENSATED {
             let kept = add_with_care(sums.total, place, over, m, member, pull, charted);
             sums = add_sums(sums, member, pressure, pull);
@@ -174,7 +178,7 @@ fn main(
         sums.total -= over.total;
         place = less(place, over);
     }
-    if is_marked(said) {
+    if is_said(said) {
         sums = add_statuses(sums, field.first, end, 1u, first);
     }
     let found = found_of(field, sums, place);
@@ -185,8 +189,8 @@ fn main(
     if (ORIENTED || AXED) && charted {
         for (var m = field.first; m < end; m++) {
             let member = members[m];
-            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
-            let q = (member.weight * pressure) * found.scale;
+            let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
+            let q = pull_of(member, pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
             }
@@ -291,13 +295,13 @@ fn wide(
     var sums = no_sums();
     var place = no_place();
     var over = nothing_over();
-    var said = vec4<u32>();
+    var said = NOTHING_SAID;
     for (var m = field.first + local; m < end; m += GROUP) {
         let member = members[m];
-        let bits = pressures[first + (member.slot << batch.lanes_log2)];
-        let pressure = unmarked(bits);
-        let pull = member.weight * pressure;
-        said |= bits;
+        let bits = bits_at(first + (member.slot << batch.lanes_log2));
+        let pressure = pressure_of(bits);
+        let pull = pull_of(member, pressure);
+        said = hear(said, bits);
         if COMPENSATED {
             let kept = add_with_care(sums.total, place, over, m, member, pull, charted);
             sums = add_sums(sums, member, pressure, pull);
@@ -315,7 +319,7 @@ fn wide(
         sums.total -= over.total;
         place = less(place, over);
     }
-    if is_marked(said) {
+    if is_said(said) {
         sums = add_statuses(sums, field.first + local, end, GROUP, first);
     }
     put_sums(local, sums, place);
@@ -339,8 +343,8 @@ fn wide(
     if ORIENTED || AXED {
         for (var m = field.first + local; m < end; m += GROUP) {
             let member = members[m];
-            let pressure = unmarked(pressures[first + (member.slot << batch.lanes_log2)]);
-            let q = (member.weight * pressure) * found.scale;
+            let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
+            let q = pull_of(member, pressure) * found.scale;
             if ORIENTED {
                 far = add_far(far, m, member, pressure, q, found.place);
             }

@@ -36,7 +36,8 @@ const FEWEST: usize = 3;
 
 /// Measure how long a call takes, from frames in memory to percepts in memory.
 ///
-/// Sensors lie at random on a flat sheet, every field has its own random ones, and in every frame every sensor is pressed.
+/// Sensors lie at random on a flat sheet, every field has its own random ones (or neighbours, with --local), and in every
+/// frame every sensor is pressed.
 /// The same arguments make the same skin and the same values. Rates count memberships: a sensor in a field in a frame.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -56,6 +57,10 @@ pub(super) struct Arguments {
     /// One field more, over K sensors.
     #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true)]
     wide: usize,
+
+    /// Put sensors in rows, and give each field neighbours instead of random ones.
+    #[arg(long)]
+    local: bool,
 
     /// Frames a call: 1 as on a live robot, more as in a recording.
     #[arg(long, value_name = "T", default_value_t = 1)]
@@ -131,8 +136,8 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
 
 impl Arguments {
     fn shape(&self) -> Shape {
-        let Self { sensors, fields, members, wide, frames, seed, .. } = *self;
-        Shape { sensors, fields, members, wide, frames, seed }
+        let Self { sensors, fields, members, wide, local, frames, seed, .. } = *self;
+        Shape { sensors, fields, members, wide, local, frames, seed }
     }
 }
 
@@ -277,7 +282,7 @@ mod tests {
     fn figures_read_well() {
         assert_eq!([2.5e-6, 0.0125, 3.0].map(time), ["2.50 µs", "12.50 ms", "3.00 s"]);
         assert_eq!([12_345.0, 4.2e7, 2.345e9].map(short), ["12.345 k", "42.0 M", "2.35 G"]);
-        let shape = Shape { sensors: 40, fields: 9, members: 1, wide: 40, frames: 1, seed: 1 };
+        let shape = Shape { sensors: 40, fields: 9, members: 1, wide: 40, local: false, frames: 1, seed: 1 };
         assert_eq!(words(&shape), "9 fields of 1 sensor and one of 40, out of 40; 1 frame a call");
     }
 }

@@ -43,7 +43,7 @@ pub fn write(
     let index = json!({
         "shape": {
             "sensors": shape.sensors, "fields": shape.fields, "members": shape.members, "wide": shape.wide,
-            "frames": shape.frames, "seed": shape.seed,
+            "local": shape.local, "frames": shape.frames, "seed": shape.seed,
         },
         "backend": backend,
         "arrays": dump.arrays,
@@ -180,7 +180,7 @@ mod tests {
     fn every_output_but_touches_is_an_array() {
         let outputs = Outputs::all().difference(Outputs::TOUCHES);
         assert!(check(outputs).is_ok() && check(Outputs::all()).is_err());
-        let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, frames: 4, seed: 1 };
+        let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, local: false, frames: 4, seed: 1 };
         let mut engine = shape.engine(&shape.body(), BackendKind::Reference, outputs).unwrap();
         let percepts = engine.process(&shape.frames()).unwrap();
         let mut percept = percepts.get(3, 0);

@@ -1,5 +1,7 @@
 //! A made-up skin of any size, to measure speed on: `somatic bench` and `benches/` share it.
 
+use std::collections::BTreeMap;
+
 use glam::{DAffine3, DVec3};
 
 use crate::author::random::Random;
@@ -13,8 +15,9 @@ use crate::signal::{Frame, RawValue};
 
 /// How many of what; the rest follows from it and the seed.
 ///
-/// Sensors lie at random on a flat square sheet, 25 mm² each. Every field has its own distinct random ones of them, of
-/// weight 1: real fields are neighbours, which is kinder to caches. In every frame every sensor is pressed.
+/// Sensors lie on a flat square sheet, 25 mm² each: at random, and every field has its own distinct random ones of them; or
+/// row by row, and every field has neighbours, as on a real skin, which is kinder to caches. All have weight 1. In every
+/// frame every sensor is pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Sensors of the sheet; their ids count up from 0.
@@ -25,6 +28,8 @@ pub struct Shape {
     pub members: usize,
     /// Sensors of one more field, the last; 0 for none.
     pub wide: usize,
+    /// Whether sensors lie in rows and fields are patches of neighbours.
+    pub local: bool,
     /// Frames a call.
     pub frames: usize,
     /// Of places, members and values.
@@ -100,11 +105,18 @@ impl Shape {
     pub fn body(&self) -> Body {
         let mut random = Random::new(self.seed);
         let side_m = PITCH_M * (self.sensors as f64).sqrt();
-        let mut along = || (random.unit() - 0.5) * side_m;
+        let columns = self.sensors.isqrt();
+        let mut place = |id: usize| match self.local {
+            true => DVec3::new((id % columns) as f64, 0.0, (id / columns) as f64) * PITCH_M,
+            false => {
+                let mut along = || (random.unit() - 0.5) * side_m;
+                DVec3::new(along(), 0.0, along())
+            }
+        };
         let taxels = (0..self.sensors).map(|id| Taxel {
             id: id as u32,
             link: 0,
-            position_in_link: DVec3::new(along(), 0.0, along()),
+            position_in_link: place(id),
             normal_in_link: DVec3::Y,
             area: PITCH_M * PITCH_M,
             modality: Modality::Pressure,
@@ -113,14 +125,19 @@ impl Shape {
         let mut order: Vec<u32> = (0..self.sensors as u32).collect();
         let widths = std::iter::repeat_n(self.members, self.fields).chain((self.wide > 0).then_some(self.wide));
         let fields = widths.enumerate().map(|(field, width)| {
-            // The first steps of a Fisher-Yates shuffle, from whatever order the field before left.
-            for place in 0..width {
-                let left = self.sensors - place;
-                order.swap(place, place + (random.unit() * left as f64) as usize);
-            }
+            let members = if self.local {
+                self.patch(width, &mut random)
+            } else {
+                // The first steps of a Fisher-Yates shuffle, from whatever order the field before left.
+                for place in 0..width {
+                    let left = self.sensors - place;
+                    order.swap(place, place + (random.unit() * left as f64) as usize);
+                }
+                order[..width].iter().map(|&id| (id, MemberSpec::default())).collect()
+            };
             FieldSpec {
                 name: if field < self.fields { format!("field {field}") } else { "wide".to_owned() },
-                members: order[..width].iter().map(|&id| (id, MemberSpec::default())).collect(),
+                members,
                 ..FieldSpec::default()
             }
         });
@@ -137,6 +154,16 @@ impl Shape {
             taxels,
             findings: Vec::new(),
         }
+    }
+
+    /// As many neighbours as `width`, in a patch as square as can be, somewhere.
+    fn patch(&self, width: usize, random: &mut Random) -> BTreeMap<u32, MemberSpec> {
+        let columns = self.sensors.isqrt();
+        let across = (width as f64).sqrt().ceil().min(columns as f64) as usize;
+        let mut anywhere = |count: usize, of: usize| (random.unit() * (of.saturating_sub(count) + 1) as f64) as usize;
+        let first_row = anywhere(width.div_ceil(across), self.sensors / columns);
+        let first = first_row * columns + anywhere(across, columns);
+        (0..width).map(|i| ((first + i / across * columns + i % across) as u32, MemberSpec::default())).collect()
     }
 
     /// A call's frames, every sensor pressed with its own value in (0, 1023], 10 ms apart from t = 0.
@@ -184,7 +211,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    const SHAPE: Shape = Shape { sensors: 50, fields: 7, members: 5, wide: 50, frames: 3, seed: 9 };
+    const SHAPE: Shape = Shape { sensors: 50, fields: 7, members: 5, wide: 50, local: false, frames: 3, seed: 9 };
 
     #[test]
     fn a_shape_is_what_it_says_and_the_same_again() {
@@ -201,6 +228,24 @@ mod tests {
         assert_eq!((body.taxels, frames), (SHAPE.body().taxels, SHAPE.frames()));
         let other = Shape { seed: 10, ..SHAPE };
         assert!(other.body().fields != body.fields && other.frames() != SHAPE.frames());
+    }
+
+    #[test]
+    fn neighbours_lie_side_by_side() {
+        for sensors in [50, 59, 64, 101] {
+            let local = Shape { sensors, wide: sensors, local: true, ..SHAPE };
+            let body = local.body();
+            let (wide, fields) = body.fields.split_last().unwrap();
+            assert_eq!(wide.members.len(), sensors);
+            let place = |id: &u32| body.taxels[*id as usize].position_in_link;
+            for field in fields {
+                assert_eq!(field.members.len(), 5);
+                let apart = field.members.keys().flat_map(|a| field.members.keys().map(move |b| place(a) - place(b)));
+                // Three in a row and two below.
+                assert!(apart.into_iter().all(|apart| apart.x.abs() < 2.1 * PITCH_M && apart.z.abs() < 1.1 * PITCH_M));
+            }
+            assert!(fields[1..].iter().any(|field| field.members != fields[0].members));
+        }
     }
 
     #[test]

@@ -112,6 +112,8 @@ impl Columns {
             overrides.push((name, if runs { 1.0 } else { 0.0 }));
         }
         overrides.push(("COMPENSATED", if plan.is_compensated() { 1.0 } else { 0.0 }));
+        let unweighted = plan.fields.iter().all(|field| field.unweighted);
+        overrides.push(("UNWEIGHTED", if unweighted { 1.0 } else { 0.0 }));
         overrides
     }
 

@@ -9,6 +9,7 @@
 pub(crate) mod adapter;
 mod bus;
 mod columns;
+mod pack;
 #[cfg(feature = "cli")]
 pub(crate) mod raster;
 mod report;
@@ -29,7 +30,7 @@ use self::adapter::Device;
 use self::columns::{Columns, NOTHING};
 use self::ring::{SETS, Set};
 use self::stage::{Over, Stage, table, table_as};
-use super::{Backend, RawBatch, Rows};
+use super::{Backend, RawBatch};
 use crate::error::{Error, Result};
 use crate::percept::Percepts;
 use crate::scene::Plan;
@@ -64,8 +65,12 @@ pub(crate) struct Gpu {
     before: Option<wgpu::Buffer>,
     taxels: wgpu::Buffer,
     stages: Vec<Stage>,
-    /// Stages that take the place of the first ones should the plan cease to be plain.
-    careful: Vec<Stage>,
+    /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
+    careful: (usize, Vec<Stage>),
+    /// Whether fields read raw values, which go up four frames of a taxel side by side.
+    direct: bool,
+    /// Where those go, if not into `raw`.
+    texture: Option<wgpu::Texture>,
     /// Number of wide fields.
     wide: u32,
     columns: Columns,
@@ -74,9 +79,9 @@ pub(crate) struct Gpu {
     pressures: Option<wgpu::Buffer>,
     /// Per field, the power of two that its lengths are counted in, m.
     units_m: Vec<f32>,
-    /// The batch's steps and a frame's values as the device reads them; kept so that a call allocates nothing.
+    /// The batch's steps and some values as the device reads them; kept so that a call allocates nothing.
     packed_steps: Vec<layout::Step>,
-    packed_row: Vec<RawValue>,
+    packed: Vec<RawValue>,
     /// What a restart sets to zero.
     memory: [wgpu::Buffer; 2],
 }
@@ -111,14 +116,21 @@ impl Gpu {
         let batch = buffer("batch", HEADER, uniform);
         let steps = working("steps", frames * STEP);
         let row = layout::padded_channels(plan.channels()) as u64 * 4;
-        let raw = working("raw", frames * row);
+        let plain = is_plain(plan);
+        let direct = plain && !plan.has_changes() && !plan.stages().touches && plan.calibrated() == plan.channels();
+        // Should the plan cease to be plain, they go up in rows.
+        let up = [false, direct].map(|direct| pack::raw_bytes(plan.channels(), capacity, direct));
+        let up = up[0].max(up[1]) as u64;
+        let raw = working("raw", up);
+        let on_processor = device.info.device_type == wgpu::DeviceType::Cpu;
+        let texture = (direct && on_processor).then(|| pack::texture(&device, up));
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
         let few = plan.members.len() <= layout::FEW;
-        let (shader, usage, least) = match few {
-            true => (&shaders::FEW_FIELDS, wgpu::BufferUsages::UNIFORM, layout::FEW * size_of::<layout::Member>()),
-            false => (&shaders::FIELDS, wgpu::BufferUsages::STORAGE, 0),
+        let (usage, least) = match few {
+            true => (wgpu::BufferUsages::UNIFORM, layout::FEW * size_of::<layout::Member>()),
+            false => (wgpu::BufferUsages::STORAGE, 0),
         };
         let members = table_as(&device, "members", &plan.members, usage, least as u64);
         let all_depths: Vec<f32> = plan.fields.iter().flat_map(|field| field.depths.iter().copied()).collect();
@@ -143,9 +155,8 @@ impl Gpu {
             let told = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
             Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
         };
-        let plain = is_plain(plan);
-        let mut stages = vec![calibrated(plain)];
-        // What a plan is calibrated with once it has more to say than that raw values are pressures.
+        let mut stages = if direct { Vec::new() } else { vec![calibrated(plain)] };
+        // What a plan runs with once it has more to say than that raw values are pressures.
         let mut careful: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
         // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
         let before = plan.has_changes().then(|| working("raw before", row));
@@ -163,11 +174,40 @@ impl Gpu {
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
         let told = columns.of_fields(plan);
-        let buffers = [&batch, &field_table, &members, &depths, &taxels, &pressures, &statuses, &results, &wide_fields];
-        stages.push(Stage::new(&device, shader, "main", Over::Quads, &told, &buffers[..8]));
-        if !wide.is_empty() {
-            stages.push(Stage::new(&device, shader, "wide", Over::WideFields, &told, &buffers));
-        }
+        let over_fields = |direct: bool| {
+            let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
+            let shader = match (direct, &texels, few) {
+                (false, _, false) => &shaders::FIELDS,
+                (false, _, true) => &shaders::FEW_FIELDS,
+                (true, None, false) => &shaders::RAW_FIELDS,
+                (true, None, true) => &shaders::FEW_RAW_FIELDS,
+                (true, Some(_), false) => &shaders::TEXTURE_FIELDS,
+                (true, Some(_), true) => &shaders::FEW_TEXTURE_FIELDS,
+            };
+            let tables = [&batch, &field_table, &members, &depths, &taxels];
+            let mut bound: Vec<_> = (0..).zip(tables.map(wgpu::Buffer::as_entire_binding)).collect();
+            match &texels {
+                Some(texels) => bound.push((5, wgpu::BindingResource::TextureView(texels))),
+                None if direct => bound.push((5, raw.as_entire_binding())),
+                None => bound.extend([(5, pressures.as_entire_binding()), (6, statuses.as_entire_binding())]),
+            }
+            bound.push((7, results.as_entire_binding()));
+            let mut stages = vec![Stage::bound(&device, shader, "main", Over::Quads, &told, &bound)];
+            if !wide.is_empty() {
+                bound.push((8, wide_fields.as_entire_binding()));
+                stages.push(Stage::bound(&device, shader, "wide", Over::WideFields, &told, &bound));
+            }
+            stages
+        };
+        let replaced = match direct {
+            true => {
+                careful.extend(over_fields(false));
+                careful.len() - 1
+            }
+            false => careful.len(),
+        };
+        let careful = (replaced, careful);
+        stages.extend(over_fields(direct));
         if wanted.hysteresis {
             let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| [f.thresholds.on, f.thresholds.off]).collect();
             let buffers = [&batch, &table(&device, "thresholds", &thresholds), &results, &touched];
@@ -181,6 +221,7 @@ impl Gpu {
             let main = [&batch, &steps, &still, &results, &last];
             stages.push(Stage::new(&device, &shaders::MOTION, "main", Over::Cells, &told, &main));
             let keep = [(0, &batch), (3, &results), (4, &last)];
+            let keep = keep.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
             stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
         }
 
@@ -188,7 +229,7 @@ impl Gpu {
         let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < BLOCK { 1 } else { SETS };
-        let ring = (0..sets).map(|_| Set::new(&device, HEADER + frames * (STEP + row), back)).collect();
+        let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
         device.check()?;
         Ok(Self {
             plan: plan.clone(),
@@ -202,13 +243,15 @@ impl Gpu {
             taxels,
             stages,
             careful,
+            direct,
+            texture,
             wide: wide.len() as u32,
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             packed_steps: Vec::with_capacity(capacity),
-            packed_row: Vec::with_capacity(layout::padded_channels(plan.channels())),
+            packed: Vec::new(),
             memory: [touched, last],
         })
     }
@@ -217,14 +260,14 @@ impl Gpu {
     fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
         let header = header(&self.plan, raw.frames as u32, self.wide);
         self.pack(set, raw, &header)?;
-        let set = &mut self.ring[set];
-        set.upload.unmap();
+        let (upload, readback) = (&self.ring[set].upload, &self.ring[set].readback);
+        upload.unmap();
         let frames = raw.frames as u64;
-        let (steps, row) = (frames * STEP, layout::padded_channels(self.plan.channels()) as u64 * 4);
+        let steps = frames * STEP;
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&set.upload, 0, &self.batch, 0, HEADER);
-        encoder.copy_buffer_to_buffer(&set.upload, HEADER, &self.steps, 0, steps);
-        encoder.copy_buffer_to_buffer(&set.upload, HEADER + steps, &self.raw, 0, frames * row);
+        encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
+        encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
+        self.send_up(&mut encoder, upload, pack::values_at(raw.frames), raw.frames);
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
             let mut pass = encoder.begin_compute_pass(&descriptor);
@@ -236,47 +279,17 @@ impl Gpu {
             }
         }
         if let Some(before) = &self.before {
+            let row = layout::padded_channels(self.plan.channels()) as u64 * 4;
             encoder.copy_buffer_to_buffer(&self.raw, (frames - 1) * row, before, 0, row);
         }
         let mut end = frames * self.plan.fields.len() as u64 * 4 * self.columns.read().len() as u64;
-        encoder.copy_buffer_to_buffer(&self.results, 0, &set.readback, 0, end);
+        encoder.copy_buffer_to_buffer(&self.results, 0, readback, 0, end);
         if let Some(pressures) = &self.pressures {
             let size = (layout::padded_quads(raw.frames) * self.plan.slots()) as u64 * 16;
-            encoder.copy_buffer_to_buffer(pressures, 0, &set.readback, end, size);
+            encoder.copy_buffer_to_buffer(pressures, 0, readback, end, size);
             end += size;
         }
-        set.submit(&self.device, encoder.finish(), (first, raw.frames), end);
-        Ok(())
-    }
-
-    /// Fills a set's upload buffer.
-    fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
-        self.packed_steps.clear();
-        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let padded = layout::padded_channels(self.plan.channels());
-        let row = padded * 4;
-        let values = (HEADER + raw.frames as u64 * STEP) as usize;
-        let end = (values + raw.frames * row) as u64;
-        let mapped = self.ring[set].upload.get_mapped_range_mut(0..end);
-        let mut mapped = mapped.map_err(|e| self.device.lost(&e))?;
-        let mut mapped = mapped.slice(..);
-        mapped.slice(..HEADER as usize).copy_from_slice(bytemuck::bytes_of(header));
-        mapped.slice(HEADER as usize..values).copy_from_slice(cast_slice(&self.packed_steps));
-        for (frame, at) in (values..).step_by(row).take(raw.frames).enumerate() {
-            self.packed_row.clear();
-            match raw.rows {
-                Rows::Picked { frames, picks } => {
-                    let values = &frames[frame].values[..];
-                    let places = &picks.places[..picks.channels];
-                    self.packed_row.extend(places.iter().map(|&place| values[place as usize]));
-                }
-                Rows::Packed { values, channels } => {
-                    self.packed_row.extend_from_slice(&values[frame * channels..][..channels]);
-                }
-            }
-            self.packed_row.resize(padded, RawValue::new(0.0));
-            mapped.slice(at..at + row).copy_from_slice(cast_slice(&self.packed_row));
-        }
+        self.ring[set].submit(&self.device, encoder.finish(), (first, raw.frames), end);
         Ok(())
     }
 
@@ -355,9 +368,10 @@ impl Backend for Gpu {
         self.plan.recalibrate(plan);
         self.device.queue.write_buffer(&self.taxels, 0, cast_slice(&self.plan.taxels));
         if !is_plain(&self.plan) {
-            for (stage, careful) in self.stages.iter_mut().zip(self.careful.drain(..)) {
-                *stage = careful;
-            }
+            let (replaced, careful) = std::mem::take(&mut self.careful);
+            self.stages.splice(..replaced, careful);
+            self.direct = false;
+            self.texture = None;
         }
     }
 

@@ -121,11 +121,11 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let batch = header(plan, frames as u32, gpu.wide);
     gpu.device.queue.write_buffer(&gpu.batch, 0, bytemuck::bytes_of(&batch));
     let clock = Clock::new(&gpu.device);
-    let channels = layout::padded_channels(plan.channels());
+    let up = gpu.raw_bytes(frames);
     let mut set = gpu.ring.swap_remove(0);
     {
         // Every taxel pressed.
-        let values: Vec<f32> = (0..frames * channels).map(|i| (i % 977 + 1) as f32).collect();
+        let values: Vec<f32> = (0..up / 4).map(|i| (i % 977 + 1) as f32).collect();
         let mapped = set.upload.get_mapped_range_mut(..(values.len() * 4) as u64);
         mapped.map_err(|e| gpu.device.lost(&e))?.slice(..).copy_from_slice(bytemuck::cast_slice(&values));
     }
@@ -133,7 +133,9 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         let start = Instant::now();
         set.upload.unmap();
         let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&set.upload, 0, &gpu.raw, 0, up);
+        if up > 0 {
+            gpu.send_up(&mut encoder, &set.upload, 0, frames);
+        }
         {
             let timestamp_writes = clock.map(Clock::writes);
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes };
@@ -157,7 +159,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         Ok(device_s.unwrap_or(start.elapsed().as_secs_f64()))
     };
     let cells = (frames * plan.fields.len()) as u64;
-    let (bytes_up, bytes_down) = ((frames * channels) as u64 * 4, cells * 4 * gpu.columns.read().len() as u64);
+    let (bytes_up, bytes_down) = (up as u64, cells * 4 * gpu.columns.read().len() as u64);
     let nothing = |_: Over| [0, 0, 0];
     let everything = |over: Over| over.groups(&batch);
     let empty_s = median(ROUNDS, || run(&nothing, None, bytes_up, bytes_down))?;
@@ -168,11 +170,12 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
             (median(ROUNDS, || run(&everything, None, 0, 0))? - still).max(0.0)
         }
     };
-    // Raw values, pressures and statuses there and back, what is known of members, and the results.
+    // Raw values, pressures and statuses there and back where there are any, what is known of members, and the results.
     let members = (plan.members.len() * size_of::<layout::Member>()) as u64;
     let slots = (frames * plan.slots()) as u64;
     let results = cells * 4 * gpu.columns.count() as u64;
-    let least_bytes = bytes_up + 2 * slots * 5 + members + results;
+    let pressures = if gpu.direct { 0 } else { 2 * slots * 5 };
+    let least_bytes = bytes_up + pressures + members + results;
     Ok(DeviceTime { frames, programs_s, by_device: clock.is_some(), least_bytes, empty_s, bytes_up, bytes_down })
 }
 

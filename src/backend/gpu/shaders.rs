@@ -28,13 +28,39 @@ macro_rules! shader {
 pub(crate) const CALIBRATE: Shader = shader!("calibrate": "calibrate";);
 pub(crate) const CHANGE: Shader = shader!("change": "change";);
 pub(crate) const FIELDS: Shader = shader!(
-    "fields": "contact", "centroid", "orientation", "axis"; "members", "angle", "line", "over_fields", "compensated");
+    "fields": "contact", "centroid", "orientation", "axis"; "pressures", "members", "angle", "line", "over_fields",
+    "compensated");
 /// The same for plans of at most [`crate::stage::layout::FEW`] memberships.
 pub(crate) const FEW_FIELDS: Shader = shader!(
-    "few fields": "contact", "centroid", "orientation", "axis"; "few_members", "angle", "line", "over_fields", "compensated");
+    "few fields": "contact", "centroid", "orientation", "axis"; "pressures", "few_members", "angle", "line", "over_fields", "compensated");
+/// Both where raw values are pressures, which are then read as they came.
+pub(crate) const RAW_FIELDS: Shader = shader!(
+    "raw fields": "contact", "centroid", "orientation", "axis"; "raw_buffer", "raw_pressures", "members", "angle", "line",
+    "over_fields", "compensated");
+pub(crate) const FEW_RAW_FIELDS: Shader = shader!(
+    "few raw fields": "contact", "centroid", "orientation", "axis"; "raw_buffer", "raw_pressures", "few_members", "angle", "line",
+    "over_fields", "compensated");
+/// Those on processors that stand in for a GPU.
+pub(crate) const TEXTURE_FIELDS: Shader = shader!(
+    "texture fields": "contact", "centroid", "orientation", "axis"; "raw_texture", "raw_pressures", "members", "angle", "line",
+    "over_fields", "compensated");
+pub(crate) const FEW_TEXTURE_FIELDS: Shader = shader!(
+    "few texture fields": "contact", "centroid", "orientation", "axis"; "raw_texture", "raw_pressures", "few_members", "angle", "line",
+    "over_fields", "compensated");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis": "hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion": "motion"; "angle");
 
 /// All of them, in the order they run.
 #[cfg(test)]
-pub(crate) const ALL: [Shader; 6] = [CALIBRATE, CHANGE, FIELDS, FEW_FIELDS, HYSTERESIS, MOTION];
+pub(crate) const ALL: [Shader; 10] = [
+    CALIBRATE,
+    CHANGE,
+    FIELDS,
+    FEW_FIELDS,
+    RAW_FIELDS,
+    FEW_RAW_FIELDS,
+    TEXTURE_FIELDS,
+    FEW_TEXTURE_FIELDS,
+    HYSTERESIS,
+    MOTION,
+];

@@ -70,8 +70,7 @@ impl Stage {
         constants: Constants<'_>,
         buffers: &[&wgpu::Buffer],
     ) -> Self {
-        let numbered: Vec<(u32, &wgpu::Buffer)> = (0..).zip(buffers.iter().copied()).collect();
-        Self::bound(device, shader, entry, over, constants, &numbered)
+        Self::bound(device, shader, entry, over, constants, &numbered(buffers))
     }
 
     /// A stage whose entry point uses only some of its shader's bindings.
@@ -81,15 +80,14 @@ impl Stage {
         entry: &str,
         over: Over,
         constants: Constants<'_>,
-        buffers: &[(u32, &wgpu::Buffer)],
+        resources: &[(u32, wgpu::BindingResource<'_>)],
     ) -> Self {
-        Self::with(pipeline(device, shader, entry, constants), shader.name, device, over, buffers)
+        Self::with(pipeline(device, shader, entry, constants), shader.name, device, over, resources)
     }
 
     /// The same program on other buffers: the very same, so that it gives the same bits.
     pub(super) fn again(&self, device: &Device, over: Over, buffers: &[&wgpu::Buffer]) -> Self {
-        let numbered: Vec<(u32, &wgpu::Buffer)> = (0..).zip(buffers.iter().copied()).collect();
-        Self::with(self.pipeline.clone(), self.name, device, over, &numbered)
+        Self::with(self.pipeline.clone(), self.name, device, over, &numbered(buffers))
     }
 
     fn with(
@@ -97,11 +95,11 @@ impl Stage {
         name: &'static str,
         device: &Device,
         over: Over,
-        buffers: &[(u32, &wgpu::Buffer)],
+        resources: &[(u32, wgpu::BindingResource<'_>)],
     ) -> Self {
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
             .iter()
-            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() })
             .collect();
         let bound = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(name),
@@ -110,6 +108,11 @@ impl Stage {
         });
         Self { name, pipeline, bound, over }
     }
+}
+
+/// Bindings 0, 1, 2, … for `buffers`.
+fn numbered<'a>(buffers: &[&'a wgpu::Buffer]) -> Vec<(u32, wgpu::BindingResource<'a>)> {
+    (0..).zip(buffers.iter().map(|buffer| buffer.as_entire_binding())).collect()
 }
 
 /// The compute pipeline of one stage's entry point.

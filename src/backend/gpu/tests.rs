@@ -218,3 +218,57 @@ fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
     let error = run(&mut gpu).unwrap_err().to_string();
     assert!(error.contains("stopped answering") && error.lines().count() == 1, "{error}");
 }
+
+/// Percepts of `frames` frames of every odd value there is, among plain ones.
+fn percepts_of_odd_values(gpu: &mut Gpu, frames: usize) -> Percepts {
+    let plan = gpu.plan.clone();
+    let odd =
+        [0, 1 << 31, 1, u32::MAX, f32::INFINITY.to_bits(), f32::NAN.to_bits(), 0x2180_0000, 0x217f_ffff, 0x5d80_0001];
+    let value = |i: usize| match i % 19 {
+        0 => bytemuck::cast(odd[i / 19 % odd.len()]),
+        1 => RawValue::new(-3.0),
+        _ => RawValue::new((i * i % 1023 + 1) as f64),
+    };
+    let values: Vec<RawValue> = (0..frames * plan.channels()).map(value).collect();
+    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
+        .with_columns(plan.columns, plan.kept_pressures());
+    percepts.reset(frames);
+    let rows = Rows::Packed { values: &values, channels: plan.channels() };
+    gpu.run(&RawBatch { first: 0, frames, rows, steps: &steps }, &mut percepts).unwrap();
+    percepts
+}
+
+#[test]
+fn raw_values_are_read_alike_from_buffers_from_textures_and_through_calibration() {
+    let Ok(device) = adapter::shared() else {
+        assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
+        return;
+    };
+    let body = Body::from_bytes("hand", include_bytes!("../../../bodies/hand.glb")).unwrap();
+    let calibration = Calibration::identity(body.taxels.len());
+    let scene = Scene { outputs: Outputs::USUAL - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+    // One that must be calibrated, though nothing comes of it: what is so small counts as 0 anyway.
+    let mut careful = plan.clone();
+    careful.taxels[0].dead_band = 1e-30;
+    for frames in [1, 7, 70, 300] {
+        let [from_buffer, from_texture] = [wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu].map(|device_type| {
+            let mut device = device.clone();
+            device.info.device_type = device_type;
+            let mut gpu = Gpu::on(device, &plan, frames).unwrap();
+            assert!(gpu.direct && gpu.texture.is_some() == (device_type == wgpu::DeviceType::Cpu));
+            let percepts = percepts_of_odd_values(&mut gpu, frames);
+            gpu.restart();
+            gpu.recalibrate(&careful);
+            assert!(!gpu.direct);
+            assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames, {device_type:?}");
+            percepts
+        });
+        assert!(from_buffer == from_texture, "{frames} frames");
+        let faulty = (0..frames)
+            .flat_map(|frame| from_buffer.frame(frame))
+            .filter(|percept| percept.flags.contains(Flags::FAULTY_INPUT | Flags::INCOMPLETE));
+        assert!(frames < 70 || faulty.count() > 0);
+    }
+}

@@ -1,0 +1,145 @@
+//! From frames to the upload buffer: raw values frame by frame where the device calibrates them, and where they are
+//! pressures four frames of a taxel side by side, as fields read them.
+
+use std::array;
+
+use bytemuck::{bytes_of, cast_slice};
+
+use super::adapter::Device;
+use super::{Gpu, HEADER, STEP};
+use crate::backend::{RawBatch, Rows};
+use crate::error::Result;
+use crate::signal::RawValue;
+use crate::stage::layout;
+
+/// Bytes of a row of the texture, 16 for each texel, as many as `shaders/shared/raw_texture.wgsl` says.
+const ROW: usize = 16 << 10;
+/// Frames and slots of a tile that is turned at once: what is read of a frame, and written of a slot, fills a line.
+const TOGETHER: usize = 16;
+const SLOTS: usize = 16;
+
+impl Gpu {
+    /// Bytes that the raw values of `frames` frames go up in.
+    pub(super) fn raw_bytes(&self, frames: usize) -> usize {
+        raw_bytes(self.plan.channels(), frames, self.direct)
+    }
+
+    /// Has the raw values of `frames` frames copied to where the programs read them, from byte `at` of `upload` on.
+    pub(super) fn send_up(&self, encoder: &mut wgpu::CommandEncoder, upload: &wgpu::Buffer, at: u64, frames: usize) {
+        let Some(texture) = &self.texture else {
+            encoder.copy_buffer_to_buffer(upload, at, &self.raw, 0, self.raw_bytes(frames) as u64);
+            return;
+        };
+        let from = wgpu::TexelCopyBufferInfo {
+            buffer: upload,
+            layout: wgpu::TexelCopyBufferLayout { offset: at, bytes_per_row: Some(ROW as u32), rows_per_image: None },
+        };
+        let height = self.raw_bytes(frames).div_ceil(ROW) as u32;
+        encoder.copy_buffer_to_texture(from, texture.as_image_copy(), size_of(height));
+    }
+
+    /// Fills a set's upload buffer.
+    pub(super) fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
+        self.packed_steps.clear();
+        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
+        let steps = HEADER as usize + cast_slice::<_, u8>(&self.packed_steps).len();
+        let values = values_at(raw.frames) as usize;
+        let end = values + self.raw_bytes(raw.frames);
+        let mapped = self.ring[set].upload.get_mapped_range_mut(0..end as u64);
+        let mut mapped = mapped.map_err(|e| self.device.lost(&e))?;
+        let mut mapped = mapped.slice(..);
+        mapped.slice(..HEADER as usize).copy_from_slice(bytes_of(header));
+        mapped.slice(HEADER as usize..steps).copy_from_slice(cast_slice(&self.packed_steps));
+        let mapped = mapped.slice(values..);
+        match self.direct {
+            true => pack_quads(raw, self.plan.channels(), &mut self.packed, mapped),
+            false => pack_rows(raw, self.plan.channels(), &mut self.packed, mapped),
+        }
+        Ok(())
+    }
+}
+
+/// Where in the upload buffer the raw values of `frames` frames begin: where a texel may.
+pub(super) fn values_at(frames: usize) -> u64 {
+    (HEADER + frames as u64 * STEP).next_multiple_of(16)
+}
+
+/// A texture that holds `bytes`, four frames of a taxel a texel.
+pub(super) fn texture(device: &Device, bytes: u64) -> wgpu::Texture {
+    device.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("raw"),
+        size: size_of(bytes.div_ceil(ROW as u64) as u32),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Uint,
+        usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::STORAGE_BINDING,
+        view_formats: &[],
+    })
+}
+
+fn size_of(height: u32) -> wgpu::Extent3d {
+    wgpu::Extent3d { width: (ROW / 16) as u32, height, depth_or_array_layers: 1 }
+}
+
+/// Bytes of `frames` frames in quads or in rows; whole rows of a texture.
+pub(super) fn raw_bytes(channels: usize, frames: usize, in_quads: bool) -> usize {
+    match in_quads {
+        true => (layout::padded_quads(frames) * channels * 16).next_multiple_of(ROW),
+        false => frames * layout::padded_channels(channels) * 4,
+    }
+}
+
+fn pack_rows(raw: &RawBatch<'_>, channels: usize, row: &mut Vec<RawValue>, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
+    let padded = layout::padded_channels(channels);
+    for frame in 0..raw.frames {
+        row.clear();
+        match raw.rows {
+            Rows::Picked { frames, picks } => {
+                let values = &frames[frame].values[..];
+                row.extend(picks.places[..channels].iter().map(|&place| values[place as usize]));
+            }
+            Rows::Packed { values, channels } => row.extend_from_slice(&values[frame * channels..][..channels]),
+        }
+        row.resize(padded, RawValue::new(0.0));
+        mapped.slice(frame * padded * 4..(frame + 1) * padded * 4).copy_from_slice(cast_slice(row));
+    }
+}
+
+/// As `at` in `shaders/shared/layout.wgsl` says, a block at a time: frames are read through, what is written scattered stays
+/// in caches, and goes to the device's memory in order.
+fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
+    let block = 4 * layout::lanes(raw.frames) as usize;
+    scratch.resize(block * channels, RawValue::new(0.0));
+    for (index, start) in (0..raw.frames).step_by(block).enumerate() {
+        let end = raw.frames.min(start + block);
+        for first in (start..end).step_by(TOGETHER) {
+            // The last quad is filled up with the last frame.
+            let count = (end - first).next_multiple_of(4).min(TOGETHER);
+            let rows: [&[RawValue]; TOGETHER] = array::from_fn(|i| {
+                let frame = (first + i).min(raw.frames - 1);
+                match raw.rows {
+                    Rows::Packed { values, channels } => &values[frame * channels..][..channels],
+                    Rows::Picked { frames, .. } => &frames[frame].values[..],
+                }
+            });
+            for some in (0..channels).step_by(SLOTS) {
+                let slots = some..channels.min(some + SLOTS);
+                for (lane, values) in (first - start..).zip(&rows[..count]) {
+                    let to = scratch[some * block..slots.end * block].chunks_exact_mut(block);
+                    match raw.rows {
+                        Rows::Packed { .. } => {
+                            to.zip(&values[slots.clone()]).for_each(|(to, &value)| to[lane] = value);
+                        }
+                        Rows::Picked { picks, .. } => {
+                            let places = &picks.places[slots.clone()];
+                            to.zip(places).for_each(|(to, &place)| to[lane] = values[place as usize]);
+                        }
+                    }
+                }
+            }
+        }
+        let bytes = block * channels * 4;
+        mapped.slice(index * bytes..(index + 1) * bytes).copy_from_slice(cast_slice(scratch));
+    }
+}
