@@ -2,11 +2,13 @@
 
 mod cadence;
 mod host;
+mod kept_up;
 
 use std::ops::Range;
 
 use self::cadence::{OnChange, step};
 use self::host::{Host, Links, Side};
+use self::kept_up::KeptUp;
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
@@ -15,8 +17,8 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, NoChart, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::{Cadence, Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, Kept, RawValue, Receptor, Unfit, Upkeep, UpkeepKeys};
-use crate::stage::{calibrate, layout};
+use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit};
+use crate::stage::calibrate;
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -103,26 +105,6 @@ impl Check {
             bounds: Vec::new(),
             last_bounds: Vec::new(),
         }
-    }
-}
-
-/// Upkeep, and what it needs of the engine.
-struct KeptUp {
-    upkeep: Upkeep,
-    /// The taxels as the calibration has them, slot by slot.
-    made: Vec<layout::Taxel>,
-    /// Per field, whether it was in contact in this epoch.
-    touched: Vec<bool>,
-}
-
-impl KeptUp {
-    fn new(plan: &Plan, keys: UpkeepKeys) -> Option<Self> {
-        let taxels = plan.calibrations.iter().map(|c| Kept { baseline: c.baseline, raw_range: c.raw_range });
-        Some(Self {
-            upkeep: Upkeep::new(keys, taxels)?,
-            made: plan.taxels.clone(),
-            touched: vec![false; plan.fields.len()],
-        })
     }
 }
 

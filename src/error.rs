@@ -121,10 +121,14 @@ impl std::error::Error for Error {}
 pub fn nearest<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
-        .map(|name| (strsim::osa_distance(asked, name), name))
-        .filter(|&(distance, name)| 3 * distance <= asked.chars().count().max(name.chars().count()))
+        .map(|name| {
+            // Of those equally far, the one that begins alike: slips of the hand are rare in first letters.
+            let alike = asked.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
+            (strsim::osa_distance(asked, name), std::cmp::Reverse(alike), name)
+        })
+        .filter(|&(distance, _, name)| 3 * distance <= asked.chars().count().max(name.chars().count()))
         .min()
-        .map(|(_, name)| name)
+        .map(|(_, _, name)| name)
 }
 
 #[cfg(test)]
@@ -141,6 +145,7 @@ mod tests {
 
     #[test]
     fn a_slip_of_the_hand_finds_its_word() {
+        assert_eq!(nearest("sorce", ["force", "source"]), Some("source"));
         assert_eq!(nearest("centriod", ["total", "centroid", "axis"]), Some("centroid"));
         assert_eq!(nearest("banana", ["total", "centroid", "axis"]), None);
     }

@@ -33,7 +33,7 @@ const SHORTENED: [(&str, &str); 5] = [
     ),
     (
         "somatic tradeoff examples/scenes/palm.toml --within '0.5 mm, 2 deg' --write",
-        "somatic tradeoff examples/scenes/palm.toml --within '0.5 mm, 2 deg' --write --seconds 0.1 --frames 60",
+        "somatic tradeoff examples/scenes/palm.toml --within '0.5 mm, 2 deg' --write --seconds 0.1 --frames 250",
     ),
     ("somatic paper --out paper", "somatic paper --quick --out paper"),
     (

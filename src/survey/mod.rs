@@ -336,7 +336,8 @@ mod tests {
             let depth = f64::from(n.min(99 - n)) / 49.0;
             // A single wrong value, far beyond.
             let wrong = if n == 3 { 900.0 } else { 245.0 - 120.0 * depth };
-            survey.press(&values(&[250.0 * (1.0 - depth), 240.0 * (1.0 - depth), wrong, 251.0]));
+            let pressed = [250.0 * (1.0 - depth), 240.0 * (1.0 - depth), wrong, 251.0];
+            survey.press(&values(&pressed.map(f64::round)));
         }
         survey
     }
