@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::scene::{Arithmetic, Cadence, Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue};
 
 /// Every backend that can run here. Without an adapter the GPU is left out, loudly, unless it is required.
@@ -15,6 +16,30 @@ pub fn backends() -> Vec<BackendKind> {
         backends.push(BackendKind::Gpu);
     }
     backends
+}
+
+/// Every backend with every knob that may change how it computes.
+pub fn ways() -> Vec<(BackendKind, Knobs)> {
+    let mut ways = Vec::new();
+    for backend in backends() {
+        let arithmetics = match backend {
+            BackendKind::Reference => vec![None],
+            _ => vec![Some(Arithmetic::OnePass), Some(Arithmetic::Compensated)],
+        };
+        // A gate stands only before the CPU's live frames; the cadence is everybody's.
+        let coverages: &[Coverage] = match backend {
+            BackendKind::Cpu => &[Coverage::All, Coverage::Touched, Coverage::CoarseToFine],
+            _ => &[Coverage::Auto],
+        };
+        for arithmetic in arithmetics {
+            for &coverage in coverages {
+                for cadence in [Cadence::EveryFrame, Cadence::OnChange] {
+                    ways.push((backend, Knobs { arithmetic, coverage, cadence, ..Knobs::default() }));
+                }
+            }
+        }
+    }
+    ways
 }
 
 /// Whether there is an adapter. With `SOMATIC_REQUIRE_GPU=1` its absence fails the test.

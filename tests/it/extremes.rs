@@ -4,23 +4,25 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DQuat, DVec3};
 use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::scene::Knobs;
 use somatic::{BackendKind, Body, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene};
 
-use crate::common::{Flat, backends, frame};
+use crate::common::{Flat, backends, frame, ways};
 
-/// The percept of field 0 for one frame of `values`, on every backend; each is also held to the reference.
+/// The percept of field 0 for one frame of `values`, on every backend with every knob that it has; each is also held to the
+/// reference.
 fn percepts(body: &Body, values: &[f64]) -> Vec<Percept> {
     let frame = frame(0.0, values);
     on_every_backend(body, &frame)
 }
 
 fn on_every_backend(body: &Body, frame: &Frame) -> Vec<Percept> {
-    backends()
+    ways()
         .into_iter()
-        .map(|kind| {
-            let mut engine = Engine::new(body, at_rest(kind)).unwrap();
+        .map(|way| {
+            let mut engine = Engine::new(body, at_rest(way)).unwrap();
             let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(frame)).unwrap();
-            assert!(agreement.holds(), "{kind:?}: {agreement}");
+            assert!(agreement.holds(), "{way:?}: {agreement}");
             let percept = percepts.get(0, 0);
             assert_finite(&percept);
             percept
@@ -29,14 +31,14 @@ fn on_every_backend(body: &Body, frame: &Frame) -> Vec<Percept> {
 }
 
 /// Everything but motion, which a single frame has none of.
-fn at_rest(backend: BackendKind) -> Options {
+fn at_rest((backend, knobs): (BackendKind, Knobs)) -> Options {
     let moving = Outputs::DISPLACEMENT
         | Outputs::DIRECTION
         | Outputs::DISTANCE
         | Outputs::RADIAL_DISTANCE
         | Outputs::SPEED
         | Outputs::RADIAL_SPEED;
-    let scene = Scene { outputs: Outputs::USUAL - moving, ..Scene::default() };
+    let scene = Scene { outputs: Outputs::USUAL - moving, knobs, ..Scene::default() };
     Options { backend, scene, ..Options::default() }
 }
 
@@ -129,8 +131,8 @@ fn an_exact_tie_goes_to_the_lowest_ids() {
 fn all_saturated_still_answers() {
     let body = field(&[[-0.5, 0.0], [0.0, 0.0], [0.5, 0.0]]);
     let calibration = somatic::Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
-    for kind in backends() {
-        let options = Options { calibration: Some(calibration.clone()), ..at_rest(kind) };
+    for way in ways() {
+        let options = Options { calibration: Some(calibration.clone()), ..at_rest(way) };
         let mut engine = Engine::new(&body, options).unwrap();
         let p = engine.process(&[frame(0.0, &[1023.0; 3])]).unwrap().get(0, 0);
         assert_eq!(p.flags, Flags::SATURATED);
@@ -380,13 +382,13 @@ fn a_field_of_a_million_taxels_answers() {
     let body = Flat::new(&uv).field("field", None, 0..side * side).body();
     let values: Vec<f64> = (0..side * side).map(|i| f64::from((i % 4096 * 7919) % 1024)).collect();
     let frame = frame(0.0, &values);
-    for kind in backends() {
+    for way in ways() {
         // Without position, which would lay a grid over the surface.
-        let mut options = at_rest(kind);
+        let mut options = at_rest(way);
         options.scene.outputs -= Outputs::POSITION | Outputs::NORMAL;
         let mut engine = Engine::new(&body, options).unwrap();
         let (percepts, agreement) = engine.process_and_compare(std::slice::from_ref(&frame)).unwrap();
-        assert!(agreement.holds(), "{kind:?}: {agreement}");
+        assert!(agreement.holds(), "{way:?}: {agreement}");
         assert_eq!(percepts.get(0, 0).active, Some(values.iter().filter(|&&v| v > 0.0).count() as u32));
     }
 }
