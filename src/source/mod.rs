@@ -4,13 +4,19 @@
 
 mod csv;
 mod ndjson;
+#[cfg(feature = "cli")]
+mod serial;
 mod simulated;
 mod spec;
 
 pub use self::csv::CsvSource;
 pub use ndjson::NdjsonSource;
+#[cfg(feature = "cli")]
+pub use serial::{BoardAccount, BoardState, Lines, SerialOptions, SerialSource};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
+
+use std::time::Instant;
 
 use crate::error::Result;
 use crate::signal::Frame;
@@ -28,6 +34,11 @@ pub trait Source {
 
     /// How much of the whole has been read, in 0..=1, where that is known.
     fn progress(&self) -> Option<f64> {
+        None
+    }
+
+    /// When the last byte of the last frame was read, where that is known; asked for once a frame.
+    fn read_at(&mut self) -> Option<Instant> {
         None
     }
 

@@ -85,22 +85,15 @@ impl SourceSpec {
             }
             Self::Mcap(path) => not_yet("MCAP", path.display().to_string()),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
-            Self::Serial { port, .. } => not_yet(&format!("serial lines ({})", ports()), port.clone()),
+            #[cfg(feature = "cli")]
+            Self::Serial { port, baud } => {
+                let ports = [(port.clone(), *baud)];
+                Ok(Box::new(super::SerialSource::open(&ports, taxels, &super::SerialOptions::default())?))
+            }
+            #[cfg(not(feature = "cli"))]
+            Self::Serial { port, .. } => not_yet("serial lines without the feature `cli`", port.clone()),
         }
     }
-}
-
-/// The serial ports of this machine, in words.
-#[cfg(feature = "cli")]
-fn ports() -> String {
-    let names: Vec<String> =
-        serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect();
-    if names.is_empty() { "no port found".to_owned() } else { format!("ports found: {}", names.join(", ")) }
-}
-
-#[cfg(not(feature = "cli"))]
-fn ports() -> String {
-    "ports are looked for only with feature `cli`".to_owned()
 }
 
 #[cfg(test)]
@@ -137,7 +130,6 @@ mod tests {
     #[test]
     fn what_is_not_read_yet_says_so() {
         let why = |text: &str| text.parse::<SourceSpec>().unwrap().open(&[1], None).err().unwrap().to_string();
-        assert!(why("serial:/dev/ttyX").starts_with("/dev/ttyX: this version does not read serial lines"));
         assert!(why("mcap:a.mcap").contains("does not read MCAP yet"));
         assert!(SourceSpec::Sim("no/such.toml".into()).open(&[1], None).err().unwrap().is_not_found());
         assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());
