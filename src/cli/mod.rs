@@ -9,6 +9,8 @@ mod completions;
 mod feed;
 mod input;
 mod inspect;
+mod latency;
+mod lines;
 mod live;
 mod paper;
 mod plan;
@@ -41,6 +43,7 @@ Examples:
   somatic run | jq -c '.fields[] | [.field, .total]'
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
+  somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         where they are

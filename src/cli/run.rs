@@ -3,19 +3,21 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use console::Term;
 use somatic::signal::Unfit;
 use somatic::sink::{FieldNames, Flow, Sink, SinkSpec};
+use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Plan, Result};
 
 use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
+use super::lines::Live;
 use super::live::{About, View};
 use super::scene::Asked;
-use super::{DONE, FAILED, LOST, say};
+use super::{DONE, FAILED, LOST, say, words};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -27,6 +29,7 @@ Examples:
   somatic run --outputs filtered_direction --filter-window 0.5mm.. --filter-time 0.2
   somatic run robot.scene.toml                           all of it from a file
   robot-driver | somatic run --body robot.glb --source - | controller
+  somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
 
 A frame on standard input is a line such as {\"t\":0.5,\"values\":{\"7\":12.0}}.
@@ -45,6 +48,15 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     asked: Asked,
+
+    /// End after so long, such as 10s.
+    #[arg(long = "for", value_name = "TIME")]
+    lasts: Option<String>,
+
+    /// Write what became of the frames of boards on serial lines, and how long percepts took, to this file in the end, as
+    /// JSON.
+    #[arg(long, value_name = "FILE")]
+    summary: Option<PathBuf>,
 }
 
 /// What sinks call the fields.
@@ -70,7 +82,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         say(&format!("{}: {finding}", body.name));
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let source = input.open(&ids, asked.rate)?;
+    let recorded = if input.lines.is_empty() { Some(input.open(&ids, asked.rate)?) } else { None };
+    let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
+    if arguments.summary.is_some() && recorded.is_some() {
+        return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
+    }
 
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
@@ -78,6 +94,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let mut engine = Engine::new(&body, asked.options(&body, &ids, batch)?)?;
+    // Boards speak as soon as their lines are open: not before somebody can listen.
+    let (source, live) = match recorded {
+        Some(source) => (source, None),
+        None => {
+            let source = input.open_lines(&ids, &asked)?;
+            engine.heed_stale();
+            let live = Live::new(source.lines(), arguments.summary.clone(), asked.quiet);
+            (Box::new(source) as Box<dyn Source + Send>, Some(live))
+        }
+    };
     engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if asked.backend.unwrap_or_default() == BackendKind::Auto && !asked.quiet {
         let (name, what, why) = engine.backend();
@@ -91,11 +117,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
     let sinks = sinks.iter().map(|sink| sink.open(&names, asked.all_fields)).collect::<Result<_>>()?;
-    let feed = Feed::start(source, Manner { most: batch, gather, speed });
+    let feed = match live {
+        None => Feed::start(source, Manner { most: batch, gather, speed }),
+        Some(_) => Feed::start_live(source, batch),
+    };
     let agreement = asked.verify.then(Agreement::default);
-    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new() };
-    let losses = pump.run(feed, &stop)?;
-    pump.finish(&losses)
+    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), live };
+    let until = lasts.map(|span| Instant::now() + span);
+    match pump.run(feed, &stop, until) {
+        Ok(losses) => pump.finish(losses),
+        Err(error) => {
+            let Pump { view, live, .. } = pump;
+            drop(view);
+            // What was said of the lines tells why.
+            live.into_iter().for_each(|mut live| live.tell(false));
+            Err(error)
+        }
+    }
 }
 
 /// Takes frames from a feed through the engine to whoever is to have the percepts.
@@ -108,15 +146,17 @@ struct Pump {
     agreement: Option<Agreement>,
     /// Taxels that have been told to be left out.
     unfit: Vec<(u32, Unfit)>,
+    /// The serial lines, if they are read.
+    live: Option<Live>,
 }
 
 impl Pump {
     /// Runs until the source ends, the last reader has gone, or `stop` is set; gives what the source lost.
-    fn run(&mut self, mut feed: Feed, stop: &AtomicBool) -> Result<Vec<String>> {
+    fn run(&mut self, mut feed: Feed, stop: &AtomicBool, until: Option<Instant>) -> Result<Vec<String>> {
         let watched = self.view.is_table() || self.sinks.is_empty();
-        while !stop.load(Ordering::Relaxed) {
+        while !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
-                Some(Arrival::Frames(frames, progress)) => {
+                Some(Arrival::Frames(frames, told)) => {
                     let percepts = match &mut self.agreement {
                         None => self.engine.process(&frames)?,
                         Some(sum) => {
@@ -125,7 +165,7 @@ impl Pump {
                             percepts
                         }
                     };
-                    self.view.see(percepts, progress);
+                    self.view.see(percepts, told.progress);
                     let mut open = Vec::with_capacity(self.sinks.len());
                     for mut sink in self.sinks.drain(..) {
                         let flow = sink.write(percepts)?;
@@ -139,6 +179,9 @@ impl Pump {
                     if self.sinks.is_empty() && !watched {
                         break;
                     }
+                    if let Some(live) = &mut self.live {
+                        live.see(&told.read_at);
+                    }
                     feed.give_back(frames);
                     if !self.view.is_table() {
                         tell_unfit(&self.engine, &mut self.unfit);
@@ -148,19 +191,26 @@ impl Pump {
                 Some(Arrival::Failed(error)) => return Err(error),
                 None => {}
             }
+            if let Some(live) = &mut self.live {
+                live.tell(self.view.is_table());
+                self.view.set_footer(|| live.rows());
+            }
             self.view.draw();
         }
         Ok(Vec::new())
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
-    fn finish(mut self, losses: &[String]) -> Result<u8> {
+    fn finish(mut self, mut losses: Vec<String>) -> Result<u8> {
         for sink in self.sinks {
             sink.finish()?;
         }
         self.view.finish();
+        if let Some(live) = self.live {
+            losses = live.finish()?;
+        }
         tell_unfit(&self.engine, &mut self.unfit);
-        for loss in losses {
+        for loss in &losses {
             say(&format!("never processed: {loss}"));
         }
         if let Some(agreement) = self.agreement {

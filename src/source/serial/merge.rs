@@ -200,8 +200,7 @@ impl Merge {
         for board in &mut self.boards {
             board.waiting = false;
             let most = board.most_age_s(self.max_age_s);
-            let absent =
-                if board.speaks(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
+            let absent = if board.speaks(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
             for (place, known) in board.places.iter().zip(&board.known) {
                 let Some(place) = *place else { continue };
                 let young = known.filter(|known| at_s - known.confirmed_s <= most);

@@ -72,7 +72,8 @@ impl SerialSource {
         check(ports, ids, &wiring)?;
         let pace = pace(options.live_rate_hz)?;
         let rate_mhz = options.board_rate_hz.map(rate_mhz).transpose()?;
-        let taxels: Vec<u32> = wiring.boards().iter().flat_map(|board| board.taxels.iter().flatten().copied()).collect();
+        let taxels: Vec<u32> =
+            wiring.boards().iter().flat_map(|board| board.taxels.iter().flatten().copied()).collect();
         let mut next = 0..taxels.len();
         let mut place = |taxel: &Option<u32>| taxel.and_then(|_| next.next());
         let places = wiring.boards().iter().map(|board| board.taxels.iter().map(&mut place).collect()).collect();
@@ -146,7 +147,9 @@ fn rate_mhz(hz: f64) -> Result<u32> {
     if hz == 0.0 || (0.001..=1e6).contains(&hz) {
         return Ok((hz * 1e3).round() as u32);
     }
-    Err(Error::usage(format!("--board-rate {hz} is no rate; give 0.001 to 1000000 Hz, or 0 for as many as the line takes")))
+    Err(Error::usage(format!(
+        "--board-rate {hz} is no rate; give 0.001 to 1000000 Hz, or 0 for as many as the line takes"
+    )))
 }
 
 impl Source for SerialSource {
@@ -190,7 +193,8 @@ impl Source for SerialSource {
                 return Err(error);
             }
             let until_due = |due_s: f64| Duration::try_from_secs_f64(due_s - self.start.elapsed().as_secs_f64());
-            let wait = self.merge.due_s().map_or(LONGEST_WAIT, |due| until_due(due).unwrap_or_default().min(LONGEST_WAIT));
+            let wait =
+                self.merge.due_s().map_or(LONGEST_WAIT, |due| until_due(due).unwrap_or_default().min(LONGEST_WAIT));
             state = shared.arrived.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
         }
     }

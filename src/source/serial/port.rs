@@ -98,7 +98,8 @@ fn serve(session: &mut Session, mut port: Box<dyn SerialPort>, start: Instant) -
                     port.set_baud_rate(baud)?;
                 }
             }
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
+            Err(error)
+                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
             Err(error) => return Err(error),
         }
     }

@@ -9,8 +9,8 @@ use super::merge::BoardFrame;
 use crate::error::Error;
 use crate::signal::{WiredBoard, Wiring};
 use crate::wire::{
-    ANY_BOARD, Bits, Command, Corruption, Decoder, Dialogue, Event, Head, Identity, NO_LAYOUT, Outcome, Patience, Placed,
-    Status, layout_hash,
+    ANY_BOARD, Bits, Command, Corruption, Decoder, Dialogue, Event, Head, Identity, NO_LAYOUT, Outcome, Patience,
+    Placed, Status, layout_hash,
 };
 
 /// The speeds that a line is tried at, baud, the likeliest first.
@@ -313,7 +313,9 @@ impl Talk {
             }
             // What we say ourselves, from a line that echoes.
             Event::Command { .. } => self.bytes = 0,
-            Event::Frame { head, placed, .. } | Event::Identity { head, placed, .. } | Event::Answer { head, placed, .. } => {
+            Event::Frame { head, placed, .. }
+            | Event::Identity { head, placed, .. }
+            | Event::Answer { head, placed, .. } => {
                 if !self.understood(now) {
                     return;
                 }
@@ -420,7 +422,8 @@ impl Talk {
     fn stranger(&mut self, id: u16) {
         self.board = None;
         let ids: Vec<String> = self.task.wiring.boards().iter().map(|board| board.id.to_string()).collect();
-        let known = if ids.len() == 1 { format!("has board {}", ids[0]) } else { format!("has boards {}", ids.join(", ")) };
+        let known =
+            if ids.len() == 1 { format!("has board {}", ids[0]) } else { format!("has boards {}", ids.join(", ")) };
         self.bad(format!("board {id} is here, and the wiring {known}; give --wiring a file that has it"));
     }
 
@@ -507,7 +510,9 @@ fn fits(wired: &WiredBoard, identity: &Identity<'_>) -> Result<(), String> {
     }
     let padded = taxels.iter().copied().chain(std::iter::repeat(None)).take(channels);
     if identity.layout != NO_LAYOUT && identity.layout != layout_hash(padded) {
-        return Err("it is made for another layout than the wiring's; flash it anew, or give --wiring its file".to_owned());
+        return Err(
+            "it is made for another layout than the wiring's; flash it anew, or give --wiring its file".to_owned()
+        );
     }
     Ok(())
 }
