@@ -117,7 +117,8 @@ fn print(text: &str) -> Result<()> {
 
 /// The body in the file `name`, or the bundled one of that name where there is no such file.
 fn load_body(name: &str) -> Result<Body> {
-    if !Path::new(name).exists() {
+    // A link of this name to a serial port is no body.
+    if !Path::new(name).is_file() {
         if let Some(bytes) = bundled::body(name) {
             return Body::from_bytes(name, bytes);
         }

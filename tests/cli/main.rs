@@ -12,6 +12,8 @@ mod plan;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;
+#[cfg(unix)]
+mod serial;
 mod simulate;
 
 use std::io::Write as _;

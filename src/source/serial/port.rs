@@ -25,10 +25,13 @@ pub(super) fn read(mut session: Session, start: Instant) {
                 session.opened(start.elapsed());
                 if let Err(error) = serve(&mut session, port, start) {
                     let error = Error::failed(error.to_string()).at(&session.task().port);
-                    session.gone(start.elapsed(), error);
+                    session.gone(start.elapsed(), || error);
                 }
             }
-            Err(error) => session.gone(start.elapsed(), error),
+            Err(error) => {
+                let name = session.task().port.clone();
+                session.gone(start.elapsed(), || explained(&name, &error));
+            }
         }
         if !is_closed(&session) {
             thread::sleep(REOPENING);
@@ -39,9 +42,8 @@ pub(super) fn read(mut session: Session, start: Instant) {
     shared.arrived.notify_all();
 }
 
-fn open(session: &Session) -> Result<Box<dyn SerialPort>, Error> {
-    let name = &session.task().port;
-    serialport::new(name, session.baud()).timeout(READING).open().map_err(|error| explained(name, &error))
+fn open(session: &Session) -> serialport::Result<Box<dyn SerialPort>> {
+    serialport::new(&session.task().port, session.baud()).timeout(READING).open()
 }
 
 /// What opening the port `name` failed on, and what to do.

@@ -134,13 +134,14 @@ impl Session {
         talk.turn(Stage::Asking, talk.task.baud, now);
     }
 
-    /// The line has gone, or cannot be opened: `why`.
-    pub(super) fn gone(&mut self, now: Duration, why: Error) {
+    /// The line has gone, or cannot be opened, which is only said once: `why`.
+    pub(super) fn gone(&mut self, now: Duration, why: impl FnOnce() -> Error) {
         let talk = &mut self.talk;
-        if talk.unplugged.replace(now).is_some() {
-            // Said already; it lasts from the first time on.
+        if talk.unplugged.is_some() {
             return;
         }
+        talk.unplugged = Some(now);
+        let why = why();
         let mut state = talk.task.shared.lock();
         state.release(talk.task.line);
         match talk.joined {
@@ -405,10 +406,15 @@ impl Talk {
             return;
         }
         // A board that stops unasked, and did not start again, was told so by somebody else, or has nothing more to say.
-        self.stopped = identity.request == 0 && !identity.running && self.started && !placed.restarted;
-        if self.stopped {
-            return self.say(&format!("board {} has stopped", head.board));
+        let stops = identity.request == 0 && !identity.running && self.started && !placed.restarted;
+        if stops {
+            if !std::mem::replace(&mut self.stopped, true) {
+                self.task.shared.lock().accounts[board].state = BoardState::Silent;
+                self.say(&format!("board {} has stopped", head.board));
+            }
+            return;
         }
+        self.stopped = false;
         let rate = self.task.rate_mhz.filter(|rate| *rate != identity.rate_mhz);
         if let Some(rate_mhz) = rate {
             self.ask(Command::Rate { rate_mhz }, now);
