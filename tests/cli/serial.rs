@@ -239,8 +239,9 @@ fn named(sources: &[&str], more: &[&str]) -> (String, Option<i32>) {
     let mut line = String::new();
     let mut told = BufReader::new(child.stderr.take().unwrap());
     told.read_line(&mut line).unwrap();
-    // Two seconds from when the line is open, and some for a busy machine to start a program.
-    assert!(start.elapsed() < Duration::from_secs(4), "{line}");
+    // Less than two seconds from when the line is open, which a unit test adds up; a busy machine may take longer than that
+    // to start a program.
+    assert!(start.elapsed() < Duration::from_secs(8), "{line}");
     (line, child.wait().unwrap().code())
 }
 

@@ -536,3 +536,38 @@ fn word(command: Command) -> &'static str {
         Command::Stop => "stop",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Bits, Identity};
+
+    #[test]
+    fn every_speed_is_tried_within_two_seconds() {
+        let probing: Duration = USUAL.iter().map(|&baud| PROBING + bits_take(baud)).sum();
+        assert!(ASKING + probing < Duration::from_millis(1800), "{:?}", ASKING + probing);
+    }
+
+    #[test]
+    fn a_board_fits_its_wiring_or_it_is_said_why() {
+        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels: vec![Some(4), None, Some(9)] };
+        let hash = |taxels: &[Option<u32>]| layout_hash(taxels.iter().copied());
+        let right = Identity {
+            request: 1,
+            running: true,
+            channels: 3,
+            bits: Bits::Ten,
+            layout: hash(&[Some(4), None, Some(9)]),
+            rate_mhz: 0,
+            firmware: "",
+        };
+        assert_eq!(fits(&wired, &right), Ok(()));
+        assert_eq!(fits(&wired, &Identity { layout: NO_LAYOUT, ..right }), Ok(()), "it does not know");
+        let longer = Identity { channels: 4, layout: hash(&[Some(4), None, Some(9), None]), ..right };
+        assert_eq!(fits(&wired, &longer), Ok(()), "channels that nobody wired");
+        let why = |identity: Identity<'_>| fits(&wired, &identity).unwrap_err();
+        assert!(why(Identity { channels: 2, ..right }).contains("2 channels, and the wiring 3"));
+        assert!(why(Identity { bits: Bits::Twelve, ..right }).contains("12 bits"));
+        assert!(why(Identity { channels: 4, ..right }).contains("another layout"));
+    }
+}
