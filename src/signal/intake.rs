@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(intake.stale(), [vec![2]]);
         intake.forget_stale();
         take(&mut intake, &frame(0.0, &[None, None, Some(1.0)]));
-        assert_eq!(intake.stale(), [vec![]]);
+        assert_eq!(intake.stale(), [Vec::<usize>::new()]);
     }
 
     #[test]
