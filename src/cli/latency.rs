@@ -26,8 +26,11 @@ impl Default for Latency {
 /// The step that `us` microseconds fall into.
 fn step(us: u64) -> usize {
     // Numbers below STEPS stand for themselves; above, their highest log₂(STEPS) + 1 bits count.
-    let doubling = (us | (STEPS - 1)).ilog2() as u64 - STEPS.ilog2() as u64 + 1;
-    let steps = if us < STEPS { us } else { doubling * STEPS + (us >> (doubling - 1)) - STEPS };
+    let above = |us: u64| {
+        let doubling = u64::from(us.ilog2() - STEPS.ilog2()) + 1;
+        doubling * STEPS + (us >> (doubling - 1)) - STEPS
+    };
+    let steps = if us < STEPS { us } else { above(us) };
     steps.min(STEPS * (DOUBLINGS + 1) - 1) as usize
 }
 
