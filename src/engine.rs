@@ -7,7 +7,7 @@ mod kept_up;
 use std::ops::Range;
 
 use self::cadence::{OnChange, step};
-use self::host::{Host, Links, Side};
+use self::host::{Host, Links, Side, flag_stale};
 use self::kept_up::KeptUp;
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
@@ -208,6 +208,13 @@ impl Engine {
         Ok(())
     }
 
+    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`Flags::STALE`] beside
+    /// [`Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
+    pub fn heed_stale(&mut self) {
+        self.intake.heed_stale();
+        self.pick();
+    }
+
     /// Finds out whether values can be read where they are. Upkeep looks at all of them, gathered.
     fn pick(&mut self) {
         let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
@@ -309,7 +316,10 @@ impl Engine {
                 kept.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }
-        self.segment(frames, start..frames.len(), check)?;
+        self.segment(frames, start..frames.len(), check.as_deref_mut())?;
+        for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
+            flag_stale(&self.plan, self.intake.stale(), percepts);
+        }
         self.frames_done += frames.len() as u64;
         Ok(())
     }
@@ -406,6 +416,7 @@ impl Engine {
             }
         }
         self.raw.clear();
+        self.intake.forget_stale();
         if self.picks.is_none() {
             for frame in frames {
                 self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);

@@ -9,12 +9,21 @@ use somatic::{Error, Frame};
 
 /// What comes from a source.
 pub(super) enum Arrival {
-    /// The next frames, and how much of the whole has been read where that is known.
-    Frames(Vec<Frame>, Option<f64>),
+    /// The next frames, and what is known of them.
+    Frames(Vec<Frame>, Told),
     /// There is no more; what was lost on the way.
     End(Vec<String>),
     /// It cannot go on.
     Failed(Error),
+}
+
+/// What a source tells of frames beside them.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    /// How much of the whole has been read, where that is known.
+    pub(super) progress: Option<f64>,
+    /// When the last byte of each was read, of those of which that is known.
+    pub(super) read_at: Vec<Instant>,
 }
 
 /// How frames are to come.
@@ -38,8 +47,18 @@ pub(super) struct Feed {
 
 impl Feed {
     /// Starts to read `source`.
-    pub(super) fn start(mut source: Box<dyn Source + Send>, manner: Manner) -> Self {
-        let (sender, arrivals) = sync_channel(if manner.gather { 4 } else { 1024 });
+    pub(super) fn start(source: Box<dyn Source + Send>, manner: Manner) -> Self {
+        Self::holding(source, manner, if manner.gather { 4 } else { 1024 })
+    }
+
+    /// Starts to read `source`, which itself drops what is not taken in time, at most so many frames at once.
+    pub(super) fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
+        Self::holding(source, Manner { most, gather: false, speed: None }, 1)
+    }
+
+    /// Starts to read `source`, of which so many arrivals may wait.
+    fn holding(mut source: Box<dyn Source + Send>, manner: Manner, waiting: usize) -> Self {
+        let (sender, arrivals) = sync_channel(waiting);
         let (spare, used) = channel();
         thread::spawn(move || {
             let end = read(&mut *source, manner, &sender, &used);
@@ -59,12 +78,13 @@ impl Feed {
                 Err(RecvTimeoutError::Disconnected) => Arrival::Failed(Error::failed("the source broke down")),
             },
         };
-        let Arrival::Frames(mut frames, mut progress) = first else { return Some(first) };
+        let Arrival::Frames(mut frames, mut told) = first else { return Some(first) };
         while frames.len() < self.most {
             match self.arrivals.try_recv() {
                 Ok(Arrival::Frames(more, further)) => {
                     frames.extend(more);
-                    progress = further;
+                    told.progress = further.progress;
+                    told.read_at.extend(further.read_at);
                 }
                 Ok(other) => {
                     self.next = Some(other);
@@ -73,7 +93,7 @@ impl Feed {
                 Err(_) => break,
             }
         }
-        Some(Arrival::Frames(frames, progress))
+        Some(Arrival::Frames(frames, told))
     }
 
     /// Takes back frames whose memory can be used again.
@@ -91,11 +111,15 @@ fn read(source: &mut dyn Source, manner: Manner, to: &SyncSender<Arrival>, used:
     loop {
         pool.extend(used.try_iter().flatten());
         let mut frames = Vec::with_capacity(together);
+        let mut told = Told::default();
         let mut end = None;
         while frames.len() < together && end.is_none() {
             let mut frame = pool.pop().unwrap_or_else(|| Frame::missing(0.0, width));
             match source.next_frame(&mut frame) {
-                Ok(true) => frames.push(frame),
+                Ok(true) => {
+                    frames.push(frame);
+                    told.read_at.extend(source.read_at());
+                }
                 Ok(false) => end = Some(Arrival::End(source.losses())),
                 Err(e) => end = Some(Arrival::Failed(e)),
             }
@@ -103,7 +127,8 @@ fn read(source: &mut dyn Source, manner: Manner, to: &SyncSender<Arrival>, used:
         if let (Some(clock), Some(frame)) = (&mut clock, frames.first()) {
             thread::sleep(clock.until(frame.t_s));
         }
-        if !frames.is_empty() && to.send(Arrival::Frames(frames, source.progress())).is_err() {
+        told.progress = source.progress();
+        if !frames.is_empty() && to.send(Arrival::Frames(frames, told)).is_err() {
             return Arrival::End(Vec::new());
         }
         if let Some(end) = end {

@@ -1,6 +1,6 @@
 //! What frames are read from.
 
-use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec};
+use somatic::source::{CsvSource, Cut, Replay, SerialSource, Source, SourceSpec};
 use somatic::{Error, Result, bundled};
 
 use super::scene::Asked;
@@ -11,6 +11,8 @@ pub(super) struct Input {
     pub(super) name: String,
     /// `None` is the bundled touch.
     pub(super) spec: Option<SourceSpec>,
+    /// The serial lines, each with its speed in baud where one is given; empty for what is no serial line.
+    pub(super) lines: Vec<(String, Option<u32>)>,
 }
 
 impl Input {
@@ -23,7 +25,7 @@ impl Input {
     pub(super) fn named(asked: &Asked) -> Result<Self> {
         let Some(text) = asked.sources.first() else {
             return match asked.body.as_deref() {
-                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None }),
+                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new() }),
                 Some(body) => Err(Error::usage(format!(
                     "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
                 ))),
@@ -33,9 +35,16 @@ impl Input {
         let name = match &spec {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
             SourceSpec::Stdin => "stdin".to_owned(),
+            _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
         };
-        let input = Self { name, spec: Some(spec) };
+        let mut lines = Vec::new();
+        for source in &asked.sources {
+            if let SourceSpec::Serial { port, baud } = source.parse()? {
+                lines.push((port, baud));
+            }
+        }
+        let input = Self { name, spec: Some(spec), lines };
         if asked.speed.is_some() && !input.is_recording() {
             return Err(Error::usage("--speed is for recordings; live frames come when they come"));
         }
@@ -51,6 +60,14 @@ impl Input {
 
     pub(super) fn is_recording(&self) -> bool {
         !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
+    }
+
+    /// Opens the serial lines. What is wrong with the wiring is told with its file.
+    pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<SerialSource> {
+        SerialSource::open(&self.lines, ids, &asked.serial()?).map_err(|e| match &asked.wiring {
+            Some(path) if !e.is_usage() => e.at(path.display()),
+            _ => e,
+        })
     }
 
     /// Opens it, or the part of it that is asked for, for a body whose taxels have `ids`.

@@ -41,6 +41,8 @@ pub(super) struct View {
     table: Option<Table>,
     pace: Pace,
     drawn: Option<Instant>,
+    /// What stands below the table.
+    footer: Vec<String>,
 }
 
 impl View {
@@ -70,21 +72,36 @@ impl View {
         }
     }
 
+    fn is_due(&self) -> bool {
+        self.screen.is_some() && self.drawn.is_none_or(|drawn| drawn.elapsed() >= REDRAW)
+    }
+
+    /// Puts `lines` below the table, if it is time to draw.
+    pub(super) fn set_footer(&mut self, lines: impl FnOnce() -> Vec<String>) {
+        if self.is_due() {
+            self.footer = lines();
+        }
+    }
+
     /// Draws, if it is time to.
     pub(super) fn draw(&mut self) {
-        let Some(screen) = &mut self.screen else { return };
-        if self.drawn.is_some_and(|drawn| drawn.elapsed() < REDRAW) {
+        if !self.is_due() {
             return;
         }
+        let Some(screen) = &mut self.screen else { return };
         self.drawn = Some(Instant::now());
         self.pace.tick();
         let (rows, columns) = screen.room();
         let bar = self.pace.bar(columns);
         let mut lines = Vec::new();
+        // The table has at least half of the room.
+        let below: Vec<String> = self.footer.iter().take(rows / 2).map(|line| clipped(line, columns)).collect();
+        let room = rows.saturating_sub(usize::from(bar.is_some()) + below.len());
         if let Some(table) = &mut self.table {
-            table.lines(&mut lines, &self.pace, rows.saturating_sub(bar.is_some().into()), columns);
+            table.lines(&mut lines, &self.pace, room, columns);
         }
-        lines.truncate(rows.saturating_sub(bar.is_some().into()));
+        lines.truncate(room);
+        lines.extend(below);
         lines.extend(bar);
         screen.draw(&lines);
     }
@@ -115,6 +132,7 @@ impl Choice {
             table: self.is_table().then(|| Table::new(about)),
             pace: Pace::new(self == Self::Bar),
             drawn: None,
+            footer: Vec::new(),
         }
     }
 }

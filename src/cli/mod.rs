@@ -14,6 +14,8 @@ mod feed;
 mod info;
 mod input;
 mod inspect;
+mod latency;
+mod lines;
 mod live;
 mod paper;
 mod plan;
@@ -47,6 +49,7 @@ Examples:
   somatic run | jq -c '.fields[] | [.field, .total]'
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
+  somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         where they are
@@ -133,7 +136,8 @@ fn print(text: &str) -> Result<()> {
 
 /// The body in the file `name`, or the bundled one of that name where there is no such file.
 fn load_body(name: &str) -> Result<Body> {
-    if !Path::new(name).exists() {
+    // A link of this name to a serial port is no body.
+    if !Path::new(name).is_file() {
         if let Some(bytes) = bundled::body(name) {
             return Body::from_bytes(name, bytes);
         }

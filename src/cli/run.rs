@@ -3,21 +3,23 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use console::Term;
 use somatic::signal::Unfit;
 use somatic::sink::{FieldNames, Flow, Heard, Session, Sink, SinkSpec};
+use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
 use super::attached;
 use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
+use super::lines::Live;
 use super::live::{About, View};
 use super::scene::Asked;
 use super::tradeoff::{say_kept, settled};
-use super::{DONE, FAILED, LOST, say};
+use super::{DONE, FAILED, LOST, say, words};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -31,6 +33,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
   somatic run --source mcap:touch.mcap --from 60 --to 90   that minute's half, with the body it was made on
+  somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
 
 A frame on standard input is a line such as {\"t\":0.5,\"values\":{\"7\":12.0}}.
@@ -49,6 +52,15 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     asked: Asked,
+
+    /// End after so long, such as 10s.
+    #[arg(long = "for", value_name = "TIME")]
+    lasts: Option<String>,
+
+    /// Write what became of the frames of boards on serial lines, and how long percepts took, to this file in the end, as
+    /// JSON.
+    #[arg(long, value_name = "FILE")]
+    summary: Option<PathBuf>,
 }
 
 /// What sinks call the fields.
@@ -75,7 +87,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     attached::check_apart(&input, &sinks)?;
-    let source = input.open(&ids, &asked)?;
+    let recorded = if input.lines.is_empty() { Some(input.open(&ids, &asked)?) } else { None };
+    let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
+    if arguments.summary.is_some() && recorded.is_some() {
+        return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
+    }
 
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
@@ -84,6 +100,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
     let mut engine = Engine::new(&body, settled.options)?;
+    // Boards speak as soon as their lines are open: not before somebody can listen.
+    let (source, live) = match recorded {
+        Some(source) => (source, None),
+        None => {
+            let source = input.open_lines(&ids, &asked)?;
+            engine.heed_stale();
+            let live = Live::new(source.lines(), arguments.summary.clone(), asked.quiet);
+            (Box::new(source) as Box<dyn Source + Send>, Some(live))
+        }
+    };
     engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if asked.backend.unwrap_or_default() == BackendKind::Auto && !asked.quiet {
         let (name, what, why) = engine.backend();
@@ -110,11 +136,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         force: asked.force,
     };
     let sinks = sinks.iter().map(|sink| sink.open(&session)).collect::<Result<_>>()?;
-    let feed = Feed::start(source, Manner { most: batch, gather, speed });
+    let feed = match live {
+        None => Feed::start(source, Manner { most: batch, gather, speed }),
+        Some(_) => Feed::start_live(source, batch),
+    };
     let agreement = asked.verify.then(Agreement::default);
-    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false };
-    let losses = pump.run(feed, &stop)?;
-    pump.finish(&losses)
+    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false, live };
+    let until = lasts.map(|span| Instant::now() + span);
+    match pump.run(feed, &stop, until) {
+        Ok(losses) => pump.finish(losses),
+        Err(error) => {
+            let Pump { view, live, .. } = pump;
+            drop(view);
+            // What was said of the lines tells why.
+            live.into_iter().for_each(|mut live| live.tell(false));
+            Err(error)
+        }
+    }
 }
 
 /// Takes frames from a feed through the engine to whoever is to have the percepts.
@@ -129,24 +167,29 @@ struct Pump {
     unfit: Vec<(u32, Unfit)>,
     /// Whether a sink could not go on.
     failed: bool,
+    /// The serial lines, if they are read.
+    live: Option<Live>,
 }
 
 impl Pump {
     /// Runs until the source ends, the last reader has gone, or `stop` is set; gives what the source lost.
-    fn run(&mut self, mut feed: Feed, stop: &AtomicBool) -> Result<Vec<String>> {
+    fn run(&mut self, mut feed: Feed, stop: &AtomicBool, until: Option<Instant>) -> Result<Vec<String>> {
         let watched = self.view.is_table() || self.sinks.is_empty();
-        while !stop.load(Ordering::Relaxed) {
+        while !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
-                Some(Arrival::Frames(frames, progress)) => {
+                Some(Arrival::Frames(frames, told)) => {
                     if let Some(sum) = &mut self.agreement {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);
                     } else {
                         self.engine.process(&frames)?;
                     }
-                    self.view.see(self.engine.percepts(), progress);
+                    self.view.see(self.engine.percepts(), told.progress);
                     self.pass_on(&frames)?;
                     if self.sinks.is_empty() && !watched {
                         break;
+                    }
+                    if let Some(live) = &mut self.live {
+                        live.see(&told.read_at);
                     }
                     feed.give_back(frames);
                     if !self.view.is_table() {
@@ -158,6 +201,10 @@ impl Pump {
                 // Nothing comes, but something may be held back.
                 None if self.flush => self.each_sink(|sink| sink.flush())?,
                 None => {}
+            }
+            if let Some(live) = &mut self.live {
+                live.tell(self.view.is_table());
+                self.view.set_footer(|| live.rows());
             }
             self.view.draw();
         }
@@ -176,13 +223,16 @@ impl Pump {
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
-    fn finish(mut self, losses: &[String]) -> Result<u8> {
+    fn finish(mut self, mut losses: Vec<String>) -> Result<u8> {
         for sink in self.sinks {
             sink.finish()?;
         }
         self.view.finish();
+        if let Some(live) = self.live {
+            losses = live.finish()?;
+        }
         tell_unfit(&self.engine, &mut self.unfit);
-        for loss in losses {
+        for loss in &losses {
             say(&format!("never processed: {loss}"));
         }
         if let Some(agreement) = self.agreement {

@@ -12,9 +12,9 @@ use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
 use somatic::scene::{FilterBy, MotionFilter};
-use somatic::signal::{FsrSignal, Letter, Receptor};
+use somatic::signal::{FsrSignal, Letter, Receptor, Wiring};
 use somatic::sink::{Part, SinkSpec};
-use somatic::source::{SimulatedSource, SourceSpec};
+use somatic::source::{SerialOptions, SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
@@ -33,8 +33,8 @@ pub(super) struct Asked {
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, or - for NDJSON on standard input [default: the bundled
-    /// touch].
+    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, serial:PORT[@BAUD], which may be several, or - for NDJSON
+    /// on standard input [default: the bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -100,6 +100,23 @@ pub(super) struct Asked {
     #[serde(rename = "rate_hz")]
     pub(super) rate: Option<f64>,
 
+    /// Which taxel hangs on which channel of which board on a serial line, TOML; docs/wire.md [default: as many boards as
+    /// ports, numbered from 1, share the taxels in ascending order of their ids].
+    #[arg(long, value_name = "FILE")]
+    pub(super) wiring: Option<PathBuf>,
+
+    /// Frames a second that boards on serial lines are put together to, in Hz; 0 is one at each frame of any board
+    /// [default: one at each frame of the fastest board].
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "live_rate_hz")]
+    pub(super) live_rate: Option<f64>,
+
+    /// Frames a second that boards on serial lines are told to send, in Hz; 0 is as many as the line takes [default: as they
+    /// do].
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "board_rate_hz")]
+    pub(super) board_rate: Option<f64>,
+
     /// Frames a call, at most: more is faster, fewer is sooner [default: 256 for recordings, 1 live].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     #[serde(deserialize_with = "batch")]
@@ -136,7 +153,8 @@ pub(super) struct Asked {
     #[arg(long)]
     pub(super) force: bool,
 
-    /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing [default: 0].
+    /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing [default: 0; for
+    /// boards on serial lines three of their frames, and at least 0.05].
     #[arg(long, value_name = "S")]
     #[serde(rename = "max_age_s")]
     pub(super) max_age: Option<f64>,
@@ -213,6 +231,7 @@ impl Asked {
         let folder = path.parent().unwrap_or(Path::new(""));
         let there = |file: &Path| folder.join(file).display().to_string();
         asked.calibration = asked.calibration.map(|file| folder.join(file));
+        asked.wiring = asked.wiring.map(|file| folder.join(file));
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
@@ -258,6 +277,9 @@ impl Asked {
             signal: list(&self.signal, file.signal),
             tare: self.tare || file.tare,
             rate: self.rate.or(file.rate),
+            wiring: self.wiring.clone().or(file.wiring),
+            live_rate: self.live_rate.or(file.live_rate),
+            board_rate: self.board_rate.or(file.board_rate),
             batch: self.batch.or(file.batch),
             speed: self.speed.or(file.speed),
             from: self.from.or(file.from),
@@ -296,8 +318,19 @@ impl Asked {
 
     fn check(&self) -> Result<()> {
         self.check_accuracy().map_err(|(_, e)| e)?;
-        if self.sources.len() > 1 {
-            return Err(Error::usage("this version reads one --source at a time; merge them, or run once for each"));
+        let lines = self.sources.iter().filter(|source| source.starts_with("serial:")).count();
+        if self.sources.len() > 1 && lines < self.sources.len() {
+            return Err(Error::usage(
+                "only serial lines are read several at a time; merge the others, or run once for each",
+            ));
+        }
+        let of_lines = [
+            ("--wiring", self.wiring.is_some()),
+            ("--live-rate", self.live_rate.is_some()),
+            ("--board-rate", self.board_rate.is_some()),
+        ];
+        if let Some((flag, _)) = of_lines.iter().find(|(_, given)| *given && lines == 0) {
+            return Err(Error::usage(format!("{flag} is for boards on serial lines; add --source serial:PORT")));
         }
         if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
             return Err(Error::usage(format!(
@@ -334,6 +367,19 @@ impl Asked {
         self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
     }
 
+    /// How boards on serial lines are read.
+    ///
+    /// # Errors
+    /// The wiring cannot be read.
+    pub(super) fn serial(&self) -> Result<SerialOptions> {
+        Ok(SerialOptions {
+            wiring: self.wiring.as_ref().map(Wiring::load).transpose()?,
+            live_rate_hz: self.live_rate,
+            board_rate_hz: self.board_rate,
+            max_age_s: self.max_age,
+        })
+    }
+
     /// The body that is meant.
     ///
     /// # Errors
@@ -368,10 +414,12 @@ impl Asked {
         let outputs = self.outputs();
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
+        let live = self.sources.iter().any(|source| source.starts_with("serial:"));
         let scene = Scene {
             outputs,
             fields: self.fields.clone(),
-            max_age_s: self.max_age.unwrap_or(usual.max_age_s),
+            // Boards' values have their age where frames are put together.
+            max_age_s: self.max_age.filter(|_| !live).unwrap_or(usual.max_age_s),
             max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
             letters: Letter::all_of(letters, &self.signal),
             filter: self.filter(outputs)?,

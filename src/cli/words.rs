@@ -1,5 +1,9 @@
 //! Numbers as people read them.
 
+use std::time::Duration;
+
+use somatic::{Error, Result};
+
 /// `value` with four significant digits, in at most nine characters.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
@@ -38,6 +42,14 @@ pub(super) fn span(seconds: f64) -> String {
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.1} h", s / 3600.0),
     }
+}
+
+/// `2s`, `500ms`, `10min`, as `--for` has them.
+pub(super) fn seconds(text: &str) -> Result<Duration> {
+    let unit = |suffix: &str, factor: f64| Some(text.strip_suffix(suffix)?.trim().parse::<f64>().ok()? * factor);
+    let span = unit("ms", 1e-3).or_else(|| unit("min", 60.0)).or_else(|| unit("s", 1.0));
+    span.and_then(|s| Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| Error::usage(format!("--for `{text}` is no time; write 2s, 500ms or 10min")))
 }
 
 /// A line of a list for people: a mark, and `text` between words onto as many lines as a terminal needs.

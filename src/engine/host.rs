@@ -50,6 +50,22 @@ pub(super) struct Host<'a> {
     pub(super) cadence: Option<&'a OnChange>,
 }
 
+/// Flags every field that holds a taxel that is stale. `stale` has those of each frame, by their places in the body.
+pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Percepts) {
+    let fields = plan.fields.len();
+    for (frame, stale) in stale.iter().enumerate().filter(|(_, stale)| !stale.is_empty()) {
+        let mut channels = vec![false; plan.channels()];
+        for channel in stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok()) {
+            channels[channel] = true;
+        }
+        for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(&plan.fields) {
+            if plan.members_of(field).iter().any(|member| channels[plan.channel_of(member.slot as usize)]) {
+                *flags |= Flags::STALE;
+            }
+        }
+    }
+}
+
 impl Host<'_> {
     /// A backend's part of a call, then the host's.
     pub(super) fn run(

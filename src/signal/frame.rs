@@ -14,6 +14,9 @@ pub struct RawValue(u32);
 impl RawValue {
     /// No value arrived.
     pub const MISSING: Self = Self(0xFFFF_FFFF);
+    /// No value arrived, and none will soon: the board that has the sensor is silent. Only for engines that heed it
+    /// ([`crate::Engine::heed_stale`]); for others it is [`RawValue::MISSING`] that says so.
+    pub const STALE: Self = Self(0xFFFF_FFFE);
     /// Something arrived that is no number.
     pub const FAULTY: Self = Self(0x7FC0_0000);
 
@@ -40,7 +43,7 @@ impl RawValue {
     /// Whether no value arrived.
     #[must_use]
     pub fn is_missing(self) -> bool {
-        self == Self::MISSING
+        self == Self::MISSING || self == Self::STALE
     }
 
     /// The number, if it is one.
@@ -61,6 +64,7 @@ impl std::fmt::Debug for RawValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.number() {
             Some(value) => write!(f, "{value}"),
+            None if *self == Self::STALE => f.write_str("stale"),
             None if self.is_missing() => f.write_str("missing"),
             None => f.write_str("faulty"),
         }
@@ -110,7 +114,8 @@ mod tests {
         assert_eq!(RawValue::new(1023.0).number(), Some(1023.0));
         assert_eq!(RawValue::new(f64::NAN), RawValue::FAULTY);
         assert_eq!(RawValue::new(1e39), RawValue::FAULTY);
-        assert!(RawValue::default().is_missing());
+        assert!(RawValue::default().is_missing() && RawValue::STALE.is_missing());
+        assert_eq!(RawValue::STALE.number(), None);
         assert_eq!(RawValue::MISSING.number(), None);
         assert_ne!(RawValue::new(1e-60).number(), Some(0.0));
         assert!(RawValue::new(-1e-60).number().unwrap() < 0.0);

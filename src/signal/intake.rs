@@ -22,6 +22,8 @@ pub(crate) struct Intake {
     /// Per taxel, how far it is pressed, in raw units; only for the check on isolated ones.
     rise: Vec<f64>,
     frames_seen: u64,
+    /// Per frame since [`Intake::forget_stale`], the taxels that are stale in it; `None` where nobody heeds them.
+    stale: Option<Vec<Vec<usize>>>,
 }
 
 impl Intake {
@@ -37,6 +39,7 @@ impl Intake {
             now: vec![RawValue::MISSING; taxels],
             rise: vec![0.0; taxels],
             frames_seen: 0,
+            stale: None,
         }
     }
 
@@ -50,6 +53,21 @@ impl Intake {
         &self.taxel_of_value
     }
 
+    /// From now on, notes which taxels are stale.
+    pub(crate) fn heed_stale(&mut self) {
+        self.stale = Some(Vec::new());
+    }
+
+    /// Per frame taken since [`Intake::forget_stale`], the taxels that are stale in it; none where that is not heeded.
+    pub(crate) fn stale(&self) -> &[Vec<usize>] {
+        self.stale.as_deref().unwrap_or_default()
+    }
+
+    /// Begins a call.
+    pub(crate) fn forget_stale(&mut self) {
+        self.stale.iter_mut().for_each(Vec::clear);
+    }
+
     /// Number of values a frame must have.
     pub(crate) fn width(&self) -> usize {
         self.taxel_of_value.len()
@@ -60,7 +78,7 @@ impl Intake {
         let checks = &self.calibration.checks;
         let checked =
             checks.settle_frames > 0 || checks.broken_frame_share.is_some() || checks.isolated_ratio.is_some();
-        if checked || self.max_age_s > 0.0 {
+        if checked || self.max_age_s > 0.0 || self.stale.is_some() {
             return None;
         }
         let mut value_of = vec![None; self.now.len()];
@@ -79,6 +97,7 @@ impl Intake {
         if self.max_age_s > 0.0 {
             self.hold(frame.t_s);
         }
+        self.note_stale();
         let settling = self.frames_seen < self.calibration.checks.settle_frames;
         self.frames_seen += 1;
         if settling || self.is_broken() {
@@ -93,6 +112,19 @@ impl Intake {
             self.distrust_isolated(ratio);
         }
         out.extend(slots.iter().map(|&slot| self.now[slot]));
+    }
+
+    /// What is stale is missing, and noted if anybody heeds it.
+    fn note_stale(&mut self) {
+        let Some(stale) = &mut self.stale else { return };
+        let mut noted = Vec::new();
+        for (taxel, value) in self.now.iter_mut().enumerate() {
+            if *value == RawValue::STALE {
+                *value = RawValue::MISSING;
+                noted.push(taxel);
+            }
+        }
+        stale.push(noted);
     }
 
     /// A value that is missing is the last one that arrived, while that is young enough.
@@ -165,6 +197,21 @@ mod tests {
         let late = take(&mut intake, &frame(1.6, &[None, None, None]));
         assert_eq!(numbers(&late), [None, None, Some(10.0)]);
         assert!(late[0].is_missing());
+    }
+
+    #[test]
+    fn what_is_stale_is_missing_and_noted() {
+        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.0);
+        assert!(intake.picks(&[0, 1]).is_some() && intake.stale().is_empty());
+        intake.heed_stale();
+        assert!(intake.picks(&[0, 1]).is_none());
+        let mut seen = frame(0.0, &[Some(1.0), None, None]);
+        seen.values[2] = RawValue::STALE;
+        assert_eq!(take(&mut intake, &seen)[1..], [RawValue::MISSING; 2]);
+        assert_eq!(intake.stale(), [vec![2]]);
+        intake.forget_stale();
+        take(&mut intake, &frame(0.0, &[None, None, Some(1.0)]));
+        assert_eq!(intake.stale(), [Vec::<usize>::new()]);
     }
 
     #[test]

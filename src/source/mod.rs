@@ -10,6 +10,8 @@ mod ports;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod replay;
+#[cfg(feature = "cli")]
+mod serial;
 mod simulated;
 mod spec;
 
@@ -19,8 +21,12 @@ pub use ndjson::NdjsonSource;
 #[cfg(feature = "cli")]
 pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
+#[cfg(feature = "cli")]
+pub use serial::{BoardAccount, BoardState, Lines, SerialOptions, SerialSource};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
+
+use std::time::Instant;
 
 use crate::error::Result;
 use crate::signal::Frame;
@@ -43,6 +49,10 @@ pub trait Source {
 
     /// Says that nothing before `t_s` is wanted: a source that can pass over it without reading it does so.
     fn skip_to(&mut self, _t_s: f64) {}
+    /// When the last byte of the last frame was read, where that is known; asked for once a frame.
+    fn read_at(&mut self) -> Option<Instant> {
+        None
+    }
 
     /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.
     fn losses(&self) -> Vec<String> {

@@ -71,15 +71,11 @@ impl SourceSpec {
     /// Opens the source. `taxels` are the ids that the body has, `rate_hz` the rate of a CSV without a column `t`.
     ///
     /// # Errors
-    /// It cannot be opened, or this version does not read it; a usage error where a rate makes no sense.
+    /// It cannot be opened, or this build does not read it; a usage error where a rate makes no sense.
     pub fn open(&self, taxels: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
         if rate_hz.is_some() && !matches!(self, Self::Csv(_)) {
             return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
         }
-        let not_yet = |what: &str, place: String| {
-            Err(Error::failed(format!("this version does not read {what} yet; record to CSV, or pipe NDJSON to `-`"))
-                .at(place))
-        };
         match self {
             Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
             Self::Stdin => {
@@ -89,24 +85,21 @@ impl SourceSpec {
             #[cfg(feature = "mcap")]
             Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
             #[cfg(not(feature = "mcap"))]
-            Self::Mcap(path) => not_yet("MCAP without the feature `mcap`", path.display().to_string()),
+            Self::Mcap(path) => {
+                Err(Error::failed("this build reads no MCAP; build with feature `mcap`").at(path.display()))
+            }
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
-            Self::Serial { port, .. } => not_yet(&format!("serial lines ({})", ports()), port.clone()),
+            #[cfg(feature = "cli")]
+            Self::Serial { port, baud } => {
+                let ports = [(port.clone(), *baud)];
+                Ok(Box::new(super::SerialSource::open(&ports, taxels, &super::SerialOptions::default())?))
+            }
+            #[cfg(not(feature = "cli"))]
+            Self::Serial { port, .. } => {
+                Err(Error::failed("this build reads no serial lines; build with feature `cli`").at(port))
+            }
         }
     }
-}
-
-/// The serial ports of this machine, in words.
-#[cfg(feature = "cli")]
-fn ports() -> String {
-    let names: Vec<String> =
-        serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect();
-    if names.is_empty() { "no port found".to_owned() } else { format!("ports found: {}", names.join(", ")) }
-}
-
-#[cfg(not(feature = "cli"))]
-fn ports() -> String {
-    "ports are looked for only with feature `cli`".to_owned()
 }
 
 #[cfg(test)]
@@ -141,9 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_yet_says_so() {
-        let why = |text: &str| text.parse::<SourceSpec>().unwrap().open(&[1], None).err().unwrap().to_string();
-        assert!(why("serial:/dev/ttyX").starts_with("/dev/ttyX: this version does not read serial lines"));
+    fn what_is_not_there_says_so() {
         assert!(SourceSpec::Mcap("no/such.mcap".into()).open(&[1], None).is_err());
         assert!(SourceSpec::Sim("no/such.toml".into()).open(&[1], None).err().unwrap().is_not_found());
         assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());

@@ -15,6 +15,8 @@ mod recording;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;
+#[cfg(unix)]
+mod serial;
 mod simulate;
 mod tradeoff;
 

@@ -125,7 +125,7 @@ const STEP: Duration = Duration::from_millis(2);
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let (mut stations, common, play) = open(arguments)?;
-    let lasts = arguments.lasts.as_deref().map(seconds).transpose()?;
+    let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
     let stop = stop_on_signal()?;
     let start = Instant::now();
     for station in &mut stations {
@@ -256,14 +256,6 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
     }
     let common = Common { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
     Ok((stations, common, Play { spec, ids, taxels, most: most.into(), again: again && !live }))
-}
-
-/// `2s`, `500ms`, `10min`.
-fn seconds(text: &str) -> Result<Duration> {
-    let unit = |suffix: &str, factor: f64| Some(text.strip_suffix(suffix)?.trim().parse::<f64>().ok()? * factor);
-    let span = unit("ms", 1e-3).or_else(|| unit("min", 60.0)).or_else(|| unit("s", 1.0));
-    span.and_then(|s| Duration::try_from_secs_f64(s).ok())
-        .ok_or_else(|| Error::usage(format!("--for `{text}` is no time; write 2s, 500ms or 10min")))
 }
 
 fn tell_where(arguments: &Arguments, stations: &[Station]) -> Result<()> {

@@ -1,0 +1,167 @@
+//! What a person is told of serial lines while they are read, and in the end.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use console::style;
+use serde_json::{Value, json};
+use somatic::source::{BoardAccount, BoardState, Lines};
+use somatic::{Error, Result};
+
+use super::latency::Latency;
+use super::say;
+use super::words::count;
+
+/// What was said last stays below the table.
+const REMEMBERED: usize = 3;
+/// More boards than this have one row together.
+const MOST_ROWS: usize = 6;
+
+/// Serial lines while they are read.
+pub(super) struct Live {
+    lines: Lines,
+    latency: Latency,
+    /// Said while a table stood there.
+    kept: Vec<String>,
+    latest: VecDeque<String>,
+    summary: Option<PathBuf>,
+    quiet: bool,
+}
+
+impl Live {
+    pub(super) fn new(lines: Lines, summary: Option<PathBuf>, quiet: bool) -> Self {
+        Self { lines, latency: Latency::default(), kept: Vec::new(), latest: VecDeque::new(), summary, quiet }
+    }
+
+    /// The percepts of frames whose last bytes were read then have been written.
+    pub(super) fn see(&mut self, read_at: &[Instant]) {
+        read_at.iter().for_each(|read_at| self.latency.see(read_at.elapsed()));
+    }
+
+    /// Says what is to be said of the lines; below the table and after it, where one stands there.
+    pub(super) fn tell(&mut self, at_table: bool) {
+        for notice in self.lines.notices() {
+            if !at_table {
+                say(&notice);
+                continue;
+            }
+            if self.latest.len() == REMEMBERED {
+                self.latest.pop_front();
+            }
+            self.latest.push_back(notice.clone());
+            // A line that breaks again and again fills no memory.
+            if self.kept.len() < 1000 {
+                self.kept.push(notice);
+            }
+        }
+    }
+
+    /// What stands below the table.
+    pub(super) fn rows(&self) -> Vec<String> {
+        let accounts = self.lines.accounts();
+        let mut rows = Vec::new();
+        if accounts.len() <= MOST_ROWS {
+            rows.extend(accounts.iter().map(|account| {
+                let text = format!("  board {}: {}, {}", account.board, account.state.word(), told(account));
+                if account.state == BoardState::Speaking { text } else { style(text).yellow().to_string() }
+            }));
+        } else {
+            rows.push(together(&accounts));
+        }
+        if !self.latency.is_empty() {
+            rows.push(format!("  latency {}", self.latency.words()));
+        }
+        rows.extend(self.latest.iter().map(|notice| style(format!("  {notice}")).yellow().to_string()));
+        rows
+    }
+
+    /// Closes the lines, says what became of them, and gives what was lost.
+    pub(super) fn finish(mut self) -> Result<Vec<String>> {
+        self.lines.close();
+        self.kept.drain(..).for_each(|notice| say(&notice));
+        self.tell(false);
+        let accounts = self.lines.accounts();
+        if !self.quiet {
+            for account in accounts.iter().filter(|account| account.state != BoardState::Awaited) {
+                let port = account.port.as_deref().unwrap_or("?");
+                say(&format!("board {} at {port}: {}", account.board, told(account)));
+            }
+            let awaited = accounts.iter().filter(|account| account.state == BoardState::Awaited);
+            let awaited: Vec<String> = awaited.map(|account| account.board.to_string()).collect();
+            if !awaited.is_empty() {
+                say(&format!("never heard of: board {}", awaited.join(", ")));
+            }
+            if !self.latency.is_empty() {
+                say(&format!("from the last byte read to the percept written: {}", self.latency.words()));
+            }
+        }
+        if let Some(path) = &self.summary {
+            let boards: Vec<Value> = accounts.iter().map(as_json).collect();
+            let text = format!("{:#}\n", json!({"boards": boards, "latency": self.latency.json()}));
+            std::fs::write(path, text).map_err(|e| Error::io(path, &e))?;
+        }
+        Ok(self.lines.losses())
+    }
+}
+
+/// What became of a board's frames, in words.
+fn told(account: &BoardAccount) -> String {
+    let sent = account.delivered + account.lost;
+    let mut text = format!("{} sent, {} delivered, {} lost", count(sent, "frame"), account.delivered, account.lost);
+    let more = [
+        (account.dropped, "dropped"),
+        (account.replaced, "replaced by later ones"),
+        (account.corrupt, "pieces corrupt"),
+        (account.unplugs, "times unplugged"),
+        (account.restarts, "times started again"),
+    ];
+    for (number, what) in more.into_iter().filter(|(number, _)| *number > 0) {
+        text += &format!(", {number} {what}");
+    }
+    if let Some(rate) = account.rate_hz {
+        text += &format!("; {rate:.1} frames/s");
+    }
+    if let Some(drift) = account.drift {
+        text += &format!("; clock {:+.0} ppm", drift * 1e6);
+    }
+    text
+}
+
+/// Many boards in one row.
+fn together(accounts: &[BoardAccount]) -> String {
+    let sum = |of: fn(&BoardAccount) -> u64| accounts.iter().map(of).sum::<u64>();
+    let mut text = format!(
+        "  {}: {} frames sent, {} delivered, {} lost",
+        count(accounts.len() as u64, "board"),
+        sum(|account| account.delivered + account.lost),
+        sum(|account| account.delivered),
+        sum(|account| account.lost)
+    );
+    for state in [BoardState::Silent, BoardState::Unplugged, BoardState::Awaited] {
+        let ids = accounts.iter().filter(|account| account.state == state);
+        let ids: Vec<String> = ids.map(|account| account.board.to_string()).collect();
+        if !ids.is_empty() {
+            text += &format!("; {} {}", state.word(), ids.join(", "));
+        }
+    }
+    text
+}
+
+fn as_json(account: &BoardAccount) -> Value {
+    json!({
+        "board": account.board,
+        "port": account.port,
+        "state": account.state.word(),
+        "sent": account.delivered + account.lost,
+        "delivered": account.delivered,
+        "lost": account.lost,
+        "dropped": account.dropped,
+        "replaced": account.replaced,
+        "corrupt": account.corrupt,
+        "restarts": account.restarts,
+        "unplugs": account.unplugs,
+        "drift_ppm": account.drift.map(|drift| drift * 1e6),
+        "rate_hz": account.rate_hz,
+    })
+}

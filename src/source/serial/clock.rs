@@ -1,0 +1,181 @@
+//! A board's clock, told in the host's time.
+//!
+//! A frame that the board reads at x on its clock arrives at y ≥ (1 + b)·x + a here: the delay of line, adapter and
+//! scheduler only ever adds. The line under all points (x, y) that lies nearest to them, which is the edge of their lower
+//! hull beneath the mean of x (Moon, Skelly and Towsley, *Estimation and removal of clock skew from network delay
+//! measurements*, 1999), so is the board's clock but for the shortest delay, however the delays are spread. It is drawn
+//! under the earliest arrival of every half second of the last minute.
+
+use std::collections::VecDeque;
+
+/// Of each so long, on the board's clock, the earliest arrival counts, s.
+const BUCKET_S: f64 = 0.5;
+/// How many of these are remembered.
+const BUCKETS: usize = 120;
+/// Before so much has been seen, s, both clocks are taken to run alike.
+const SHORTEST_S: f64 = 1.0;
+/// Before so much has been seen, s, a drift is not worth telling.
+const TELLING_S: f64 = 10.0;
+/// A board's clock that is off by more, s, was set, and is learnt anew.
+const JUMP_S: f64 = 2.0;
+
+/// What is known of a board's clock.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Clock {
+    first_us: Option<u64>,
+    /// Board's time x since the first frame, s, and y − x, s.
+    buckets: VecDeque<(f64, f64)>,
+    offset_s: f64,
+    /// b: how much faster the host's clock runs, as a part of one.
+    slope: f64,
+    /// The last frame, on both clocks.
+    last: Option<(f64, f64)>,
+}
+
+impl Clock {
+    /// When, in the host's time, the board read a frame that its clock says was at `board_us`, and that arrived at
+    /// `arrived_s`. Never after it arrived; in the order of the board's clock.
+    pub(super) fn place(&mut self, board_us: u64, arrived_s: f64) -> f64 {
+        let x = self.since_first_s(board_us);
+        let y = arrived_s - x;
+        let known = self.offset_s + self.slope * x;
+        if self.last.is_some_and(|(last_x, _)| x < last_x || (y - known).abs() > JUMP_S) {
+            *self = Self::default();
+            return self.place(board_us, arrived_s);
+        }
+        let lower = match self.buckets.back_mut() {
+            Some((at, least)) if (*at / BUCKET_S).floor() == (x / BUCKET_S).floor() => {
+                let lower = y < *least;
+                if lower {
+                    (*at, *least) = (x, y);
+                }
+                lower
+            }
+            _ => {
+                self.buckets.push_back((x, y));
+                true
+            }
+        };
+        if self.buckets.len() > BUCKETS {
+            self.buckets.pop_front();
+        }
+        if lower {
+            self.draw();
+        }
+        let mut host_s = x + (self.offset_s + self.slope * x).min(y);
+        // A line drawn anew must not turn two frames round, nor squeeze the time between them to nothing.
+        if let Some((last_x, last_s)) = self.last {
+            host_s = host_s.max(last_s + 0.5 * (x - last_x)).min(arrived_s.max(last_s));
+        }
+        self.last = Some((x, host_s));
+        host_s
+    }
+
+    /// How much faster the board's clock runs, as a part of one, once that is known.
+    pub(super) fn drift(&self) -> Option<f64> {
+        let (first, last) = (self.buckets.front()?.0, self.buckets.back()?.0);
+        (last - first >= TELLING_S).then(|| (1.0 + self.slope).recip() - 1.0)
+    }
+
+    fn since_first_s(&mut self, board_us: u64) -> f64 {
+        let first = *self.first_us.get_or_insert(board_us);
+        board_us.wrapping_sub(first) as i64 as f64 * 1e-6
+    }
+
+    /// Draws the line under the buckets.
+    fn draw(&mut self) {
+        let (first, last) = (self.buckets[0].0, self.buckets[self.buckets.len() - 1].0);
+        if last - first < SHORTEST_S {
+            let least = self.buckets.iter().map(|&(_, y)| y).fold(f64::INFINITY, f64::min);
+            (self.offset_s, self.slope) = (least, 0.0);
+            return;
+        }
+        let mean = self.buckets.iter().map(|&(x, _)| x).sum::<f64>() / self.buckets.len() as f64;
+        // Andrew's monotone chain, the lower half.
+        let mut hull: Vec<(f64, f64)> = Vec::with_capacity(self.buckets.len());
+        for &point in &self.buckets {
+            while let [.., a, b] = hull[..]
+                && (b.0 - a.0) * (point.1 - a.1) <= (b.1 - a.1) * (point.0 - a.0)
+            {
+                hull.pop();
+            }
+            hull.push(point);
+        }
+        let right = hull.partition_point(|&(x, _)| x <= mean).clamp(1, hull.len() - 1);
+        let ((x0, y0), (x1, y1)) = (hull[right - 1], hull[right]);
+        self.slope = (y1 - y0) / (x1 - x0);
+        self.offset_s = y0 - self.slope * x0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// SplitMix64's stream as numbers in 0..1.
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// The largest error of placing, s, after `from_s`, and the drift found, of a clock with this `drift` whose frames come
+    /// every 20 ms with delays of 3 ms and up to `jitter_s` more, now and then 50 ms more.
+    fn followed(drift: f64, jitter_s: f64, from_s: f64) -> (f64, f64) {
+        let (mut clock, mut state, mut worst) = (Clock::default(), 7, 0.0_f64);
+        for frame in 0..6000 {
+            let read_s = 5.0 + 0.02 * f64::from(frame);
+            let late = if random(&mut state) < 0.05 { 0.05 } else { 0.0 };
+            let arrived_s = read_s + 0.003 + jitter_s * random(&mut state) + late;
+            let host_s = clock.place((read_s * (1.0 + drift) * 1e6) as u64, arrived_s);
+            assert!(host_s <= arrived_s);
+            if read_s > from_s {
+                worst = worst.max((host_s - read_s - 0.003).abs());
+            }
+        }
+        (worst, clock.drift().unwrap())
+    }
+
+    #[test]
+    fn clocks_that_run_apart_are_followed() {
+        for drift in [-100e-6, 0.0, 100e-6, 0.01] {
+            // The least of 25 delays, each even over the jitter, is over half of it with a chance of 2⁻²⁵: the line stays
+            // within half of the jitter of the truth where it is drawn, and twice that far at its end.
+            let (worst, found) = followed(drift, 0.002, 15.0);
+            assert!(worst < 0.002, "{drift}: {worst}");
+            // Half the jitter at both ends of the window's minute.
+            assert!((found - drift).abs() < 0.002 / 59.0, "{drift}: {found}");
+        }
+        // Without jitter, to the microsecond that the board's clock counts in.
+        let (worst, found) = followed(100e-6, 0.0, 6.0);
+        assert!(worst < 5e-6 && (found - 100e-6).abs() < 2e-6 / 59.0 + 1e-9, "{worst} {found}");
+        // The same frames, taken to be from a clock that runs as ours, would be off by 12 ms in the end.
+        assert!((100e-6_f64 * 120.0 - 0.012).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_clock_that_was_set_is_learnt_anew() {
+        let mut clock = Clock::default();
+        for frame in 0..100_u32 {
+            clock.place(u64::from(frame) * 20_000, 1.0 + 0.02 * f64::from(frame));
+        }
+        assert_eq!(clock.place(90_000_000, 3.02), 3.02, "ahead");
+        assert_eq!(clock.place(5, 3.04), 3.04, "back");
+        assert!((clock.place(20_005, 3.07) - 3.06).abs() < 1e-9, "late, and known to be");
+    }
+
+    #[test]
+    fn time_goes_on_when_a_delay_gets_shorter() {
+        let mut clock = Clock::default();
+        let mut last = f64::NEG_INFINITY;
+        // A shorter delay bends the line until most of what is remembered is later than it.
+        for frame in 0..1000_u32 {
+            let delay = if frame < 200 { 0.1 } else { 0.001 };
+            let at = clock.place(u64::from(frame) * 20_000, 0.02 * f64::from(frame) + delay);
+            assert!(at > last, "{frame}: {at} {last}");
+            last = at;
+        }
+        assert!((last - 999.0 * 0.02 - 0.001).abs() < 1e-9, "{last}");
+    }
+}

@@ -1,0 +1,323 @@
+//! Boards' frames put together into frames of the whole skin. No I/O, no clock: times are given, in seconds of the host's.
+//!
+//! A channel's value is as old as the last frame of its board that confirmed it: one that holds it, or a partial one that
+//! leaves it out as unchanged, where nothing was lost in between. What is too old is missing, and what belongs to a board
+//! that is silent is stale; neither is ever taken for zero.
+
+use crate::signal::{Frame, RawValue};
+
+use super::clock::Clock;
+
+/// Frames of a board that may be missing before its values count as missing, unless the user says how long.
+const PERIODS: f64 = 3.0;
+/// As USB adapters and schedulers hold frames up, values are believed at least so long, s.
+const LEAST_AGE_S: f64 = 0.05;
+/// The period of a board that has not shown its own, s.
+const UNKNOWN_PERIOD_S: f64 = 0.1;
+/// While no board speaks, a frame without values comes so often, s.
+const HEARTBEAT_S: f64 = 0.1;
+/// A board takes over the pace only when it is so much faster.
+const FASTER: f64 = 0.8;
+
+/// When a frame is put together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pace {
+    /// At each frame of the fastest board.
+    Fastest,
+    /// At each frame of any board.
+    Arrival,
+    /// Every so many seconds.
+    Every(f64),
+}
+
+/// A frame of a board, as it came.
+#[derive(Clone, Debug)]
+pub(super) struct BoardFrame {
+    /// Which of the wiring's boards.
+    pub(super) board: usize,
+    /// The board's clock, unwrapped, µs.
+    pub(super) board_us: u64,
+    /// When its last byte was read, s.
+    pub(super) arrived_s: f64,
+    /// Frames before it that were lost.
+    pub(super) lost: u32,
+    /// Whether the board's clock has begun anew.
+    pub(super) restarted: bool,
+    /// Whether what it leaves out is as before.
+    pub(super) partial: bool,
+    /// Channels and their values.
+    pub(super) values: Vec<(u16, u16)>,
+}
+
+/// What a channel said.
+#[derive(Clone, Copy)]
+struct Known {
+    value: u16,
+    /// The last frame that confirmed it, s.
+    confirmed_s: f64,
+    /// Whether nothing was lost since that may have changed it.
+    sure: bool,
+}
+
+/// What is known of a board.
+struct Board {
+    /// Per channel, its taxel's place in a frame's values.
+    places: Vec<Option<usize>>,
+    /// Per channel.
+    known: Vec<Option<Known>>,
+    clock: Clock,
+    period_s: f64,
+    /// The last frame: when it was read in the board's time, µs, and in the host's, s.
+    last: Option<(u64, f64)>,
+    /// Whether its last frame is in no frame of the skin yet.
+    waiting: bool,
+    replaced: u64,
+}
+
+impl Board {
+    fn most_age_s(&self, asked: Option<f64>) -> f64 {
+        asked.unwrap_or((PERIODS * self.period_s).max(LEAST_AGE_S))
+    }
+
+    fn speaks(&self, now_s: f64, asked: Option<f64>) -> bool {
+        self.last.is_some_and(|(_, at)| now_s - at <= self.most_age_s(asked))
+    }
+
+    /// Takes what `frame` says; when it was read, in the host's time.
+    fn take(&mut self, frame: &BoardFrame) -> f64 {
+        if frame.restarted {
+            (self.clock, self.last) = (Clock::default(), None);
+            self.known.fill(None);
+        }
+        let at = self.clock.place(frame.board_us, frame.arrived_s);
+        if let Some((before_us, _)) = self.last {
+            let frames = f64::from(frame.lost) + 1.0;
+            let step = frame.board_us.saturating_sub(before_us) as f64 * 1e-6 / frames;
+            // A pause says nothing of a period.
+            if step > 0.0 && step < 8.0 * self.period_s {
+                self.period_s += 0.1 * (step - self.period_s);
+            }
+        }
+        self.last = Some((frame.board_us, at));
+        for known in self.known.iter_mut().flatten() {
+            known.sure &= frame.lost == 0;
+            if frame.partial && known.sure {
+                known.confirmed_s = at;
+            }
+        }
+        for &(channel, value) in &frame.values {
+            if let Some(known) = self.known.get_mut(usize::from(channel)) {
+                *known = Some(Known { value, confirmed_s: at, sure: true });
+            }
+        }
+        self.replaced += u64::from(std::mem::replace(&mut self.waiting, true));
+        at
+    }
+}
+
+/// Boards on their way to frames.
+pub(super) struct Merge {
+    boards: Vec<Board>,
+    pace: Pace,
+    max_age_s: Option<f64>,
+    /// Which board sets the pace.
+    leader: Option<usize>,
+    last_s: f64,
+    /// When a frame is due by itself.
+    due_s: Option<f64>,
+}
+
+impl Merge {
+    /// For boards whose channels have these places in a frame's values.
+    pub(super) fn new(boards: Vec<Vec<Option<usize>>>, pace: Pace, max_age_s: Option<f64>) -> Self {
+        let board = |places: Vec<Option<usize>>| Board {
+            known: vec![None; places.len()],
+            places,
+            clock: Clock::default(),
+            period_s: UNKNOWN_PERIOD_S,
+            last: None,
+            waiting: false,
+            replaced: 0,
+        };
+        let boards = boards.into_iter().map(board).collect();
+        Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None }
+    }
+
+    /// Takes a board's frame; when the frame of the skin is to be that this brings about, if it brings one.
+    pub(super) fn take(&mut self, frame: &BoardFrame) -> Option<f64> {
+        let at = self.boards.get_mut(frame.board)?.take(frame);
+        if let Pace::Every(period_s) = self.pace {
+            self.due_s.get_or_insert(frame.arrived_s + period_s);
+            return None;
+        }
+        if self.pace == Pace::Fastest && self.lead(frame.board, at) != frame.board {
+            return None;
+        }
+        // While nobody speaks, frames come by themselves: from when this board's values are too old.
+        let longest = self.boards.iter().map(|board| board.most_age_s(self.max_age_s)).fold(0.0, f64::max);
+        self.due_s = Some(frame.arrived_s + longest + HEARTBEAT_S);
+        (at > self.last_s).then_some(at)
+    }
+
+    /// Which board sets the pace, now that `board` has spoken.
+    fn lead(&mut self, board: usize, now_s: f64) -> usize {
+        let leads = match self.leader {
+            Some(leader) if self.boards[leader].speaks(now_s, self.max_age_s) => {
+                let (own, theirs) = (self.boards[board].period_s, self.boards[leader].period_s);
+                if own < FASTER * theirs { board } else { leader }
+            }
+            _ => board,
+        };
+        self.leader = Some(leads);
+        leads
+    }
+
+    /// Whether frames come at a rate of their own.
+    pub(super) fn is_timed(&self) -> bool {
+        matches!(self.pace, Pace::Every(_))
+    }
+
+    /// When [`Merge::tick`] next has something to do, s.
+    pub(super) fn due_s(&self) -> Option<f64> {
+        self.due_s
+    }
+
+    /// When the frame of the skin is to be that is due at `now_s`, if one is.
+    pub(super) fn tick(&mut self, now_s: f64) -> Option<f64> {
+        let due = self.due_s.filter(|due| now_s >= *due)?;
+        let period_s = if let Pace::Every(period_s) = self.pace { period_s } else { HEARTBEAT_S };
+        // What could not be kept up with is not made up for.
+        let next = due + period_s;
+        self.due_s = Some(if next < now_s { now_s + period_s } else { next });
+        (now_s > self.last_s).then_some(now_s)
+    }
+
+    /// Puts together what is known at `at_s`.
+    pub(super) fn fill(&mut self, at_s: f64, frame: &mut Frame) {
+        frame.clear();
+        frame.t_s = at_s;
+        self.last_s = at_s;
+        for board in &mut self.boards {
+            board.waiting = false;
+            let most = board.most_age_s(self.max_age_s);
+            let absent = if board.speaks(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
+            for (place, known) in board.places.iter().zip(&board.known) {
+                let Some(place) = *place else { continue };
+                let young = known.filter(|known| at_s - known.confirmed_s <= most);
+                frame.values[place] = young.map_or(absent, |known| RawValue::new(known.value.into()));
+            }
+        }
+    }
+
+    /// Of the board `board`: frames that a later one replaced before a frame of the skin had them, the drift of its clock,
+    /// and frames a second.
+    pub(super) fn about(&self, board: usize) -> (u64, Option<f64>, Option<f64>) {
+        let board = &self.boards[board];
+        (board.replaced, board.clock.drift(), board.last.map(|_| board.period_s.recip()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(board: usize, at_s: f64, values: &[(u16, u16)]) -> BoardFrame {
+        let board_us = (at_s * 1e6).round() as u64;
+        let values = values.to_vec();
+        BoardFrame { board, board_us, arrived_s: at_s, lost: 0, restarted: false, partial: false, values }
+    }
+
+    fn two_boards(pace: Pace, max_age_s: Option<f64>) -> Merge {
+        Merge::new(vec![vec![Some(0), Some(1)], vec![None, Some(2)]], pace, max_age_s)
+    }
+
+    fn numbers(merge: &mut Merge, at_s: f64) -> Vec<Option<f64>> {
+        let mut frame = Frame::missing(0.0, 3);
+        merge.fill(at_s, &mut frame);
+        assert_eq!(frame.t_s, at_s);
+        frame.values.iter().map(|value| value.number()).collect()
+    }
+
+    #[test]
+    fn the_fastest_board_sets_the_pace_and_another_takes_over() {
+        let mut merge = two_boards(Pace::Fastest, None);
+        let mut came = Vec::new();
+        for tick in 0..200_u32 {
+            let at = 1.0 + 0.01 * f64::from(tick);
+            // Board 1 is twice as fast until it falls silent.
+            for (board, sends) in [(0, tick % 2 == 0), (1, tick < 100)] {
+                if sends && let Some(at) = merge.take(&frame(board, at + 0.001 * board as f64, &[(1, tick as u16)])) {
+                    merge.fill(at, &mut Frame::missing(0.0, 3));
+                    came.push((tick, board));
+                }
+            }
+        }
+        let leaders: Vec<usize> = came.iter().map(|&(_, board)| board).collect();
+        assert!(leaders[30..90].iter().all(|&board| board == 1), "{leaders:?}");
+        assert!(came.iter().filter(|(tick, _)| (105..).contains(tick)).all(|&(_, board)| board == 0));
+        assert!(came.iter().filter(|(tick, _)| *tick >= 110).count() == 45, "every frame of the other");
+        // Board 1 is known to be faster after three frames of the other. Board 0 takes over when 50 ms are over.
+        assert!(merge.about(0).0 <= 4 && merge.about(1).0 <= 5, "{} {}", merge.about(0).0, merge.about(1).0);
+    }
+
+    #[test]
+    fn what_is_too_old_is_missing_and_a_silent_board_is_stale() {
+        let mut merge = two_boards(Pace::Arrival, Some(0.1));
+        assert_eq!(merge.take(&frame(0, 1.0, &[(0, 5), (1, 6)])), Some(1.0));
+        assert_eq!(numbers(&mut merge, 1.0), [Some(5.0), Some(6.0), None], "board 1 was never heard");
+        merge.take(&frame(1, 1.05, &[(0, 9), (1, 7)]));
+        assert_eq!(numbers(&mut merge, 1.05), [Some(5.0), Some(6.0), Some(7.0)]);
+        // A full frame without channel 1: it ages alone.
+        merge.take(&frame(0, 1.09, &[(0, 4)]));
+        merge.take(&frame(0, 1.12, &[(0, 3)]));
+        let mut seen = Frame::missing(0.0, 3);
+        merge.fill(1.12, &mut seen);
+        assert_eq!(seen.values, [RawValue::new(3.0), RawValue::MISSING, RawValue::new(7.0)]);
+        merge.take(&frame(0, 1.2, &[(0, 3)]));
+        merge.fill(1.2, &mut seen);
+        assert_eq!(seen.values, [RawValue::new(3.0), RawValue::MISSING, RawValue::STALE]);
+    }
+
+    #[test]
+    fn a_partial_frame_confirms_what_it_leaves_out_unless_something_was_lost() {
+        let mut merge = two_boards(Pace::Arrival, Some(0.1));
+        merge.take(&frame(0, 1.0, &[(0, 5), (1, 6)]));
+        let partial = |at, lost, values: &[(u16, u16)]| BoardFrame { partial: true, lost, ..frame(0, at, values) };
+        merge.take(&partial(1.09, 0, &[(0, 8)]));
+        assert_eq!(numbers(&mut merge, 1.15), [Some(8.0), Some(6.0), None]);
+        merge.take(&partial(1.18, 1, &[(0, 9)]));
+        assert_eq!(numbers(&mut merge, 1.18), [Some(9.0), Some(6.0), None], "still young");
+        merge.take(&partial(1.24, 0, &[]));
+        // Channel 1 may have changed in the frame that was lost: what leaves it out says nothing more of it.
+        assert_eq!(numbers(&mut merge, 1.24), [Some(9.0), None, None]);
+        merge.take(&partial(1.25, 0, &[(1, 7)]));
+        assert_eq!(numbers(&mut merge, 1.25), [Some(9.0), Some(7.0), None]);
+        let restarted = BoardFrame { restarted: true, ..frame(0, 0.5, &[(0, 1)]) };
+        merge.take(&BoardFrame { arrived_s: 1.3, ..restarted });
+        assert_eq!(numbers(&mut merge, 1.3), [Some(1.0), None, None]);
+    }
+
+    #[test]
+    fn frames_come_at_the_rate_that_was_asked_for() {
+        let mut merge = two_boards(Pace::Every(0.1), None);
+        assert_eq!((merge.due_s(), merge.tick(5.0)), (None, None), "nobody has spoken");
+        assert_eq!(merge.take(&frame(0, 10.0, &[(0, 1)])), None);
+        assert_eq!(merge.tick(10.05), None);
+        assert_eq!(merge.tick(10.11), Some(10.11));
+        assert!((merge.due_s().unwrap() - 10.2).abs() < 1e-9);
+        assert_eq!(merge.tick(12.0), Some(12.0), "late");
+        assert!((merge.due_s().unwrap() - 12.1).abs() < 1e-9, "and not made up for");
+    }
+
+    #[test]
+    fn while_nobody_speaks_frames_say_so() {
+        let mut merge = two_boards(Pace::Fastest, Some(0.1));
+        merge.take(&frame(0, 1.0, &[(0, 5)]));
+        assert_eq!(numbers(&mut merge, 1.0)[0], Some(5.0));
+        assert_eq!(merge.tick(1.15), None);
+        assert_eq!(merge.tick(1.25), Some(1.25));
+        let mut seen = Frame::missing(0.0, 3);
+        merge.fill(1.25, &mut seen);
+        assert_eq!(seen.values, [RawValue::STALE; 3]);
+    }
+}

@@ -1,0 +1,216 @@
+//! Boards on serial lines, many at once, as one source of frames.
+//!
+//! A thread a port reads and decodes ([`crate::wire`]) and never waits for whoever takes the frames: what nobody takes is
+//! dropped, oldest first, and counted. Frames of boards are put together into frames of the skin, each channel with its
+//! age. `docs/live.md` says what is told of lines and what each message means.
+
+mod clock;
+mod lines;
+mod merge;
+mod port;
+mod session;
+
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::{Arc, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+pub use lines::{BoardAccount, BoardState, Lines};
+
+use self::lines::Shared;
+use self::merge::{Merge, Pace};
+use self::session::{Session, Task};
+use super::Source;
+use crate::error::{Error, Result};
+use crate::signal::{Frame, Wiring};
+
+/// The speed of a line for which nobody says another, baud.
+const USUAL_BAUD: u32 = 57_600;
+/// The longest wait between two looks at whether the lines are closed.
+const LONGEST_WAIT: Duration = Duration::from_millis(50);
+
+/// How boards on serial lines are read.
+#[derive(Clone, Debug, Default)]
+pub struct SerialOptions {
+    /// Which taxel hangs on which channel of which board. Without one, as many boards as ports, numbered from 1, share the
+    /// body's taxels in ascending order of their ids ([`Wiring::in_order`]).
+    pub wiring: Option<Wiring>,
+    /// Frames of the skin a second, Hz; 0 for one at each frame of any board. Without one, one at each frame of the fastest
+    /// board.
+    pub live_rate_hz: Option<f64>,
+    /// Frames a second that boards are told to send, Hz; 0 is as many as the line takes. Without one, they send as they do.
+    pub board_rate_hz: Option<f64>,
+    /// How old a value may be, s; without one, three frames of its board, and 50 ms at least.
+    pub max_age_s: Option<f64>,
+}
+
+/// Frames of boards on serial lines.
+///
+/// Times count from when it was opened, s. What is missing because its whole board is silent is [`crate::RawValue::STALE`].
+pub struct SerialSource {
+    lines: Lines,
+    merge: Merge,
+    taxels: Vec<u32>,
+    start: Instant,
+    read_at: Option<Instant>,
+}
+
+impl SerialSource {
+    /// Starts to read `ports`, each with its speed in baud where one is given, for a body whose taxels have `ids`.
+    ///
+    /// It is open at once: whether boards answer is said while it is read ([`Lines::notices`]), and is an error of
+    /// [`Source::next_frame`] where no line can be used.
+    ///
+    /// # Errors
+    /// A port is named twice; the wiring has taxels that the body does not have; a rate or an age makes no sense.
+    pub fn open(ports: &[(String, Option<u32>)], ids: &[u32], options: &SerialOptions) -> Result<Self> {
+        let wiring = match &options.wiring {
+            Some(wiring) => wiring.clone(),
+            None => Wiring::in_order(ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
+        };
+        check(ports, ids, &wiring)?;
+        let pace = pace(options.live_rate_hz)?;
+        let rate_mhz = options.board_rate_hz.map(rate_mhz).transpose()?;
+        let taxels: Vec<u32> =
+            wiring.boards().iter().flat_map(|board| board.taxels.iter().flatten().copied()).collect();
+        let mut next = 0..taxels.len();
+        let mut place = |taxel: &Option<u32>| taxel.and_then(|_| next.next());
+        let places = wiring.boards().iter().map(|board| board.taxels.iter().map(&mut place).collect()).collect();
+
+        let wiring = Arc::new(wiring);
+        let shared = Arc::new(Shared::new(wiring.boards().iter().map(|board| board.id), ports.len()));
+        let start = Instant::now();
+        for (line, (port, baud)) in ports.iter().enumerate() {
+            let usual = || wired_baud(&wiring, port).unwrap_or(USUAL_BAUD);
+            let session = Session::new(Task {
+                line,
+                port: port.clone(),
+                baud: baud.unwrap_or_else(usual),
+                fixed: baud.is_some(),
+                rate_mhz,
+                wiring: Arc::clone(&wiring),
+                shared: Arc::clone(&shared),
+            });
+            thread::Builder::new()
+                .name(format!("line {}", line + 1))
+                .spawn(move || port::read(session, start))
+                .map_err(|e| Error::failed(format!("cannot start a thread: {e}")).at(port))?;
+        }
+        let merge = Merge::new(places, pace, options.max_age_s);
+        Ok(Self { lines: Lines(shared), merge, taxels, start, read_at: None })
+    }
+
+    /// What is to be known of the lines, for whoever shows it.
+    #[must_use]
+    pub fn lines(&self) -> Lines {
+        self.lines.clone()
+    }
+}
+
+/// The speed that the wiring has for the board that it expects on `port`, or for all boards.
+fn wired_baud(wiring: &Wiring, port: &str) -> Option<u32> {
+    let boards = wiring.boards();
+    let own = boards.iter().find(|board| board.port.as_deref() == Some(port)).and_then(|board| board.baud);
+    own.or_else(|| boards[0].baud.filter(|_| boards.iter().all(|board| board.baud == boards[0].baud)))
+}
+
+fn check(ports: &[(String, Option<u32>)], ids: &[u32], wiring: &Wiring) -> Result<()> {
+    let mut named = HashSet::new();
+    for (port, _) in ports {
+        let same = Path::new(port).canonicalize().unwrap_or_else(|_| port.into());
+        if !named.insert(same) {
+            return Err(Error::usage("this port is named twice; name each once").at(port));
+        }
+    }
+    let there: HashSet<u32> = ids.iter().copied().collect();
+    for board in wiring.boards() {
+        let strange = board.taxels.iter().enumerate().find(|(_, taxel)| taxel.is_some_and(|id| !there.contains(&id)));
+        if let Some((channel, Some(id))) = strange {
+            let what = format!("taxel {id} hangs here, which the body does not have; is it the right body?");
+            return Err(Error::failed(what).at(format!("wiring: board {}: channel {channel}", board.id)));
+        }
+    }
+    Ok(())
+}
+
+fn pace(live_rate_hz: Option<f64>) -> Result<Pace> {
+    match live_rate_hz {
+        None => Ok(Pace::Fastest),
+        Some(0.0) => Ok(Pace::Arrival),
+        Some(hz) if (0.001..=1e5).contains(&hz) => Ok(Pace::Every(hz.recip())),
+        Some(hz) => Err(Error::usage(format!("--live-rate {hz} is no rate; give 0.001 to 100000 Hz, or 0"))),
+    }
+}
+
+fn rate_mhz(hz: f64) -> Result<u32> {
+    if hz == 0.0 || (0.001..=1e6).contains(&hz) {
+        return Ok((hz * 1e3).round() as u32);
+    }
+    Err(Error::usage(format!(
+        "--board-rate {hz} is no rate; give 0.001 to 1000000 Hz, or 0 for as many as the line takes"
+    )))
+}
+
+impl Source for SerialSource {
+    fn taxels(&self) -> &[u32] {
+        &self.taxels
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        let shared = Arc::clone(&self.lines.0);
+        let mut state = shared.lock();
+        loop {
+            if state.closed {
+                return Ok(false);
+            }
+            let due = match state.take() {
+                Some((came, read_at)) => {
+                    let due = self.merge.take(&came);
+                    let (replaced, drift, rate_hz) = self.merge.about(came.board);
+                    let account = &mut state.accounts[came.board];
+                    (account.replaced, account.drift, account.rate_hz) = (replaced, drift, rate_hz);
+                    self.read_at = Some(read_at);
+                    due
+                }
+                None => {
+                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
+                    // A frame that says that nobody speaks is made of no bytes.
+                    self.read_at = self.read_at.filter(|_| due.is_none() || self.merge.is_timed());
+                    due
+                }
+            };
+            if let Some(at_s) = due {
+                drop(state);
+                frame.values.resize(self.taxels.len(), crate::signal::RawValue::MISSING);
+                self.merge.fill(at_s, frame);
+                return Ok(true);
+            }
+            if !state.queue.is_empty() {
+                continue;
+            }
+            if let Some(error) = state.hopeless() {
+                return Err(error);
+            }
+            let until_due = |due_s: f64| Duration::try_from_secs_f64(due_s - self.start.elapsed().as_secs_f64());
+            let wait =
+                self.merge.due_s().map_or(LONGEST_WAIT, |due| until_due(due).unwrap_or_default().min(LONGEST_WAIT));
+            state = shared.arrived.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn read_at(&mut self) -> Option<Instant> {
+        // A frame that nobody's bytes brought about has none.
+        self.read_at.take()
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.lines.losses()
+    }
+}
+
+impl Drop for SerialSource {
+    fn drop(&mut self) {
+        self.lines.close();
+    }
+}

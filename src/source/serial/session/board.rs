@@ -1,0 +1,190 @@
+//! Whether who speaks on a line is the board that the wiring has, and what becomes of its frames.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::{Talk, Task};
+use crate::signal::WiredBoard;
+use crate::source::serial::lines::{BoardState, Verdict};
+use crate::source::serial::merge::BoardFrame;
+use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, Placed, layout_hash};
+
+impl Talk {
+    /// Counts what was lost before a packet of the board that has an account.
+    pub(super) fn enter(&mut self, head: &Head, placed: &Placed, now: Duration) {
+        let Some((board, id)) = self.joined.filter(|(_, id)| *id == head.board) else { return };
+        let mut state = self.task.shared.lock();
+        state.accounts[board].lost += u64::from(placed.lost);
+        self.lost += placed.lost;
+        if placed.restarted {
+            state.accounts[board].restarts += 1;
+            state.say(format!("{}: board {id} has started again", self.task.port));
+            drop(state);
+            self.clock_begins = true;
+            self.doubt(now);
+        }
+    }
+
+    /// Who is there must be asked for again.
+    fn doubt(&mut self, now: Duration) {
+        (self.board, self.since) = (None, now);
+    }
+
+    /// A board says who it is: whether the wiring has it so, and what it is to do.
+    pub(super) fn identified(&mut self, head: &Head, placed: &Placed, identity: &Identity<'_>, now: Duration) {
+        let wiring = Arc::clone(&self.task.wiring);
+        let Some(board) = wiring.boards().iter().position(|board| board.id == head.board) else {
+            return self.stranger(head.board);
+        };
+        if let Err(why) = fits(&wiring.boards()[board], identity) {
+            self.board = None;
+            return self.bad(format!("board {}: {why}", head.board));
+        }
+        if !self.join(board, head.board) {
+            return;
+        }
+        // A board that stops unasked, and did not start again, was told so by somebody else, or has nothing more to say.
+        let stops = identity.request == 0 && !identity.running && self.started && !placed.restarted;
+        if stops {
+            if !std::mem::replace(&mut self.stopped, true) {
+                self.task.shared.lock().accounts[board].state = BoardState::Silent;
+                self.say(&format!("board {} has stopped", head.board));
+            }
+            return;
+        }
+        self.stopped = false;
+        let rate = self.task.rate_mhz.filter(|rate| *rate != identity.rate_mhz);
+        if let Some(rate_mhz) = rate {
+            self.ask(Command::Rate { rate_mhz }, now);
+        }
+        if !identity.running {
+            self.ask(Command::Start, now);
+            self.started = true;
+        }
+    }
+
+    fn stranger(&mut self, id: u16) {
+        self.board = None;
+        let ids: Vec<String> = self.task.wiring.boards().iter().map(|board| board.id.to_string()).collect();
+        let known =
+            if ids.len() == 1 { format!("has board {}", ids[0]) } else { format!("has boards {}", ids.join(", ")) };
+        self.bad(format!("board {id} is here, and the wiring {known}; give --wiring a file that has it"));
+    }
+
+    /// A board that sends frames and answers nothing is believed as far as its frames go.
+    pub(super) fn take_as_it_is(&mut self, head: &Head, reach: usize, partial: bool) {
+        let wiring = Arc::clone(&self.task.wiring);
+        let Some(board) = wiring.boards().iter().position(|board| board.id == head.board) else {
+            return self.stranger(head.board);
+        };
+        let wired = wiring.boards()[board].taxels.len();
+        if !partial && reach < wired {
+            return self.bad(format!("board {} has {reach} channels, and the wiring {wired}", head.board));
+        }
+        if self.join(board, head.board) {
+            let what = "sends frames but answers nothing, so its layout is not checked; does the line lead to it, too?";
+            self.say(&format!("board {} {what}", head.board));
+        }
+    }
+
+    /// The board is right, and heard on this line alone.
+    fn join(&mut self, board: usize, id: u16) -> bool {
+        let Task { line, port, shared, .. } = &self.task;
+        let mut state = shared.lock();
+        if let Some(other) = state.claim(board, *line) {
+            drop(state);
+            self.bad(format!("board {id} is here and on line {} as well; give one of them another id", other + 1));
+            return false;
+        }
+        state.judge(*line, Verdict::Good);
+        let account = &mut state.accounts[board];
+        account.port = Some(port.clone());
+        let (was_away, was_bad) = (self.unplugged.take().is_some(), self.said.take().is_some());
+        if was_away && self.joined == Some((board, id)) {
+            state.say(format!("{port}: board {id} is back"));
+            self.clock_begins = true;
+        } else if was_away || was_bad {
+            state.say(format!("{port}: board {id} is there"));
+        }
+        if self.joined != Some((board, id)) {
+            if let Some((other, _)) = self.joined {
+                state.accounts[other].state = BoardState::Silent;
+            }
+            // What came before is not in its account.
+            (self.joined, self.lost, self.clock_begins) = (Some((board, id)), 0, true);
+        }
+        drop(state);
+        self.board = Some(board);
+        true
+    }
+
+    /// Hands a frame on, if its board is known.
+    pub(super) fn frame(&mut self, head: &Head, frame: BoardFrame, now: Duration, read_at: Instant) {
+        let Some((board, id)) = self.joined.filter(|(_, id)| *id == head.board) else {
+            if self.board.is_some() {
+                // Another board on this line.
+                self.doubt(now);
+            }
+            return;
+        };
+        if self.board != Some(board) {
+            // It came, and was not used: lost.
+            self.lost += 1;
+            self.task.shared.lock().accounts[board].lost += 1;
+            return;
+        }
+        if std::mem::take(&mut self.silent) {
+            self.task.shared.lock().say(format!("{}: board {id} sends frames again", self.task.port));
+        }
+        (self.last_frame, self.stopped) = (now, false);
+        let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_begins));
+        self.task.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);
+    }
+}
+
+/// Whether `identity` is that of the board that the wiring has.
+fn fits(wired: &WiredBoard, identity: &Identity<'_>) -> Result<(), String> {
+    let (channels, taxels) = (usize::from(identity.channels), &wired.taxels);
+    if channels < taxels.len() {
+        return Err(format!("it has {channels} channels, and the wiring {}", taxels.len()));
+    }
+    if wired.bits.and_then(Bits::new).is_some_and(|bits| bits != identity.bits) {
+        let (has, wants) = (identity.bits.count(), wired.bits.unwrap_or(0));
+        return Err(format!("its values have {has} bits, and the wiring says {wants}"));
+    }
+    let padded = taxels.iter().copied().chain(std::iter::repeat(None)).take(channels);
+    if identity.layout != NO_LAYOUT && identity.layout != layout_hash(padded) {
+        return Err(
+            "it is made for another layout than the wiring's; flash it anew, or give --wiring its file".to_owned()
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_fits_its_wiring_or_it_is_said_why() {
+        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels: vec![Some(4), None, Some(9)] };
+        let hash = |taxels: &[Option<u32>]| layout_hash(taxels.iter().copied());
+        let right = Identity {
+            request: 1,
+            running: true,
+            channels: 3,
+            bits: Bits::Ten,
+            layout: hash(&[Some(4), None, Some(9)]),
+            rate_mhz: 0,
+            firmware: "",
+        };
+        assert_eq!(fits(&wired, &right), Ok(()));
+        assert_eq!(fits(&wired, &Identity { layout: NO_LAYOUT, ..right }), Ok(()), "it does not know");
+        let longer = Identity { channels: 4, layout: hash(&[Some(4), None, Some(9), None]), ..right };
+        assert_eq!(fits(&wired, &longer), Ok(()), "channels that nobody wired");
+        let why = |identity: Identity<'_>| fits(&wired, &identity).unwrap_err();
+        assert!(why(Identity { channels: 2, ..right }).contains("2 channels, and the wiring 3"));
+        assert!(why(Identity { bits: Bits::Twelve, ..right }).contains("12 bits"));
+        assert!(why(Identity { channels: 4, ..right }).contains("another layout"));
+    }
+}
