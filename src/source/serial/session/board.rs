@@ -101,8 +101,8 @@ impl Talk {
         account.port = Some(port.clone());
         let (was_away, was_bad) = (self.unplugged.take().is_some(), self.said.take().is_some());
         if was_away && self.joined == Some((board, id)) {
+            // Its clock went on, or it says that it has started again.
             state.say(format!("{port}: board {id} is back"));
-            self.clock_begins = true;
         } else if was_away || was_bad {
             state.say(format!("{port}: board {id} is there"));
         }
