@@ -2,12 +2,14 @@
 
 mod cadence;
 mod host;
+mod ids;
 mod kept_up;
 
 use std::ops::Range;
 
 use self::cadence::{OnChange, step};
 use self::host::{Host, Links, Side, flag_stale};
+use self::ids::ranges;
 use self::kept_up::KeptUp;
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::reference::{CellBound, Reference};
@@ -437,22 +439,4 @@ fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], 
         Some(picks) => Rows::Picked { frames, picks },
         None => Rows::Packed { values: raw, channels },
     }
-}
-
-/// Ascending ids in few words: `0–35, 64–103`.
-fn ranges(ids: &[u32]) -> String {
-    let mut words: Vec<String> = Vec::new();
-    let mut start = 0;
-    for end in 1..=ids.len() {
-        if end == ids.len() || ids[end] != ids[end - 1] + 1 {
-            let (first, last) = (ids[start], ids[end - 1]);
-            words.push(if first == last { first.to_string() } else { format!("{first}–{last}") });
-            start = end;
-        }
-    }
-    if words.len() > 6 {
-        words.truncate(5);
-        words.push("…".into());
-    }
-    words.join(", ")
 }

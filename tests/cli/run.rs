@@ -140,7 +140,7 @@ fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--nonsense"]).contains("--nonsense"));
     assert!(fails(2, &["run", "--backend", "gpo"]).contains("'gpu'"));
     assert!(fails(2, &["run", "--body", "mat"]).contains("needs a --source"));
-    assert!(fails(2, &["run", "--source", "a.csv", "--source", "b.csv"]).contains("one --source"));
+    assert!(fails(2, &["run", "--source", "a.csv", "--source", "b.csv"]).contains("only serial lines"));
     assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
     assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
     assert!(fails(2, &["run", "--max-age", "nan"]).contains("--max-age"));
