@@ -18,7 +18,7 @@ use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, NoChart, neighbours};
 use crate::percept::{Flags, Percepts, Precision};
-use crate::scene::{Cadence, Plan, Scene};
+use crate::scene::{Cadence, Coordinates, Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit};
 use crate::stage::calibrate;
 
@@ -157,6 +157,7 @@ impl Engine {
             frames_done: 0,
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
             links: Links {
+                posed: scene.coordinates == Coordinates::World,
                 index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
                 parent: body.links.iter().map(|link| link.parent).collect(),
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),

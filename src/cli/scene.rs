@@ -1,6 +1,7 @@
 //! What is asked for: by the arguments of `somatic run` and `somatic plan`, and by scene files, which have the same words.
 
 mod accuracy;
+mod check;
 mod said;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
-use somatic::scene::{FilterBy, MotionFilter};
+use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor, Wiring};
 use somatic::sink::{Part, SinkSpec};
 use somatic::source::{SerialOptions, SimulatedSource, SourceSpec};
@@ -188,6 +189,19 @@ pub(super) struct Asked {
     #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
     pub(super) accuracy: Accuracy,
 
+    /// By how much a pressure may change, in its unit, until its fields are computed again, with --coverage touched; what
+    /// goes to 0 or comes from it always counts [default: 0, the same percepts to the last bit].
+    #[arg(long, value_name = "P")]
+    pub(super) change_threshold: Option<f64>,
+
+    /// In which frame positions and normals are given: the world where frames carry poses, or each field's anchor whatever
+    /// they carry [default: world].
+    #[arg(long, value_name = "FRAME", value_parser = PossibleValuesParser::new(Coordinates::WORDS)
+        .try_map(|name| name.parse::<Coordinates>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
+    pub(super) coordinates: Option<Coordinates>,
+
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
     pub(super) verify: bool,
@@ -289,6 +303,8 @@ impl Asked {
             force: self.force || file.force,
             max_age: self.max_age.or(file.max_age),
             max_gap: self.max_gap.or(file.max_gap),
+            change_threshold: self.change_threshold.or(file.change_threshold),
+            coordinates: self.coordinates.or(file.coordinates),
             filter_window: self.filter_window.clone().or(file.filter_window),
             filter_by: self.filter_by.or(file.filter_by),
             filter_time: self.filter_time.or(file.filter_time),
@@ -314,57 +330,6 @@ impl Asked {
             BackendKind::Gpu => Some("gpu"),
         };
         self.accuracy.check(backend, self.outputs())
-    }
-
-    fn check(&self) -> Result<()> {
-        self.check_accuracy().map_err(|(_, e)| e)?;
-        let lines = self.sources.iter().filter(|source| source.starts_with("serial:")).count();
-        if self.sources.len() > 1 && lines < self.sources.len() {
-            return Err(Error::usage(
-                "only serial lines are read several at a time; merge the others, or run once for each",
-            ));
-        }
-        let of_lines = [
-            ("--wiring", self.wiring.is_some()),
-            ("--live-rate", self.live_rate.is_some()),
-            ("--board-rate", self.board_rate.is_some()),
-        ];
-        if let Some((flag, _)) = of_lines.iter().find(|(_, given)| *given && lines == 0) {
-            return Err(Error::usage(format!("{flag} is for boards on serial lines; add --source serial:PORT")));
-        }
-        if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
-            return Err(Error::usage(format!(
-                "--speed {speed} is no speed; give a positive number, 1 for as recorded"
-            )));
-        }
-        if let Some(age) = self.max_age.filter(|age| !(age.is_finite() && *age >= 0.0)) {
-            return Err(Error::usage(format!("--max-age {age} is no time span; give seconds from 0")));
-        }
-        if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
-            return Err(Error::usage(format!("--max-gap {gap} is no time span; give seconds over 0")));
-        }
-        Ok(())
-    }
-
-    /// Which motion counts, if that is asked for.
-    fn filter(&self, outputs: Outputs) -> Result<MotionFilter> {
-        let usual = MotionFilter::default();
-        let given = [
-            ("--filter-window", self.filter_window.is_some()),
-            ("--filter-by", self.filter_by.is_some()),
-            ("--filter-time", self.filter_time.is_some()),
-        ];
-        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
-            return Err(Error::usage(format!(
-                "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
-            )));
-        }
-        let filter = MotionFilter {
-            by: self.filter_by.unwrap_or(usual.by),
-            time_constant_s: self.filter_time.unwrap_or(usual.time_constant_s),
-            ..usual
-        };
-        self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
     }
 
     /// How boards on serial lines are read.
@@ -424,6 +389,8 @@ impl Asked {
             letters: Letter::all_of(letters, &self.signal),
             filter: self.filter(outputs)?,
             knobs: self.accuracy.knobs(),
+            change_threshold: self.change_threshold.unwrap_or(usual.change_threshold),
+            coordinates: self.coordinates.unwrap_or(usual.coordinates),
         };
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

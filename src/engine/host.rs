@@ -14,6 +14,8 @@ use crate::stage::{filter, position, touches};
 
 /// What poses are applied to: the body's links and how they hang together at rest.
 pub(super) struct Links {
+    /// Whether poses are heeded.
+    pub(super) posed: bool,
     pub(super) index_of: HashMap<String, usize>,
     pub(super) parent: Vec<Option<usize>>,
     pub(super) world_from_link: Vec<DAffine3>,
@@ -235,7 +237,7 @@ impl Links {
     /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from
     /// there on. `None` where the frame poses neither.
     fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
-        if frame.pose.is_empty() {
+        if frame.pose.is_empty() || !self.posed {
             return None;
         }
         let mut at = Some(link);

@@ -147,6 +147,18 @@ words! {"cadence",
     }
 }
 
+words! {"frame of coordinates",
+    /// In which frame positions and normals are given.
+    #[derive(Default)]
+    Coordinates {
+        /// The world, where a frame carries poses; else each field's anchor.
+        #[default]
+        World = "world",
+        /// Each field's anchor, whatever poses there are.
+        Anchor = "anchor",
+    }
+}
+
 impl Knobs {
     /// Refuses what does not go together with `outputs` and with letters that are changes.
     pub(super) fn check(self, outputs: Outputs, has_changes: bool) -> Result<()> {

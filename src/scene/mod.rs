@@ -9,10 +9,11 @@ mod slots;
 
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
-pub use knobs::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
+pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub use plan::{Plan, choose_fields};
 pub(crate) use plan::{PlanField, Stages};
 
+use crate::error::{Error, Result};
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
@@ -34,6 +35,11 @@ pub struct Scene {
     pub filter: MotionFilter,
     /// What is traded for what.
     pub knobs: Knobs,
+    /// By how much a pressure may change, in its unit, until the fields that hold it are computed again, behind the gate of
+    /// [`Coverage::Touched`]; what goes to 0 or comes from it always counts. At 0 percepts are the same to the last bit.
+    pub change_threshold: f64,
+    /// In which frame positions and normals are given.
+    pub coordinates: Coordinates,
 }
 
 impl Default for Scene {
@@ -44,8 +50,24 @@ impl Default for Scene {
             max_age_s: 0.0,
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
+            change_threshold: 0.0,
+            coordinates: Coordinates::default(),
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
         }
+    }
+}
+
+impl Scene {
+    /// Refuses a threshold that is none, or that no gate heeds.
+    fn check_threshold(&self) -> Result<()> {
+        let threshold = self.change_threshold;
+        if !(threshold.is_finite() && threshold >= 0.0) {
+            return Err(Error::usage(format!("a change threshold is a pressure from 0, not {threshold}")));
+        }
+        if threshold > 0.0 && self.knobs.coverage != Coverage::Touched {
+            return Err(Error::usage("a change threshold is for the gate of coverage touched; ask for that too"));
+        }
+        Ok(())
     }
 }

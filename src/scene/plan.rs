@@ -52,6 +52,7 @@ pub struct Plan {
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
+    change_threshold: f32,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
@@ -144,6 +145,7 @@ impl Plan {
         Letter::check(&scene.letters)?;
         let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
         scene.knobs.check(scene.outputs, has_changes)?;
+        scene.check_threshold()?;
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
@@ -171,6 +173,7 @@ impl Plan {
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
+            change_threshold: scene.change_threshold as f32,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -366,6 +369,11 @@ impl Plan {
     #[must_use]
     pub fn knobs(&self) -> Knobs {
         self.knobs
+    }
+
+    /// By how much a pressure may change unheeded.
+    pub(crate) fn change_threshold(&self) -> f32 {
+        self.change_threshold
     }
 
     /// How single precision adds up, and so how far it may be off.

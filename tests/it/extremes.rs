@@ -337,6 +337,17 @@ fn a_pose_puts_the_answer_in_the_world() {
         // The chart is the field's own and does not turn with the robot.
         assert_eq!(p.centroid, Some([0.5, 0.5]));
     }
+    // Who asks for the anchor's frame gets it, whatever poses there are.
+    for way in ways() {
+        let mut options = at_rest(way);
+        options.scene.coordinates = somatic::scene::Coordinates::Anchor;
+        let p = Engine::new(&body, options).unwrap().process(std::slice::from_ref(&posed)).unwrap().get(0, 0);
+        assert_eq!(
+            (p.in_world, p.position, p.normal),
+            (false, Some([0.5, 0.0, -0.5]), Some([0.0, 1.0, 0.0])),
+            "{way:?}"
+        );
+    }
 }
 
 #[test]

@@ -1,0 +1,64 @@
+//! What does not go together in what is asked for.
+
+use somatic::scene::MotionFilter;
+use somatic::{Error, Outputs, Result};
+
+use super::Asked;
+
+impl Asked {
+    pub(super) fn check(&self) -> Result<()> {
+        self.check_accuracy().map_err(|(_, e)| e)?;
+        let lines = self.sources.iter().filter(|source| source.starts_with("serial:")).count();
+        if self.sources.len() > 1 && lines < self.sources.len() {
+            return Err(Error::usage(
+                "only serial lines are read several at a time; merge the others, or run once for each",
+            ));
+        }
+        let of_lines = [
+            ("--wiring", self.wiring.is_some()),
+            ("--live-rate", self.live_rate.is_some()),
+            ("--board-rate", self.board_rate.is_some()),
+        ];
+        if let Some((flag, _)) = of_lines.iter().find(|(_, given)| *given && lines == 0) {
+            return Err(Error::usage(format!("{flag} is for boards on serial lines; add --source serial:PORT")));
+        }
+        if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
+            return Err(Error::usage(format!(
+                "--speed {speed} is no speed; give a positive number, 1 for as recorded"
+            )));
+        }
+        if let Some(age) = self.max_age.filter(|age| !(age.is_finite() && *age >= 0.0)) {
+            return Err(Error::usage(format!("--max-age {age} is no time span; give seconds from 0")));
+        }
+        if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
+            return Err(Error::usage(format!("--max-gap {gap} is no time span; give seconds over 0")));
+        }
+        if self.verify && self.change_threshold.is_some_and(|threshold| threshold > 0.0) {
+            return Err(Error::usage(
+                "--verify holds percepts to bounds that leave no room for a --change-threshold; leave one of them out",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Which motion counts, if that is asked for.
+    pub(super) fn filter(&self, outputs: Outputs) -> Result<MotionFilter> {
+        let usual = MotionFilter::default();
+        let given = [
+            ("--filter-window", self.filter_window.is_some()),
+            ("--filter-by", self.filter_by.is_some()),
+            ("--filter-time", self.filter_time.is_some()),
+        ];
+        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
+            return Err(Error::usage(format!(
+                "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
+            )));
+        }
+        let filter = MotionFilter {
+            by: self.filter_by.unwrap_or(usual.by),
+            time_constant_s: self.filter_time.unwrap_or(usual.time_constant_s),
+            ..usual
+        };
+        self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
+    }
+}
