@@ -2,7 +2,6 @@
 
 import json
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -16,10 +15,11 @@ every = ("total,peak,active,area,centroid,position,normal,orientation,axis,aniso
 
 def run(arguments):
     """Processor time in s and peak memory in bytes of one run."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([somatic, "run", "--source", recording, "--backend", "cpu", "--quiet", *arguments], check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, after.ru_maxrss * 1024
+    child = subprocess.Popen([somatic, "run", "--source", recording, "--backend", "cpu", "--quiet", *arguments])
+    _, status, used = os.wait4(child.pid, 0)
+    if status:
+        sys.exit(f"benches/recordings: it ended with {os.waitstatus_to_exitcode(status)}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
 
 
 out = os.path.join(place, "percepts.mcap")

@@ -1,4 +1,4 @@
-"""Touches of a person who handles a humanoid: a hand on its forearm, a finger on its chest, one on its shank."""
+"""Touches of a person who handles a humanoid: three fingers on its forearm."""
 
 import sys
 
@@ -20,10 +20,10 @@ noise_sigma = 0.7
 """)
 
 
-def touch(link, path, newton):
+def touch(field, path, newton):
     times = [seconds * i / (len(path) - 1) for i in range(len(path))]
     print(f"""[[touch]]
-on = "{link}"
+on = "{field}"
 indenter = "fingertip"
 path = {path}
 times_s = {times}
@@ -31,11 +31,12 @@ hold = {{ newton = {newton} }}
 """)
 
 
-# Strokes up and down, 4 s each way; the first and last places are the same.
-def stroke(a, b):
+# Strokes to and fro, 4 s each way, of which the field's chart holds every place.
+def stroke(half):
     turns = max(int(seconds / 4), 1)
-    return [a if i % 2 == 0 else b for i in range(turns + 1)]
+    return [[-half if i % 2 == 0 else half, 0.0] for i in range(turns + 1)]
 
 
-touch("left_forearm", stroke([0.03, 0.0, -0.04], [0.03, 0.0, -0.10]), 6)
-touch("chest", stroke([-0.04, 0.12, 0.1], [0.04, 0.12, 0.1]), 4)
+touch("left_arm/forearm/patch_01", stroke(0.008), 6)
+touch("left_arm/forearm/patch_10", stroke(0.006), 6)
+touch("left_arm/forearm/patch_18", stroke(0.006), 4)
