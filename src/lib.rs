@@ -76,7 +76,8 @@ mod stage;
 pub mod survey;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
-mod whole;
+#[doc(hidden)]
+pub mod whole;
 pub mod wire;
 
 pub use backend::BackendKind;

@@ -18,7 +18,10 @@ pub(crate) fn beside(path: &Path) -> Result<NamedTempFile> {
 }
 
 /// Writes `bytes` at `path`.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+///
+/// # Errors
+/// It cannot be written; what was there stays.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = beside(path)?;
     file.write_all(bytes).map_err(|e| Error::io(path, &e))?;
     file.persist(path).map_err(|e| Error::io(path, &e.error))?;
@@ -26,7 +29,10 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes `bytes` at `path`, where nothing may be yet.
-pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+///
+/// # Errors
+/// Something is there, or it cannot be written.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = beside(path)?;
     file.write_all(bytes).map_err(|e| Error::io(path, &e))?;
     file.persist_noclobber(path).map_err(|e| Error::io(path, &e.error))?;

@@ -131,31 +131,19 @@ fn finish_lines(index: u32, quad: u32, found: Found, far: Farthest, moments: Mom
     store(0u, index, quad, status);
 }
 
-@compute @workgroup_size(GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
-    // same block, which so stays in the cache.
-    let index = (group_number(group, groups) * GROUP + local) >> batch.lanes_log2;
-    let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
-    if index >= batch.fields || quad >= quads() {
-        return;
-    }
-    let field = fields[index];
-    if field.count > WIDE {
-        return;
-    }
-    let end = field.first + field.count;
-    let first = at(0u, quad);
-    let charted = field.charted != 0u;
+// What a first look at members gives.
+struct Touch {
+    sums: Sums,
+    place: Place,
+}
+
+// Looks at every `step`th member from `begin` on; their frames begin at `first`.
+fn touch_of(begin: u32, end: u32, step: u32, first: u32, charted: bool) -> Touch {
     var sums = no_sums();
     var place = no_place();
     var over = nothing_over();
     var said = NOTHING_SAID;
-    for (var m = field.first; m < end; m++) {
+    for (var m = begin; m < end; m += step) {
         let member = members[m];
         let bits = bits_at(first + (member.slot << batch.lanes_log2));
         let pressure = pressure_of(bits);
@@ -179,15 +167,23 @@ fn main(
         place = less(place, over);
     }
     if is_said(said) {
-        sums = add_statuses(sums, field.first, end, 1u, first);
+        sums = add_statuses(sums, begin, end, step, first);
     }
-    let found = found_of(field, sums, place);
-    store_sums(index, quad, sums, found.place);
+    return Touch(sums, place);
+}
+
+// What a second look gives, from the place that the first has found.
+struct Spread {
+    far: Farthest,
+    moments: Moments,
+}
+
+fn spread_of(begin: u32, end: u32, step: u32, first: u32, found: Found) -> Spread {
     var far = nobody_far();
     var moments = no_moments();
-    var over_moments = no_moments();
-    if (ORIENTED || AXED) && charted {
-        for (var m = field.first; m < end; m++) {
+    var over = no_moments();
+    if ORIENTED || AXED {
+        for (var m = begin; m < end; m += step) {
             let member = members[m];
             let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
             let q = pull_of(member, pressure) * found.scale;
@@ -196,9 +192,9 @@ fn main(
             }
             if AXED {
                 if COMPENSATED {
-                    let kept = add_moments_with_care(moments, over_moments, member, q, found.place);
+                    let kept = add_moments_with_care(moments, over, member, q, found.place);
                     moments = kept.sums;
-                    over_moments = kept.over;
+                    over = kept.over;
                 } else {
                     moments = add_moments(moments, member, q, found.place);
                 }
@@ -206,9 +202,39 @@ fn main(
         }
     }
     if COMPENSATED {
-        moments = less_moments(moments, over_moments);
+        moments = less_moments(moments, over);
     }
-    finish_lines(index, quad, found, far, moments);
+    return Spread(far, moments);
+}
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
+    // same block, which so stays in the cache.
+    let index = (group_number(group, groups) * GROUP + local) >> batch.lanes_log2;
+    let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
+    if index >= batch.fields || quad >= quads() {
+        return;
+    }
+    let field = fields[index];
+    if field.count > WIDE {
+        return;
+    }
+    let end = field.first + field.count;
+    let first = at(0u, quad);
+    let charted = field.charted != 0u;
+    let touch = touch_of(field.first, end, 1u, first, charted);
+    let found = found_of(field, touch.sums, touch.place);
+    store_sums(index, quad, touch.sums, found.place);
+    var spread = Spread(nobody_far(), no_moments());
+    if charted {
+        spread = spread_of(field.first, end, 1u, first, found);
+    }
+    finish_lines(index, quad, found, spread.far, spread.moments);
 }
 
 // What an invocation has found so far, as bits: of one kind after the other, as there is no room for all.
@@ -292,37 +318,8 @@ fn wide(
     let end = field.first + field.count;
     let first = at(0u, quad);
     let charted = field.charted != 0u;
-    var sums = no_sums();
-    var place = no_place();
-    var over = nothing_over();
-    var said = NOTHING_SAID;
-    for (var m = field.first + local; m < end; m += GROUP) {
-        let member = members[m];
-        let bits = bits_at(first + (member.slot << batch.lanes_log2));
-        let pressure = pressure_of(bits);
-        let pull = pull_of(member, pressure);
-        said = hear(said, bits);
-        if COMPENSATED {
-            let kept = add_with_care(sums.total, place, over, m, member, pull, charted);
-            sums = add_sums(sums, member, pressure, pull);
-            sums.total = kept.total;
-            place = kept.place;
-            over = kept.over;
-        } else {
-            sums = add_sums(sums, member, pressure, pull);
-            if CENTRED {
-                place = add_place(place, m, member, pull, charted);
-            }
-        }
-    }
-    if COMPENSATED {
-        sums.total -= over.total;
-        place = less(place, over);
-    }
-    if is_said(said) {
-        sums = add_statuses(sums, field.first + local, end, GROUP, first);
-    }
-    put_sums(local, sums, place);
+    let touch = touch_of(field.first + local, end, GROUP, first, charted);
+    put_sums(local, touch.sums, touch.place);
     for (var half = GROUP / 2u; half > 0u; half /= 2u) {
         workgroupBarrier();
         if local < half {
@@ -332,33 +329,14 @@ fn wide(
     }
     workgroupBarrier();
     // Every invocation goes on with what all have found.
-    sums = sums_at(0u);
+    let sums = sums_at(0u);
     let found = found_of(field, sums, place_at(0u));
     if local == 0u {
         store_sums(index, quad, sums, found.place);
     }
-    var far = nobody_far();
-    var moments = no_moments();
-    var over_moments = no_moments();
-    if ORIENTED || AXED {
-        for (var m = field.first + local; m < end; m += GROUP) {
-            let member = members[m];
-            let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
-            let q = pull_of(member, pressure) * found.scale;
-            if ORIENTED {
-                far = add_far(far, m, member, pressure, q, found.place);
-            }
-            if AXED {
-                if COMPENSATED {
-                    let kept = add_moments_with_care(moments, over_moments, member, q, found.place);
-                    moments = kept.sums;
-                    over_moments = kept.over;
-                } else {
-                    moments = add_moments(moments, member, q, found.place);
-                }
-            }
-        }
-    }
+    let spread = spread_of(field.first + local, end, GROUP, first, found);
+    var far = spread.far;
+    var moments = spread.moments;
     if ORIENTED {
         workgroupBarrier();
         put_far(local, far);
@@ -371,9 +349,6 @@ fn wide(
         far = far_at(0u);
     }
     if AXED {
-        if COMPENSATED {
-            moments = less_moments(moments, over_moments);
-        }
         workgroupBarrier();
         put_moments(local, moments);
         for (var half = GROUP / 2u; half > 0u; half /= 2u) {

@@ -9,9 +9,10 @@ use console::style;
 use serde_json::json;
 use somatic::source::{Source, SourceSpec};
 use somatic::survey::{Findings, Found, Survey, Wishes};
-use somatic::{Body, Calibration, Error, Result};
+use somatic::{Body, Calibration, Error, Result, whole};
 
 use super::feed::{Arrival, Feed, Manner};
+use super::plot::Format;
 use super::run::stop_on_signal;
 use super::table::{plain, right, shown};
 use super::words::{bullet, count};
@@ -83,7 +84,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
         return Err(Error::usage("--rest and --press are times over 0, in seconds"));
     }
-    let draw = arguments.plot.as_deref().map(picture).transpose()?;
+    let format = arguments.plot.as_deref().map(Format::of).transpose()?;
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let spec: SourceSpec = arguments.source.parse()?;
@@ -98,9 +99,10 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let known: Vec<u32> =
         ids.iter().copied().filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
     Calibration::parse(&text, &known).map_err(|e| e.at("the calibration that follows from this survey"))?;
-    somatic::survey::write(output, text.as_bytes())?;
-    if let (Some(path), Some(draw)) = (&arguments.plot, draw) {
-        somatic::survey::write(path, &draw(&findings)?)?;
+    let write = if arguments.force { whole::write } else { whole::write_new };
+    write(output, text.as_bytes())?;
+    if let (Some(path), Some(format)) = (&arguments.plot, format) {
+        format.write(path, || findings.svg(), || findings.png())?;
     }
     print(&if arguments.json { json_of(&findings) } else { table_of(&findings) })?;
     for loss in &lost {
@@ -172,17 +174,6 @@ fn gather(
         }
     }
     Ok(Vec::new())
-}
-
-type Draw = fn(&Findings) -> Result<Vec<u8>>;
-
-/// How the picture at `path` is drawn, by its ending.
-fn picture(path: &Path) -> Result<Draw> {
-    match path.extension().and_then(|ending| ending.to_str()) {
-        Some("svg") => Ok(|findings| findings.svg().map(String::into_bytes)),
-        Some("png") => Ok(Findings::png),
-        _ => Err(Error::usage("a plot ends in .svg or .png").at(path.display())),
-    }
 }
 
 fn table_of(findings: &Findings) -> String {

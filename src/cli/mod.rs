@@ -19,6 +19,7 @@ mod lines;
 mod live;
 mod paper;
 mod plan;
+mod plot;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;

@@ -3,7 +3,7 @@
 mod settled;
 mod written;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
@@ -16,6 +16,7 @@ use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
 use super::input::Input;
+use super::plot::Format;
 use super::run::{RECORDED_BATCH, stop_on_signal};
 use super::scene::Asked;
 use super::table::{plain, right, shown};
@@ -81,7 +82,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is no time span; give seconds over 0", arguments.seconds)));
     }
-    let drawn = arguments.plot.as_deref().map(Drawn::of).transpose()?;
+    let format = arguments.plot.as_deref().map(Format::of).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
         (Some(_), true) if wish.is_empty() => {
@@ -120,8 +121,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     }
     let way = if asked.batch.is_some_and(|batch| batch > 1) { Way::Batch } else { Way::Live };
     let pick = if wish.is_empty() { None } else { wish.pick(&report, way) };
-    if let (Some(path), Some(drawn)) = (&arguments.plot, drawn) {
-        drawn.write(path, &report)?;
+    if let (Some(path), Some(format)) = (&arguments.plot, format) {
+        format.write(path, || plot_svg(&report), || plot_png(&report))?;
     }
     print(&if arguments.json { json(&report, pick.as_ref())? } else { text(&report, arguments.all) })?;
     let Some(pick) = pick else { return Ok(DONE) };
@@ -189,31 +190,6 @@ fn played(input: &Input, asked: &Asked, ids: &[u32], most: usize) -> Result<Play
         return Err(Error::failed("there is no frame in it").at(&played.source));
     }
     Ok(played)
-}
-
-/// A picture's format.
-#[derive(Clone, Copy)]
-enum Drawn {
-    Svg,
-    Png,
-}
-
-impl Drawn {
-    fn of(path: &Path) -> Result<Self> {
-        match path.extension().and_then(|end| end.to_str()) {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(Error::usage(format!("--plot {} is neither .svg nor .png", path.display()))),
-        }
-    }
-
-    fn write(self, path: &Path, report: &Report) -> Result<()> {
-        let bytes = match self {
-            Self::Svg => plot_svg(report)?.into_bytes(),
-            Self::Png => plot_png(report)?,
-        };
-        std::fs::write(path, bytes).map_err(|e| Error::io(path, &e))
-    }
 }
 
 fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {

@@ -8,11 +8,8 @@
 mod figure;
 mod file;
 
-use std::path::Path;
-
 use crate::error::{Error, Result};
 use crate::signal::RawValue;
-use crate::whole;
 
 /// Values of a sensor that are kept, at most; of a longer rest every second, fourth and so on.
 const MOST: usize = 4096;
@@ -234,14 +231,6 @@ impl Survey {
         let there = ends.iter().filter(|&&other| other == end).count();
         (there >= 3 && 10 * there >= ends.len()).then(|| end.into())
     }
-}
-
-/// Writes `bytes` at `path`, whole or not at all.
-///
-/// # Errors
-/// It cannot be written.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    whole::write(path, bytes)
 }
 
 /// A sensor's baseline and noise from its values at rest.

@@ -27,7 +27,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("sink", vec!["error", "percept", "signal", "body", "recording"]),
         ("ink", vec!["error"]),
         ("picture", vec!["error", "body", "field", "backend", "ink", "whole"]),
-        ("survey", vec!["error", "signal", "ink", "whole"]),
+        ("survey", vec!["error", "signal", "ink"]),
         (
             "experiments",
             vec![

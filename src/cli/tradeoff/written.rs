@@ -4,21 +4,16 @@ use std::path::Path;
 
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Combination, Wish};
-use somatic::{BackendKind, Error, Result};
+use somatic::{BackendKind, Error, Result, whole};
 use toml_edit::{DocumentMut, Item, Table, value};
 
 /// Writes `combination` into the scene file at `path`.
 pub(super) fn write(path: &Path, combination: &Combination, wish: &Wish) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let text = with(&text, combination, wish).map_err(|e| e.at(path.display()))?;
-    // Beside it first: a scene is there whole, or as it was.
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let beside = tempfile::NamedTempFile::new_in(folder).map_err(|e| Error::io(folder, &e))?;
-    std::fs::write(beside.path(), text).map_err(|e| Error::io(path, &e))?;
-    let like_before =
-        std::fs::metadata(path).and_then(|meta| std::fs::set_permissions(beside.path(), meta.permissions()));
-    like_before.map_err(|e| Error::io(path, &e))?;
-    beside.persist(path).map(|_| ()).map_err(|e| Error::io(path, &e.error))
+    let permissions = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?.permissions();
+    whole::write(path, text.as_bytes())?;
+    std::fs::set_permissions(path, permissions).map_err(|e| Error::io(path, &e))
 }
 
 /// `text` with `combination` in it.
