@@ -129,6 +129,8 @@ impl Engine {
         }
         let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
+        // Of a large skin these take as much memory as the plan.
+        drop(recharted.fields);
         let upkeep = KeptUp::new(&plan, calibration.upkeep);
         if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(

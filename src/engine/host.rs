@@ -60,7 +60,7 @@ pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Perce
         for channel in stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok()) {
             channels[channel] = true;
         }
-        for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(&plan.fields) {
+        for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(plan.fields.iter()) {
             if plan.members_of(field).iter().any(|member| channels[plan.channel_of(member.slot as usize)]) {
                 *flags |= Flags::STALE;
             }

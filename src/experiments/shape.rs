@@ -16,8 +16,8 @@ use crate::signal::{Frame, RawValue};
 /// How many of what; the rest follows from it and the seed.
 ///
 /// Sensors lie on a flat square sheet, 25 mm² each: at random, and every field has its own distinct random ones of them; or
-/// row by row, and every field has neighbours, as on a real skin, which is kinder to caches. All have weight 1. In every
-/// frame every sensor is pressed.
+/// row by row, and every field has neighbours and stands beside the one before it, as on a real skin, which is kinder to
+/// caches. All have weight 1. In every frame every sensor is pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Sensors of the sheet; their ids count up from 0.
@@ -124,22 +124,25 @@ impl Shape {
         let taxels = taxels.collect();
         let mut order: Vec<u32> = (0..self.sensors as u32).collect();
         let widths = std::iter::repeat_n(self.members, self.fields).chain((self.wide > 0).then_some(self.wide));
-        let fields = widths.enumerate().map(|(field, width)| {
-            let members = if self.local {
-                self.patch(width, &mut random)
-            } else {
-                // The first steps of a Fisher-Yates shuffle, from whatever order the field before left.
-                for place in 0..width {
-                    let left = self.sensors - place;
-                    order.swap(place, place + (random.unit() * left as f64) as usize);
-                }
-                order[..width].iter().map(|&id| (id, MemberSpec::default())).collect()
-            };
-            FieldSpec {
-                name: if field < self.fields { format!("field {field}") } else { "wide".to_owned() },
-                members,
-                ..FieldSpec::default()
+        let members = widths.map(|width| {
+            if self.local {
+                return self.patch(width, &mut random);
             }
+            // The first steps of a Fisher-Yates shuffle, from whatever order the field before left.
+            for place in 0..width {
+                let left = self.sensors - place;
+                order.swap(place, place + (random.unit() * left as f64) as usize);
+            }
+            order[..width].iter().map(|&id| (id, MemberSpec::default())).collect()
+        });
+        let mut members: Vec<BTreeMap<u32, MemberSpec>> = members.collect();
+        if self.local {
+            members[..self.fields].sort_by_key(|members| members.keys().next().copied());
+        }
+        let fields = members.into_iter().enumerate().map(|(field, members)| FieldSpec {
+            name: if field < self.fields { format!("field {field}") } else { "wide".to_owned() },
+            members,
+            ..FieldSpec::default()
         });
         Body {
             name: "sheet".to_owned(),

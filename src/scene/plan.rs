@@ -1,6 +1,7 @@
 //! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use glam::DVec3;
 use globset::{GlobBuilder, GlobSetBuilder};
@@ -66,9 +67,10 @@ pub struct Plan {
     pub(crate) taxels: Vec<layout::Taxel>,
     /// What their responses refer to.
     pub(crate) curves: Curves,
-    pub(crate) fields: Vec<PlanField>,
+    /// Shared by the engine and its backend: of a large skin these are most of what a plan takes.
+    pub(crate) fields: Arc<[PlanField]>,
     /// All fields' members, one field after the other, each by ascending id.
-    pub(crate) members: Vec<layout::Member>,
+    pub(crate) members: Arc<[layout::Member]>,
 }
 
 /// A field in one letter, as a backend sees it.
@@ -179,8 +181,8 @@ impl Plan {
             calibrated: 0,
             taxels: Vec::new(),
             curves: Curves::default(),
-            fields: Vec::with_capacity(chosen.len()),
-            members: Vec::new(),
+            fields: Arc::default(),
+            members: Arc::default(),
             body_taxels: Vec::new(),
         };
         let first_slots = plan.lay_out_slots(calibration)?;
@@ -188,20 +190,22 @@ impl Plan {
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         let mut first_of = BTreeMap::new();
+        let mut plan_fields: Vec<PlanField> = Vec::with_capacity(chosen.len() * plan.letters.len());
+        let mut members: Vec<layout::Member> = Vec::new();
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let above = std::iter::successors(field.parent, |&above| fields.fields[above].parent);
             let above: Option<usize> = above.into_iter().find_map(|above| first_of.get(&above).copied());
             let unit_m = unit_of(field.radius_m());
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
-            let first = plan.fields.len();
+            let first = plan_fields.len();
             first_of.insert(index, first);
             let still_within = motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32;
-            plan.fields.push(PlanField {
+            plan_fields.push(PlanField {
                 name: field.name.clone(),
                 letter: 0,
                 link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
                 anchor: field.anchor,
-                first: plan.members.len(),
+                first: members.len(),
                 count: field.members.len(),
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
@@ -222,24 +226,24 @@ impl Plan {
             });
             // The same in every letter, but for what it reads and when it counts as touched.
             for letter in 1..plan.letters.len() {
-                plan.fields.push(PlanField { letter, ..plan.fields[first].clone() });
+                plan_fields.push(PlanField { letter, ..plan_fields[first].clone() });
             }
             for (letter, &first_slot) in first_slots.iter().enumerate() {
-                let in_letter = &mut plan.fields[first + letter];
-                in_letter.first = plan.members.len();
+                let in_letter = &mut plan_fields[first + letter];
+                in_letter.first = members.len();
                 in_letter.above = above.map(|above| above + letter);
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
-                plan.members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| {
-                    layout::Member {
-                        slot: first_slot + channel_of(member.taxel),
-                        weight: member.weight as f32,
-                        u: place.x as f32,
-                        v: place.y as f32,
-                    }
+                members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
+                    slot: first_slot + channel_of(member.taxel),
+                    weight: member.weight as f32,
+                    u: place.x as f32,
+                    v: place.y as f32,
                 }));
             }
         }
         plan.body_taxels = body_taxels;
+        plan.fields = plan_fields.into();
+        plan.members = members.into();
         plan.stages.hysteresis = plan.fields.iter().any(|field| field.thresholds != Thresholds::default());
         if plan.stages.hysteresis {
             plan.columns |= Outputs::TOTAL;

@@ -1,5 +1,7 @@
 //! Many frames: sixteen frames of a field abreast.
 
+use std::ops::Range;
+
 use bytemuck::cast_slice_mut;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, u32x16};
@@ -18,11 +20,11 @@ use crate::stage::layout::{Member, Taxel};
 
 /// What a task needs to work in.
 pub(super) struct Scratch {
-    /// By slot, a lane a frame.
+    /// By slot, as far as the window reaches, a lane a frame.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
-    /// Tiles whose statuses say something.
-    faulty: Vec<usize>,
+    /// Places of tiles whose statuses say something.
+    faulty: Vec<bool>,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     between: Box<[Between; LANES]>,
@@ -31,13 +33,13 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    pub(super) fn new(plan: &Plan) -> Self {
-        let padded = plan.slots().next_multiple_of(LANES);
-        let before = if plan.has_changes() { padded / LANES } else { 0 };
+    pub(super) fn new(plan: &Plan, tables: &Tables) -> Self {
+        let kept = tables.window.slots();
+        let before = if plan.has_changes() { kept / LANES } else { 0 };
         Self {
-            pressures: Lines::new(padded, 0.0),
-            statuses: Lines::new(padded, 0),
-            faulty: Vec::new(),
+            pressures: Lines::new(kept, 0.0),
+            statuses: Lines::new(kept, 0),
+            faulty: vec![false; kept / LANES],
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
@@ -48,7 +50,10 @@ impl Scratch {
 /// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
 struct OverFrames<'a, const WEIGHTED: bool> {
+    /// By slot.
     members: &'a [Member],
+    /// The same, by place in the window.
+    seen: &'a [Member],
     depths: &'a [f32],
     taxels: &'a [Taxel],
     pressures: &'a [Row<f32>],
@@ -56,20 +61,27 @@ struct OverFrames<'a, const WEIGHTED: bool> {
 }
 
 impl<'a, const WEIGHTED: bool> OverFrames<'a, WEIGHTED> {
-    fn new(plan: &'a Plan, field: &'a PlanField, pressures: &'a [Row<f32>], statuses: &'a [Row<u32>]) -> Self {
-        Self { members: plan.members_of(field), depths: &field.depths, taxels: &plan.taxels, pressures, statuses }
+    fn new(
+        plan: &'a Plan,
+        seen: &'a [Member],
+        field: &'a PlanField,
+        (pressures, statuses): (&'a [Row<f32>], &'a [Row<u32>]),
+    ) -> Self {
+        let seen = &seen[field.first..field.first + field.count];
+        let members = plan.members_of(field);
+        Self { members, seen, depths: &field.depths, taxels: &plan.taxels, pressures, statuses }
     }
 }
 
 impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
     #[inline(always)]
     fn count(self) -> usize {
-        self.members.len()
+        self.seen.len()
     }
 
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
-        let Member { slot, weight, u, v } = self.members[member];
+        let Member { slot, weight, u, v } = self.seen[member];
         let pressure = load(simd, &self.pressures[slot as usize], at);
         Part {
             pressure,
@@ -91,7 +103,7 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
 
     #[inline(always)]
     fn status(self, simd: S, member: usize, at: usize) -> U<S> {
-        load_u(simd, &self.statuses[self.members[member].slot as usize], at)
+        load_u(simd, &self.statuses[self.seen[member].slot as usize], at)
     }
 }
 
@@ -109,7 +121,14 @@ pub(super) fn block(
     cells: &mut CellsMut<'_>,
 ) {
     let frames = cells.frames();
-    let mut faults = with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, scratch));
+    let window = &tables.window;
+    let mut faults = false;
+    let mut there = 0..0;
+    if window.is_whole() {
+        there = 0..window.slots() / LANES;
+        let tiles = 0..tables.tiles.len();
+        faults = with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, tiles, scratch));
+    }
     if plan.has_changes() {
         let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
         calibrate::frame(level, plan, tables, before, was, said);
@@ -124,13 +143,23 @@ pub(super) fn block(
             }
         }
     }
-    let Scratch { pressures, statuses, cells: answers, between, .. } = scratch;
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
-    for (chunk, fields) in plan.fields.chunks(LANES).enumerate().rev() {
+    let last = plan.fields.len().div_ceil(LANES).saturating_sub(1);
+    for chunk in std::iter::once(last).chain(0..last) {
+        let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
+        for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
+            faults |= with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, tiles, scratch));
+        }
+        if chunk + 1 < last {
+            let ahead = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
+            ahead.for_each(|tile| (first..first + frames).for_each(|frame| simd::announce(raw.rows, frame, tile)));
+        }
+        let Scratch { pressures, statuses, cells: answers, between, .. } = &mut *scratch;
+        let values = (&pressures[..], &statuses[..]);
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
         place.announce(cells);
-        with_widest!(level, simd => answer(simd, plan, fields, pressures, statuses, faults, between, answers));
+        with_widest!(level, simd => answer(simd, plan, &tables.seen, fields, values, faults, between, answers));
         with_widest!(level, simd => write(simd, answers, place, plan.outputs, cells));
     }
 }
@@ -141,9 +170,9 @@ pub(super) fn block(
 fn answer<S: Simd>(
     simd: S,
     plan: &Plan,
+    seen: &[Member],
     fields: &[PlanField],
-    pressures: &[Row<f32>],
-    statuses: &[Row<u32>],
+    values: (&[Row<f32>], &[Row<u32>]),
     faults: bool,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
@@ -154,22 +183,23 @@ fn answer<S: Simd>(
         let (between, answers) = (&mut between[first..][..run.len()], &mut answers[first..][..run.len()]);
         let kind = |index: usize| OneKind::new(&run[index]);
         if run[0].is_wide() {
-            let over = |index| ManyAbreast(OverFrames::<true>::new(plan, &run[index], pressures, statuses));
+            let over = |index| ManyAbreast(OverFrames::<true>::new(plan, seen, &run[index], values));
             touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
         } else if run[0].unweighted {
-            let over = |index| Abreast(OverFrames::<false>::new(plan, &run[index], pressures, statuses));
+            let over = |index| Abreast(OverFrames::<false>::new(plan, seen, &run[index], values));
             touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
         } else {
-            let over = |index| Abreast(OverFrames::<true>::new(plan, &run[index], pressures, statuses));
+            let over = |index| Abreast(OverFrames::<true>::new(plan, seen, &run[index], values));
             touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
         }
         first += run.len();
     }
 }
 
-/// Calibrates up to sixteen frames, and turns them so that a taxel's frames stand abreast. Whether any value is anything
-/// but a plain number.
+/// Calibrates some tiles of up to sixteen frames, and turns them so that a taxel's frames stand abreast. Whether any value
+/// is anything but a plain number.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "as `block`")]
 fn read<S: Simd>(
     simd: S,
     plan: &Plan,
@@ -177,16 +207,16 @@ fn read<S: Simd>(
     raw: Rows<'_>,
     first: usize,
     frames: usize,
+    tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    for tile in scratch.faulty.drain(..) {
-        scratch.statuses[tile * LANES..][..LANES].fill([0; LANES]);
-    }
+    let mut any = false;
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
-    for (index, tile) in tables.tiles.iter().enumerate() {
+    for (index, tile) in tiles.clone().zip(&tables.tiles[tiles]) {
         let slot = index * LANES;
+        let place = slot & tables.window.mask();
         // All of them first: what was stored piece by piece is not yet to be had as a whole.
         for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
             simd::read(simd, raw, first + frame, index, plan.calibrated(), tables.shuffles, bits);
@@ -197,18 +227,21 @@ fn read<S: Simd>(
             faults |= calibrate::tile(simd, plan, tile, slot, &bits[frame], pressures, statuses);
         }
         let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
-        for (lanes, turned) in scratch.pressures[slot..slot + LANES].iter_mut().zip(&turned) {
+        for (lanes, turned) in scratch.pressures[place..place + LANES].iter_mut().zip(&turned) {
             turned.store_slice(lanes);
         }
         if faults {
             let turned: [u32x16<S>; LANES] = transpose(simd, |frame| statuses[frame]);
-            for (lanes, turned) in scratch.statuses[slot..slot + LANES].iter_mut().zip(&turned) {
+            for (lanes, turned) in scratch.statuses[place..place + LANES].iter_mut().zip(&turned) {
                 turned.store_slice(lanes);
             }
-            scratch.faulty.push(index);
+        } else if scratch.faulty[place / LANES] {
+            scratch.statuses[place..place + LANES].fill([0; LANES]);
         }
+        scratch.faulty[place / LANES] = faults;
+        any |= faults;
     }
-    !scratch.faulty.is_empty()
+    any
 }
 
 /// Writes answers where they belong.

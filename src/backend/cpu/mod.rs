@@ -26,8 +26,9 @@ mod simd;
 mod tests;
 mod touch;
 mod wide;
+mod window;
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fearless_simd::Level;
 
@@ -37,6 +38,7 @@ use crate::error::Result;
 use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
 use crate::signal::RawValue;
+use crate::stage::layout::Member;
 
 /// Memberships that one task takes at least, if it can: some ten microseconds.
 const TASK: usize = 1 << 14;
@@ -62,6 +64,9 @@ struct Tables {
     /// Whether sixteen values are better shuffled out of 32 than read one by one.
     shuffles: bool,
     tiles: Vec<calibrate::Tile>,
+    window: window::Window,
+    /// The plan's members, each with its slot's place in the window.
+    seen: Arc<[Member]>,
     /// The members of the fields that have many.
     wide: Vec<wide::Table>,
 }
@@ -80,8 +85,11 @@ impl Cpu {
                 (member.slot, [member.weight, member.u, member.v, depth, area])
             }))
         });
+        let window = window::Window::new(plan);
         Self {
             tables: Tables {
+                seen: window.members(plan),
+                window,
                 shuffles: matches!(instructions(level), "AVX-512" | "AVX2"),
                 tiles: calibrate::Tile::all(plan),
                 wide: wide.collect(),
@@ -106,7 +114,7 @@ impl Cpu {
             return;
         }
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan));
+        let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));

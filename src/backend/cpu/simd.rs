@@ -121,6 +121,15 @@ pub(super) fn read<S: Simd>(
     raw.read(frame, tile * LANES, calibrated, bits);
 }
 
+/// Has frame `frame` fetched from slot 16 · `tile` on, where it lies together.
+#[inline(always)]
+pub(super) fn announce(raw: Rows<'_>, frame: usize, tile: usize) {
+    if let Some(bits) = raw.straight(frame, tile) {
+        soon_needed(bits);
+        soon_needed(&bits[LANES - 1]);
+    }
+}
+
 /// Has the cache fetch the line that `value` begins in, to be read or written soon. A core that writes to memory waits for
 /// what was there before, too: a tenth of a batch's time.
 #[inline(always)]

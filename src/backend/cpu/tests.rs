@@ -5,6 +5,7 @@ use fearless_simd::Level;
 use super::*;
 use crate::backend::Step;
 use crate::body::Body;
+use crate::experiments::shape::Shape;
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
 use crate::scene::{Arithmetic, Knobs, PlanField, Scene};
@@ -88,5 +89,22 @@ fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
+    const FRAMES: usize = 37;
+    let shape = Shape { sensors: 30_000, fields: 3_000, members: 16, wide: 0, local: true, frames: FRAMES, seed: 3 };
+    let body = shape.body();
+    let scene = Scene { outputs: Outputs::USUAL, ..Scene::default() };
+    let calibration = Calibration::identity(shape.sensors);
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+    assert!(!window::Window::new(&plan).is_whole());
+    let raw = values(&plan, FRAMES);
+    // A frame alone has all of it.
+    let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+    for level in levels() {
+        assert!(right == run(&plan, level, &raw, FRAMES, FRAMES), "{level:?}");
     }
 }

@@ -141,8 +141,11 @@ impl Gpu {
         let results = working("results", frames * fields * 4 * columns.count() as u64);
         // What the frame before left; buffers begin as zeros, and zero is no contact.
         let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
-        let wide: Vec<u32> =
-            (0..).zip(&plan.fields).filter(|(_, field)| field.count > layout::WIDE).map(|(index, _)| index).collect();
+        let wide: Vec<u32> = (0..)
+            .zip(plan.fields.iter())
+            .filter(|(_, field)| field.count > layout::WIDE)
+            .map(|(index, _)| index)
+            .collect();
         let wide_fields = table(&device, "wide fields", &wide);
 
         let wanted = plan.stages();
