@@ -138,12 +138,12 @@ mod tests {
             let mut reads = vec![0; 70];
             for (chunk, need) in needs.into_iter().enumerate() {
                 for tile in window.slide(&mut there, chunk).into_iter().flatten() {
-                    let place = (tile * LANES & window.mask()) / LANES;
+                    let place = ((tile * LANES) & window.mask()) / LANES;
                     kept[place] = tile;
                     reads[tile] += 1;
                 }
-                prop_assert!(need.clone().all(|tile| kept[(tile * LANES & window.mask()) / LANES] == tile));
-                prop_assert!(there.clone().all(|tile| kept[(tile * LANES & window.mask()) / LANES] == tile));
+                prop_assert!(need.clone().all(|tile| kept[((tile * LANES) & window.mask()) / LANES] == tile));
+                prop_assert!(there.clone().all(|tile| kept[((tile * LANES) & window.mask()) / LANES] == tile));
             }
             prop_assert!(!is_whole || reads.iter().all(|&reads| reads <= 1), "nothing is read twice where all has room");
         }
