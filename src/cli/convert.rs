@@ -73,6 +73,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("it is read and would be written; name another file").at(to_path.display()));
     }
     let mut source = from.open(&[], arguments.rate)?;
+    source.tell_stale();
     let attached = files(arguments, &from)?;
     let mut target = match &to {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
@@ -96,6 +97,9 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     say(&format!("{} in {}", count(frames, "frame"), to_path.display()));
     if is_csv && posed > 0 {
         say(&format!("a CSV has no place for poses: those of {} are left out", count(posed, "frame")));
+    }
+    if is_csv && source.has_stale() {
+        say("a CSV has no word for what is stale: it is missing there");
     }
     if is_csv && !attached.is_empty() {
         let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();

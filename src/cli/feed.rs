@@ -24,6 +24,8 @@ pub(super) struct Told {
     pub(super) progress: Option<f64>,
     /// When the last byte of each was read, of those of which that is known.
     pub(super) read_at: Vec<Instant>,
+    /// Whether anything so far is stale.
+    pub(super) has_stale: bool,
 }
 
 /// How frames are to come.
@@ -85,6 +87,7 @@ impl Feed {
                     frames.extend(more);
                     told.progress = further.progress;
                     told.read_at.extend(further.read_at);
+                    told.has_stale |= further.has_stale;
                 }
                 Ok(other) => {
                     self.next = Some(other);
@@ -127,7 +130,7 @@ fn read(source: &mut dyn Source, manner: Manner, to: &SyncSender<Arrival>, used:
         if let (Some(clock), Some(frame)) = (&mut clock, frames.first()) {
             thread::sleep(clock.until(frame.t_s));
         }
-        told.progress = source.progress();
+        (told.progress, told.has_stale) = (source.progress(), source.has_stale());
         if !frames.is_empty() && to.send(Arrival::Frames(frames, told)).is_err() {
             return Arrival::End(Vec::new());
         }

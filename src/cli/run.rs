@@ -102,7 +102,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let mut engine = Engine::new(&body, settled.options)?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
     let (source, live) = match recorded {
-        Some(source) => (source, None),
+        Some(mut source) => {
+            source.tell_stale();
+            (source, None)
+        }
         None => {
             let source = input.open_lines(&ids, &asked)?;
             engine.heed_stale();
@@ -141,7 +144,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         Some(_) => Feed::start_live(source, batch),
     };
     let agreement = asked.verify.then(Agreement::default);
-    let mut pump = Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false, live };
+    let heeds_stale = live.is_some();
+    let mut pump =
+        Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false, live, heeds_stale };
     let until = lasts.map(|span| Instant::now() + span);
     match pump.run(feed, &stop, until) {
         Ok(losses) => pump.finish(losses),
@@ -169,6 +174,8 @@ struct Pump {
     failed: bool,
     /// The serial lines, if they are read.
     live: Option<Live>,
+    /// Whether the engine heeds what is stale.
+    heeds_stale: bool,
 }
 
 impl Pump {
@@ -178,6 +185,9 @@ impl Pump {
         while !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
                 Some(Arrival::Frames(frames, told)) => {
+                    if told.has_stale && !std::mem::replace(&mut self.heeds_stale, true) {
+                        self.engine.heed_stale();
+                    }
                     if let Some(sum) = &mut self.agreement {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);
                     } else {

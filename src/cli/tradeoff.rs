@@ -13,7 +13,7 @@ use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
-pub(super) use self::settled::{Settled, settled};
+pub(super) use self::settled::{Settled, driver, settled};
 use super::bar::Bar;
 use super::input::Input;
 use super::plot::Format;
@@ -115,7 +115,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
         && let Some(store) = Store::of_user()
-        && let Err(e) = store.keep(&body, &options, &settled::driver(), &report)
+        && let Err(e) = store.keep(&body, &options, &driver(), &report)
     {
         say(&format!("what was measured is not kept: {e}"));
     }

@@ -1,6 +1,7 @@
 //! A frame as a message, `somatic.Frame`: its values as single-precision numbers, what is missing listed beside them.
 //!
-//! Where most values are missing, as in what boards deliver live, those that came are listed instead.
+//! Where most values are missing, as in what boards deliver live, those that came are listed instead. Of what is missing,
+//! what is stale is listed once more.
 
 use glam::{DQuat, DVec3};
 
@@ -13,6 +14,7 @@ pub(super) const VALUES: u32 = 2;
 pub(super) const MISSING: u32 = 3;
 pub(super) const PRESENT: u32 = 4;
 pub(super) const POSES: u32 = 5;
+pub(super) const STALE: u32 = 6;
 pub(super) const LINK: u32 = 1;
 pub(super) const POSE: u32 = 2;
 
@@ -42,6 +44,10 @@ pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
         writer.bytes(VALUES, &bytes);
         writer.numbers(PRESENT, indices(false));
     }
+    if frame.values.contains(&RawValue::STALE) {
+        let stale = (0_u32..).zip(&frame.values).filter(|(_, value)| **value == RawValue::STALE);
+        writer.numbers(STALE, stale.map(|(index, _)| index));
+    }
     for (link, pose) in &frame.pose {
         writer.message(POSES, |writer| {
             writer.text(LINK, link);
@@ -58,17 +64,19 @@ fn value_of(bits: [u8; 4]) -> RawValue {
     if single.is_finite() { RawValue::new(single.into()) } else { RawValue::FAULTY }
 }
 
-/// Reads the message in `bytes` into `frame`, which has `width` values. `None` where it is no such frame.
-pub(super) fn decode(bytes: &[u8], width: usize, frame: &mut Frame) -> Option<()> {
+/// Reads the message in `bytes` into `frame`, which has `width` values, with `stale` for those that are. `None` where it is
+/// no such frame.
+pub(super) fn decode(bytes: &[u8], width: usize, stale: RawValue, frame: &mut Frame) -> Option<()> {
     frame.pose.clear();
     let mut t_s = None;
-    let (mut values, mut missing, mut present) = (&[][..], &[][..], None);
+    let (mut values, mut missing, mut present, mut stale_ones) = (&[][..], &[][..], None, &[][..]);
     for field in Fields(bytes) {
         match field? {
             (T, value) => t_s = Some(value.double()?),
             (VALUES, Value::Bytes(bytes)) => values = bytes,
             (MISSING, Value::Bytes(bytes)) => missing = bytes,
             (PRESENT, Value::Bytes(bytes)) => present = Some(bytes),
+            (STALE, Value::Bytes(bytes)) => stale_ones = bytes,
             (POSES, Value::Bytes(bytes)) => frame.pose.push(pose(bytes)?),
             // Of a later version: what it adds takes nothing away.
             _ => {}
@@ -93,12 +101,20 @@ pub(super) fn decode(bytes: &[u8], width: usize, frame: &mut Frame) -> Option<()
     while !missing.is_empty() {
         *frame.values.get_mut(usize::try_from(take_varint(&mut missing)?).ok()?)? = RawValue::MISSING;
     }
+    while !stale_ones.is_empty() {
+        *frame.values.get_mut(usize::try_from(take_varint(&mut stale_ones)?).ok()?)? = stale;
+    }
     Some(())
 }
 
 /// The time of the frame in `bytes`.
 pub(super) fn time_of(bytes: &[u8]) -> Option<f64> {
     Fields(bytes).flatten().find(|(field, _)| *field == T)?.1.double().filter(|t_s| t_s.is_finite())
+}
+
+/// Whether the frame in `bytes` has values that are stale.
+pub(super) fn has_stale(bytes: &[u8]) -> bool {
+    Fields(bytes).flatten().any(|(field, _)| field == STALE)
 }
 
 /// Whether the frame in `bytes` poses links.
@@ -139,6 +155,7 @@ mod tests {
         prop_oneof![
             any::<f32>().prop_map(|value| RawValue::new(value.into())),
             Just(RawValue::MISSING),
+            Just(RawValue::STALE),
             Just(RawValue::FAULTY),
             Just(RawValue::new(-0.0)),
             Just(RawValue::new(f64::from(f32::from_bits(1)))),
@@ -164,7 +181,7 @@ mod tests {
             let mut bytes = Vec::new();
             encode(&frame, &mut bytes);
             let mut back = Frame::default();
-            prop_assert_eq!(decode(&bytes, frame.values.len(), &mut back), Some(()));
+            prop_assert_eq!(decode(&bytes, frame.values.len(), RawValue::STALE, &mut back), Some(()));
             prop_assert_eq!(back.t_s.to_bits(), frame.t_s.to_bits());
             prop_assert_eq!(time_of(&bytes), Some(frame.t_s));
             prop_assert_eq!(&back, &frame);
@@ -180,7 +197,7 @@ mod tests {
             let at = at.index(bytes.len());
             bytes[at] = to;
             let mut back = Frame::default();
-            if decode(&bytes, frame.values.len(), &mut back).is_some() {
+            if decode(&bytes, frame.values.len(), RawValue::STALE, &mut back).is_some() {
                 prop_assert_eq!(back.values.len(), frame.values.len());
                 prop_assert!(back.t_s.is_finite());
             }
@@ -191,6 +208,19 @@ mod tests {
     fn a_frame_of_another_width_is_none() {
         let mut bytes = Vec::new();
         encode(&Frame { values: vec![RawValue::new(1.0); 3], ..Frame::default() }, &mut bytes);
-        assert_eq!(decode(&bytes, 4, &mut Frame::default()), None);
+        assert_eq!(decode(&bytes, 4, RawValue::STALE, &mut Frame::default()), None);
+    }
+
+    #[test]
+    fn what_is_stale_is_missing_for_whoever_does_not_heed_it() {
+        let seen = Frame { values: vec![RawValue::new(1.0), RawValue::STALE, RawValue::MISSING], ..Frame::default() };
+        let mut bytes = Vec::new();
+        encode(&seen, &mut bytes);
+        assert!(has_stale(&bytes));
+        let mut back = Frame::default();
+        decode(&bytes, 3, RawValue::MISSING, &mut back).unwrap();
+        assert_eq!(back.values, [RawValue::new(1.0), RawValue::MISSING, RawValue::MISSING]);
+        encode(&back, &mut bytes);
+        assert!(!has_stale(&bytes));
     }
 }

@@ -3,6 +3,7 @@
 //! `docs/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
 //! read record by record here, so that a damaged one gives what is whole in it and memory stays bounded.
 
+mod entries;
 mod frames;
 mod proto;
 mod reader;
@@ -10,9 +11,11 @@ mod recorder;
 mod records;
 mod schemas;
 mod survey;
+mod unpack;
 mod view;
 
-pub use self::reader::{Attached, Reader};
+pub use self::entries::Attached;
+pub use self::reader::Reader;
 pub use self::recorder::Recorder;
 pub use self::survey::{Rhythm, Survey, Topic};
 pub(crate) use self::view::{Arrow, Cloud, Scene, Transforms};

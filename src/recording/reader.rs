@@ -5,33 +5,14 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
+use super::entries::{Attached, Channel, attached, channel, data_of, metadata};
 use super::records::{ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, MESSAGE, METADATA, Next, Parts, Record, Records};
-use super::{FRAMES, TAXEL_IDS, frames, ids_of, nanoseconds};
+use super::{FRAMES, frames, nanoseconds, unpack};
 use crate::error::{Error, Result};
-use crate::signal::Frame;
+use crate::signal::{Frame, RawValue};
 
 /// Bytes of an attachment's record that hold its name and kind; names are not longer.
 const ATTACHMENT_HEAD: u64 = 4096;
-
-/// A file that lies beside the frames.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Attached {
-    /// Its name.
-    pub name: String,
-    /// What it is, such as [`super::BODY`].
-    pub media_type: String,
-    /// Its length.
-    pub bytes: u64,
-    at: u64,
-    record: u64,
-}
-
-/// A channel of messages.
-#[derive(Clone, Debug)]
-pub(super) struct Channel {
-    pub(super) topic: String,
-    pub(super) encoding: String,
-}
 
 /// A message as it lies in its chunk.
 pub(super) struct Message {
@@ -55,6 +36,9 @@ pub struct Reader {
     from: u64,
     has_end: bool,
     ended: bool,
+    /// What is given for values that are stale, and whether any was so far.
+    stale: RawValue,
+    seen_stale: bool,
     /// The time of the last frame.
     last_s: Option<f64>,
     damage: Damage,
@@ -104,6 +88,8 @@ impl Reader {
             from: 0,
             has_end,
             ended: false,
+            stale: RawValue::MISSING,
+            seen_stale: false,
             last_s: None,
             damage: Damage::default(),
             losses: Vec::new(),
@@ -185,6 +171,18 @@ impl Reader {
         self.from = nanoseconds(t_s);
     }
 
+    /// From now on gives what is stale as [`RawValue::STALE`], for engines that heed it
+    /// ([`crate::Engine::heed_stale`]); else it is missing.
+    pub fn tell_stale(&mut self) {
+        self.stale = RawValue::STALE;
+    }
+
+    /// Whether any value so far is stale.
+    #[must_use]
+    pub fn has_stale(&self) -> bool {
+        self.seen_stale
+    }
+
     /// How much of the file has been read, in 0..=1.
     #[must_use]
     pub fn progress(&self) -> f64 {
@@ -208,7 +206,9 @@ impl Reader {
             if !is_frame {
                 continue;
             }
-            if frames::decode(&self.chunk[message.data.clone()], self.taxels.len(), frame).is_some() {
+            let data = &self.chunk[message.data.clone()];
+            if frames::decode(data, self.taxels.len(), self.stale, frame).is_some() {
+                self.seen_stale |= frames::has_stale(data);
                 self.last_s = Some(frame.t_s);
                 return Ok(true);
             }
@@ -337,25 +337,34 @@ impl Reader {
         read?;
         let mut parts = Parts(&self.chunk);
         let head = (|| {
-            let (_, _, _) = (parts.u64()?, parts.u64()?, parts.u64()?);
-            Some((parts.u32()?, parts.text()?, parts.u64()?))
+            let (_, _, size) = (parts.u64()?, parts.u64()?, parts.u64()?);
+            Some((size, parts.u32()?, parts.text()?, parts.u64()?))
         })();
-        let Some((crc, compression, length)) = head.filter(|(_, _, length)| *length == parts.0.len() as u64) else {
+        let Some((size, crc, compression, _)) = head.filter(|(.., length)| *length == parts.0.len() as u64) else {
             self.damaged(record.length);
             return Ok(false);
         };
-        // The format lets a checksum be 0 for none; then nothing could be told from damage.
-        if crc32fast::hash(parts.0) != crc {
-            self.damaged(record.length);
-            return Ok(false);
-        }
-        if !compression.is_empty() {
+        if !unpack::KNOWN.contains(&compression) {
             return Err(Opening::Wrong(format!(
-                "its chunks are compressed ({}), which this version does not read; decompress it: mcap decompress IN -o OUT",
+                "its chunks are compressed by `{}`, which is not read here; write it anew: mcap compress --compression zstd IN -o OUT",
                 compression.chars().take(10).collect::<String>()
             )));
         }
-        self.left = self.chunk.len() - length as usize..self.chunk.len();
+        let packed = parts.0;
+        let unpacked = (!compression.is_empty()).then(|| unpack::unpacked(compression, packed, size));
+        let records = match &unpacked {
+            None => (packed.len() as u64 == size).then_some(packed),
+            Some(unpacked) => unpacked.as_deref(),
+        };
+        // The format lets a checksum be 0 for none; then nothing could be told from damage.
+        if records.is_none_or(|records| crc32fast::hash(records) != crc) {
+            self.damaged(record.length);
+            return Ok(false);
+        }
+        if let Some(unpacked) = unpacked.flatten() {
+            self.chunk = unpacked;
+        }
+        self.left = self.chunk.len() - size as usize..self.chunk.len();
         Ok(true)
     }
 
@@ -405,45 +414,4 @@ impl From<io::Error> for Opening {
     fn from(error: io::Error) -> Self {
         Self::Io(error)
     }
-}
-
-/// The taxels that the metadata in `body` tell of.
-fn metadata(body: &[u8]) -> Option<Vec<u32>> {
-    let mut parts = Parts(body);
-    if parts.text()? != super::METADATA {
-        return None;
-    }
-    let length = parts.u32()?;
-    let mut pairs = Parts(parts.bytes(length.into())?);
-    while !pairs.0.is_empty() {
-        let (key, value) = (pairs.text()?, pairs.text()?);
-        if key == TAXEL_IDS {
-            return ids_of(value);
-        }
-    }
-    None
-}
-
-fn attached(head: &[u8], record: Record) -> Option<Attached> {
-    let mut parts = Parts(head);
-    let _times = (parts.u64()?, parts.u64()?);
-    let (name, media_type) = (parts.text()?.to_owned(), parts.text()?.to_owned());
-    Some(Attached { name, media_type, bytes: parts.u64()?, at: record.at, record: record.length })
-}
-
-/// The data of a whole attachment's record, if its checksum is right.
-fn data_of(body: &[u8]) -> Option<&[u8]> {
-    let (checked, crc) = body.split_at_checked(body.len().checked_sub(4)?)?;
-    let crc = u32::from_le_bytes(crc.try_into().ok()?);
-    let mut parts = Parts(checked);
-    let _times = (parts.u64()?, parts.u64()?);
-    let _names = (parts.text()?, parts.text()?);
-    let length = parts.u64()?;
-    let data = parts.bytes(length)?;
-    (crc32fast::hash(checked) == crc).then_some(data)
-}
-
-fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
-    let (id, _schema) = (parts.u16()?, parts.u16()?);
-    Some((id, Channel { topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))
 }

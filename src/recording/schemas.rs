@@ -83,13 +83,14 @@ const ENUMERATIONS: [Enumeration; 3] = [
 const SOMATIC: [Message; 2] = [
     (
         "Frame",
-        "double t 1; repeated float values 2; repeated uint32 missing 3; repeated uint32 present 4; repeated LinkPose poses 5",
+        "double t 1; repeated float values 2; repeated uint32 missing 3; repeated uint32 present 4; repeated LinkPose poses 5; \
+         repeated uint32 stale 6",
     ),
     ("LinkPose", "string link 1; repeated double pose 2"),
 ];
 
 const _: () = assert!(frames::T == 1 && frames::VALUES == 2 && frames::MISSING == 3 && frames::PRESENT == 4);
-const _: () = assert!(frames::POSES == 5 && frames::LINK == 1 && frames::POSE == 2);
+const _: () = assert!(frames::POSES == 5 && frames::STALE == 6 && frames::LINK == 1 && frames::POSE == 2);
 
 /// The schema of the frames.
 pub(super) fn somatic() -> Vec<u8> {

@@ -4,10 +4,17 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::proto::Writer;
 
-/// Bytes of a point: x, y, z and the pressure, single precision each.
-const STRIDE: u32 = 16;
-/// `FLOAT32` of `PackedElementField.NumericType`.
+/// Bytes of a point: x, y, z and the pressure, single precision each, and its colour. By these names of its parts viewers
+/// know it for one.
+const STRIDE: u32 = 20;
+const NUMBERS: [&str; 4] = ["x", "y", "z", "pressure"];
+const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
+/// `UINT8` and `FLOAT32` of `PackedElementField.NumericType`.
+const UINT8: u64 = 1;
 const FLOAT32: u64 = 7;
+/// Red, green and blue of what is touched, and of a taxel that is not.
+const TOUCHED: [f64; 3] = [0.95, 0.35, 0.1];
+const UNTOUCHED: [f64; 3] = [0.35, 0.4, 0.5];
 /// `ALL` of `SceneEntityDeletion.Type`.
 const ALL: u64 = 1;
 
@@ -34,26 +41,34 @@ fn pose(writer: &mut Writer<'_>, field: u32, place: [f64; 3], rotation: DQuat) {
     });
 }
 
-fn colour(writer: &mut Writer<'_>, field: u32, rgba: [f64; 4]) {
+/// [`TOUCHED`], so opaque.
+fn colour(writer: &mut Writer<'_>, field: u32, alpha: f64) {
     writer.message(field, |writer| {
-        for (field, value) in (1..).zip(rgba) {
+        for (field, value) in (1..).zip(TOUCHED.into_iter().chain([alpha])) {
             writer.double(field, value);
         }
     });
 }
 
-/// Taxels as points, m in the world, each with its pressure.
+/// Taxels as points, m in the world, each with its pressure and a colour for it.
 #[derive(Default)]
 pub(crate) struct Cloud {
     data: Vec<u8>,
 }
 
 impl Cloud {
-    pub(crate) fn push(&mut self, place: DVec3, pressure: f64) {
+    /// A point whose pressure is that `share` of the highest.
+    pub(crate) fn push(&mut self, place: DVec3, pressure: f64, share: f64) {
         let [x, y, z] = place.as_vec3().to_array();
         for value in [x, y, z, pressure as f32] {
             self.data.extend_from_slice(&value.to_le_bytes());
         }
+        // A root, as little pressure is to be seen too.
+        let share = share.clamp(0.0, 1.0).sqrt();
+        for (from, to) in UNTOUCHED.into_iter().zip(TOUCHED) {
+            self.data.push((255.0 * (from + (to - from) * share)).round() as u8);
+        }
+        self.data.push(u8::MAX);
     }
 
     /// The message `foxglove.PointCloud`, appended to `to`; afterwards there are no points.
@@ -63,11 +78,13 @@ impl Cloud {
         writer.text(2, "world");
         pose(&mut writer, 3, [0.0; 3], DQuat::IDENTITY);
         writer.fixed32(4, STRIDE);
-        for (offset, name) in (0..).step_by(4).zip(["x", "y", "z", "pressure"]) {
+        let numbers = (0..).step_by(4).zip(NUMBERS).map(|(offset, name)| (offset, name, FLOAT32));
+        let colours = (16..).zip(COLOURS).map(|(offset, name)| (offset, name, UINT8));
+        for (offset, name, kind) in numbers.chain(colours) {
             writer.message(5, |field| {
                 field.text(1, name);
                 field.fixed32(2, offset);
-                field.number(3, FLOAT32);
+                field.number(3, kind);
             });
         }
         writer.bytes(6, &self.data);
@@ -141,13 +158,13 @@ impl<'a> Scene<'a> {
                     primitive.double(3, 0.1 * arrow.length_m);
                     primitive.double(4, 0.3 * arrow.length_m);
                     primitive.double(5, 0.2 * arrow.length_m);
-                    colour(primitive, 6, [0.95, 0.35, 0.1, 1.0]);
+                    colour(primitive, 6, 1.0);
                 });
             }
             entity.message(9, |sphere| {
                 pose(sphere, 1, arrow.position, DQuat::IDENTITY);
                 vector(sphere, 2, [arrow.diameter_m; 3]);
-                colour(sphere, 3, [0.95, 0.35, 0.1, 0.6]);
+                colour(sphere, 3, 0.6);
             });
         });
     }

@@ -20,6 +20,10 @@ pub struct PlannedStage {
     pub over: usize,
     /// Memberships that it goes over, once or several times; 0 where it works on what others found.
     pub memberships: usize,
+    /// Of these, those in fields of so many members that the CPU takes them by themselves.
+    pub wide: usize,
+    /// Bytes that a frame brings to it, and that it adds to what comes back from a device.
+    pub bytes: [usize; 2],
 }
 
 impl Plan {
@@ -31,44 +35,50 @@ impl Plan {
         let charted = |field: &PlanField| field.charted;
         let of = |which: &dyn Fn(&PlanField) -> bool| {
             let chosen = self.fields.iter().filter(|field| which(field));
-            chosen.fold((0, 0), |(fields, memberships), field| (fields + 1, memberships + field.count))
+            chosen.fold((0, 0, 0), |(fields, memberships, wide), field| {
+                (fields + 1, memberships + field.count, wide + if field.is_wide() { field.count } else { 0 })
+            })
         };
         let place = Outputs::POSITION | Outputs::NORMAL;
         let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
-        let slots = (self.calibrated(), 0);
-        let found = (of(&all).0, 0);
+        let slots = (self.calibrated(), 0, 0);
+        let found = (of(&all).0, 0, 0);
+        let found_charted = (of(&charted).0, 0, 0);
         // What each stage gives, whether it runs, what it goes over, and why it might not.
         let rows = [
             ("calibrate", Outputs::empty(), true, slots, ""),
-            ("change", Outputs::empty(), self.has_changes(), (self.slots() - slots.0, 0), "no letter is `change`"),
+            ("change", Outputs::empty(), self.has_changes(), (self.slots() - slots.0, 0, 0), "no letter is `change`"),
             ("contact", sums, true, of(&all), ""),
             ("centroid", Outputs::CENTROID, stages.centroid, of(&all), ""),
             ("orientation", Outputs::ORIENTATION, stages.orientation, of(&charted), ""),
             ("axis", Outputs::AXIS | Outputs::ANISOTROPY, stages.axis, of(&charted), ""),
             ("hysteresis", Outputs::empty(), stages.hysteresis, found, "the calibration has no thresholds"),
-            ("motion", Outputs::MOTION, stages.motion, (of(&charted).0, 0), ""),
+            ("motion", Outputs::MOTION, stages.motion, found_charted, ""),
             ("position", place, stages.position, found, ""),
             ("touches", Outputs::TOUCHES, stages.touches, of(&all), ""),
-            ("filter", Outputs::FILTERED, stages.filter, (of(&charted).0, 0), ""),
+            ("filter", Outputs::FILTERED, stages.filter, found_charted, ""),
         ];
-        let row = |&(name, gives, runs, (over, memberships), idle): &(&'static str, Outputs, bool, (_, _), &str)| {
-            let asked: Vec<String> = (self.outputs() & gives).names().collect();
-            let why = match (runs, asked.is_empty(), idle.is_empty()) {
-                (true, false, _) => format!("asked for: {}", asked.join(", ")),
-                (true, true, _) => self.needed_by(name).to_owned(),
-                (false, _, false) => idle.to_owned(),
-                (false, _, true) => "no output needs it".to_owned(),
+        let row =
+            |&(name, gives, runs, (over, memberships, wide), idle): &(&'static str, Outputs, bool, (_, _, _), &str)| {
+                let asked: Vec<String> = (self.outputs() & gives).names().collect();
+                let why = match (runs, asked.is_empty(), idle.is_empty()) {
+                    (true, false, _) => format!("asked for: {}", asked.join(", ")),
+                    (true, true, _) => self.needed_by(name).to_owned(),
+                    (false, _, false) => idle.to_owned(),
+                    (false, _, true) => "no output needs it".to_owned(),
+                };
+                PlannedStage {
+                    name,
+                    runs,
+                    on_host: ["position", "touches", "filter"].contains(&name),
+                    why,
+                    gives,
+                    over: if runs { over } else { 0 },
+                    memberships: if runs { memberships } else { 0 },
+                    wide: if runs { wide } else { 0 },
+                    bytes: [if name == "calibrate" { self.bytes_up() } else { 0 }, self.bytes_from(name)],
+                }
             };
-            PlannedStage {
-                name,
-                runs,
-                on_host: ["position", "touches", "filter"].contains(&name),
-                why,
-                gives,
-                over: if runs { over } else { 0 },
-                memberships: if runs { memberships } else { 0 },
-            }
-        };
         rows.iter().map(row).collect()
     }
 
@@ -94,35 +104,47 @@ impl Plan {
     /// Bytes of results that a frame brings back from a device: a status, and the numbers of the outputs, a field.
     #[must_use]
     pub fn bytes_down(&self) -> usize {
-        self.fields.len() * (1 + self.numbers_a_field()) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
+        let numbers: usize = NUMBERS.iter().map(|(_, some, numbers)| self.numbers(*some, *numbers)).sum();
+        self.fields.len() * (1 + numbers) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
     }
 
-    /// Numbers that a field's percept takes on the way back from a device.
-    fn numbers_a_field(&self) -> usize {
-        let place = Outputs::POSITION | Outputs::NORMAL;
-        let numbers = [
-            (Outputs::TOTAL, 1),
-            (Outputs::PEAK, 1),
-            (Outputs::ACTIVE, 1),
-            (Outputs::AREA, 1),
-            (place | Outputs::CENTROID | Outputs::FILTERED, 2),
-            (place, 1),
-            (Outputs::ORIENTATION, 1),
-            (Outputs::AXIS, 1),
-            (Outputs::ANISOTROPY, 1),
-            // What motion says, and then its numbers.
-            (Outputs::MOTION, 1),
-            (Outputs::DISPLACEMENT, 2),
-            (Outputs::DIRECTION, 1),
-            (Outputs::DISTANCE, 1),
-            (Outputs::RADIAL_DISTANCE, 1),
-            (Outputs::SPEED, 1),
-            (Outputs::RADIAL_SPEED, 1),
-        ];
-        let wanted = numbers.iter().filter(|(some, _)| self.outputs().intersects(*some));
-        wanted.map(|(_, numbers)| numbers).sum()
+    /// What of [`Plan::bytes_down`] is there for the sake of `stage`.
+    fn bytes_from(&self, stage: &str) -> usize {
+        let own = NUMBERS.iter().filter(|(by, ..)| *by == stage);
+        let numbers: usize = own.map(|(_, some, numbers)| self.numbers(*some, *numbers)).sum();
+        let status = usize::from(stage == "contact");
+        let kept = if stage == "touches" { self.kept_pressures() } else { 0 };
+        (self.fields.len() * (status + numbers) + kept) * size_of::<f32>()
+    }
+
+    /// `numbers` if any of `some` is wanted.
+    fn numbers(&self, some: Outputs, numbers: usize) -> usize {
+        if self.outputs().intersects(some) { numbers } else { 0 }
     }
 }
+
+const PLACE: Outputs = Outputs::POSITION.union(Outputs::NORMAL);
+
+/// Numbers that a field's percept takes on the way back from a device: of which stage, for which outputs, how many.
+const NUMBERS: [(&str, Outputs, usize); 16] = [
+    ("contact", Outputs::TOTAL, 1),
+    ("contact", Outputs::PEAK, 1),
+    ("contact", Outputs::ACTIVE, 1),
+    ("contact", Outputs::AREA, 1),
+    ("centroid", PLACE.union(Outputs::CENTROID).union(Outputs::FILTERED), 2),
+    ("position", PLACE, 1),
+    ("orientation", Outputs::ORIENTATION, 1),
+    ("axis", Outputs::AXIS, 1),
+    ("axis", Outputs::ANISOTROPY, 1),
+    // What motion says, and then its numbers.
+    ("motion", Outputs::MOTION, 1),
+    ("motion", Outputs::DISPLACEMENT, 2),
+    ("motion", Outputs::DIRECTION, 1),
+    ("motion", Outputs::DISTANCE, 1),
+    ("motion", Outputs::RADIAL_DISTANCE, 1),
+    ("motion", Outputs::SPEED, 1),
+    ("motion", Outputs::RADIAL_SPEED, 1),
+];
 
 #[cfg(test)]
 mod tests {
@@ -170,5 +192,18 @@ mod tests {
         assert_eq!(whole.bytes_down(), whole.fields.len() * 3 * 4);
         let contact = &one.explain()[2];
         assert_eq!((contact.name, contact.over, contact.memberships), ("contact", 1, count));
+    }
+
+    #[test]
+    fn what_stages_move_adds_up_to_what_a_frame_moves() {
+        for outputs in [Outputs::TOTAL, Outputs::POSITION, Outputs::SPEED, Outputs::TOUCHES, Outputs::all()] {
+            let plan = plan(outputs, &[]);
+            let stages = plan.explain();
+            let sum = |way: usize| stages.iter().map(|stage| stage.bytes[way]).sum::<usize>();
+            assert_eq!([sum(0), sum(1)], [plan.bytes_up(), plan.bytes_down()], "{outputs:?}");
+            assert!(stages.iter().all(|stage| stage.runs || stage.bytes == [0, 0]), "{outputs:?}");
+        }
+        let contact = &plan(Outputs::TOTAL, &[]).explain()[2];
+        assert!(0 < contact.wide && contact.wide < contact.memberships, "{contact:?}");
     }
 }

@@ -66,6 +66,8 @@ pub(super) struct Scenery {
     cloud: Cloud,
     pressures: Vec<(u32, f64)>,
     strongest: f64,
+    /// The highest pressure of a taxel yet.
+    highest: f64,
     shown: bool,
     paces: [Pace; 3],
     message: Vec<u8>,
@@ -99,6 +101,7 @@ impl Scenery {
             cloud: Cloud::default(),
             pressures: Vec::new(),
             strongest: 0.0,
+            highest: 0.0,
             shown: false,
             paces: [Pace::new(TAXELS_EVERY_S), Pace::new(TOUCHES_EVERY_S), Pace::new(LINKS_EVERY_S)],
             message: Vec::new(),
@@ -125,9 +128,13 @@ impl Scenery {
             }
             if taxels_due {
                 (heard.pressures)(frame, &mut self.pressures);
+                self.highest =
+                    self.pressures.iter().fold(self.highest, |highest, (_, pressure)| highest.max(*pressure));
+                let highest = self.highest.max(f64::MIN_POSITIVE);
                 for (id, pressure) in &self.pressures {
                     if let Some((link, place)) = self.taxels.get(id) {
-                        self.cloud.push(self.world[*link].transform_point3(*place), *pressure);
+                        let place = self.world[*link].transform_point3(*place);
+                        self.cloud.push(place, *pressure, pressure / highest);
                     }
                 }
                 self.message.clear();

@@ -49,6 +49,15 @@ pub trait Source {
 
     /// Says that nothing before `t_s` is wanted: a source that can pass over it without reading it does so.
     fn skip_to(&mut self, _t_s: f64) {}
+
+    /// From now on gives what is known to be stale as [`crate::RawValue::STALE`], not as missing: for engines that heed it.
+    fn tell_stale(&mut self) {}
+
+    /// Whether any value so far is stale, which an engine has to heed then.
+    fn has_stale(&self) -> bool {
+        false
+    }
+
     /// When the last byte of the last frame was read, where that is known; asked for once a frame.
     fn read_at(&mut self) -> Option<Instant> {
         None

@@ -22,6 +22,14 @@ impl Source for Reader {
         Self::skip_to(self, t_s);
     }
 
+    fn tell_stale(&mut self) {
+        Self::tell_stale(self);
+    }
+
+    fn has_stale(&self) -> bool {
+        Self::has_stale(self)
+    }
+
     fn losses(&self) -> Vec<String> {
         Self::losses(self)
     }

@@ -41,6 +41,9 @@ pub struct Replay {
     gave: bool,
     /// Whether the next frame is the first of a turn that is not the first.
     again: bool,
+    /// Whether what is stale is to be told, and whether anything was in the turns before.
+    tells_stale: bool,
+    had_stale: bool,
     losses: Vec<String>,
 }
 
@@ -69,6 +72,8 @@ impl Replay {
             step_s: 0.0,
             gave: false,
             again: false,
+            tells_stale: false,
+            had_stale: false,
             losses: Vec::new(),
         })
     }
@@ -84,7 +89,11 @@ impl Replay {
         if self.played == self.cut.times || !self.gave {
             return Ok(false);
         }
+        self.had_stale |= self.source.has_stale();
         self.source = (self.open)()?;
+        if self.tells_stale {
+            self.source.tell_stale();
+        }
         (self.start_s, self.gave, self.again) = (None, false, true);
         Ok(true)
     }
@@ -147,6 +156,15 @@ impl Source for Replay {
         }
         let done = self.played as f64 + self.source.progress().unwrap_or(0.0);
         Some((done / self.cut.times as f64).min(1.0))
+    }
+
+    fn tell_stale(&mut self) {
+        self.tells_stale = true;
+        self.source.tell_stale();
+    }
+
+    fn has_stale(&self) -> bool {
+        self.had_stale || self.source.has_stale()
     }
 
     fn losses(&self) -> Vec<String> {

@@ -1,11 +1,11 @@
 //! Measurements that are kept, one file for each body and scene, and whether they still hold.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::Report;
+use super::{Rates, Report};
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
@@ -41,6 +41,16 @@ pub struct Stored {
     pub taken_at_s: u64,
     /// What was measured.
     pub report: Report,
+}
+
+/// Rates that were kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoredRates {
+    key: Key,
+    /// When they were learned, s since 1970.
+    pub taken_at_s: u64,
+    /// What was learned.
+    pub rates: Rates,
 }
 
 /// What a look into a store finds.
@@ -103,26 +113,64 @@ impl Store {
     /// # Errors
     /// It cannot be written.
     pub fn keep(&self, body: &Body, options: &Options, driver: &str, report: &Report) -> Result<()> {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-        let stored = Stored { key: Key::new(body, options, driver), taken_at_s: now, report: report.clone() };
-        let path = self.file(body, options);
-        std::fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, &e))?;
-        let text = serde_json::to_string_pretty(&stored).map_err(|e| Error::failed(e.to_string()))?;
-        whole::write(&path, text.as_bytes())
+        let stored = Stored { key: Key::new(body, options, driver), taken_at_s: now_s(), report: report.clone() };
+        self.write(&self.file(body, options), &stored)
     }
+
+    /// Where rates are kept of what `of` says in words, such as a backend.
+    #[must_use]
+    pub fn rates_file(&self, of: &str) -> PathBuf {
+        self.folder.join(format!("rates-{:016x}.json", hash(&[of])))
+    }
+
+    /// The rates of `of`, if there are any that hold on this machine with this `driver`.
+    #[must_use]
+    pub fn rates(&self, of: &str, driver: &str) -> Option<StoredRates> {
+        let text = std::fs::read_to_string(self.rates_file(of)).ok()?;
+        serde_json::from_str::<StoredRates>(&text).ok().filter(|stored| stored.key == Key::of_rates(of, driver))
+    }
+
+    /// Keeps `rates`, in place of any before.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub fn keep_rates(&self, of: &str, driver: &str, rates: &Rates) -> Result<()> {
+        let stored = StoredRates { key: Key::of_rates(of, driver), taken_at_s: now_s(), rates: rates.clone() };
+        self.write(&self.rates_file(of), &stored)
+    }
+
+    fn write(&self, path: &Path, stored: &impl Serialize) -> Result<()> {
+        std::fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, &e))?;
+        let text = serde_json::to_string_pretty(stored).map_err(|e| Error::failed(e.to_string()))?;
+        whole::write(path, text.as_bytes())
+    }
+}
+
+fn now_s() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
 impl Key {
     fn new(body: &Body, options: &Options, driver: &str) -> Self {
         let laid = format!("{:?} {:?} {:?}", body.taxels, body.fields, body.links);
         let calibration = options.calibration.as_ref().map(|calibration| format!("{calibration:?}"));
+        let scene = [&asked(options), calibration.as_deref().unwrap_or_default()];
+        Self::of(format!("{:016x}", hash(&[&laid])), format!("{:016x}", hash(&scene)), driver)
+    }
+
+    /// Rates hang on no body.
+    fn of_rates(of: &str, driver: &str) -> Self {
+        Self::of(String::new(), of.to_owned(), driver)
+    }
+
+    fn of(body: String, scene: String, driver: &str) -> Self {
         Self {
             version: VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
             machine: machine(),
             driver: driver.to_owned(),
-            body: format!("{:016x}", hash(&[&laid])),
-            scene: format!("{:016x}", hash(&[&asked(options), calibration.as_deref().unwrap_or_default()])),
+            body,
+            scene,
         }
     }
 }
@@ -209,5 +257,23 @@ mod tests {
         assert!(why(store.find(&body, &options, "a")).contains("another version"));
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();
         assert!(why(store.find(&body, &options, "a")).contains("damaged"));
+    }
+
+    #[test]
+    fn rates_that_are_kept_hold_for_what_they_were_learned_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path().join("new"));
+        let rates = Rates::learn(crate::BackendKind::Cpu, None, 1).unwrap();
+        assert!(store.rates("cpu, 1", "a").is_none());
+        store.keep_rates("cpu, 1", "a", &rates).unwrap();
+        assert_eq!(store.rates("cpu, 1", "a").map(|stored| stored.rates), Some(rates));
+        assert!(store.rates("cpu, 1", "b").is_none(), "with another driver");
+        assert!(store.rates("cpu, 256", "a").is_none(), "of something else");
+        let path = store.rates_file("cpu, 1");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("\"version\": 1", "\"version\": 0")).unwrap();
+        assert!(store.rates("cpu, 1", "a").is_none());
+        std::fs::write(&path, &text[..text.len() / 2]).unwrap();
+        assert!(store.rates("cpu, 1", "a").is_none());
     }
 }

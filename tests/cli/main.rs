@@ -11,6 +11,9 @@ mod inspect;
 mod live;
 mod paper;
 mod plan;
+// The library's own numbers that look like chance.
+#[path = "../../src/author/random.rs"]
+mod random;
 mod recording;
 #[cfg(feature = "gpu")]
 mod render;

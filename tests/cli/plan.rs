@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{done, fails, frames};
+use crate::{done, fails, frames, somatic, stderr};
 
 const PALM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/scenes/palm.toml");
 
@@ -81,6 +81,52 @@ fn a_plan_counts_what_a_scene_needs_and_leaves_out_the_rest() {
     assert_eq!(centroid["taxels"], centroid["of_taxels"]);
     let text = done(&["plan", "--body", "humanoid", "--outputs", "centroid", "--backend", "reference"]);
     assert!(text.contains("no output needs it") && text.contains("memberships"), "{text}");
+}
+
+#[test]
+fn an_estimate_stands_beside_what_is_measured_and_comes_from_counts_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = |arguments: &[&str]| -> Value {
+        let arguments = [&["plan", "--json", "--backend", "cpu", "--body", "humanoid"], arguments].concat();
+        let output = somatic(&arguments).env("XDG_CACHE_HOME", folder.path()).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let stages = |bill: &Value| bill["stages"].as_array().unwrap().clone();
+    let whole = plan(&["--outputs", "centroid,orientation"]);
+    assert!(whole["estimated_us"].as_f64().unwrap() > 0.0 && whole["us"].as_f64().unwrap() > 0.0, "{whole}");
+    assert!(whole["estimated_by"].as_str().unwrap().ends_with("just now"), "{whole}");
+    let mut sum = 0.0;
+    for stage in stages(&whole) {
+        assert_eq!(stage["estimated_us"].is_number(), stage["us"].is_number(), "{stage}");
+        sum += stage["estimated_us"].as_f64().unwrap_or(0.0);
+    }
+    assert!((sum - whole["estimated_us"].as_f64().unwrap()).abs() < 0.01, "{sum}: {whole}");
+    let bytes = |way: &str| stages(&whole).iter().map(|stage| stage[way].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(bytes("bytes_up"), whole["bytes_up"].as_u64().unwrap());
+    assert_eq!(bytes("bytes_down"), whole["bytes_down"].as_u64().unwrap());
+
+    // Without measuring it is the same number: measuring has no part in it. What was learned is kept.
+    let alone = plan(&["--outputs", "centroid,orientation", "--estimate"]);
+    assert_eq!(alone["estimated_us"], whole["estimated_us"]);
+    assert!(alone["estimated_by"].as_str().unwrap().contains(" on 20"), "{alone}");
+    assert!(alone["us"].is_null() && alone["agrees"].is_null(), "{alone}");
+    assert!(stages(&alone).iter().all(|stage| stage["us"].is_null()));
+    // It grows with memberships, and with what is asked for.
+    let us = |arguments: &[&str]| plan(&[arguments, &["--estimate"]].concat())["estimated_us"].as_f64().unwrap();
+    let some = us(&["--outputs", "centroid,orientation", "--fields", "left_arm/**"]);
+    assert!(0.0 < some && some < whole["estimated_us"].as_f64().unwrap(), "{some}: {whole}");
+    let most = ["--outputs", "total,centroid,orientation,axis,position,touches,speed"];
+    assert!(us(&most) > whole["estimated_us"].as_f64().unwrap());
+
+    // Where counts do not tell, nothing is told.
+    let none = plan(&["--estimate", "--cadence", "on-change"]);
+    assert!(none["estimated_us"].is_null(), "{none}");
+    assert!(none["estimated_by"].as_str().unwrap().contains("`on-change`"), "{none}");
+    let text = done(&["plan", "--backend", "cpu", "--estimate", "--coverage", "touched"]);
+    assert!(text.contains("no estimate: with `touched`"), "{text}");
+    let text = done(&["plan", "--backend", "cpu", "--outputs", "total"]);
+    assert!(text.contains("estimated µs") && text.contains("times what is measured"), "{text}");
 }
 
 #[test]

@@ -10,26 +10,15 @@ use serde_json::Value;
 use somatic::recording::{Reader, Recorder};
 use somatic::{Frame, RawValue};
 
+use super::random::Random;
 use super::{code_of, done, fails, files_in, frames, output, somatic, stderr, text_of};
 
 const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
 const CALIBRATION: &str = "[all]\nbaseline = 10.5\ngain = 0.25\ndead_band = 1\n";
 
-/// Numbers that look like chance, the same in every run: splitmix64.
-struct Chance(u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
+/// A whole number from 0 up to `end`.
+fn below(chance: &mut Random, end: usize) -> usize {
+    (chance.unit() * end as f64) as usize
 }
 
 /// Taxels of the bundled hand, and the order that a driver may give them in.
@@ -42,7 +31,7 @@ fn recorded(path: &Path, count: u64, keep: bool) -> Vec<Frame> {
     let ids = ids();
     let mut recorder = Recorder::create(path, &ids, false).unwrap();
     recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
-    let mut chance = Chance(7);
+    let mut chance = Random::new(7);
     let mut kept = Vec::new();
     let mut frame = Frame::missing(0.0, ids.len());
     for index in 0..count {
@@ -251,7 +240,7 @@ fn a_full_disk_ends_a_recording_and_not_what_is_live() {
 #[test]
 fn a_process_that_is_killed_loses_less_than_a_second() {
     let folder = tempfile::tempdir().unwrap();
-    let mut chance = Chance(u64::from(std::process::id()));
+    let mut chance = Random::new(u64::from(std::process::id()));
     for round in 0..4 {
         let path = folder.path().join(format!("{round}.mcap"));
         let mut child =
@@ -262,7 +251,7 @@ fn a_process_that_is_killed_loses_less_than_a_second() {
                 .unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         // Long enough for something to lose; when exactly is left to chance.
-        let until = Duration::from_millis(1200 + chance.below(1500) as u64);
+        let until = Duration::from_millis(1200 + below(&mut chance, 1500) as u64);
         let mut delivered = frames(&lines.next().unwrap().unwrap());
         let start = Instant::now();
         while start.elapsed() < until {
@@ -293,15 +282,15 @@ fn a_process_that_is_killed_loses_less_than_a_second() {
 }
 
 /// Does to `bytes` what disks, cables and programs do.
-fn damage(bytes: &mut Vec<u8>, chance: &mut Chance) {
-    for _ in 0..=chance.below(3) {
+fn damage(bytes: &mut Vec<u8>, chance: &mut Random) {
+    for _ in 0..=below(chance, 3) {
         if bytes.is_empty() {
             return;
         }
-        let at = chance.below(bytes.len());
-        let length = chance.below(200).min(bytes.len() - at);
-        match chance.below(6) {
-            0 => bytes[at] ^= 1 << chance.below(8),
+        let at = below(chance, bytes.len());
+        let length = below(chance, 200).min(bytes.len() - at);
+        match below(chance, 6) {
+            0 => bytes[at] ^= 1 << below(chance, 8),
             1 => bytes[at..at + length].fill(0),
             2 => bytes[at..at + length].fill_with(|| chance.next() as u8),
             3 => drop(bytes.drain(at..at + length)),
@@ -326,7 +315,7 @@ fn survive(rounds: u64, end: Option<Instant>, seed: u64) -> u64 {
     let mut round = 0;
     while round < rounds && end.is_none_or(|end| Instant::now() < end) {
         round += 1;
-        let mut chance = Chance(seed ^ round);
+        let mut chance = Random::new(seed ^ round);
         let mut bytes = whole.clone();
         damage(&mut bytes, &mut chance);
         std::fs::write(&path, &bytes).unwrap();
@@ -419,6 +408,125 @@ fn ten_hours_replay_in_two_hundred_megabytes() {
     assert!(peak > 0 && peak < 200 << 20, "{peak} bytes");
 }
 
+/// The recording at `from` with its chunks compressed, without an index, as `to`.
+fn compressed(from: &Path, to: &Path, compression: &str, pack: impl Fn(&[u8]) -> Vec<u8>) {
+    let bytes = std::fs::read(from).unwrap();
+    let mut out = bytes[..8].to_vec();
+    let mut at = 8;
+    loop {
+        let (kind, length) = (bytes[at], u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize);
+        let body = &bytes[at + 9..at + 9 + length];
+        let body = if kind == 0x06 {
+            // Two times, the length and its checksum stay; then how it is compressed, and the records.
+            let records = pack(&body[40..]);
+            let name = [&(compression.len() as u32).to_le_bytes(), compression.as_bytes()].concat();
+            [&body[..28], &name, &(records.len() as u64).to_le_bytes(), &records].concat()
+        } else {
+            body.to_vec()
+        };
+        out.push(kind);
+        out.extend((body.len() as u64).to_le_bytes());
+        out.extend(body);
+        at += 9 + length;
+        if kind == 0x0F {
+            break;
+        }
+    }
+    // A footer that knows of no summary.
+    out.extend([&[0x02][..], &20_u64.to_le_bytes(), &[0; 20], &bytes[..8]].concat());
+    std::fs::write(to, out).unwrap();
+}
+
+#[test]
+fn what_other_programs_have_compressed_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plain, packed) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    let kept = recorded(&plain, 3000, true);
+    let lz4 = |bytes: &[u8]| {
+        let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    };
+    let zstd = |bytes: &[u8]| ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest);
+    for name in ["lz4", "zstd"] {
+        compressed(&plain, &packed, name, |bytes| if name == "lz4" { lz4(bytes) } else { zstd(bytes) });
+        let length = |path: &Path| std::fs::metadata(path).unwrap().len();
+        assert!(length(&packed) < length(&plain), "{name}: {} B", length(&packed));
+        let mut reader = Reader::open(&packed).unwrap();
+        let mut frame = Frame::missing(0.0, 16);
+        for (index, wanted) in kept.iter().enumerate() {
+            assert!(reader.next_frame(&mut frame).unwrap(), "{name}: frame {index}");
+            assert_eq!(&frame, wanted, "{name}: frame {index}");
+        }
+        assert!(!reader.next_frame(&mut frame).unwrap() && reader.losses().is_empty());
+        // Damage is found all the same, and the chunk left out.
+        let mut bytes = std::fs::read(&packed).unwrap();
+        // Beyond the body, among the frames.
+        let at = bytes.len() * 9 / 10;
+        bytes[at] ^= 0xFF;
+        std::fs::write(&packed, bytes).unwrap();
+        let (code, info) = json(&packed);
+        assert!(code == Some(3) && info["frames"].as_u64().unwrap() < 3000, "{name}: {info}");
+    }
+    compressed(&plain, &packed, "brotli", <[u8]>::to_vec);
+    let why = fails(1, &["info", text_of(&packed)]);
+    assert!(why.contains("compressed by `brotli`") && why.contains("mcap compress"), "{why}");
+}
+
+#[test]
+fn what_is_stale_is_stale_in_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let body = somatic::Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let mut recorder = Recorder::create(place("a.mcap"), &ids, false).unwrap();
+    recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
+    // The first frames are all there, then a third of them is stale, then most are; one is only missing.
+    let stale_in = |index: usize, value: usize| value < [0, ids.len() / 3, ids.len() - 5][index / 100];
+    let frames_of = |index: usize| {
+        let value = |value: usize| match value {
+            _ if stale_in(index, value) => RawValue::STALE,
+            39 => RawValue::MISSING,
+            _ => RawValue::new((index * 7 + value) as f64),
+        };
+        Frame { t_s: index as f64 / 50.0, values: (0..ids.len()).map(value).collect(), pose: Vec::new() }
+    };
+    let kept: Vec<Frame> = (0..300).map(frames_of).collect();
+    kept.iter().for_each(|frame| recorder.frame(frame).unwrap());
+    recorder.finish().unwrap();
+
+    // As an engine says that got the frames themselves.
+    let options = somatic::Options { backend: somatic::BackendKind::Cpu, ..somatic::Options::default() };
+    let mut engine = somatic::Engine::new(&body, options).unwrap();
+    engine.heed_stale();
+    let percepts = engine.process(&kept).unwrap();
+    let replayed = frames(&done(&["run", "--source", &source(&place("a.mcap")), "--backend", "cpu", "--all-fields"]));
+    assert_eq!(replayed.len(), kept.len());
+    let mut flagged = [0; 3];
+    for (index, line) in replayed.iter().enumerate() {
+        for (field, said) in line["fields"].as_array().unwrap().iter().enumerate() {
+            let percept = percepts.get(index, field);
+            let names: Vec<String> = percept.flags.names().collect();
+            assert_eq!(said["flags"], serde_json::json!(names), "frame {index}, field {field}");
+            assert_eq!(said["total"].as_f64(), percept.total, "frame {index}, field {field}");
+            flagged[index / 100] += u32::from(percept.flags.contains(somatic::Flags::STALE));
+        }
+    }
+    assert!(flagged[0] == 0 && 0 < flagged[1] && flagged[1] < flagged[2], "{flagged:?}");
+
+    // Copies keep it; whoever does not heed it finds it missing; a CSV has no word for it.
+    done(&["convert", text_of(&place("a.mcap")), text_of(&place("b.mcap"))]);
+    let mut reader = Reader::open(place("b.mcap")).unwrap();
+    let mut frame = Frame::missing(0.0, ids.len());
+    assert!((0..150).all(|_| reader.next_frame(&mut frame).unwrap()));
+    assert!(frame.values[0] == RawValue::MISSING && reader.has_stale());
+    reader.tell_stale();
+    assert!(reader.next_frame(&mut frame).unwrap());
+    assert_eq!(frame.values, kept[150].values);
+    let said = stderr(&output(&["convert", text_of(&place("a.mcap")), text_of(&place("c.csv"))]));
+    assert!(said.contains("no word for what is stale"), "{said}");
+}
+
 /// Python with the format's own library, or why there is none.
 fn python() -> Result<PathBuf, String> {
     static ONCE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
@@ -491,6 +599,15 @@ fn another_library_reads_the_same() {
             assert_eq!(point[name].as_f64().unwrap() as f32, wanted as f32);
         }
         assert_eq!(point["pressure"], first[index.to_string()]);
+    }
+    // Viewers colour points by these names: the harder pressed, the redder, and the hardest like what touches it.
+    let points = || clouds.iter().flat_map(|cloud| cloud["points"].as_array().unwrap());
+    let number = |point: &Value, name: &str| point[name].as_f64().unwrap();
+    let hardest = points().max_by(|a, b| number(a, "pressure").total_cmp(&number(b, "pressure"))).unwrap();
+    assert_eq!(["red", "green", "blue", "alpha"].map(|name| number(hardest, name)), [242.0, 89.0, 25.0, 255.0]);
+    for point in points() {
+        let untouched = number(point, "pressure") <= 0.0;
+        assert_eq!(number(point, "red") <= 89.0, untouched, "{point}");
     }
     // What is touched is where the percepts say, in the frame that they say.
     let shown: Vec<&Value> =

@@ -217,9 +217,15 @@ fn a_run_says_what_became_of_a_board_that_starts_again() {
 fn fields_of_a_silent_board_are_stale() {
     let boards = Boards::start(&["--wait", "--for", "4s", "--faults", "silence=9s@1.5s"]);
     let source = format!("serial:{}", boards.ports[0]);
+    let folder = tempfile::tempdir().unwrap();
+    let recording = format!("mcap:{}", folder.path().join("live.mcap").display());
     let arguments = ["run", "--backend", "cpu", "--source", &source, "--sink", "-", "--all-fields", "--for", "3s"];
-    let output = somatic(&arguments).output().unwrap();
+    let output = somatic(&[&arguments[..], &["--sink", &recording]].concat()).output().unwrap();
     let text = String::from_utf8(output.stdout.clone()).unwrap();
+    // What was recorded of it says the same, flags and all.
+    let replayed =
+        somatic(&["run", "--backend", "cpu", "--source", &recording, "--sink", "-", "--all-fields"]).output();
+    assert!(replayed.unwrap().stdout == output.stdout);
     let last: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
     for field in last["fields"].as_array().unwrap() {
         let flags: Vec<&str> = field["flags"].as_array().unwrap().iter().filter_map(Value::as_str).collect();

@@ -115,6 +115,8 @@ fn each_heavy_dependency_has_one_door() {
         ("rustix", "cli/board/pty.rs|source/ports.rs"),
         ("mcap", "recording"),
         ("crc32fast", "recording"),
+        ("lz4_flex", "recording"),
+        ("ruzstd", "recording"),
         ("serialport", "source"),
     ];
     for (dependency, door) in doors {

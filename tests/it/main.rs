@@ -24,6 +24,9 @@ mod lint;
 mod meshes;
 mod motion;
 mod properties;
+// The library's own numbers that look like chance.
+#[path = "../../src/author/random.rs"]
+mod random;
 mod real;
 mod recordings;
 mod simulated;

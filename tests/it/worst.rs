@@ -5,39 +5,26 @@ use std::collections::BTreeMap;
 use somatic::{Agreement, BackendKind, Engine, Frame, Options, Outputs, Scene};
 
 use crate::common::{Flat, backends, frame};
-
-/// Numbers in 0..1, the same every time (an additive sequence, mixed by multiplication).
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        ((mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-}
+use crate::random::Random;
 
 /// What came of comparing `kind` with the reference on `fields` random fields of `taxels` taxels, over `frames` frames.
 fn compared(kind: BackendKind, taxels: usize, fields: usize, frames: usize) -> Agreement {
-    let mut numbers = Numbers(taxels as u64);
+    let mut numbers = Random::new(taxels as u64);
+    let between = |numbers: &mut Random, low: f64, high: f64| low + (high - low) * numbers.unit();
     let mut uv: Vec<[f64; 2]> = Vec::with_capacity(taxels * fields);
     let mut decades = Vec::with_capacity(fields);
     for _ in 0..fields {
-        let size = 10.0_f64.powf(numbers.between(-3.0, 1.0));
-        let off_centre = numbers.between(0.0, 3.0);
-        let mut at = |centre: f64| size * (centre + numbers.between(-1.0, 1.0));
+        let size = 10.0_f64.powf(between(&mut numbers, -3.0, 1.0));
+        let off_centre = between(&mut numbers, 0.0, 3.0);
+        let mut at = |centre: f64| size * (centre + between(&mut numbers, -1.0, 1.0));
         uv.extend((0..taxels).map(|_| [at(off_centre), at(0.0)]));
-        decades.push(numbers.between(0.0, 8.0));
+        decades.push(between(&mut numbers, 0.0, 8.0));
     }
     let ids = |field: usize| (field * taxels) as u32..((field + 1) * taxels) as u32;
     let skin = (0..fields).fold(Flat::new(&uv), |skin, field| skin.field(&format!("{field:05}"), None, ids(field)));
-    let mut value = |n: usize| match numbers.next() < 0.2 {
+    let mut value = |n: usize| match numbers.unit() < 0.2 {
         true => 0.0,
-        false => 10.0_f64.powf(numbers.between(0.0, decades[n / taxels])),
+        false => 10.0_f64.powf(between(&mut numbers, 0.0, decades[n / taxels])),
     };
     let recording: Vec<Frame> =
         (0..frames).map(|n| frame(n as f64 * 0.01, &(0..uv.len()).map(&mut value).collect::<Vec<_>>())).collect();

@@ -28,10 +28,10 @@ def frame(message):
 
 def points(message):
     fields = {f.name: (f.offset, f.type) for f in message.fields}
-    assert all(kind == 7 for _, kind in fields.values()), "single precision"
+    letters = {1: "<B", 7: "<f"}
     rows = []
     for at in range(0, len(message.data), message.point_stride):
-        rows.append({name: struct.unpack_from("<f", message.data, at + offset)[0] for name, (offset, _) in fields.items()})
+        rows.append({name: struct.unpack_from(letters[kind], message.data, at + offset)[0] for name, (offset, kind) in fields.items()})
     return {"frame_id": message.frame_id, "points": rows, "ns": message.timestamp.ToNanoseconds()}
 
 

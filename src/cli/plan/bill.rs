@@ -1,0 +1,142 @@
+//! What a scene costs: counted, estimated, measured.
+
+use somatic::scene::PlannedStage;
+use somatic::tradeoff::{Combination, ladder};
+use somatic::{Agreement, BackendKind, Body, Engine, Frame, Options, Outputs, Result};
+
+use super::estimated::Estimate;
+use super::timed::{Played, measured, pressed};
+use crate::cli::input::Input;
+use crate::cli::run::RECORDED_BATCH;
+use crate::cli::scene::Asked;
+use crate::cli::tradeoff::{Settled, settled};
+use crate::cli::words::count;
+
+/// What a scene costs.
+pub(super) struct Bill {
+    pub(super) body: String,
+    /// Of how many.
+    pub(super) taxels: [usize; 2],
+    pub(super) fields: [usize; 2],
+    pub(super) memberships: usize,
+    pub(super) bytes: [usize; 2],
+    pub(super) backend: (String, String, String),
+    pub(super) knobs: Combination,
+    /// Fields that cannot have the charts that are asked for, and why.
+    pub(super) kept_charts: Vec<String>,
+    /// What `somatic tradeoff` measured of this, and when.
+    pub(super) kept: Option<String>,
+    /// Frames a call.
+    pub(super) batch: usize,
+    pub(super) stages: Vec<Stage>,
+    pub(super) estimate: Estimate,
+    /// None where nothing is to be measured.
+    pub(super) measured: Option<Measured>,
+}
+
+/// A stage, and times of a frame, µs, where there are any of it.
+pub(super) struct Stage {
+    pub(super) planned: PlannedStage,
+    pub(super) estimated_us: Option<f64>,
+    pub(super) measured_us: Option<f64>,
+}
+
+/// What was measured.
+pub(super) struct Measured {
+    /// On what, in words.
+    pub(super) on: String,
+    /// A frame, µs.
+    pub(super) whole_us: f64,
+    /// None on the reference.
+    pub(super) agreement: Option<Agreement>,
+}
+
+impl Bill {
+    /// The bill of `asked`, measured too if `measures` says so.
+    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body, measures: bool) -> Result<Self> {
+        let recorded = input.filter(|input| input.is_recording());
+        let gather = recorded.is_some() && asked.speed.is_none();
+        let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
+        let Settled { options, why: picked, measured: kept } = settled(asked, input, body, batch)?;
+        let engine = Engine::new(body, options.clone())?;
+        let (name, what, why) = engine.backend();
+        let backend = (name.to_owned(), what, picked.unwrap_or_else(|| why.to_owned()));
+        let kind: BackendKind = name.parse()?;
+        let plan = engine.plan();
+        let knobs = Combination { backend: kind, knobs: plan.knobs() };
+        let explained = plan.explain();
+        let rungs = ladder(plan);
+        // Before anything of this plan is measured: neither knows of the other.
+        let estimate = Estimate::new(&rungs, &explained, knobs, batch);
+        let made = |outputs: Outputs| -> Result<Engine> {
+            let mut options = Options { backend: kind, ..options.clone() };
+            options.scene.outputs = outputs;
+            Engine::new(body, options)
+        };
+        let mut stages: Vec<Stage> =
+            explained.into_iter().map(|planned| Stage { planned, estimated_us: None, measured_us: None }).collect();
+        for (rung, us) in rungs.iter().zip(&estimate.rungs_us) {
+            stages[rung.stages.end - 1].estimated_us = *us;
+        }
+        let mut measured_too = None;
+        if measures {
+            let mut engines = rungs.iter().map(|rung| made(rung.outputs)).collect::<Result<Vec<_>>>()?;
+            let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs())).transpose()?;
+            engines.extend(compared);
+            let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
+            let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();
+            let us = measured(&mut engines, &mut played)?;
+            let below = std::iter::once(0.0).chain(us.iter().copied());
+            for ((rung, us), below) in rungs.iter().zip(&us).zip(below) {
+                stages[rung.stages.end - 1].measured_us = Some((us - below).max(0.0));
+            }
+            let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
+            measured_too = Some(Measured { on, whole_us: us[us.len() - 1], agreement });
+        }
+        Ok(Self {
+            body: body.name.clone(),
+            taxels: [plan.channels(), body.taxels.len()],
+            fields: [plan.fields().len(), body.fields.len() * plan.letters().len()],
+            memberships: plan.memberships(),
+            bytes: [plan.bytes_up(), plan.bytes_down()],
+            backend,
+            knobs,
+            kept_charts: engine.kept_charts().map(|(name, why)| format!("{name}: {why}")).collect(),
+            kept,
+            batch,
+            stages,
+            estimate,
+            measured: measured_too,
+        })
+    }
+}
+
+/// The frames that `engines` are measured on, and what they are, in words.
+fn played(
+    asked: &Asked,
+    recorded: Option<&Input>,
+    body: &Body,
+    batch: usize,
+    engines: &mut [Engine],
+) -> Result<(Played, String)> {
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let mut frames = Vec::new();
+    let mut on = "with every taxel pressed".to_owned();
+    if let Some(input) = recorded {
+        let mut source = input.open(&ids, asked)?;
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        while frames.len() < batch.max(RECORDED_BATCH) && source.next_frame(&mut frame)? {
+            frames.push(frame.clone());
+        }
+        if !frames.is_empty() {
+            on = format!("on the first {} of {}", count(frames.len() as u64, "frame"), input.name);
+            for engine in engines {
+                engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+            }
+        }
+    }
+    if frames.is_empty() {
+        frames = pressed(ids.len(), batch);
+    }
+    Ok((Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() }, on))
+}

@@ -1,0 +1,156 @@
+//! A bill as text and as JSON.
+
+use comfy_table::ColumnConstraint;
+use console::style;
+use serde_json::{Value, json};
+use somatic::Agreement;
+
+use super::bill::{Bill, Stage};
+use crate::cli::table::{plain, right, shown};
+use crate::cli::words::count;
+
+impl Bill {
+    pub(super) fn text(&self) -> String {
+        let mut text = format!("{}\n", style(&self.body).bold());
+        let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
+        line("fields", format!("{} of {}", self.fields[0], self.fields[1]));
+        line("taxels", format!("{} of {} are read", self.taxels[0], self.taxels[1]));
+        line("memberships", self.memberships.to_string());
+        let moved = format!("{} B up, {} B down", self.bytes[0], self.bytes[1]);
+        line(
+            "a frame",
+            match &self.measured {
+                Some(measured) => format!("{moved}, {:.2} µs {}", measured.whole_us, measured.on),
+                None => moved,
+            },
+        );
+        line("estimated", self.estimated());
+        let (name, what, why) = &self.backend;
+        line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
+        let [_, knobs @ ..] = self.knobs.words();
+        line("knobs", knobs.join(", "));
+        if let Some(kept) = &self.kept {
+            line("measured", kept.clone());
+        }
+        self.kept_charts.iter().for_each(|kept| line("kept chart", kept.clone()));
+        if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
+            line("accuracy", accuracy(agreement));
+        }
+        text + "\n" + &self.table()
+    }
+
+    /// The estimate in words, and how far it is from what was measured.
+    fn estimated(&self) -> String {
+        let Some(us) = self.estimate.whole_us else { return format!("no estimate: {}", self.estimate.by) };
+        let measured = self.measured.as_ref().map(|measured| us / measured.whole_us);
+        let beside = measured.map_or(String::new(), |times| format!(", {times:.2} times what is measured"));
+        format!("{us:.2} µs with every field touched{beside}; {}", self.estimate.by)
+    }
+
+    fn table(&self) -> String {
+        let headings = ["stage", "over", "memberships", "bytes", "estimated µs", "measured µs", "where", "why"];
+        let mut table = plain(headings);
+        table.set_constraints((0..7).map(|_| ColumnConstraint::ContentWidth));
+        for column in 1..6 {
+            right(&mut table, column);
+        }
+        for Stage { planned: stage, estimated_us, measured_us } in &self.stages {
+            let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
+            let place = if stage.on_host { "host" } else { &self.backend.0 };
+            let over = if ["calibrate", "change"].contains(&stage.name) { "value" } else { "field" };
+            let us = |us: &Option<f64>| us.map_or(String::new(), |us| format!("{us:.3}"));
+            table.add_row([
+                stage.name.to_owned(),
+                if stage.runs { count(stage.over as u64, over) } else { "–".to_owned() },
+                number(stage.memberships),
+                match stage.bytes {
+                    [0, 0] => String::new(),
+                    [0, down] => format!("{down} down"),
+                    [up, _] => format!("{up} up"),
+                },
+                us(estimated_us),
+                us(measured_us),
+                if stage.runs { place.to_owned() } else { String::new() },
+                stage.why.clone(),
+            ]);
+        }
+        shown(&table)
+    }
+
+    fn knobs_json(&self) -> Value {
+        let [_, arithmetic, charts, orientation_by, coverage, cadence] = self.knobs.words();
+        json!({
+            "arithmetic": arithmetic,
+            "charts": charts,
+            "orientation_by": orientation_by,
+            "coverage": coverage,
+            "cadence": cadence,
+        })
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let (name, what, why) = &self.backend;
+        let stage = |Stage { planned, estimated_us, measured_us }: &Stage| {
+            json!({
+                "stage": planned.name,
+                "runs": planned.runs,
+                "why": planned.why,
+                "where": if planned.on_host { "host" } else { "backend" },
+                "over": planned.over,
+                "memberships": planned.memberships,
+                "bytes_up": planned.bytes[0],
+                "bytes_down": planned.bytes[1],
+                "estimated_us": estimated_us.map(rounded),
+                "us": measured_us.map(rounded),
+            })
+        };
+        let mut bill = json!({
+            "body": self.body,
+            "fields": self.fields[0],
+            "of_fields": self.fields[1],
+            "taxels": self.taxels[0],
+            "of_taxels": self.taxels[1],
+            "memberships": self.memberships,
+            "bytes_up": self.bytes[0],
+            "bytes_down": self.bytes[1],
+            "backend": name,
+            "adapter": what,
+            "why": why,
+            "knobs": self.knobs_json(),
+            "kept_charts": self.kept_charts,
+            "measured": self.kept,
+            "batch": self.batch,
+            "estimated_us": self.estimate.whole_us.map(rounded),
+            "estimated_by": self.estimate.by,
+            "us": self.measured.as_ref().map(|measured| rounded(measured.whole_us)),
+            "stages": self.stages.iter().map(stage).collect::<Vec<_>>(),
+        });
+        if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
+            let errors = agreement.quantities.iter().map(|(name, of)| (name.clone(), of.worst_error.into()));
+            bill["worst_errors"] = Value::Object(errors.collect());
+            bill["agrees"] = agreement.holds().into();
+        }
+        bill
+    }
+}
+
+fn rounded(us: f64) -> f64 {
+    (us * 1e3).round() / 1e3
+}
+
+/// What single precision costs, in the units that people think in.
+fn accuracy(agreement: &Agreement) -> String {
+    let worst = |name: &str| agreement.quantities.get(name).filter(|of| of.compared > 0).map(|of| of.worst_error);
+    let mut words = Vec::new();
+    if let Some(metres) = worst("centroid") {
+        words.push(format!("centroid within {:.1e} mm", metres * 1e3));
+    }
+    for name in ["orientation", "axis", "direction"] {
+        if let Some(radians) = worst(name) {
+            words.push(format!("{name} within {:.1e}°", radians.to_degrees()));
+        }
+    }
+    let verdict =
+        if agreement.holds() { "as the reference, to rounding" } else { "NOT as the reference; run --verify" };
+    if words.is_empty() { verdict.to_owned() } else { format!("{verdict}: {}", words.join(", ")) }
+}

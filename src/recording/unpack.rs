@@ -1,0 +1,52 @@
+//! Chunks that other programs have compressed, as they were before.
+
+use std::io::Read;
+
+/// Bytes of a chunk, at most: more is damage, or meant to fill memory.
+const MOST: u64 = 1 << 28;
+
+/// Ways to compress that are known.
+pub(super) const KNOWN: [&str; 3] = ["", "lz4", "zstd"];
+
+/// The `length` bytes that `bytes` are, compressed by one of [`KNOWN`]. `None` where they are not.
+pub(super) fn unpacked(compression: &str, bytes: &[u8], length: u64) -> Option<Vec<u8>> {
+    let mut unpacked = Vec::new();
+    let wanted = (length <= MOST).then(|| length + 1)?;
+    let read = match compression {
+        "lz4" => lz4_flex::frame::FrameDecoder::new(bytes).take(wanted).read_to_end(&mut unpacked),
+        "zstd" => ruzstd::decoding::StreamingDecoder::new(bytes).ok()?.take(wanted).read_to_end(&mut unpacked),
+        _ => return None,
+    };
+    (read.is_ok() && unpacked.len() as u64 == length).then_some(unpacked)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    #[test]
+    fn what_was_compressed_comes_back_and_damage_does_not() {
+        let bytes: Vec<u8> = (0..50_000_u32).flat_map(|i| (i / 7).to_le_bytes()).collect();
+        let length = bytes.len() as u64;
+        let mut lz4 = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        lz4.write_all(&bytes).unwrap();
+        let level = ruzstd::encoding::CompressionLevel::Fastest;
+        let packed = [("lz4", lz4.finish().unwrap()), ("zstd", ruzstd::encoding::compress_to_vec(&bytes[..], level))];
+        for (compression, packed) in packed {
+            assert!(packed.len() < bytes.len());
+            assert!(unpacked(compression, &packed, length).as_ref() == Some(&bytes), "{compression}");
+            assert_eq!(unpacked(compression, &packed, length - 1), None, "{compression}: longer than it says");
+            assert_eq!(unpacked(compression, &packed, length + 1), None, "{compression}: shorter than it says");
+            assert_eq!(unpacked(compression, &packed, u64::MAX), None, "{compression}: beyond all memory");
+            assert_eq!(unpacked(compression, &packed[..packed.len() / 2], length), None, "{compression}: cut");
+            for at in (0..packed.len()).step_by(97) {
+                // Another answer, which a checksum tells, or none: no panic.
+                let mut damaged = packed.clone();
+                damaged[at] ^= 0x55;
+                let _ = unpacked(compression, &damaged, length);
+            }
+        }
+    }
+}
