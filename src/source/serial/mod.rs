@@ -176,9 +176,10 @@ impl Source for SerialSource {
                     due
                 }
                 None => {
-                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
                     // A frame that says that nobody speaks is made of no bytes.
-                    self.read_at = self.read_at.filter(|_| due.is_none() || self.merge.is_timed());
+                    let of_bytes = self.merge.is_timed() || self.merge.holds();
+                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
+                    self.read_at = self.read_at.filter(|_| due.is_none() || of_bytes);
                     due
                 }
             };
