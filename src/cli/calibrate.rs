@@ -7,12 +7,13 @@ use std::time::Duration;
 use clap::Args;
 use console::style;
 use serde_json::json;
-use somatic::source::{Source, SourceSpec};
+use somatic::source::{Lines, Source, SourceSpec};
 use somatic::survey::{Findings, Found, Survey, Wishes};
 use somatic::{Body, Calibration, Error, Result, whole};
 
 use super::feed::{Arrival, Feed, Manner};
 use super::plot::Format;
+use super::ports::LineFlags;
 use super::run::stop_on_signal;
 use super::table::{plain, right, shown};
 use super::words::{bullet, count};
@@ -22,6 +23,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic calibrate --body robot.glb --source session.csv --rest 5 -o robot.toml --plot robot.svg
   robot-driver | somatic calibrate --body robot.glb --source - --bits 10 -o robot.toml
+  somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
 
 First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one after the other or many at
@@ -35,9 +37,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "BODY")]
     body: String,
 
-    /// Where frames come from: as for `somatic run`.
-    #[arg(long, value_name = "SOURCE")]
-    source: String,
+    /// Where frames come from: as for `somatic run`; serial lines may be several.
+    #[arg(long = "source", value_name = "SOURCE", required = true)]
+    sources: Vec<String>,
+
+    #[command(flatten)]
+    lines: LineFlags,
 
     /// The calibration to write, TOML.
     #[arg(short, long, value_name = "FILE.toml")]
@@ -87,11 +92,23 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let format = arguments.plot.as_deref().map(Format::of).transpose()?;
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let spec: SourceSpec = arguments.source.parse()?;
-    let source = spec.open(&ids, arguments.rate)?;
-    let is_live = matches!(spec, SourceSpec::Stdin | SourceSpec::Serial { .. });
+    let ports = arguments.lines.lines(&arguments.sources)?;
+    let (source, lines): (Box<dyn Source + Send>, _) = if ports.is_empty() {
+        (first_of(&arguments.sources)?.open(&ids, arguments.rate)?, None)
+    } else if arguments.rate.is_some() {
+        return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
+    } else {
+        let source = arguments.lines.open(&ports, &ids, None)?;
+        let lines = source.lines();
+        (Box::new(source), Some(lines))
+    };
     let mut survey = Survey::new(&in_body(&body, &*source)?);
-    let lost = gather(&mut survey, source, arguments, is_live)?;
+    let gathered = gather(&mut survey, source, arguments, lines.as_ref());
+    if let Some(lines) = &lines {
+        lines.close();
+        tell(lines);
+    }
+    let lost = gathered?;
     let findings = survey.finish(Wishes { bits: arguments.bits, equalise: arguments.equalise })?;
 
     let text = findings.calibration(&name_of(&body));
@@ -112,6 +129,16 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     Ok(if lost.is_empty() { DONE } else { super::LOST })
 }
 
+/// The first of `sources`.
+fn first_of(sources: &[String]) -> Result<SourceSpec> {
+    sources.first().ok_or_else(|| Error::usage("give a --source"))?.parse()
+}
+
+/// Says what is to be said of serial lines.
+fn tell(lines: &Lines) {
+    lines.notices().iter().for_each(|notice| say(notice));
+}
+
 /// The ids that `source` delivers, each of which `body` must have.
 fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
     match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
@@ -124,7 +151,7 @@ fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
 }
 
 /// What a calibration calls `body`: its file's name without folder and ending.
-fn name_of(body: &Body) -> String {
+pub(super) fn name_of(body: &Body) -> String {
     Path::new(&body.name).file_stem().map_or_else(|| body.name.clone(), |stem| stem.to_string_lossy().into_owned())
 }
 
@@ -133,10 +160,14 @@ fn gather(
     survey: &mut Survey,
     source: Box<dyn Source + Send>,
     arguments: &Arguments,
-    is_live: bool,
+    lines: Option<&Lines>,
 ) -> Result<Vec<String>> {
+    let is_live = lines.is_some() || first_of(&arguments.sources)? == SourceSpec::Stdin;
     let stop = stop_on_signal()?;
-    let mut feed = Feed::start(source, Manner { most: 64, gather: !is_live, speed: None });
+    let mut feed = match lines {
+        Some(_) => Feed::start_live(source, 64),
+        None => Feed::start(source, Manner { most: 64, gather: !is_live, speed: None }),
+    };
     let guide = |what: &str| {
         if is_live {
             say(what);
@@ -146,6 +177,7 @@ fn gather(
     let mut begin = None;
     let mut is_pressing = false;
     while !stop.load(Ordering::Relaxed) {
+        lines.into_iter().for_each(tell);
         match feed.next(Duration::from_millis(40)) {
             Some(Arrival::Frames(frames, _)) => {
                 for frame in &frames {

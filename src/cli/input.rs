@@ -38,12 +38,7 @@ impl Input {
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
         };
-        let mut lines = Vec::new();
-        for source in &asked.sources {
-            if let SourceSpec::Serial { port, baud } = source.parse()? {
-                lines.push((port, baud));
-            }
-        }
+        let lines = asked.line_flags().lines(&asked.sources)?;
         let input = Self { name, spec: Some(spec), lines };
         if asked.speed.is_some() && !input.is_recording() {
             return Err(Error::usage("--speed is for recordings; live frames come when they come"));
@@ -62,12 +57,9 @@ impl Input {
         !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
     }
 
-    /// Opens the serial lines. What is wrong with the wiring is told with its file.
+    /// Opens the serial lines.
     pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<SerialSource> {
-        SerialSource::open(&self.lines, ids, &asked.serial()?).map_err(|e| match &asked.wiring {
-            Some(path) if !e.is_usage() => e.at(path.display()),
-            _ => e,
-        })
+        asked.line_flags().open(&self.lines, ids, asked.max_age)
     }
 
     /// Opens it, or the part of it that is asked for, for a body whose taxels have `ids`.

@@ -20,6 +20,7 @@ mod live;
 mod paper;
 mod plan;
 mod plot;
+mod ports;
 #[cfg(feature = "gpu")]
 mod render;
 mod run;
@@ -28,6 +29,7 @@ mod screen;
 mod simulate;
 mod table;
 mod tradeoff;
+mod tune;
 mod words;
 
 use std::io::{self, Write as _};
@@ -57,6 +59,7 @@ Examples:
   somatic plan --outputs centroid               what that computes, what not, and what it costs
   somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs that are so true, here
   somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
+  somatic tune --source serial:/dev/ttyUSB0 -o hand.toml   its sensors' potentiometers
   somatic board --link /tmp/hand                a hand on a serial line, made of software
   somatic info touch.mcap                       how long a recording is, and what is in it
   somatic bench --sensors 1000 --fields 100     how fast this machine is
@@ -92,6 +95,7 @@ enum Command {
     Board(Box<board::Arguments>),
     Bench(bench::Arguments),
     Calibrate(calibrate::Arguments),
+    Tune(tune::Arguments),
     Devices(devices::Arguments),
     Completions(completions::Arguments),
 }
@@ -114,6 +118,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Board(arguments) => board::run(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(arguments),
+        Command::Tune(arguments) => tune::tune(arguments),
         Command::Devices(arguments) => devices::devices(arguments),
         Command::Completions(arguments) => completions::completions(arguments),
     }

@@ -99,6 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
+    asked.line_flags().check_taps(settled.options.calibration.as_ref(), &ids)?;
     let mut engine = Engine::new(&body, settled.options)?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
     let (source, live) = match recorded {

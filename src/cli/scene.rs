@@ -13,14 +13,15 @@ use serde::Deserialize;
 use somatic::error::nearest;
 use somatic::keys;
 use somatic::scene::{Coordinates, FilterBy};
-use somatic::signal::{FsrSignal, Letter, Receptor, Wiring};
+use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{Part, SinkSpec};
-use somatic::source::{SerialOptions, SimulatedSource, SourceSpec};
+use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
 use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 use super::input::Input;
+use super::ports::LineFlags;
 use super::{attached, load_body};
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
@@ -333,16 +334,8 @@ impl Asked {
     }
 
     /// How boards on serial lines are read.
-    ///
-    /// # Errors
-    /// The wiring cannot be read.
-    pub(super) fn serial(&self) -> Result<SerialOptions> {
-        Ok(SerialOptions {
-            wiring: self.wiring.as_ref().map(Wiring::load).transpose()?,
-            live_rate_hz: self.live_rate,
-            board_rate_hz: self.board_rate,
-            max_age_s: self.max_age,
-        })
+    pub(super) fn line_flags(&self) -> LineFlags {
+        LineFlags { wiring: self.wiring.clone(), live_rate: self.live_rate, board_rate: self.board_rate }
     }
 
     /// The body that is meant.

@@ -1,5 +1,7 @@
 //! Wiring: which taxel hangs on which channel of which board. It belongs to one robot; `docs/wire.md` has the file's keys.
 
+mod written;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -31,6 +33,8 @@ pub struct WiredBoard {
     pub baud: Option<u32>,
     /// The taxel's id, one a channel; `None` for a channel on which nothing hangs.
     pub taxels: Vec<Option<u32>>,
+    /// The tap that its potentiometer is to have, one a channel, where the file says so.
+    pub taps: Vec<Option<u8>>,
 }
 
 #[derive(Deserialize)]
@@ -57,6 +61,7 @@ struct RunKeys {
     first: Option<Spanned<i64>>,
     count: Option<Spanned<i64>>,
     ids: Option<Vec<u32>>,
+    taps: Option<Spanned<Vec<Spanned<i64>>>>,
 }
 
 impl Wiring {
@@ -126,7 +131,8 @@ impl Wiring {
             let (own, after) = rest.split_at(rest.len().div_ceil(boards - index));
             rest = after;
             let taxels = own.iter().copied().map(Some).collect();
-            WiredBoard { id: first_id + index as u16, bits: None, port: None, baud: None, taxels }
+            let taps = vec![None; own.len()];
+            WiredBoard { id: first_id + index as u16, bits: None, port: None, baud: None, taxels, taps }
         };
         Ok(Self { boards: (0..boards).map(take).collect() })
     }
@@ -141,6 +147,17 @@ impl Wiring {
     #[must_use]
     pub fn board(&self, id: u16) -> Option<&WiredBoard> {
         self.boards.iter().find(|board| board.id == id)
+    }
+
+    /// The same wiring with other taps: what `tap` gives for a board's id and a channel that has a taxel.
+    #[must_use]
+    pub fn with_taps(&self, tap: impl Fn(u16, u16) -> Option<u8>) -> Self {
+        let mut wiring = self.clone();
+        for board in &mut wiring.boards {
+            let wired = (0..).zip(&board.taxels);
+            board.taps = wired.map(|(channel, taxel)| taxel.and_then(|_| tap(board.id, channel))).collect();
+        }
+        wiring
     }
 
     /// The taxel on a board's channel.
@@ -161,6 +178,7 @@ impl BoardKeys {
         let baud = whole("baud", self.baud.as_ref(), 1..1_000_000_000)?;
         let channels = whole("channels", self.channels.as_ref(), 1..MOST_CHANNELS + 1)?.map(|count| count as usize);
         let mut taxels = vec![None; channels.unwrap_or(0)];
+        let mut taps = taxels.iter().map(|_| None).collect::<Vec<Option<u8>>>();
         for keys in &self.taxels {
             let run = keys.get_ref();
             let channel = whole("channel", Some(&run.channel), 0..MOST_CHANNELS)?.unwrap_or(0) as usize;
@@ -183,6 +201,16 @@ impl BoardKeys {
                 return Err(text.wrong(keys.span(), what));
             }
             taxels.resize(taxels.len().max(end), None);
+            taps.resize(taxels.len(), None);
+            if let Some(given) = &run.taps {
+                if given.get_ref().len() != ids.len() {
+                    let what = format!("{} `taps` are given for {} channels", given.get_ref().len(), ids.len());
+                    return Err(text.wrong(given.span(), what));
+                }
+                for (channel, tap) in (channel..).zip(given.get_ref()) {
+                    taps[channel] = whole("taps", Some(tap), 0..256)?.map(|tap| tap as u8);
+                }
+            }
             for (channel, id) in (channel..).zip(ids) {
                 if taxels[channel].replace(id).is_some() {
                     return Err(text.wrong(keys.span(), format!("channel {channel} has a taxel already")));
@@ -192,7 +220,7 @@ impl BoardKeys {
         if taxels.iter().all(Option::is_none) {
             return Err(text.wrong(self.id.span(), format!("nothing hangs on board {id}; give `taxels`")));
         }
-        Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels })
+        Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels, taps })
     }
 }
 
@@ -247,6 +275,8 @@ mod tests {
         assert!(why(&run("{ channel = 250, first = 0, count = 9 }")).contains("channel 258"));
         assert!(why(&run("{ channel = 0, ids = [5] }, { channel = 1, ids = [5] }")).contains("taxel 5 hangs on"));
         assert!(why(&board("bits = 9\ntaxels = [{ channel = 0, first = 0 }]")).contains("8, 10, 12 or 16"));
+        assert!(why(&run("{ channel = 0, first = 1, count = 2, taps = [3] }")).contains("1 `taps` are given for 2"));
+        assert!(why(&run("{ channel = 0, first = 1, taps = [256] }")).contains("between 0 and 255"));
         assert!(why(&board("chanels = 3\ntaxels = []")).contains("did you mean `channels`"));
         assert!(why(&board("taxels = []")).contains("nothing hangs"));
         assert!(why(&run("{ channel = 0, first = 1 }").repeat(2)).contains("two boards"));

@@ -22,7 +22,7 @@ pub use ndjson::NdjsonSource;
 pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
 #[cfg(feature = "cli")]
-pub use serial::{BoardAccount, BoardState, Lines, SerialOptions, SerialSource};
+pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, SerialOptions, SerialSource, TapTrouble};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 

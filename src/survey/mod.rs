@@ -7,6 +7,7 @@
 
 mod figure;
 mod file;
+pub mod tuning;
 
 use crate::error::{Error, Result};
 use crate::signal::RawValue;

@@ -22,6 +22,8 @@ mod run;
 mod serial;
 mod simulate;
 mod tradeoff;
+#[cfg(unix)]
+mod tune;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

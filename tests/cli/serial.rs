@@ -213,6 +213,50 @@ fn a_run_says_what_became_of_a_board_that_starts_again() {
     assert!(lines.lines().count() as u64 >= number(latency, "frames"));
 }
 
+/// Times of the frames that `somatic run` makes of two boards that play at 50 Hz and send as `board` says, in two seconds.
+fn times(board: &[&str], run: &[&str]) -> Vec<f64> {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = recording(folder.path(), 2);
+    let boards = Boards::start(&[&["--boards", "2", "--source", &rows, "--wait", "--for", "20s"], board].concat());
+    let sources: Vec<String> = boards.ports.iter().map(|port| format!("serial:{port}")).collect();
+    let body = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/mat.glb");
+    let ids: Vec<String> = (1..=2)
+        .map(|id| {
+            format!("[[board]]\nid = {id}\ntaxels = [{{ channel = 0, first = {}, count = 16 }}]\n", (id - 1) * 16)
+        })
+        .collect();
+    let wiring = boards.folder.path().join("wiring.toml");
+    std::fs::write(&wiring, ids.concat()).unwrap();
+    let first = ["run", "--body", body, "--backend", "cpu", "--outputs", "total", "--sink", "-", "--for", "3s"];
+    let lines = ["--wiring", text_of(&wiring), "--source", &sources[0], "--source", &sources[1]];
+    let output = somatic(&[&first[..], &lines, run].concat()).output().unwrap();
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", stderr(&output));
+    let time = |line: &str| serde_json::from_str::<Value>(line).unwrap()["t"].as_f64().unwrap();
+    String::from_utf8(output.stdout).unwrap().lines().map(time).collect()
+}
+
+/// The median time from a frame to the next, s.
+fn usual_step_s(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps[steps.len() / 2]
+}
+
+#[test]
+fn frames_come_as_often_as_is_asked_of_boards_and_of_their_merger() {
+    // Boards that are told to send ten frames a second do; frames are put together twenty times a second where asked for.
+    for (board, run, period_s) in [
+        (&[][..], &["--board-rate", "10"][..], 0.1),
+        (&["--partial"], &["--board-rate", "10"], 0.1),
+        (&[], &["--live-rate", "20"], 0.05),
+        (&["--partial"], &["--board-rate", "25", "--live-rate", "5"], 0.2),
+    ] {
+        let times = times(board, run);
+        let step = usual_step_s(&times);
+        assert!(times.len() > 4 && (step / period_s - 1.0).abs() < 0.2, "{board:?} {run:?}: {step} s: {times:?}");
+    }
+}
+
 #[test]
 fn fields_of_a_silent_board_are_stale() {
     let boards = Boards::start(&["--wait", "--for", "4s", "--faults", "silence=9s@1.5s"]);

@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, Source, SourceSpec};
-use somatic::wire::board::{Faults, Make, VirtualBoard};
+use somatic::wire::board::{Faults, Make, Potentiometers, VirtualBoard};
 use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
@@ -37,6 +37,17 @@ enum Rest {
     Low,
     /// Readings fall when pressed.
     High,
+}
+
+/// What boards do when they are told to set a tap.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Taps {
+    /// They set it.
+    Obeyed,
+    /// They do not know the command.
+    Unknown,
+    /// They do not answer.
+    Ignored,
 }
 
 /// Play boards on pseudo-terminals: the live path without hardware.
@@ -94,6 +105,10 @@ pub(super) struct Arguments {
     /// What an untouched sensor reads, which matters to the taps.
     #[arg(long, value_enum, default_value = "low")]
     rest: Rest,
+
+    /// What boards do when they are told to set a tap of a potentiometer.
+    #[arg(long, value_enum, default_value = "obeyed")]
+    taps: Taps,
 
     /// What is to go wrong.
     #[arg(long, value_name = "FAULTS", default_value = "")]
@@ -245,6 +260,11 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
             running: !arguments.wait,
             partial: arguments.partial,
             falls: arguments.rest == Rest::High,
+            potentiometers: match arguments.taps {
+                Taps::Obeyed => Potentiometers::Obeyed,
+                Taps::Unknown => Potentiometers::Unknown,
+                Taps::Ignored => Potentiometers::Ignored,
+            },
             drift: faults.drift,
         };
         let link = arguments.link.as_ref().map(|link| match wiring.boards() {

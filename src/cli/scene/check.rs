@@ -8,20 +8,7 @@ use super::Asked;
 impl Asked {
     pub(super) fn check(&self) -> Result<()> {
         self.check_accuracy().map_err(|(_, e)| e)?;
-        let lines = self.sources.iter().filter(|source| source.starts_with("serial:")).count();
-        if self.sources.len() > 1 && lines < self.sources.len() {
-            return Err(Error::usage(
-                "only serial lines are read several at a time; merge the others, or run once for each",
-            ));
-        }
-        let of_lines = [
-            ("--wiring", self.wiring.is_some()),
-            ("--live-rate", self.live_rate.is_some()),
-            ("--board-rate", self.board_rate.is_some()),
-        ];
-        if let Some((flag, _)) = of_lines.iter().find(|(_, given)| *given && lines == 0) {
-            return Err(Error::usage(format!("{flag} is for boards on serial lines; add --source serial:PORT")));
-        }
+        self.line_flags().lines(&self.sources)?;
         if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
             return Err(Error::usage(format!(
                 "--speed {speed} is no speed; give a positive number, 1 for as recorded"

@@ -5,7 +5,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::merge::BoardFrame;
+use super::taps::{self, ChannelTap};
 use crate::error::Error;
+use crate::signal::Wiring;
 
 /// Frames of boards that wait at most, a line.
 const MOST_WAITING: usize = 64;
@@ -50,6 +52,8 @@ pub struct BoardAccount {
     pub board: u16,
     /// The port where it was heard last.
     pub port: Option<String>,
+    /// Bits of its values, once it has said so.
+    pub bits: Option<u8>,
     /// How it is.
     pub state: BoardState,
     /// Frames that came intact.
@@ -133,6 +137,8 @@ pub(super) enum Verdict {
 pub(super) struct State {
     pub(super) queue: VecDeque<(BoardFrame, Instant)>,
     pub(super) accounts: Vec<BoardAccount>,
+    /// One a channel, board by board.
+    pub(super) taps: Vec<Vec<ChannelTap>>,
     notices: VecDeque<String>,
     verdicts: Vec<Verdict>,
     /// Per board, the line that it was heard on.
@@ -150,14 +156,16 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(boards: impl Iterator<Item = u16>, lines: usize) -> Self {
-        let accounts: Vec<_> = boards.map(|board| BoardAccount { board, ..BoardAccount::default() }).collect();
+    pub(super) fn new(wiring: &Wiring, lines: usize) -> Self {
+        let account = |board: u16| BoardAccount { board, ..BoardAccount::default() };
+        let accounts: Vec<_> = wiring.boards().iter().map(|board| account(board.id)).collect();
         let state = State {
             queue: VecDeque::new(),
             notices: VecDeque::new(),
             verdicts: vec![Verdict::Pending; lines],
             owners: vec![None; accounts.len()],
             gaps: vec![0; accounts.len()],
+            taps: taps::wanted(wiring),
             accounts,
             closed: false,
             readers: lines,

@@ -19,6 +19,12 @@ const HEARTBEAT_S: f64 = 0.1;
 /// A board takes over the pace only when it is so much faster.
 const FASTER: f64 = 0.8;
 
+/// A frame of the skin waits for boards as fast as the one that sets the pace, where they are about to send: so long at
+/// most, s, and this share of the period. Without, boards that send together come now before and now after it, and of two
+/// frames one is never seen.
+const GRACE_S: f64 = 0.005;
+const GRACE_PERIODS: f64 = 0.25;
+
 /// When a frame is put together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pace {
@@ -69,6 +75,8 @@ struct Board {
     period_s: f64,
     /// The last frame: when it was read in the board's time, µs, and in the host's, s.
     last: Option<(u64, f64)>,
+    /// When that arrived, s.
+    arrived_s: f64,
     /// Whether its last frame is in no frame of the skin yet.
     waiting: bool,
     replaced: u64,
@@ -99,6 +107,7 @@ impl Board {
             }
         }
         self.last = Some((frame.board_us, at));
+        self.arrived_s = frame.arrived_s;
         for known in self.known.iter_mut().flatten() {
             known.sure &= frame.lost == 0;
             if frame.partial && known.sure {
@@ -125,6 +134,8 @@ pub(super) struct Merge {
     last_s: f64,
     /// When a frame is due by itself.
     due_s: Option<f64>,
+    /// A frame that waits for boards about to send: when it is to be, and until when it waits, s.
+    held_s: Option<(f64, f64)>,
 }
 
 impl Merge {
@@ -136,11 +147,12 @@ impl Merge {
             clock: Clock::default(),
             period_s: UNKNOWN_PERIOD_S,
             last: None,
+            arrived_s: 0.0,
             waiting: false,
             replaced: 0,
         };
         let boards = boards.into_iter().map(board).collect();
-        Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None }
+        Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None, held_s: None }
     }
 
     /// Takes a board's frame; when the frame of the skin is to be that this brings about, if it brings one.
@@ -151,12 +163,34 @@ impl Merge {
             return None;
         }
         if self.pace == Pace::Fastest && self.lead(frame.board, at) != frame.board {
-            return None;
+            let over = self.held_s.is_some_and(|(_, until)| !self.awaits(frame.arrived_s, until));
+            return self.held_s.take_if(|_| over).map(|(at, _)| at);
         }
         // While nobody speaks, frames come by themselves: from when this board's values are too old.
         let longest = self.boards.iter().map(|board| board.most_age_s(self.max_age_s)).fold(0.0, f64::max);
         self.due_s = Some(frame.arrived_s + longest + HEARTBEAT_S);
-        (at > self.last_s).then_some(at)
+        let until = frame.arrived_s + (GRACE_PERIODS * self.boards[frame.board].period_s).min(GRACE_S);
+        // A frame that waits has waited long enough when the next one comes.
+        let holds = self.held_s.take().is_none() && at > self.last_s && self.awaits(frame.arrived_s, until);
+        self.held_s = holds.then_some((at, until));
+        (at > self.last_s && !holds).then_some(at)
+    }
+
+    /// Whether a board that sends as fast as the one that sets the pace, and has sent nothing since the last frame, should be
+    /// heard by `until`.
+    fn awaits(&self, now_s: f64, until_s: f64) -> bool {
+        let Some(leader) = self.leader.filter(|_| self.pace == Pace::Fastest) else { return false };
+        let period_s = self.boards[leader].period_s;
+        self.boards.iter().enumerate().any(|(index, board)| {
+            let is_as_fast = FASTER * board.period_s < period_s;
+            let is_due = board.arrived_s + board.period_s <= until_s;
+            index != leader && !board.waiting && is_as_fast && is_due && board.speaks(now_s, self.max_age_s)
+        })
+    }
+
+    /// Whether a frame waits for boards that are about to send.
+    pub(super) fn holds(&self) -> bool {
+        self.held_s.is_some()
     }
 
     /// Which board sets the pace, now that `board` has spoken.
@@ -179,11 +213,15 @@ impl Merge {
 
     /// When [`Merge::tick`] next has something to do, s.
     pub(super) fn due_s(&self) -> Option<f64> {
-        self.due_s
+        let held = self.held_s.map(|(_, until)| until);
+        held.into_iter().chain(self.due_s).reduce(f64::min)
     }
 
     /// When the frame of the skin is to be that is due at `now_s`, if one is.
     pub(super) fn tick(&mut self, now_s: f64) -> Option<f64> {
+        if let Some((at, _)) = self.held_s.take_if(|(_, until)| now_s >= *until) {
+            return (at > self.last_s).then_some(at);
+        }
         let due = self.due_s.filter(|due| now_s >= *due)?;
         let period_s = if let Pace::Every(period_s) = self.pace { period_s } else { HEARTBEAT_S };
         // What could not be kept up with is not made up for.
@@ -258,6 +296,50 @@ mod tests {
         assert!(came.iter().filter(|(tick, _)| *tick >= 110).count() == 45, "every frame of the other");
         // Board 1 is known to be faster after three frames of the other. Board 0 takes over when 50 ms are over.
         assert!(merge.about(0).0 <= 4 && merge.about(1).0 <= 5, "{} {}", merge.about(0).0, merge.about(1).0);
+    }
+
+    /// Boards that send 50 times a second, the second `late_s` after the first and now a millisecond sooner, now later:
+    /// frames that none of the skin had, of 1000 each; how many they would be if nothing waited; and how long frames of the
+    /// skin waited at most, s.
+    fn together(late_s: f64) -> (u64, usize, f64) {
+        let mut merge = two_boards(Pace::Fastest, None);
+        let mut arrivals = Vec::new();
+        for tick in 0..1000_u32 {
+            let at = 1.0 + 0.02 * f64::from(tick);
+            let jitter = 0.001 * f64::from((tick * 7919) % 11) / 5.0 - 0.001;
+            arrivals.extend([(0, at, at), (1, at, at + late_s + jitter)]);
+        }
+        arrivals.sort_by(|a, b| a.2.total_cmp(&b.2));
+        let twice = arrivals.windows(2).filter(|pair| (pair[0].0, pair[1].0) == (1, 1)).count();
+        let (mut longest_s, mut came_s, mut skin) = (0.0_f64, 0.0, Frame::missing(0.0, 3));
+        for (board, read_s, arrived_s) in arrivals {
+            while let Some(due_s) = merge.due_s().filter(|due| *due < arrived_s && merge.holds()) {
+                let at = merge.tick(due_s).unwrap();
+                longest_s = longest_s.max(due_s - came_s);
+                merge.fill(at, &mut skin);
+            }
+            let held = merge.holds();
+            let frame = BoardFrame { arrived_s, ..frame(board, read_s, &[(1, 1)]) };
+            if let Some(at) = merge.take(&frame) {
+                longest_s = longest_s.max(if held { arrived_s - came_s } else { 0.0 });
+                merge.fill(at, &mut skin);
+            } else if !held {
+                came_s = arrived_s;
+            }
+        }
+        (merge.about(0).0 + merge.about(1).0, twice, longest_s)
+    }
+
+    #[test]
+    fn boards_that_send_together_are_in_one_frame() {
+        for (late_s, least) in [(0.0, 50), (0.0005, 50), (0.002, 0)] {
+            let (replaced, twice, longest_s) = together(late_s);
+            assert!(twice >= least, "{late_s}: {twice} are to be mended");
+            assert!(replaced <= 20 && longest_s <= GRACE_S + 1e-9, "{late_s}: {replaced}, {longest_s}");
+        }
+        // What is not about to come is not waited for.
+        let (replaced, _, longest_s) = together(0.01);
+        assert!(replaced <= 4 && longest_s == 0.0, "{replaced}, {longest_s}");
     }
 
     #[test]

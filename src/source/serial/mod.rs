@@ -9,6 +9,7 @@ mod lines;
 mod merge;
 mod port;
 mod session;
+mod taps;
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -17,6 +18,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 pub use lines::{BoardAccount, BoardState, Lines};
+pub use taps::{ChannelTap, TapTrouble};
 
 use self::lines::Shared;
 use self::merge::{Merge, Pace};
@@ -79,7 +81,7 @@ impl SerialSource {
         let places = wiring.boards().iter().map(|board| board.taxels.iter().map(&mut place).collect()).collect();
 
         let wiring = Arc::new(wiring);
-        let shared = Arc::new(Shared::new(wiring.boards().iter().map(|board| board.id), ports.len()));
+        let shared = Arc::new(Shared::new(&wiring, ports.len()));
         let start = Instant::now();
         for (line, (port, baud)) in ports.iter().enumerate() {
             let usual = || wired_baud(&wiring, port).unwrap_or(USUAL_BAUD);
@@ -174,9 +176,10 @@ impl Source for SerialSource {
                     due
                 }
                 None => {
-                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
                     // A frame that says that nobody speaks is made of no bytes.
-                    self.read_at = self.read_at.filter(|_| due.is_none() || self.merge.is_timed());
+                    let of_bytes = self.merge.is_timed() || self.merge.holds();
+                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
+                    self.read_at = self.read_at.filter(|_| due.is_none() || of_bytes);
                     due
                 }
             };

@@ -2,6 +2,7 @@
 //! is wrong where it is not. No I/O, no clock.
 
 mod board;
+mod taps;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -80,6 +81,8 @@ struct Talk {
     /// The board that has an account, whether or not its identity is known at the moment, and its id.
     joined: Option<(usize, u16)>,
     started: bool,
+    /// Whether it is to be started once its taps are set.
+    starts: bool,
     stopped: bool,
     silent: bool,
     last_frame: Duration,
@@ -104,6 +107,7 @@ impl Session {
             board: None,
             joined: None,
             started: false,
+            starts: false,
             stopped: false,
             silent: false,
             last_frame: Duration::ZERO,
@@ -128,7 +132,7 @@ impl Session {
     pub(super) fn opened(&mut self, now: Duration) {
         self.decoder.rejoin();
         let talk = &mut self.talk;
-        (talk.bytes, talk.version, talk.board) = (0, None, None);
+        (talk.bytes, talk.version, talk.board, talk.starts) = (0, None, None, false);
         talk.last_frame = now;
         talk.turn(Stage::Asking, talk.task.baud, now);
     }
@@ -229,6 +233,9 @@ impl Talk {
             && ended.command != Command::Identify
             && self.stage == Stage::Speaking
         {
+            if matches!(ended.command, Command::Tap { .. }) {
+                return self.tap_ended(ended);
+            }
             self.say(&format!("the board does not answer `{}`", word(ended.command)));
         }
         let over = |span: Duration| now >= self.since + span;
@@ -236,7 +243,10 @@ impl Talk {
             Stage::Asking if over(ASKING) => self.probe(0, now),
             Stage::Probing(index) if over(PROBING + bits_take(self.baud)) => self.probe(index + 1, now),
             Stage::GivenUp if over(AGAIN) => self.turn(Stage::Asking, self.task.baud, now),
-            Stage::Speaking => self.watch(now),
+            Stage::Speaking => {
+                self.tune(now);
+                self.watch(now);
+            }
             _ => {}
         }
     }
@@ -283,7 +293,8 @@ impl Talk {
             }
             return;
         }
-        if now < self.last_frame + SILENCE || self.stopped {
+        // A board that is started once its taps are set has nothing to send yet.
+        if now < self.last_frame + SILENCE || self.stopped || self.starts {
             return;
         }
         if !self.silent {
@@ -339,7 +350,9 @@ impl Talk {
                     self.frame(head, frame, now, read_at);
                 }
                 let ended = self.dialogue.hear(event);
-                if let Some((ended, Outcome::Refused(status))) = ended.map(|ended| (ended, ended.outcome)) {
+                if let Some(ended) = ended.filter(|ended| matches!(ended.command, Command::Tap { .. })) {
+                    self.tap_ended(ended);
+                } else if let Some((ended, Outcome::Refused(status))) = ended.map(|ended| (ended, ended.outcome)) {
                     let why = match status {
                         Status::Unknown => "does not know",
                         _ => "refuses",

@@ -17,6 +17,18 @@ use super::format::{ANY_BOARD, Answer, Bits, Command, Head, Identity, MOST_CHANN
 /// From one full frame to the next, when those between are partial.
 const FULL_EVERY: Duration = Duration::from_secs(1);
 
+/// What a board does when it is told to set a tap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Potentiometers {
+    /// It sets it.
+    #[default]
+    Obeyed,
+    /// It answers that it does not know the command, as firmware without potentiometers does.
+    Unknown,
+    /// It does not answer.
+    Ignored,
+}
+
 /// What a board is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Make {
@@ -36,6 +48,8 @@ pub struct Make {
     pub partial: bool,
     /// Whether readings fall when pressed, which matters to its taps.
     pub falls: bool,
+    /// What it does when it is told to set a tap.
+    pub potentiometers: Potentiometers,
     /// How much faster its clock runs, as a part of one.
     pub drift: f64,
 }
@@ -110,6 +124,12 @@ impl VirtualBoard {
         self.commands
     }
 
+    /// The taps that are set, one a channel.
+    #[must_use]
+    pub fn taps(&self) -> &[u8] {
+        &self.taps
+    }
+
     /// Whether it sends frames.
     #[must_use]
     pub fn is_running(&self) -> bool {
@@ -145,6 +165,8 @@ impl VirtualBoard {
                 (self.rate_mhz, value) = (rate_mhz, rate_mhz);
                 self.due = now;
             }
+            Command::Tap { .. } if self.make.potentiometers == Potentiometers::Ignored => return,
+            Command::Tap { .. } if self.make.potentiometers == Potentiometers::Unknown => status = Status::Unknown,
             Command::Tap { channel, tap } => match self.taps.get_mut(usize::from(channel)) {
                 Some(set) => (*set, value) = (tap, tap.into()),
                 None => status = Status::Bad,

@@ -49,6 +49,18 @@ mod tests {
             }
         }
         assert_eq!(at_tap(700, Bits::Ten, RECORDED_TAP, false), 700);
+        // As the paper's circuit itself: a step at tap 38 is as many at another as the curve is steeper there, and a
+        // reading stands for the middle of its step.
+        use crate::signal::FsrCircuit;
+        for (tap, force) in (0..=255).flat_map(|tap| (1..100).map(move |n| (tap, 0.1 * f64::from(n)))) {
+            let recorded = FsrCircuit::default().counts(force);
+            let [low, high] = [recorded, recorded + 1].map(|counts| {
+                let x = f64::from(counts.min(1023)) / 1024.0;
+                1024.0 * x / (x + (1.0 - x) * divider_ohm(tap) / divider_ohm(RECORDED_TAP))
+            });
+            let (read, own) = (at_tap(recorded, Bits::Ten, tap, true), FsrCircuit { tap }.counts(force));
+            assert!(f64::from(own.abs_diff(read)) <= high - low + 1.0, "{force} N at {tap}: {own} {read}");
+        }
         // By hand: x = 512.5/1024, r = 49.857 kΩ / 7.474 kΩ = 6.671: 6.684 / 7.684 of 1024.
         assert_eq!(at_tap(512, Bits::Ten, 255, false), 890);
     }

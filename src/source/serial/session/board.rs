@@ -7,6 +7,7 @@ use super::{Talk, Task};
 use crate::signal::WiredBoard;
 use crate::source::serial::lines::{BoardState, Verdict};
 use crate::source::serial::merge::BoardFrame;
+use crate::source::serial::taps::ChannelTap;
 use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, Placed, layout_hash};
 
 impl Talk {
@@ -17,6 +18,7 @@ impl Talk {
         state.accounts[board].lost += u64::from(placed.lost);
         self.lost += placed.lost;
         if placed.restarted {
+            state.taps[board].iter_mut().for_each(ChannelTap::forget);
             state.accounts[board].restarts += 1;
             state.say(format!("{}: board {id} has started again", self.task.port));
             drop(state);
@@ -57,10 +59,9 @@ impl Talk {
         if let Some(rate_mhz) = rate {
             self.ask(Command::Rate { rate_mhz }, now);
         }
-        if !identity.running {
-            self.ask(Command::Start, now);
-            self.started = true;
-        }
+        self.task.shared.lock().accounts[board].bits = Some(identity.bits.count());
+        // Taps come before frames.
+        (self.starts, self.started) = (!identity.running, self.started || !identity.running);
     }
 
     fn stranger(&mut self, id: u16) {
@@ -110,7 +111,8 @@ impl Talk {
             if let Some((other, _)) = self.joined {
                 state.accounts[other].state = BoardState::Silent;
             }
-            // What came before is not in its account.
+            // What came before is not in its account, and its taps may be any.
+            state.taps[board].iter_mut().for_each(ChannelTap::forget);
             (self.joined, self.lost, self.clock_begins) = (Some((board, id)), 0, true);
         }
         drop(state);
@@ -137,6 +139,11 @@ impl Talk {
             self.task.shared.lock().say(format!("{}: board {id} sends frames again", self.task.port));
         }
         (self.last_frame, self.stopped) = (now, false);
+        let mut frame = frame;
+        {
+            let taps = &self.task.shared.lock().taps[board];
+            frame.values.retain(|(channel, _)| !taps.get(usize::from(*channel)).is_some_and(|tap| tap.is_unknown()));
+        }
         let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_begins));
         self.task.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);
     }
@@ -167,7 +174,8 @@ mod tests {
 
     #[test]
     fn a_board_fits_its_wiring_or_it_is_said_why() {
-        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels: vec![Some(4), None, Some(9)] };
+        let (taxels, taps) = (vec![Some(4), None, Some(9)], vec![None; 3]);
+        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels, taps };
         let hash = |taxels: &[Option<u32>]| layout_hash(taxels.iter().copied());
         let right = Identity {
             request: 1,

@@ -1,0 +1,171 @@
+//! `somatic tune`: boards' potentiometers set so that rest and a firm press use their converters' range.
+
+mod bench;
+mod report;
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use somatic::signal::{FsrCircuit, Wiring};
+use somatic::survey::tuning::{MOST_ROUNDS, Tuned, Tuning};
+use somatic::{Error, Result, whole};
+
+use self::bench::{Bench, Until, Went};
+use super::calibrate::name_of;
+use super::ports::LineFlags;
+use super::run::stop_on_signal;
+use super::{DONE, FAILED, load_body, print, say};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic tune --body hand --source serial:/dev/ttyUSB0 --wiring hand.toml -o tuned.toml
+  somatic tune --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --rest 5 --press 60 --json
+  somatic calibrate --body hand --source serial:/dev/ttyUSB0 --wiring tuned.toml -o calibration.toml
+  somatic run --source serial:/dev/ttyUSB0 --wiring tuned.toml --calibration calibration.toml
+
+First nothing touches the robot, for --rest seconds; then every sensor is pressed as firmly as it ever will be. From that
+follows which tap lets it use most of the range and leaves a sixteenth; the taps are set, and the sensors pressed again to
+see it, until all fit, in at most five rounds. What stands in the file written by -o is set again by every command that has
+it as its --wiring, whenever a board starts. Ctrl-C puts all taps back. docs/live.md says more.";
+
+/// Set the boards' potentiometers so that their sensors use the converters' range.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    #[arg(long, value_name = "BODY", default_value = "hand")]
+    body: String,
+
+    /// The boards' lines: serial:PORT[@BAUD], which may be several.
+    #[arg(long = "source", value_name = "SOURCE", required = true)]
+    sources: Vec<String>,
+
+    #[command(flatten)]
+    lines: LineFlags,
+
+    /// The wiring with its taps, to write as TOML: what --wiring has with `taps`.
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: Option<PathBuf>,
+
+    /// A calibration for the paper's circuit at these taps, to write as TOML.
+    #[arg(long, value_name = "FILE.toml")]
+    fsr_calibration: Option<PathBuf>,
+
+    /// The tap to begin with, where the wiring has none: a board cannot be asked which it has.
+    #[arg(long, value_name = "TAP", default_value_t = FsrCircuit::MIDDLE_TAP)]
+    tap: u8,
+
+    /// How long nothing touches the robot, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    rest: f64,
+
+    /// How long sensors are pressed in each round, in seconds [default: until Enter].
+    #[arg(long, value_name = "S")]
+    press: Option<f64>,
+
+    /// Replace the files that are there.
+    #[arg(long)]
+    force: bool,
+
+    /// Print what was found as JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
+    let outputs = [&arguments.output, &arguments.fsr_calibration];
+    if let Some(there) = outputs.into_iter().flatten().find(|path| path.exists() && !arguments.force) {
+        return Err(Error::failed("is there already; --force replaces it").at(there.display()));
+    }
+    let spans = [Some(arguments.rest), arguments.press];
+    let [rest, press] = spans.map(|s| s.map(|s| Duration::try_from_secs_f64(s).ok().filter(|span| !span.is_zero())));
+    let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {
+        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+    };
+    let ports = arguments.lines.lines(&arguments.sources)?;
+    if ports.is_empty() {
+        return Err(Error::usage("only boards on serial lines have potentiometers; give --source serial:PORT"));
+    }
+    if press.is_none() && !std::io::stdin().is_terminal() {
+        return Err(Error::usage("nobody can press Enter here; say with --press how many seconds sensors are pressed"));
+    }
+    let body = load_body(&arguments.body)?;
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let wiring = match arguments.lines.wiring()? {
+        Some(wiring) => wiring,
+        None => Wiring::in_order(&ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
+    };
+    let own = |board: u16, channel: u16| wiring.board(board)?.taps.get(usize::from(channel)).copied()?;
+    let start = wiring.with_taps(|board, channel| Some(own(board, channel).unwrap_or(arguments.tap)));
+    let stop = stop_on_signal()?;
+    let source = arguments.lines.open_as(Some(start.clone()), &ports, &ids, None)?;
+    let mut bench = Bench::new(source, &start, stop);
+
+    let press = press.flatten().map_or(Until::Enter, Until::Over);
+    let mut tuning = None;
+    let tuned = rounds(&mut bench, rest, press, &mut tuning);
+    let tuning = match (tuned, tuning) {
+        (Ok(Went::On), Some(tuning)) => tuning,
+        (Ok(_), _) => return Err(Error::failed(format!("ended before all was tuned; {}", bench.put_back()))),
+        (Err(error), _) => {
+            say(&bench.put_back());
+            return Err(error);
+        }
+    };
+    let now = bench.places(&start);
+    bench.close();
+
+    let tapped = |board: u16, channel: u16| {
+        let sensor = now.iter().zip(tuning.sensors()).find(|(place, _)| (place.id, place.channel) == (board, channel));
+        // What a board does not set says nothing of what it has.
+        sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.tap).or_else(|| own(board, channel))
+    };
+    let write = if arguments.force { whole::write } else { whole::write_new };
+    if let Some(path) = &arguments.output {
+        write(path, report::wiring(&wiring.with_taps(tapped)).as_bytes())?;
+    }
+    print(&if arguments.json { report::json(&tuning, &now) } else { report::table(&tuning, &now) })?;
+    if let Some(path) = &arguments.fsr_calibration {
+        write(path, report::fsr(&tuning, &name_of(&body))?.as_bytes())?;
+    }
+    outputs.into_iter().flatten().for_each(|path| say(&format!("wrote {}", path.display())));
+    if arguments.output.is_none() {
+        say("a board that starts again forgets its taps; with -o FILE they can be set again");
+    }
+    Ok(if tuning.outcomes().any(|(_, tuned, _)| tuned == Tuned::NotSet) { FAILED } else { DONE })
+}
+
+/// Looks and sets, until every sensor fits.
+fn rounds(bench: &mut Bench, rest: Duration, press: Until, done: &mut Option<Tuning>) -> Result<Went> {
+    bench.guide.say("setting the taps to begin with");
+    if bench.settle()? == Went::Stopped {
+        return Ok(Went::Stopped);
+    }
+    let mut tuning = bench.tuning()?;
+    bench.guide.say(&format!("leave the robot alone for {} s", rest.as_secs_f64()));
+    if bench.listen(Until::Over(rest), &mut tuning, |tuning, frame| tuning.rest(&frame.values))? == Went::Stopped {
+        return Ok(Went::Stopped);
+    }
+    loop {
+        let again = if tuning.rounds() == 0 { "" } else { " once more" };
+        let end = if press == Until::Enter { "; Enter when all are done" } else { "" };
+        bench.guide.say(&format!("now press every sensor firmly{again}{end}"));
+        if bench.listen(press, &mut tuning, |tuning, frame| tuning.press(&frame.values))? == Went::Stopped {
+            return Ok(Went::Stopped);
+        }
+        let taps = tuning.next_round()?;
+        if taps.is_empty() {
+            break;
+        }
+        bench.guide.say(&format!("round {} of at most {MOST_ROUNDS}: setting {} taps", tuning.rounds(), taps.len()));
+        bench.set(&taps);
+        if bench.settle()? == Went::Stopped {
+            return Ok(Went::Stopped);
+        }
+        bench.heed_troubles(&mut tuning);
+    }
+    *done = Some(tuning);
+    Ok(Went::On)
+}

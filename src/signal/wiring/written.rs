@@ -1,0 +1,77 @@
+//! A wiring as the file that it is read from.
+
+use std::fmt::Write as _;
+
+use super::{WiredBoard, Wiring};
+
+impl Wiring {
+    /// The file's text, TOML.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let boards: Vec<String> = self.boards.iter().map(WiredBoard::to_toml).collect();
+        boards.join("\n")
+    }
+}
+
+impl WiredBoard {
+    fn to_toml(&self) -> String {
+        let mut text = format!("[[board]]\nid = {}\n", self.id);
+        let mut key = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                let _ = writeln!(text, "{name} = {value}");
+            }
+        };
+        key("bits", self.bits.map(|bits| bits.to_string()));
+        // A TOML string, as JSON writes it.
+        key("port", self.port.as_ref().map(|port| serde_json::Value::from(port.as_str()).to_string()));
+        key("baud", self.baud.map(|baud| baud.to_string()));
+        key("channels", Some(self.taxels.len().to_string()));
+        text += "taxels = [\n";
+        let mut from = 0;
+        while from < self.taxels.len() {
+            let has_tap = |channel: usize| self.taps.get(channel).copied().flatten().is_some();
+            let belongs = |&channel: &usize| self.taxels[channel].is_some() && has_tap(channel) == has_tap(from);
+            let end = (from..self.taxels.len()).take_while(belongs).last().map_or(from, |last| last + 1);
+            if end > from {
+                text += &self.run(from, end);
+            }
+            from = end.max(from + 1);
+        }
+        text + "]\n"
+    }
+
+    /// The channels from `from` to before `end`, all of which have taxels.
+    fn run(&self, from: usize, end: usize) -> String {
+        let ids: Vec<u32> = self.taxels[from..end].iter().flatten().copied().collect();
+        let ascends = ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));
+        let what =
+            if ascends { format!("first = {}, count = {}", ids[0], ids.len()) } else { format!("ids = {ids:?}") };
+        let taps: Vec<u8> = (from..end).filter_map(|channel| self.taps.get(channel).copied().flatten()).collect();
+        let taps = if taps.is_empty() { String::new() } else { format!(", taps = {taps:?}") };
+        format!("  {{ channel = {from}, {what}{taps} }},\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_as_it_was() {
+        let hand = include_str!("../../../examples/wirings/hand.toml");
+        let boards = include_str!("../../../examples/wirings/hand-boards.toml");
+        let more = "[[board]]\nid = 9\nbits = 12\nport = \"/dev/\\\"a\"\nbaud = 1000\ntaxels = [\n\
+                    { channel = 3, ids = [7, 3], taps = [0, 255] }, { channel = 5, first = 11 }]\n";
+        for text in [hand, boards, more] {
+            let wiring = Wiring::from_text(text).unwrap();
+            let taps = wiring.with_taps(|board, channel| channel.is_multiple_of(3).then_some(board as u8));
+            for wiring in [wiring, taps] {
+                let written = wiring.to_toml();
+                assert_eq!(Wiring::from_text(&written).unwrap(), wiring, "{written}");
+            }
+        }
+        let read = Wiring::from_text(more).unwrap();
+        assert_eq!(read.boards()[0].taps, [None, None, None, Some(0), Some(255), None]);
+        assert_eq!(read.with_taps(|_, _| Some(8)).boards()[0].taps[..4], [None, None, None, Some(8)]);
+    }
+}
