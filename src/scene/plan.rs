@@ -190,8 +190,7 @@ impl Plan {
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         let mut first_of = BTreeMap::new();
-        let mut plan_fields: Vec<PlanField> = Vec::with_capacity(chosen.len() * plan.letters.len());
-        let mut members: Vec<layout::Member> = Vec::new();
+        let (mut plan_fields, mut members) = (Vec::<PlanField>::with_capacity(chosen.len()), Vec::new());
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let above = std::iter::successors(field.parent, |&above| fields.fields[above].parent);
             let above: Option<usize> = above.into_iter().find_map(|above| first_of.get(&above).copied());

@@ -1,11 +1,11 @@
 //! Percepts have the same bits on every set of instructions, in batches and frame by frame.
 
 use fearless_simd::Level;
+use glam::{DAffine3, DVec3};
 
 use super::*;
 use crate::backend::Step;
-use crate::body::Body;
-use crate::experiments::shape::Shape;
+use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
 use crate::scene::{Arithmetic, Knobs, PlanField, Scene};
@@ -92,13 +92,44 @@ fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
     }
 }
 
+/// Rows of taxels on a sheet, and fields of sixteen that follow each other, each over half of the one before.
+fn sheet(taxels: u32) -> Body {
+    const COLUMNS: u32 = 100;
+    let taxel = |id| Taxel {
+        id,
+        link: 0,
+        position_in_link: DVec3::new(f64::from(id % COLUMNS), 0.0, f64::from(id / COLUMNS)) * 0.005,
+        normal_in_link: DVec3::Y,
+        area: 25e-6,
+        modality: Modality::Pressure,
+    };
+    let field = |first: u32| FieldSpec {
+        name: format!("field {first}"),
+        members: (first..first + 16).map(|id| (id, MemberSpec::default())).collect(),
+        ..FieldSpec::default()
+    };
+    let link = Link {
+        name: "sheet".to_owned(),
+        parent: None,
+        world_from_link: DAffine3::IDENTITY,
+        link_from_node: DAffine3::IDENTITY,
+    };
+    Body {
+        name: "sheet".to_owned(),
+        fields: (0..taxels - 15).step_by(8).map(field).collect(),
+        links: vec![link],
+        surfaces: Vec::new(),
+        taxels: (0..taxels).map(taxel).collect(),
+        findings: Vec::new(),
+    }
+}
+
 #[test]
 fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     const FRAMES: usize = 37;
-    let shape = Shape { sensors: 30_000, fields: 3_000, members: 16, wide: 0, local: true, frames: FRAMES, seed: 3 };
-    let body = shape.body();
+    let body = sheet(30_000);
     let scene = Scene { outputs: Outputs::USUAL, ..Scene::default() };
-    let calibration = Calibration::identity(shape.sensors);
+    let calibration = Calibration::identity(body.taxels.len());
     let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
     assert!(!window::Window::new(&plan).is_whole());
     let raw = values(&plan, FRAMES);
