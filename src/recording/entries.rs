@@ -1,7 +1,7 @@
 //! What single records say: taxels, attachments, channels.
 
 use super::records::{Parts, Record};
-use super::{TAXEL_IDS, ids_of};
+use super::{FRAMES_CHANNEL, TAXEL_IDS, ids_of};
 
 /// A file that lies beside the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,21 +23,31 @@ pub(super) struct Channel {
     pub(super) encoding: String,
 }
 
-/// The taxels that the metadata in `body` tell of.
-pub(super) fn metadata(body: &[u8]) -> Option<Vec<u32>> {
+/// What stands before all else in a recording.
+pub(super) struct Preface {
+    /// The ids of a frame's values, in their order.
+    pub(super) taxels: Vec<u32>,
+    /// The channel of frames, which older recordings do not tell.
+    pub(super) frames: Option<u16>,
+}
+
+/// What the metadata in `body` tell, if they are a recording's own.
+pub(super) fn preface(body: &[u8]) -> Option<Preface> {
     let mut parts = Parts(body);
     if parts.text()? != super::METADATA {
         return None;
     }
     let length = parts.u32()?;
     let mut pairs = Parts(parts.bytes(length.into())?);
+    let (mut taxels, mut frames) = (None, None);
     while !pairs.0.is_empty() {
-        let (key, value) = (pairs.text()?, pairs.text()?);
-        if key == TAXEL_IDS {
-            return ids_of(value);
+        match (pairs.text()?, pairs.text()?) {
+            (TAXEL_IDS, ids) => taxels = ids_of(ids),
+            (FRAMES_CHANNEL, id) => frames = id.parse().ok(),
+            _ => {}
         }
     }
-    None
+    Some(Preface { taxels: taxels?, frames })
 }
 
 /// The attachment whose record begins with `head`.

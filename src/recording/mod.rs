@@ -38,9 +38,10 @@ pub const CALIBRATION: &str = "calibration.toml";
 /// Name of the attached scene.
 pub const SCENE: &str = "scene.toml";
 
-/// The word before the taxels in the metadata that every recording begins with.
+/// The name of the metadata that every recording begins with, and what they tell.
 const METADATA: &str = "somatic";
 const TAXEL_IDS: &str = "taxels";
+const FRAMES_CHANNEL: &str = "frames_channel";
 
 /// A time as MCAP has it, ns from 0; what is before 0 is at 0, and frames have theirs to the last bit.
 pub(crate) fn nanoseconds(t_s: f64) -> u64 {

@@ -5,8 +5,10 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use super::entries::{Attached, Channel, attached, channel, data_of, metadata};
-use super::records::{ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, MESSAGE, METADATA, Next, Parts, Record, Records};
+use super::entries::{Attached, Channel, attached, channel, data_of, preface};
+use super::records::{
+    ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, LONGEST, MESSAGE, METADATA, Next, Parts, Record, Records,
+};
 use super::{FRAMES, frames, nanoseconds, unpack};
 use crate::error::{Error, Result};
 use crate::signal::{Frame, RawValue};
@@ -94,6 +96,9 @@ impl Reader {
             damage: Damage::default(),
             losses: Vec::new(),
         };
+        // Each channel is told in the first chunk that has it; should that be damaged, others still make sense.
+        let told = reader.records.in_summary(CHANNEL)?;
+        reader.channels = told.iter().filter_map(|body| channel(&mut Parts(body))).collect();
         let taxels = reader.read_head()?;
         reader.taxels = taxels.ok_or_else(|| {
             wrong("it holds no frames of touch, which `somatic run --sink mcap:FILE` and `somatic convert` write")
@@ -114,7 +119,15 @@ impl Reader {
             match record.kind {
                 METADATA => {
                     self.records.body(record, u64::MAX, &mut body)?;
-                    taxels = taxels.or(metadata(&body));
+                    if let Some(preface) = preface(&body).filter(|_| taxels.is_none()) {
+                        let frames = Channel { topic: FRAMES.to_owned(), encoding: "protobuf".to_owned() };
+                        self.channels.extend(preface.frames.map(|id| (id, frames)));
+                        taxels = Some(preface.taxels);
+                    }
+                }
+                CHANNEL => {
+                    self.records.body(record, LONGEST, &mut body)?;
+                    self.channels.extend(channel(&mut Parts(&body)));
                 }
                 ATTACHMENT => {
                     self.records.body(record, ATTACHMENT_HEAD, &mut body)?;
@@ -202,9 +215,13 @@ impl Reader {
     pub fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             let Some(message) = self.next_message()? else { return Ok(false) };
-            let is_frame = self.channels.get(&message.channel).is_some_and(|channel| channel.topic == FRAMES);
-            if !is_frame {
-                continue;
+            match self.channels.get(&message.channel) {
+                Some(channel) if channel.topic == FRAMES => {}
+                Some(_) => continue,
+                None => {
+                    self.damaged(message.data.len() as u64);
+                    continue;
+                }
             }
             let data = &self.chunk[message.data.clone()];
             if frames::decode(data, self.taxels.len(), self.stale, frame).is_some() {

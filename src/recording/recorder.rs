@@ -10,7 +10,10 @@ use mcap::McapError;
 use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 
-use super::{FRAMES, LINKS, METADATA, PERCEPTS, TAXEL_IDS, TAXELS, TOUCHES, frames, nanoseconds, schemas, words_of};
+use super::{
+    FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, TAXEL_IDS, TAXELS, TOUCHES, frames, nanoseconds, schemas,
+    words_of,
+};
 use crate::error::{Error, Result};
 use crate::signal::Frame;
 
@@ -18,6 +21,9 @@ use crate::signal::Frame;
 const HELD_BACK: Duration = Duration::from_millis(500);
 /// Bytes of messages after which a chunk is closed.
 const CHUNK: u64 = 1 << 20;
+
+/// The number of the channel that is added first.
+const FIRST_CHANNEL: u16 = 1;
 
 /// Writes frames, and messages about them, to a file that can be read however the writing ends.
 pub struct Recorder {
@@ -82,8 +88,9 @@ impl Recorder {
             worth_keeping: is_there,
         };
         // Outside of any chunk and before all else: what every frame's meaning hangs on.
-        let ids = BTreeMap::from([(TAXEL_IDS.to_owned(), recorder.taxels.clone())]);
-        recorder.with(|writer| writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata: ids }))?;
+        let preface = [(TAXEL_IDS, recorder.taxels.clone()), (FRAMES_CHANNEL, FIRST_CHANNEL.to_string())];
+        let metadata = preface.map(|(key, value)| (key.to_owned(), value)).into();
+        recorder.with(|writer| writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata }))?;
         Ok(recorder)
     }
 
@@ -117,8 +124,12 @@ impl Recorder {
         let index = match self.channels.iter().position(|(known, ..)| *known == topic) {
             Some(index) => index,
             None => {
-                let id = self.add_channel(topic)?;
-                self.channels.push((topic, id, 0));
+                // The first one is that of frames, as the preface says.
+                let first = Some(FRAMES).filter(|_| self.channels.is_empty() && topic != FRAMES);
+                for topic in first.into_iter().chain([topic]) {
+                    let id = self.add_channel(topic)?;
+                    self.channels.push((topic, id, 0));
+                }
                 self.channels.len() - 1
             }
         };

@@ -10,6 +10,9 @@ const HEAD: u64 = 9;
 /// Magic, and the footer's record.
 const END: u64 = HEAD + 20 + 8;
 
+/// Bytes of a record that says a word or two; a longer one is damaged.
+pub(super) const LONGEST: u64 = 1 << 16;
+
 // Kinds of records.
 pub(super) const FOOTER: u8 = 0x02;
 pub(super) const CHANNEL: u8 = 0x04;
@@ -123,6 +126,26 @@ impl<R: Read + Seek> Records<R> {
         self.go_to(back)?;
         let start = u64::from_le_bytes(bytes[9..17].try_into().expect("eight bytes"));
         Ok((bytes[0] == FOOTER && bytes[END as usize - 8..] == MAGIC).then_some(start))
+    }
+
+    /// The bodies of the summary's records of kind `kind`.
+    pub(super) fn in_summary(&mut self, kind: u8) -> io::Result<Vec<Vec<u8>>> {
+        let back = self.at;
+        let mut bodies = Vec::new();
+        if let Some(start) = self.summary_start()?.filter(|&start| start > 0 && start < self.length) {
+            self.go_to(start)?;
+            while let Next::Record(record) = self.next()? {
+                if record.kind == kind {
+                    let mut body = Vec::new();
+                    self.body(record, LONGEST, &mut body)?;
+                    bodies.push(body);
+                } else {
+                    self.skip(record.length)?;
+                }
+            }
+        }
+        self.go_to(back)?;
+        Ok(bodies)
     }
 
     /// Goes to the first chunk after `at` that the file's own index knows; `false` where there is none.

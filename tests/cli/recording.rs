@@ -354,6 +354,69 @@ fn damage_costs_what_it_hit_and_never_more_than_a_line() {
     assert!(survive(120, None, 1) > 10, "damage must leave something to read");
 }
 
+/// Frames of the recording at `path`, and what is said of those that are lost.
+fn count_of(path: &Path) -> (usize, Vec<String>) {
+    let mut reader = Reader::open(path).unwrap();
+    let mut frame = Frame::missing(0.0, reader.taxels().len());
+    let mut count = 0;
+    while reader.next_frame(&mut frame).unwrap() {
+        count += 1;
+    }
+    (count, reader.losses())
+}
+
+/// Where the bodies of records of kind `kind` are.
+fn records_of(bytes: &[u8], kind: u8) -> Vec<std::ops::Range<usize>> {
+    let mut found = Vec::new();
+    let mut at = 8;
+    while at + 9 <= bytes.len() - 8 {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        if bytes[at] == kind {
+            found.push(at + 9..at + 9 + length);
+        }
+        at += 9 + length;
+    }
+    found
+}
+
+#[test]
+fn damage_to_the_first_chunk_costs_that_chunk_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let all = recorded(&path, 30_000, true).len();
+    let whole = std::fs::read(&path).unwrap();
+    let chunks = records_of(&whole, 0x06);
+    assert!(chunks.len() > 2);
+    for (name, end) in [("ended", whole.len()), ("cut", chunks[chunks.len() - 1].start - 9)] {
+        let mut bytes = whole[..end].to_vec();
+        bytes[chunks[0].start + 1000] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        let (count, losses) = count_of(&path);
+        assert!(all / 3 < count && count < all, "{name}: {count} of {all}");
+        assert!(losses.iter().any(|loss| loss.contains("damaged in one place")), "{name}: {losses:?}");
+    }
+}
+
+#[test]
+fn messages_without_chunks_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let all = recorded(&path, 3_000, true).len();
+    let whole = std::fs::read(&path).unwrap();
+    let chunks = records_of(&whole, 0x06);
+    let mut bytes = whole[..chunks[0].start - 9].to_vec();
+    // Two times, a length, a checksum, no compression and another length stand before a chunk's records.
+    chunks.iter().for_each(|chunk| bytes.extend(&whole[chunk.start + 40..chunk.end]));
+    let ends = [records_of(&whole, 0x0F), records_of(&whole, 0x02)].concat();
+    bytes.extend(&whole[ends[0].start - 9..ends[0].end]);
+    bytes.extend(&whole[ends[1].start - 9..ends[1].start]);
+    // Neither a summary nor a checksum of it.
+    bytes.extend([0; 20]);
+    bytes.extend(&whole[..8]);
+    std::fs::write(&path, &bytes).unwrap();
+    assert_eq!(count_of(&path), (all, Vec::new()));
+}
+
 /// `SOMATIC_FUZZ_SECONDS=300 cargo test --test cli recording -- --ignored`
 #[test]
 #[ignore = "runs for SOMATIC_FUZZ_SECONDS"]
