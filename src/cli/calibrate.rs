@@ -26,8 +26,9 @@ Examples:
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
 
-First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one after the other or many at
-once, until the recording ends, --press seconds are over, or Ctrl-C. docs/calibration.md describes the file.";
+First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one
+after the other or many at once, until the recording ends, --press seconds are over, or Ctrl-C.
+docs/calibration.md describes the file.";
 
 /// Find baselines, noise, direction and range of a robot's sensors, and write them down as its calibration.
 #[derive(Args)]

@@ -20,8 +20,8 @@ Examples:
   somatic convert touch.mcap touch.csv
   somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
 
-Frames come through bit for bit. A CSV has no place for poses, body and calibration, an MCAP gets no percepts: make them
-with `somatic run`.";
+Frames come through bit for bit. A CSV has no place for poses, body and calibration, an MCAP gets
+no percepts: make them with `somatic run`.";
 
 /// Turn a recording into one of another kind: CSV and MCAP, either way.
 #[derive(Args)]

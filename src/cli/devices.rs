@@ -16,7 +16,8 @@ Examples:
   somatic devices
   somatic devices --json | jq -r '.ports[] | select(.trouble == null) | .name'
 
-Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all the same.";
+Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all
+the same.";
 
 /// Say which GPUs and serial ports there are, what each can do, and what it lacks.
 #[derive(Args)]

@@ -24,9 +24,10 @@ Examples:
   somatic plan robot.scene.toml --estimate                   nothing is run, as by EXPLAIN without ANALYZE
   somatic plan --schema > scene.schema.json      for editors that know JSON Schema
 
-Measured times are of now and here, on the source's first frames where it is a recording, else with every taxel pressed.
-A stage's time is what a plan with it takes more than a plan without. Estimates are made without running the plan: its
-counts times what this machine takes for each, which is found out once, on other skins, and kept.";
+Measured times are of now and here, on the source's first frames where it is a recording, else
+with every taxel pressed. A stage's time is what a plan with it takes more than a plan without.
+Estimates are made without running the plan: its counts times what this machine takes for each,
+which is found out once, on other skins, and kept.";
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]

@@ -18,8 +18,8 @@ Examples:
   somatic render hand -o palm.png --field 'hand/palm*' --view top,bottom
   somatic render humanoid -o chart.png --uv head/skull/patch_14
 
-A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those side by side differ in
-colour.";
+A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
+side by side differ in colour.";
 
 /// Draw a body from four sides, its taxels coloured by field.
 #[derive(Args)]

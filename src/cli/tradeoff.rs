@@ -31,9 +31,10 @@ Examples:
   somatic tradeoff robot.scene.toml --budget 100us                               the truest that is so fast
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
-Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is what no other combination
-beats: none is as true in both and faster. What is measured is kept, and `somatic run` and `somatic plan` choose by it where
-a scene leaves the backend or the knobs to be chosen. docs/tradeoff.md says what to conclude.";
+Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is
+what no other combination beats: none is as true in both and faster. What is measured is kept, and
+`somatic run` and `somatic plan` choose by it where a scene leaves the backend or the knobs to be
+chosen. docs/tradeoff.md says what to conclude.";
 
 /// Frames that are measured on, unless told otherwise.
 const FRAMES: usize = 512;

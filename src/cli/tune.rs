@@ -25,10 +25,11 @@ Examples:
   somatic calibrate --body hand --source serial:/dev/ttyUSB0 --wiring tuned.toml -o calibration.toml
   somatic run --source serial:/dev/ttyUSB0 --wiring tuned.toml --calibration calibration.toml
 
-First nothing touches the robot, for --rest seconds; then every sensor is pressed as firmly as it ever will be. From that
-follows which tap lets it use most of the range and leaves a sixteenth; the taps are set, and the sensors pressed again to
-see it, until all fit, in at most five rounds. What stands in the file written by -o is set again by every command that has
-it as its --wiring, whenever a board starts. Ctrl-C puts all taps back. docs/live.md says more.";
+First nothing touches the robot, for --rest seconds; then every sensor is pressed as firmly as it
+ever will be. From that follows which tap lets it use most of the range and leaves a sixteenth;
+the taps are set, and the sensors pressed again to see it, until all fit, in at most five rounds.
+What stands in the file written by -o is set again by every command that has it as its --wiring,
+whenever a board starts. Ctrl-C puts all taps back. docs/live.md says more.";
 
 /// Set the boards' potentiometers so that their sensors use the converters' range.
 #[derive(Args)]

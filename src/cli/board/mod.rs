@@ -26,9 +26,9 @@ Examples:
   somatic board --wiring hand.toml --source sim:rod.toml --frames 500
   somatic board --boards 4 --for 10s --faults noise=1e-4,drop=1e-4,unplug=1s@5s
 
-Faults, with commas between them: noise=P and drop=P, the chance of a byte; flip=P, of a bit; drift=50ppm;
-silence=2s@10s, for 2 s once after 10 s; unplug=1s/20s, for 1 s every 20 s; reset@30s.
-docs/wire.md describes the format, the wiring and the board.";
+Faults, with commas between them: noise=P and drop=P, the chance of a byte; flip=P, of a bit;
+drift=50ppm; silence=2s@10s, for 2 s once after 10 s; unplug=1s/20s, for 1 s every 20 s;
+reset@30s. docs/wire.md describes the format, the wiring and the board.";
 
 /// What a sensor that nobody touches reads.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
