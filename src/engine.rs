@@ -1,6 +1,7 @@
 //! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
 
 mod cadence;
+mod check;
 mod host;
 mod ids;
 mod kept_up;
@@ -8,16 +9,16 @@ mod kept_up;
 use std::ops::Range;
 
 use self::cadence::{OnChange, step};
+use self::check::Check;
 use self::host::{Host, Links, Side, flag_stale};
 use self::ids::ranges;
 use self::kept_up::KeptUp;
 use crate::backend::agreement::{Agreement, compare};
-use crate::backend::reference::{CellBound, Reference};
 use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
-use crate::field::{FieldSet, NoChart, neighbours};
-use crate::percept::{Flags, Percepts, Precision};
+use crate::field::{FieldSet, NoChart, Recharted, neighbours};
+use crate::percept::{Flags, Percepts};
 use crate::scene::{Cadence, Coordinates, Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit};
 use crate::stage::calibrate;
@@ -86,30 +87,6 @@ pub struct Engine {
     kept_charts: Vec<(String, NoChart)>,
 }
 
-/// The reference's side of a comparison.
-struct Check {
-    reference: Reference,
-    side: Side,
-    right: Percepts,
-    bounds: Vec<CellBound>,
-    /// Those of the frame before, where percepts are kept.
-    last_bounds: Vec<CellBound>,
-}
-
-impl Check {
-    fn new(plan: &Plan) -> Self {
-        Self {
-            reference: Reference::new(plan),
-            side: Side::new(plan.fields.len()),
-            right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
-                .with_columns(plan.columns, plan.kept_pressures())
-                .with_letters(plan.letters().len()),
-            bounds: Vec::new(),
-            last_bounds: Vec::new(),
-        }
-    }
-}
-
 impl Engine {
     /// An engine for `body`.
     ///
@@ -117,6 +94,13 @@ impl Engine {
     /// The body has no taxels or no fields, a field is empty, the scene asks for what is not there, or the backend that
     /// was asked for cannot run here ([`Error::is_no_adapter`]).
     pub fn new(body: &Body, options: Options) -> Result<Self> {
+        let scene = &options.scene;
+        let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;
+        Self::in_charts(body, recharted, options)
+    }
+
+    /// [`Engine::new`] with the fields in the charts that the scene asks for, which take seconds to lay on some bodies.
+    pub(crate) fn in_charts(body: &Body, recharted: Recharted, options: Options) -> Result<Self> {
         let Options { scene, calibration, backend: kind, tare, batch } = options;
         let kind = kind.with(scene.knobs.arithmetic)?;
         let calibration = calibration.unwrap_or_else(|| Calibration::identity(body.taxels.len()));
@@ -127,7 +111,6 @@ impl Engine {
                 body.taxels.len()
             )));
         }
-        let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         // Of a large skin these take as much memory as the plan.
         drop(recharted.fields);

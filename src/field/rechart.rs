@@ -5,6 +5,7 @@ use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
 use crate::error::Result;
 
 /// Fields in other charts than the layout's, and those that could not have one.
+#[derive(Clone)]
 pub(crate) struct Recharted {
     pub(crate) fields: FieldSet,
     /// Names of fields that stayed as they are, and why.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::Result;
-use crate::field::FieldSet;
+use crate::field::Recharted;
 use crate::percept::{Flags, Outputs, Percept};
 use crate::scene::{Charts, Knobs, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Letter};
@@ -56,8 +56,8 @@ pub(super) struct Ruler {
 }
 
 impl Ruler {
-    pub(super) fn new(body: &Body, options: &Options, charts: Charts) -> Result<Self> {
-        let made = charts.applied(body, FieldSet::new(body)?, &options.scene.fields)?;
+    /// For `made`, which are the body's fields in `charts`.
+    pub(super) fn new(body: &Body, options: &Options, charts: Charts, made: &Recharted) -> Result<Self> {
         let scene = Scene {
             outputs: Outputs::CENTROID | Outputs::POSITION,
             fields: options.scene.fields.clone(),
@@ -179,6 +179,7 @@ impl Sum {
 mod tests {
     use super::*;
     use crate::bundled;
+    use crate::field::FieldSet;
 
     #[test]
     fn errors_are_counted_and_ranked() {
@@ -193,8 +194,10 @@ mod tests {
     #[test]
     fn a_place_is_the_same_on_the_skin_whatever_chart_it_is_told_in() {
         let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
-        let rulers =
-            [Charts::Plane, Charts::Geodesic].map(|charts| Ruler::new(&body, &Options::default(), charts).unwrap());
+        let rulers = [Charts::Plane, Charts::Geodesic].map(|charts| {
+            let made = charts.applied(&body, FieldSet::new(&body).unwrap(), &[]).unwrap();
+            Ruler::new(&body, &Options::default(), charts, &made).unwrap()
+        });
         let [plane, geodesic] = &rulers;
         let mut compared = 0;
         for field in 0..plane.plan.fields.len() {

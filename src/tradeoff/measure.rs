@@ -10,6 +10,7 @@ use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result};
+use crate::field::{FieldSet, Recharted};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Charts, Knobs, OrientationBy, Scene};
 use crate::signal::Frame;
@@ -100,7 +101,9 @@ pub fn measure(
     manner: &Manner,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
-    let rulers = rulers(body, options)?;
+    // Once: on some bodies geodesic charts take seconds to lay.
+    let made = all_charts(body, options)?;
+    let rulers = rulers(body, options, &made)?;
     let mut report = Report {
         body: body.name.clone(),
         source: played.source.clone(),
@@ -118,26 +121,34 @@ pub fn measure(
     for charts in Charts::ALL.iter().filter(|charts| rulers.contains_key(charts.word()) && !another(**charts)) {
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
     }
+    const MADE: f64 = 0.1;
+    const COMPARED: f64 = 0.3;
+    let stopped = || Error::failed("stopped before everything had been measured once");
+    let combinations: Vec<(Way, Combination)> = manner
+        .ways
+        .iter()
+        .flat_map(|&way| Combination::all(&options.scene, way, &manner.backends).into_iter().map(move |one| (way, one)))
+        .filter(|(_, combination)| another(combination.knobs.charts))
+        .collect();
     let mut trials = Vec::new();
-    for &way in &manner.ways {
-        let all = Combination::all(&options.scene, way, &manner.backends);
-        for combination in all.into_iter().filter(|combination| another(combination.knobs.charts)) {
-            match Trial::new(body, options, played, way, combination, manner.batch) {
-                Ok(trial) => trials.push(trial),
-                Err(e) if combination.backend == BackendKind::Gpu => {
-                    let why = format!("gpu: {e}");
-                    if !report.left_out.contains(&why) {
-                        report.left_out.push(why);
-                    }
+    for (index, &(way, combination)) in combinations.iter().enumerate() {
+        let recharted = made[combination.knobs.charts.word()].clone();
+        match Trial::new(body, options, played, way, combination, recharted, manner.batch) {
+            Ok(trial) => trials.push(trial),
+            Err(e) if combination.backend == BackendKind::Gpu => {
+                let why = format!("gpu: {e}");
+                if !report.left_out.contains(&why) {
+                    report.left_out.push(why);
                 }
-                Err(e) => return Err(e),
             }
+            Err(e) => return Err(e),
+        }
+        if !progress(MADE * (index + 1) as f64 / combinations.len() as f64) {
+            return Err(stopped());
         }
     }
-    const FIRST_PART: f64 = 0.3;
-    let stopped = || Error::failed("stopped before everything had been measured once");
     // What they are off by, once.
-    let right = Right::new(body, options, played)?;
+    let right = Right::new(body, options, played, authored)?;
     (report.touched, report.ties, report.truth) = (right.touched, right.ties, right.has_truth);
     if report.touched == 0 {
         return Err(Error::failed("no field with a chart is touched in these frames; give others").at(&played.source));
@@ -147,7 +158,7 @@ pub fn measure(
     for (index, trial) in trials.iter_mut().enumerate() {
         let ruler = &rulers[&trial.combination.knobs.charts.word()];
         trial.compare(&mut calls[trial.way as usize], ruler, authored, &right)?;
-        if !progress(FIRST_PART * (index + 1) as f64 / count as f64) {
+        if !progress(MADE + (COMPARED - MADE) * (index + 1) as f64 / count as f64) {
             return Err(stopped());
         }
     }
@@ -163,7 +174,7 @@ pub fn measure(
             trials.iter_mut().for_each(|trial| trial.times_us.clear());
         }
         let share = (start.elapsed().as_secs_f64() / manner.seconds).min(1.0);
-        let go_on = progress(FIRST_PART + (1.0 - FIRST_PART) * share);
+        let go_on = progress(COMPARED + (1.0 - COMPARED) * share);
         if rounds < 2 && !go_on {
             return Err(stopped());
         }
@@ -185,12 +196,22 @@ fn asked_by(scene: &Scene) -> OrientationBy {
     }
 }
 
-/// A ruler for each kind of charts that is measured.
-fn rulers(body: &Body, options: &Options) -> Result<BTreeMap<&'static str, Ruler>> {
+/// The body's fields in each kind of charts that is measured.
+fn all_charts(body: &Body, options: &Options) -> Result<BTreeMap<&'static str, Recharted>> {
     let given = options.scene.knobs.charts;
     let kinds =
         Charts::ALL.iter().filter(|&&kind| given == Charts::AsAuthored || kind == given || kind == Charts::AsAuthored);
-    kinds.map(|&charts| Ok((charts.word(), Ruler::new(body, options, charts)?))).collect()
+    kinds.map(|kind| Ok((kind.word(), kind.applied(body, FieldSet::new(body)?, &options.scene.fields)?))).collect()
+}
+
+/// A ruler for each of them.
+fn rulers(
+    body: &Body,
+    options: &Options,
+    made: &BTreeMap<&'static str, Recharted>,
+) -> Result<BTreeMap<&'static str, Ruler>> {
+    let kinds = Charts::ALL.iter().filter_map(|kind| Some((kind, made.get(kind.word())?)));
+    kinds.map(|(&kind, made)| Ok((kind.word(), Ruler::new(body, options, kind, made)?))).collect()
 }
 
 /// What the reference says of all frames.
@@ -204,8 +225,7 @@ struct Right {
 }
 
 impl Right {
-    fn new(body: &Body, options: &Options, played: &Played) -> Result<Self> {
-        let authored = Ruler::new(body, options, Charts::AsAuthored)?;
+    fn new(body: &Body, options: &Options, played: &Played, authored: &Ruler) -> Result<Self> {
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
@@ -240,6 +260,7 @@ impl Trial {
         played: &Played,
         way: Way,
         combination: Combination,
+        recharted: Recharted,
         batch: usize,
     ) -> Result<Self> {
         let batch = if way == Way::Live { 1 } else { batch.max(1) };
@@ -250,7 +271,7 @@ impl Trial {
         // An orientation is judged by the centroid that it is about.
         let outputs = options.scene.outputs | Outputs::CENTROID;
         let scene = Scene { knobs, outputs, ..options.scene.clone() };
-        let mut engine = Engine::new(body, Options { scene, backend, batch, ..options.clone() })?;
+        let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
         engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
         let (times_us, errors) = (Vec::new(), Sum::default());
         Ok(Self { way, combination, engine, next: 0, gone_through: 0, times_us, errors })
