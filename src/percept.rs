@@ -5,13 +5,15 @@
 //! is ever NaN or infinite.
 
 mod batch;
+mod cells;
 mod keep;
 
 use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 pub use batch::Percepts;
-pub(crate) use batch::{CellsMut, Columns, Values};
+pub(crate) use batch::{Columns, Values};
+pub(crate) use cells::CellsMut;
 
 bitflags! {
     /// Why a quantity is absent or in doubt, and what was wrong with the input.

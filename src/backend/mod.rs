@@ -102,6 +102,25 @@ pub(crate) struct Picks {
     pub(crate) blocks: Vec<Option<usize>>,
     /// What [`Near::Shuffled`] refers to: which bytes of 32 values are wanted.
     pub(crate) bytes: Vec<[u8; 64]>,
+    /// The same, for eight and eight of them, where each lie among sixteen.
+    pub(crate) halves: Vec<Option<[Half; 2]>>,
+}
+
+/// Where eight values lie among sixteen of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Half {
+    pub(crate) from: usize,
+    pub(crate) places: [u32; 8],
+}
+
+impl Half {
+    /// For a frame of `width` values, of which those at `places` are wanted.
+    fn new(places: &[u32], width: usize) -> Option<Self> {
+        let (low, high) = (*places.iter().min()? as usize, *places.iter().max()? as usize);
+        let from = low.min(width.checked_sub(16)?);
+        let place = |index: usize| places.get(index).map_or(0, |&place| place - from as u32);
+        (high < from + 16).then(|| Self { from, places: std::array::from_fn(place) })
+    }
 }
 
 /// Where sixteen values lie in a frame.
@@ -118,7 +137,7 @@ impl Picks {
     /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
-        let mut all_bytes = Vec::new();
+        let (mut all_bytes, mut all_halves) = (Vec::new(), Vec::new());
         // What fills up the last ones is as good a value as any.
         let near = places.chunks(16).map(|places| {
             let (low, high) = places.iter().fold((u32::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
@@ -137,6 +156,10 @@ impl Picks {
                 bytes.iter_mut().zip(first..).for_each(|(byte, index)| *byte = index as u8);
             }
             all_bytes.push(bytes);
+            // What fills up the last ones is there twice, then.
+            let [first, second] = [places, places.get(8..).filter(|rest| !rest.is_empty()).unwrap_or(places)];
+            let [first, second] = [first, second].map(|half| Half::new(&half[..half.len().min(8)], width));
+            all_halves.push(first.zip(second).map(|(first, second)| [first, second]));
             Near::Shuffled(from, all_bytes.len() - 1)
         });
         let near: Vec<Near> = near.collect();
@@ -147,7 +170,7 @@ impl Picks {
             tiles.iter().enumerate().all(follows).then_some(from)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
-        Self { near, blocks, bytes: all_bytes, channels: channels.len(), places }
+        Self { near, blocks, bytes: all_bytes, halves: all_halves, channels: channels.len(), places }
     }
 }
 

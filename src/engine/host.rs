@@ -33,6 +33,8 @@ pub(super) struct Memory {
 pub(super) struct Side {
     /// Per field.
     memories: Vec<Memory>,
+    /// Per field, whether its memory holds anything of a contact.
+    held: Vec<bool>,
     /// The percepts of the frame before, where some may be kept.
     last: Option<Percepts>,
 }
@@ -40,7 +42,7 @@ pub(super) struct Side {
 impl Side {
     /// Of `fields` fields.
     pub(super) fn new(fields: usize) -> Self {
-        Self { memories: vec![Memory::default(); fields], last: None }
+        Self { memories: vec![Memory::default(); fields], held: vec![false; fields], last: None }
     }
 }
 
@@ -80,7 +82,7 @@ impl Host<'_> {
     ) -> Result<()> {
         backend.run(raw, percepts)?;
         let stages = self.plan.stages();
-        let Side { memories, last } = side;
+        let Side { memories, held, last } = side;
         for ((index, frame), step) in (raw.first..).zip(frames).zip(raw.steps) {
             percepts.t_s[index] = frame.t_s;
             if !(stages.position || stages.filter || self.cadence.is_some()) {
@@ -97,7 +99,15 @@ impl Host<'_> {
                         }
                     }
                 }
-                let contact = !percepts.flags[cell].contains(Flags::NO_CONTACT);
+                let contact = percepts.in_contact(index, number);
+                if !contact && !held[number] {
+                    // Most of a skin, most of the time.
+                    if stages.touches {
+                        percepts.push_touches([]);
+                    }
+                    continue;
+                }
+                held[number] = contact;
                 let posed = contact && stages.position;
                 let world =
                     if posed { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };

@@ -57,7 +57,8 @@ impl Composer {
         print(line, &percepts.frame_number(frame));
         line.extend_from_slice(b",\"fields\":[");
         let mut first = true;
-        for percept in percepts.frame(frame).filter(|percept| *all_fields || percept.contact) {
+        let listed = (0..percepts.fields()).filter(|&field| *all_fields || percepts.in_contact(frame, field));
+        for percept in listed.map(|field| percepts.get(frame, field)) {
             if !std::mem::take(&mut first) {
                 line.push(b',');
             }

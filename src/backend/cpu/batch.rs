@@ -2,29 +2,34 @@
 
 use std::ops::Range;
 
-use bytemuck::cast_slice_mut;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, u32x16};
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
+use super::columns::Place;
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, touch};
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, width, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
-use super::{calibrate, change};
-use crate::percept::{CellsMut, Flags, Outputs};
+use super::{calibrate, change, columns};
+use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::{Member, Taxel};
 
+/// Tiles whose raw bits are fetched together: frame by frame, as they lie in memory, so that the processor sees it coming.
+const GROUP: usize = 64;
+
 /// What a task needs to work in.
 pub(super) struct Scratch {
+    /// Raw bits of a few tiles, a row a frame.
+    bits: Lines<u32>,
     /// By slot, as far as the window reaches, a lane a frame.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
-    /// Places of tiles whose statuses say something.
-    faulty: Vec<bool>,
+    /// By tile, as far as the window reaches.
+    tiles: Vec<KeptTile>,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     between: Box<[Between; LANES]>,
@@ -37,14 +42,24 @@ impl Scratch {
         let kept = tables.window.slots();
         let before = if plan.has_changes() { kept / LANES } else { 0 };
         Self {
+            bits: Lines::new(GROUP * LANES, 0),
             pressures: Lines::new(kept, 0.0),
             statuses: Lines::new(kept, 0),
-            faulty: vec![false; kept / LANES],
+            tiles: vec![KeptTile { rests: true, faulty: false }; kept / LANES],
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
         }
     }
+}
+
+/// What is known of sixteen taxels in sixteen frames.
+#[derive(Clone, Copy)]
+struct KeptTile {
+    /// All pressures and statuses are 0.
+    rests: bool,
+    /// Statuses say something.
+    faulty: bool,
 }
 
 /// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
@@ -61,15 +76,41 @@ struct OverFrames<'a, const WEIGHTED: bool> {
 }
 
 impl<'a, const WEIGHTED: bool> OverFrames<'a, WEIGHTED> {
+    /// Of field `field`.
+    #[inline(always)]
     fn new(
         plan: &'a Plan,
-        seen: &'a [Member],
-        field: &'a PlanField,
+        tables: &'a Tables,
+        field: usize,
         (pressures, statuses): (&'a [Row<f32>], &'a [Row<u32>]),
     ) -> Self {
-        let seen = &seen[field.first..field.first + field.count];
-        let members = plan.members_of(field);
-        Self { members, seen, depths: &field.depths, taxels: &plan.taxels, pressures, statuses }
+        let brief = &tables.briefs[field];
+        let members = brief.first..brief.first + brief.count;
+        Self {
+            members: &plan.members[members.clone()],
+            seen: &tables.seen[members],
+            depths: if brief.kind.is_charted() { &[] } else { &plan.fields[field].depths },
+            taxels: &plan.taxels,
+            pressures,
+            statuses,
+        }
+    }
+}
+
+/// What blocks have to know of every field: little, and side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Brief {
+    first: usize,
+    count: usize,
+    is_wide: bool,
+    unweighted: bool,
+    kind: OneKind,
+}
+
+impl Brief {
+    pub(super) fn new(field: &PlanField) -> Self {
+        let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
+        Self { first: field.first, count: field.count, is_wide, unweighted: field.unweighted, kind }
     }
 }
 
@@ -134,12 +175,16 @@ pub(super) fn block(
         calibrate::frame(level, plan, tables, before, was, said);
         let before = (was.as_flattened(), said.as_flattened());
         faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
+        scratch.tiles.iter_mut().for_each(|tile| tile.rests = false);
     }
     if !cells.pressures.is_empty() {
         let slots = plan.slots();
-        for (slot, lanes) in scratch.pressures.iter().take(slots).enumerate() {
-            for (frame, &pressure) in lanes.iter().take(frames).enumerate() {
-                cells.pressures[frame * slots + slot] = pressure.into();
+        let tiles = scratch.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&scratch.tiles).enumerate();
+        // Those at rest are 0 there already.
+        for (tile, (rows, _)) in tiles.filter(|(_, (_, kept))| !kept.rests) {
+            for frame in 0..frames {
+                let frame_of = &mut cells.pressures[frame * slots..][tile * LANES..slots.min((tile + 1) * LANES)];
+                frame_of.iter_mut().zip(rows).for_each(|(to, lanes)| *to = lanes[frame].into());
             }
         }
     }
@@ -155,44 +200,76 @@ pub(super) fn block(
             let ahead = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
             ahead.for_each(|tile| (first..first + frames).for_each(|frame| simd::announce(raw.rows, frame, tile)));
         }
-        let Scratch { pressures, statuses, cells: answers, between, .. } = &mut *scratch;
+        let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
         let values = (&pressures[..], &statuses[..]);
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
         place.announce(cells);
-        with_widest!(level, simd => answer(simd, plan, &tables.seen, fields, values, faults, between, answers));
-        with_widest!(level, simd => write(simd, answers, place, plan.outputs, cells));
+        let rests: [bool; LANES] = std::array::from_fn(|index| {
+            index >= place.count || tables.rest.is_field(place.first + index, |tile| tiles[tile].rests)
+        });
+        let (first, rests) = (place.first, &rests[..place.count]);
+        if rests.iter().all(|&rests| rests) {
+            columns::write_at_rest(fields, place, plan.outputs, cells);
+            continue;
+        }
+        with_widest!(level, simd => answer(simd, plan, tables, first, rests, values, faults, between, answers));
+        with_widest!(level, simd => columns::write(simd, answers, place, plan.outputs, cells));
     }
 }
 
-/// All stages for `fields`, over sixteen frames.
+/// All stages for the fields from `first` on, of which `rests` says whether any pressure is to be seen, over sixteen frames.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "as `block`")]
 fn answer<S: Simd>(
     simd: S,
     plan: &Plan,
-    seen: &[Member],
-    fields: &[PlanField],
+    tables: &Tables,
+    first: usize,
+    rests: &[bool],
     values: (&[Row<f32>], &[Row<u32>]),
     faults: bool,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
-    let mut first = 0;
-    for run in fields.chunk_by(|a, b| (a.is_wide(), a.unweighted) == (b.is_wide(), b.unweighted)) {
-        let (between, answers) = (&mut between[first..][..run.len()], &mut answers[first..][..run.len()]);
-        let kind = |index: usize| OneKind::new(&run[index]);
-        if run[0].is_wide() {
-            let over = |index| ManyAbreast(OverFrames::<true>::new(plan, seen, &run[index], values));
-            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
-        } else if run[0].unweighted {
-            let over = |index| Abreast(OverFrames::<false>::new(plan, seen, &run[index], values));
-            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
-        } else {
-            let over = |index| Abreast(OverFrames::<true>::new(plan, seen, &run[index], values));
-            touch(simd, |index| (over(index), kind(index)), LANES, wanted, between, answers);
+    let briefs = &tables.briefs[first..first + rests.len()];
+    let sort = |index: usize| (rests[index], briefs[index].is_wide, briefs[index].unweighted);
+    let mut start = 0;
+    while start < briefs.len() {
+        let alike = (start..briefs.len()).take_while(|&index| sort(index) == sort(start)).count();
+        let run = start..start + alike;
+        let (between, answers) = (&mut between[run.clone()], &mut answers[run.clone()]);
+        let (last, briefs) = (alike - 1, &briefs[run]);
+        // Once for all stages.
+        macro_rules! answer {
+            ($abreast:ident, $weighted:literal) => {{
+                let lots: [_; LANES] = std::array::from_fn(|index| {
+                    let index = index.min(last);
+                    let over = OverFrames::<$weighted>::new(plan, tables, first + start + index, values);
+                    ($abreast(over), briefs[index].kind)
+                });
+                touch(
+                    simd,
+                    #[inline(always)]
+                    |index| lots[index],
+                    LANES,
+                    wanted,
+                    between,
+                    answers,
+                );
+            }};
         }
-        first += run.len();
+        match sort(start) {
+            (true, ..) => {
+                for (cells, brief) in answers.iter_mut().zip(briefs) {
+                    *cells = Cells::at_rest(&brief.kind);
+                }
+            }
+            (_, true, _) => answer!(ManyAbreast, true),
+            (_, _, true) => answer!(Abreast, false),
+            _ => answer!(Abreast, true),
+        }
+        start += alike;
     }
 }
 
@@ -211,138 +288,57 @@ fn read<S: Simd>(
     scratch: &mut Scratch,
 ) -> bool {
     let mut any = false;
-    let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
-    for (index, tile) in tiles.clone().zip(&tables.tiles[tiles]) {
+    for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        // All of them first: what was stored piece by piece is not yet to be had as a whole.
-        for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
-            simd::read(simd, raw, first + frame, index, plan.calibrated(), tables.shuffles, bits);
+        let ahead = (index - tiles.start) % GROUP;
+        if ahead == 0 {
+            let group = index..tiles.end.min(index + GROUP);
+            for frame in 0..frames {
+                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
+                    simd::read(simd, raw, first + frame, tile, plan.calibrated(), tables.shuffles, &mut bits[frame]);
+                }
+            }
         }
+        let bits = &scratch.bits[ahead * LANES..][..LANES];
         let mut faults = false;
         for frame in 0..frames {
             let (pressures, statuses) = (&mut pressures[frame], &mut statuses[frame]);
             faults |= calibrate::tile(simd, plan, tile, slot, &bits[frame], pressures, statuses);
         }
-        let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
-        for (lanes, turned) in scratch.pressures[place..place + LANES].iter_mut().zip(&turned) {
-            turned.store_slice(lanes);
+        let (abreast, kept) = (&mut scratch.pressures[place..place + LANES], &mut scratch.tiles[place / LANES]);
+        let rests = !faults && !is_pressed(simd, &pressures[..frames]);
+        if !rests {
+            let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
+            abreast.iter_mut().zip(&turned).for_each(|(lanes, turned)| turned.store_slice(lanes));
+        } else if !kept.rests {
+            abreast.fill([0.0; LANES]);
         }
+        let abreast = &mut scratch.statuses[place..place + LANES];
         if faults {
             let turned: [u32x16<S>; LANES] = transpose(simd, |frame| statuses[frame]);
-            for (lanes, turned) in scratch.statuses[place..place + LANES].iter_mut().zip(&turned) {
-                turned.store_slice(lanes);
-            }
-        } else if scratch.faulty[place / LANES] {
-            scratch.statuses[place..place + LANES].fill([0; LANES]);
+            abreast.iter_mut().zip(&turned).for_each(|(lanes, turned)| turned.store_slice(lanes));
+        } else if kept.faulty {
+            abreast.fill([0; LANES]);
         }
-        scratch.faulty[place / LANES] = faults;
+        *kept = KeptTile { rests, faulty: faults };
         any |= faults;
     }
     any
 }
 
-/// Writes answers where they belong.
+/// Whether any of a tile's pressures is more than nothing.
 #[inline(always)]
-fn write<S: Simd>(simd: S, answers: &[Cells; LANES], place: Place, outputs: Outputs, cells: &mut CellsMut<'_>) {
-    floats(simd, answers, place, cells.total, |cells| &cells.total);
-    floats(simd, answers, place, cells.peak, |cells| &cells.peak);
-    floats(simd, answers, place, cells.area, |cells| &cells.area);
-    floats(simd, answers, place, cells.centroid_u, |cells| &cells.u);
-    floats(simd, answers, place, cells.centroid_v, |cells| &cells.v);
-    floats(simd, answers, place, cells.centroid_depth, |cells| &cells.depth);
-    floats(simd, answers, place, cells.orientation, |cells| &cells.orientation);
-    floats(simd, answers, place, cells.axis, |cells| &cells.axis);
-    floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
-    integers(simd, answers, place, cells.active, |cells| &cells.active, u32::MAX);
-    integers(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
-    let present = cast_slice_mut::<Outputs, u32>(cells.present);
-    integers(simd, answers, place, present, |cells| &cells.present, outputs.bits());
-}
-
-/// Where answers go in a column.
-#[derive(Clone, Copy)]
-struct Place {
-    /// A frame's cells.
-    fields: usize,
-    /// The first of them that is written, and how many.
-    first: usize,
-    count: usize,
-    frames: usize,
-}
-
-impl Place {
-    /// Has the memory that is going to be written fetched meanwhile.
-    fn announce(self, cells: &CellsMut<'_>) {
-        let columns = [
-            &cells.total[..],
-            cells.peak,
-            cells.area,
-            cells.centroid_u,
-            cells.centroid_v,
-            cells.centroid_depth,
-            cells.orientation,
-            cells.axis,
-            cells.anisotropy,
-        ];
-        for column in columns {
-            self.announce_column(column);
-        }
-        self.announce_column(cells.active);
-        self.announce_column(cells.flags);
-        self.announce_column(cells.present);
-    }
-
-    /// Of a row, where it begins: its end is where the one that was written before began.
-    fn announce_column<T>(self, column: &[T]) {
-        for frame in 0..self.frames {
-            if let Some(cell) = column.get(frame * self.fields + self.first) {
-                simd::soon_needed(cell);
-            }
+fn is_pressed<S: Simd>(simd: S, pressures: &[Row<f32>]) -> bool {
+    let mut any = splat(simd, 0.0);
+    for row in pressures {
+        let mut at = 0;
+        while at < LANES {
+            any = any.max(load(simd, row, at));
+            at += width::<S>();
         }
     }
-
-    /// Writes a row for each frame.
-    #[inline(always)]
-    fn put<S: Simd, V: SimdBase<S>>(self, rows: &[V; LANES], column: &mut [V::Element]) {
-        for (frame, row) in rows.iter().take(self.frames).enumerate() {
-            let start = frame * self.fields + self.first;
-            // A whole row, though it may reach into the next frame: what belongs there is written later.
-            match column.get_mut(start..start + LANES) {
-                Some(cells) if self.fields >= LANES => row.store_slice(cells),
-                _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn floats<S: Simd>(
-    simd: S,
-    answers: &[Cells; LANES],
-    place: Place,
-    column: &mut [f32],
-    of: impl Fn(&Cells) -> &Row<f32>,
-) {
-    if !column.is_empty() {
-        let rows: [f32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
-        place.put(&rows, column);
-    }
-}
-
-#[inline(always)]
-fn integers<S: Simd>(
-    simd: S,
-    answers: &[Cells; LANES],
-    place: Place,
-    column: &mut [u32],
-    of: impl Fn(&Cells) -> &Row<u32>,
-    mask: u32,
-) {
-    if !column.is_empty() {
-        let rows: [u32x16<S>; LANES] = transpose(simd, |field| of(&answers[field]).map(|bits| bits & mask));
-        place.put(&rows, column);
-    }
+    any.simd_gt(splat(simd, 0.0)).any_true()
 }

@@ -10,9 +10,11 @@ mod batch;
 mod calibrate;
 mod centroid;
 mod change;
+mod columns;
 mod compensated;
 mod contact;
 mod descent;
+mod eights;
 mod gate;
 mod hysteresis;
 mod lines;
@@ -21,6 +23,7 @@ mod lot;
 mod motion;
 mod orientation;
 mod put;
+mod rest;
 mod simd;
 #[cfg(test)]
 mod tests;
@@ -67,6 +70,9 @@ struct Tables {
     window: window::Window,
     /// The plan's members, each with its slot's place in the window.
     seen: Arc<[Member]>,
+    /// By field.
+    briefs: Vec<batch::Brief>,
+    rest: rest::Rest,
     /// The members of the fields that have many.
     wide: Vec<wide::Table>,
 }
@@ -86,9 +92,12 @@ impl Cpu {
             }))
         });
         let window = window::Window::new(plan);
+        let seen = window.members(plan);
         Self {
             tables: Tables {
-                seen: window.members(plan),
+                briefs: plan.fields.iter().map(batch::Brief::new).collect(),
+                rest: rest::Rest::new(&plan.fields, &seen),
+                seen,
                 window,
                 shuffles: matches!(instructions(level), "AVX-512" | "AVX2"),
                 tiles: calibrate::Tile::all(plan),

@@ -9,6 +9,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{u8x64, u32x16};
 
 use super::super::{Near, Rows};
+use super::eights;
 
 /// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
 /// what every processor has: sets in between would cost their compilation and gain little.
@@ -108,6 +109,7 @@ pub(super) fn read<S: Simd>(
                 bits.copy_from_slice(&values[from..from + LANES]);
                 return;
             }
+            Near::Shuffled(_, at) if width::<S>() == 8 && eights::pick(simd, values, &picks.halves[at], bits) => return,
             Near::Shuffled(from, bytes) if shuffles => {
                 let [low, high] = [&values[from..from + LANES], &values[from + LANES..from + 2 * LANES]];
                 let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));

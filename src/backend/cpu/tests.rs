@@ -44,6 +44,21 @@ fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
         .collect()
 }
 
+/// The same where most of the skin rests: every twenty frames another ninth of it is touched, and elsewhere a value is
+/// missing now and then.
+fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
+    for (index, value) in raw.iter_mut().enumerate() {
+        let (frame, channel) = (index / channels, index % channels);
+        let is_touched = channel * 9 / channels == frame / 20 % 9;
+        if !is_touched && (frame * 7 + channel) % 9973 != 0 {
+            *value = RawValue::new(0.0);
+        } else if !is_touched {
+            *value = RawValue::MISSING;
+        }
+    }
+    raw
+}
+
 fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
     let mut cpu = Cpu::with_level(plan, level);
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
@@ -75,21 +90,50 @@ fn bits_do_not_depend_on_instructions_or_on_what_stands_abreast() {
         for (scene, calibration) in scenes.iter().flat_map(|scene| calibrations.iter().map(move |c| (scene, c))) {
             let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), scene, calibration).unwrap();
             assert!(name == "hand" || plan.fields.iter().any(PlanField::is_wide));
-            let raw = values(&plan, FRAMES);
-            let right = run(&plan, Level::new(), &raw, FRAMES, FRAMES);
-            assert!((0..FRAMES).any(|frame| right.touched(frame).next().is_some()));
-            for level in levels() {
-                for at_once in [1, 7, 16, FRAMES] {
-                    let also = run(&plan, level, &raw, FRAMES, at_once);
-                    for (frame, field) in (0..FRAMES).flat_map(|f| (0..plan.fields.len()).map(move |i| (f, i))) {
-                        let (one, other) = (right.get(frame, field), also.get(frame, field));
-                        assert!(one == other, "{name}, {level:?}, {at_once} at once, frame {frame}: {one:?} {other:?}");
+            let all_over = values(&plan, FRAMES);
+            for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
+                let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+                assert!((0..FRAMES).any(|frame| right.touched(frame).next().is_some()));
+                for level in levels() {
+                    for at_once in [1, 7, 16, FRAMES] {
+                        let also = run(&plan, level, &raw, FRAMES, at_once);
+                        let cells =
+                            (0..FRAMES).flat_map(|frame| (0..plan.fields.len()).map(move |field| (frame, field)));
+                        for (frame, field) in cells {
+                            let (one, other) = (right.get(frame, field), also.get(frame, field));
+                            let place = format!("{name}, {level:?}, {at_once} at once, frame {frame}");
+                            assert!(one == other, "{place}: {one:?} {other:?}");
+                        }
+                        assert!(right == also, "{name}, {level:?}, {at_once} at once");
                     }
-                    assert!(right == also, "{name}, {level:?}, {at_once} at once");
                 }
             }
         }
     }
+}
+
+#[test]
+fn much_of_a_skin_rests_and_has_the_same_bits() {
+    const FRAMES: usize = 64;
+    let body = Body::from_bytes("humanoid", HUMANOID).unwrap();
+    let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &Calibration::identity(body.taxels.len()));
+    let plan = plan.unwrap();
+    let raw = mostly_at_rest(values(&plan, FRAMES), plan.channels());
+    let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+    assert!(right == run(&plan, Level::new(), &raw, FRAMES, FRAMES));
+    let rest = rest::Rest::new(&plan.fields, &plan.members);
+    let rests = |block: usize| {
+        let pressed = |tile: usize| {
+            let channels = tile * LANES..plan.channels().min((tile + 1) * LANES);
+            (block * LANES..(block + 1) * LANES)
+                .flat_map(|frame| &raw[frame * plan.channels()..][channels.clone()])
+                .any(|value| value.number() != Some(0.0))
+        };
+        (0..plan.fields.len()).filter(|&field| rest.is_field(field, |tile| !pressed(tile))).count()
+    };
+    let (resting, all) = ((0..FRAMES / LANES).map(rests).sum::<usize>(), plan.fields.len() * FRAMES / LANES);
+    assert!(resting > all / 3 && resting < all, "{resting} of {all}");
 }
 
 /// Rows of taxels on a sheet, and fields of sixteen that follow each other, each over half of the one before.
@@ -132,10 +176,12 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     let calibration = Calibration::identity(body.taxels.len());
     let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
     assert!(!window::Window::new(&plan).is_whole());
-    let raw = values(&plan, FRAMES);
-    // A frame alone has all of it.
-    let right = run(&plan, Level::new(), &raw, FRAMES, 1);
-    for level in levels() {
-        assert!(right == run(&plan, level, &raw, FRAMES, FRAMES), "{level:?}");
+    let all_over = values(&plan, FRAMES);
+    for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
+        // A frame alone has all of it.
+        let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+        for level in levels() {
+            assert!(right == run(&plan, level, &raw, FRAMES, FRAMES), "{level:?}");
+        }
     }
 }

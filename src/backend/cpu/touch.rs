@@ -127,6 +127,10 @@ impl OneKind {
         }
     }
 
+    pub(super) fn is_charted(&self) -> bool {
+        self.charted
+    }
+
     /// Flags and quantities of a field that nothing presses.
     pub(super) fn untouched(&self) -> (u32, u32) {
         (self.always | Flags::NO_CONTACT.bits(), self.sums)
@@ -264,6 +268,12 @@ impl Cells {
         axis: [0.0; LANES],
         anisotropy: [0.0; LANES],
     };
+
+    /// Those of a field that nothing presses.
+    pub(super) fn at_rest(field: &OneKind) -> Self {
+        let (flags, present) = field.untouched();
+        Self { flags: [flags; LANES], present: [present; LANES], ..Self::EMPTY }
+    }
 }
 
 /// What the lanes know of their touch so far.

@@ -1,0 +1,158 @@
+//! From sixteen fields' answers, a lane a frame, to the columns of percepts.
+
+use bytemuck::cast_slice_mut;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x16, u32x16};
+
+use super::simd::{self, LANES, Row, transpose};
+use super::touch::{Cells, OneKind};
+use crate::percept::{CellsMut, Flags, Outputs};
+use crate::scene::PlanField;
+
+/// Where answers go in a column.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    /// A frame's cells.
+    pub(super) fields: usize,
+    /// The first of them that is written, and how many.
+    pub(super) first: usize,
+    pub(super) count: usize,
+    pub(super) frames: usize,
+}
+
+impl Place {
+    /// Has the memory that is going to be written fetched meanwhile.
+    pub(super) fn announce(self, cells: &CellsMut<'_>) {
+        let columns = [
+            &cells.total[..],
+            cells.peak,
+            cells.area,
+            cells.centroid_u,
+            cells.centroid_v,
+            cells.centroid_depth,
+            cells.orientation,
+            cells.axis,
+            cells.anisotropy,
+        ];
+        for column in columns {
+            self.announce_column(column);
+        }
+        self.announce_column(cells.active);
+        self.announce_column(cells.flags);
+        self.announce_column(cells.present);
+    }
+
+    /// Of a row, where it begins: its end is where the one that was written before began.
+    fn announce_column<T>(self, column: &[T]) {
+        for frame in 0..self.frames {
+            if let Some(cell) = column.get(frame * self.fields + self.first) {
+                simd::soon_needed(cell);
+            }
+        }
+    }
+
+    /// Writes a row for each frame.
+    #[inline(always)]
+    fn put<S: Simd, V: SimdBase<S>>(self, rows: &[V; LANES], column: &mut [V::Element]) {
+        for (frame, row) in rows.iter().take(self.frames).enumerate() {
+            let start = frame * self.fields + self.first;
+            // A whole row, though it may reach into the next frame: what belongs there is written later.
+            match column.get_mut(start..start + LANES) {
+                Some(cells) if self.fields >= LANES => row.store_slice(cells),
+                _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
+            }
+        }
+    }
+
+    /// The cells of one of the frames.
+    #[inline(always)]
+    fn of_frame<T>(self, column: &mut [T], frame: usize) -> &mut [T] {
+        let start = frame * self.fields + self.first;
+        &mut column[start..start + self.count]
+    }
+}
+
+/// Writes answers where they belong.
+#[inline(always)]
+pub(super) fn write<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    outputs: Outputs,
+    cells: &mut CellsMut<'_>,
+) {
+    floats(simd, answers, place, cells.total, |cells| &cells.total);
+    floats(simd, answers, place, cells.peak, |cells| &cells.peak);
+    floats(simd, answers, place, cells.area, |cells| &cells.area);
+    floats(simd, answers, place, cells.centroid_u, |cells| &cells.u);
+    floats(simd, answers, place, cells.centroid_v, |cells| &cells.v);
+    floats(simd, answers, place, cells.centroid_depth, |cells| &cells.depth);
+    floats(simd, answers, place, cells.orientation, |cells| &cells.orientation);
+    floats(simd, answers, place, cells.axis, |cells| &cells.axis);
+    floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
+    integers(simd, answers, place, cells.active, |cells| &cells.active, u32::MAX);
+    integers(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    let present = cast_slice_mut::<Outputs, u32>(cells.present);
+    integers(simd, answers, place, present, |cells| &cells.present, outputs.bits());
+}
+
+#[inline(always)]
+fn floats<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    column: &mut [f32],
+    of: impl Fn(&Cells) -> &Row<f32>,
+) {
+    if !column.is_empty() {
+        let rows: [f32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
+        place.put(&rows, column);
+    }
+}
+
+#[inline(always)]
+fn integers<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    column: &mut [u32],
+    of: impl Fn(&Cells) -> &Row<u32>,
+    mask: u32,
+) {
+    if !column.is_empty() {
+        let rows: [u32x16<S>; LANES] = transpose(simd, |field| of(&answers[field]).map(|bits| bits & mask));
+        place.put(&rows, column);
+    }
+}
+
+/// Writes what [`write`] would if none of `fields` has a pressure or a status.
+pub(super) fn write_at_rest(fields: &[PlanField], place: Place, outputs: Outputs, cells: &mut CellsMut<'_>) {
+    let (mut flags, mut present) = ([Flags::empty(); LANES], [Outputs::empty(); LANES]);
+    for (field, (flags, present)) in fields.iter().zip(flags.iter_mut().zip(&mut present)) {
+        let (said, given) = OneKind::new(field).untouched();
+        (*flags, *present) = (Flags::from_bits_retain(said), Outputs::from_bits_retain(given) & outputs);
+    }
+    for frame in 0..place.frames {
+        place.of_frame(cells.flags, frame).copy_from_slice(&flags[..place.count]);
+        place.of_frame(cells.present, frame).copy_from_slice(&present[..place.count]);
+        if !cells.active.is_empty() {
+            place.of_frame(cells.active, frame).fill(0);
+        }
+    }
+    let columns = [
+        &mut *cells.total,
+        cells.peak,
+        cells.area,
+        cells.centroid_u,
+        cells.centroid_v,
+        cells.centroid_depth,
+        cells.orientation,
+        cells.axis,
+        cells.anisotropy,
+    ];
+    for column in columns.into_iter().filter(|column| !column.is_empty()) {
+        for frame in 0..place.frames {
+            place.of_frame(column, frame).fill(0.0);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The columns of a batch, to be written by a backend in single precision.
+
+use super::batch::Values;
+use super::{Flags, Outputs, Percepts};
+
+/// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
+pub(crate) struct CellsMut<'a> {
+    fields: usize,
+    slots: usize,
+    /// Per frame and taxel, not per cell.
+    pub(crate) pressures: &'a mut [f64],
+    pub(crate) flags: &'a mut [Flags],
+    pub(crate) present: &'a mut [Outputs],
+    pub(crate) active: &'a mut [u32],
+    pub(crate) total: &'a mut [f32],
+    pub(crate) peak: &'a mut [f32],
+    pub(crate) area: &'a mut [f32],
+    pub(crate) centroid_u: &'a mut [f32],
+    pub(crate) centroid_v: &'a mut [f32],
+    pub(crate) centroid_depth: &'a mut [f32],
+    pub(crate) orientation: &'a mut [f32],
+    pub(crate) axis: &'a mut [f32],
+    pub(crate) anisotropy: &'a mut [f32],
+    pub(crate) displacement: &'a mut [[f32; 2]],
+    pub(crate) direction: &'a mut [f32],
+    pub(crate) distance: &'a mut [f32],
+    pub(crate) radial_distance: &'a mut [f32],
+    pub(crate) speed: &'a mut [f32],
+    pub(crate) radial_speed: &'a mut [f32],
+}
+
+impl Percepts {
+    /// All cells of single-precision percepts; `None` for double precision.
+    pub(crate) fn cells_f32(&mut self) -> Option<CellsMut<'_>> {
+        let Values::F32(columns) = &mut self.values else { return None };
+        Some(CellsMut {
+            fields: self.fields,
+            slots: self.slots,
+            pressures: &mut self.pressures,
+            flags: &mut self.flags,
+            present: &mut self.present,
+            active: &mut self.active,
+            total: &mut columns.total,
+            peak: &mut columns.peak,
+            area: &mut columns.area,
+            centroid_u: &mut columns.centroid_u,
+            centroid_v: &mut columns.centroid_v,
+            centroid_depth: &mut columns.centroid_depth,
+            orientation: &mut columns.orientation,
+            axis: &mut columns.axis,
+            anisotropy: &mut columns.anisotropy,
+            displacement: &mut columns.displacement,
+            direction: &mut columns.direction,
+            distance: &mut columns.distance,
+            radial_distance: &mut columns.radial_distance,
+            speed: &mut columns.speed,
+            radial_speed: &mut columns.radial_speed,
+        })
+    }
+}
+
+impl CellsMut<'_> {
+    pub(crate) fn fields(&self) -> usize {
+        self.fields
+    }
+
+    pub(crate) fn frames(&self) -> usize {
+        self.flags.len() / self.fields.max(1)
+    }
+
+    /// The first `frames` frames, and the rest.
+    pub(crate) fn split_at(self, frames: usize) -> (Self, Self) {
+        fn split<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
+            column.split_at_mut(cells.min(column.len()))
+        }
+        let cells = frames * self.fields;
+        let (pressures, later_pressures) = split(self.pressures, frames * self.slots);
+        macro_rules! split_all {
+            ($($column:ident => $later:ident),* $(,)?) => {{
+                $(let ($column, $later) = split(self.$column, cells);)*
+                (
+                    Self { fields: self.fields, slots: self.slots, pressures, $($column),* },
+                    Self { fields: self.fields, slots: self.slots, pressures: later_pressures, $($column: $later),* },
+                )
+            }};
+        }
+        split_all! {
+            flags => later_flags,
+            present => later_present,
+            active => later_active,
+            total => later_total,
+            peak => later_peak,
+            area => later_area,
+            centroid_u => later_centroid_u,
+            centroid_v => later_centroid_v,
+            centroid_depth => later_centroid_depth,
+            orientation => later_orientation,
+            axis => later_axis,
+            anisotropy => later_anisotropy,
+            displacement => later_displacement,
+            direction => later_direction,
+            distance => later_distance,
+            radial_distance => later_radial_distance,
+            speed => later_speed,
+            radial_speed => later_radial_speed,
+        }
+    }
+
+    /// The same cells again, for a shorter while.
+    pub(crate) fn reborrow(&mut self) -> CellsMut<'_> {
+        CellsMut {
+            fields: self.fields,
+            slots: self.slots,
+            pressures: self.pressures,
+            flags: self.flags,
+            present: self.present,
+            active: self.active,
+            total: self.total,
+            peak: self.peak,
+            area: self.area,
+            centroid_u: self.centroid_u,
+            centroid_v: self.centroid_v,
+            centroid_depth: self.centroid_depth,
+            orientation: self.orientation,
+            axis: self.axis,
+            anisotropy: self.anisotropy,
+            displacement: self.displacement,
+            direction: self.direction,
+            distance: self.distance,
+            radial_distance: self.radial_distance,
+            speed: self.speed,
+            radial_speed: self.radial_speed,
+        }
+    }
+
+    /// Sets a cell's flags and the quantities it holds, by their bits.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
+        self.flags[cell] = Flags::from_bits_truncate(flags);
+        self.present[cell] = Outputs::from_bits_truncate(present);
+    }
+}
