@@ -2,11 +2,12 @@
 
 use fearless_simd::prelude::*;
 
-use super::simd::{F, U, splat, splat_u};
+use super::simd::{F, U, splat, splat_u, width};
 use super::touch::{Members, Part};
 use crate::stage::calibrate::UNUSABLE;
 
 /// S, how many taxels are pressed, and the numerators of the centroid.
+#[derive(Clone, Copy)]
 pub(super) struct Sums<S: Simd> {
     pub(super) total: F<S>,
     pub(super) active: U<S>,
@@ -14,28 +15,43 @@ pub(super) struct Sums<S: Simd> {
     pub(super) v: F<S>,
 }
 
-/// One pass over the members; the centroid's sums ride along where they are wanted.
+/// One pass over the members for `N` vectors of lanes from `at` on; the centroid's sums ride along where they are wanted.
+///
+/// A sum waits for the one before it: two vectors' sums side by side keep a core busy that takes eight lanes at a time.
 #[inline(always)]
-pub(super) fn sums<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, centroid: bool) -> Sums<S> {
+pub(super) fn sums<S: Simd, P: Members<S>, const N: usize>(
+    simd: S,
+    members: P,
+    at: usize,
+    centroid: bool,
+) -> [Sums<S>; N] {
     let none = splat(simd, 0.0);
-    let (mut total, mut active, mut u, mut v) = (none, splat_u(simd, 0), none, none);
+    let mut sums = [Sums { total: none, active: splat_u(simd, 0), u: none, v: none }; N];
     // Two loops, as the choice is not to be made for every member.
     if centroid {
         for member in 0..members.count() {
-            let part = members.part(simd, member, at);
-            total += part.pull;
-            active += pressed(simd, &part);
-            u += part.pull * part.u;
-            v += part.pull * part.v;
+            let mut i = 0;
+            while i < N {
+                let part = members.part(simd, member, at + i * width::<S>());
+                sums[i].total += part.pull;
+                sums[i].active += pressed(simd, &part);
+                sums[i].u += part.pull * part.u;
+                sums[i].v += part.pull * part.v;
+                i += 1;
+            }
         }
     } else {
         for member in 0..members.count() {
-            let part = members.part(simd, member, at);
-            total += part.pull;
-            active += pressed(simd, &part);
+            let mut i = 0;
+            while i < N {
+                let part = members.part(simd, member, at + i * width::<S>());
+                sums[i].total += part.pull;
+                sums[i].active += pressed(simd, &part);
+                i += 1;
+            }
         }
     }
-    Sums { total, active, u, v }
+    sums
 }
 
 /// 1 where P > 0, else 0. No P is negative or −0, so that its bits tell.

@@ -9,7 +9,7 @@ use super::gate::Gate;
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
-use super::simd::{F, LANES, Row, U, load, load_u, with_widest};
+use super::simd::{F, LANES, Row, U, load, load_u, soon_needed, with_widest};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
@@ -37,6 +37,8 @@ struct Narrow {
     /// By member; lanes that have no more go on with an unpressed one.
     slots: Slots,
     places: Vec<PlaceRow>,
+    /// Rows of the groups before it.
+    first_row: usize,
     /// None where all are 1.
     weights: Option<Lines<f32>>,
     depths: Lines<f32>,
@@ -97,6 +99,7 @@ impl Narrow {
             kinds: Kinds::EMPTY,
             slots: Slots::Far(Lines::default()),
             places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            first_row: 0,
             weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
             depths: blank.clone(),
             areas: blank,
@@ -224,6 +227,11 @@ impl Live {
         let unpressed = tiles * LANES;
         let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
         let mut narrow: Vec<Narrow> = narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
+        let mut first_row = 0;
+        for group in &mut narrow {
+            group.first_row = first_row;
+            first_row += group.places.len();
+        }
         let most_rows = narrow.iter().map(|group| group.places.len()).max().unwrap_or(0);
         let together = (GATHERED_ROWS / most_rows.max(1)).max(1);
         for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
@@ -386,6 +394,11 @@ impl Frame<'_> {
         let mut first = 0;
         for group in groups {
             let rows = first..first + group.places.len();
+            // They wait for stores: their places are fetched meanwhile.
+            group.places.iter().for_each(|place| {
+                soon_needed(&place.u);
+                soon_needed(&place.v);
+            });
             group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
             if self.faults {
                 group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
@@ -415,18 +428,25 @@ impl Frame<'_> {
             care: self.plan.is_compensated(),
         };
         let Gathered { pressures, statuses, between, .. } = gathered;
-        let lot = |index: usize| {
-            let first: usize = groups[..index].iter().map(|group| group.places.len()).sum();
-            let group = &groups[index];
-            let members = OverFields::<WEIGHTED> {
-                group,
-                weights: group.weights.as_deref().unwrap_or_default(),
-                pressures: &pressures[first..],
-                statuses: &statuses[first..],
-            };
-            (Abreast(members), &group.kinds)
-        };
-        touch(simd, lot, LANES, wanted, &mut between[..groups.len()], answers);
+        touch(
+            simd,
+            #[inline(always)]
+            |index| {
+                let group = &groups[index];
+                let rows = group.first_row - groups[0].first_row..;
+                let members = OverFields::<WEIGHTED> {
+                    group,
+                    weights: group.weights.as_deref().unwrap_or_default(),
+                    pressures: &pressures[rows.clone()],
+                    statuses: &statuses[rows],
+                };
+                (Abreast(members), &group.kinds)
+            },
+            LANES,
+            wanted,
+            &mut between[..groups.len()],
+            answers,
+        );
     }
 
     /// Lanes that have no more members do not keep the others from being all unusable.

@@ -5,6 +5,7 @@
 
 use fearless_simd::prelude::*;
 
+use super::contact::Sums;
 use super::orientation::{self, Apart};
 use super::simd::{F, LANES, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
 use super::touch::{Cells, Kind, Line, Sweep, Touch};
@@ -55,8 +56,21 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     let Wanted { stages, care, .. } = wanted;
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
-        for at in (0..lanes).step_by(width::<S>()) {
-            sums(simd, members, &kind, wanted, at, between, cells);
+        for at in (0..lanes).step_by(2 * width::<S>()) {
+            let next = at + width::<S>();
+            if care || next >= lanes {
+                for at in [at, next].into_iter().filter(|&at| at < lanes) {
+                    let sums = match care {
+                        true => members.sums_with_care(simd, at, stages.centroid),
+                        false => members.sums(simd, at, stages.centroid),
+                    };
+                    contact(simd, members, &kind, wanted, at, &sums, between, cells);
+                }
+            } else {
+                let [sums, next_sums] = members.two_sums(simd, at, stages.centroid);
+                contact(simd, members, &kind, wanted, at, &sums, between, cells);
+                contact(simd, members, &kind, wanted, next, &next_sums, between, cells);
+            }
         }
     }
     if !stages.centroid {
@@ -122,18 +136,18 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
 
 /// Total, contact, peak, area and active; and the centroid's numerators.
 #[inline(always)]
-fn sums<S: Simd, P: Sweep<S>>(
+#[expect(clippy::too_many_arguments, reason = "a cell, what it is made of, and where")]
+fn contact<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
     kind: &impl Kind<S>,
     wanted: Wanted,
     at: usize,
+    sums: &Sums<S>,
     between: &mut Between,
     cells: &mut Cells,
 ) {
-    let Wanted { stages, outputs, faults, care } = wanted;
-    let centroid = stages.centroid;
-    let sums = if care { members.sums_with_care(simd, at, centroid) } else { members.sums(simd, at, centroid) };
+    let Wanted { outputs, faults, .. } = wanted;
     let none = splat(simd, 0.0);
     let touched = sums.total.simd_gt(none);
     let mut flags = kind.always(simd, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());

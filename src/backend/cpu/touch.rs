@@ -10,7 +10,7 @@ use super::centroid;
 use super::compensated::Compensated;
 use super::contact::{self, Sums};
 use super::orientation::{self, Farthest};
-use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u};
+use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, width};
 use crate::percept::{Flags, Outputs};
 use crate::scene::PlanField;
 use crate::stage::calibrate::UNUSABLE;
@@ -41,6 +41,11 @@ pub(super) trait Members<S: Simd>: Copy {
 pub(super) trait Sweep<S: Simd>: Compensated<S> {
     /// S, how many are pressed, and the centroid's numerators where `centroid` says so.
     fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S>;
+    /// The same for two vectors of lanes.
+    #[inline(always)]
+    fn two_sums(self, simd: S, at: usize, centroid: bool) -> [Sums<S>; 2] {
+        [self.sums(simd, at, centroid), self.sums(simd, at + width::<S>(), centroid)]
+    }
     /// The largest P, and the area of the pressed taxels, m².
     fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>);
     /// What calibration says of the members together, and where it left all of them out.
@@ -58,6 +63,12 @@ pub(super) struct Abreast<P>(pub(super) P);
 impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
     #[inline(always)]
     fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S> {
+        let [sums] = contact::sums(simd, self.0, at, centroid);
+        sums
+    }
+
+    #[inline(always)]
+    fn two_sums(self, simd: S, at: usize, centroid: bool) -> [Sums<S>; 2] {
         contact::sums(simd, self.0, at, centroid)
     }
 

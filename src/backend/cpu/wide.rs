@@ -281,7 +281,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
         let (mut rows, mut active) = ([[0.0; LANES]; 3], [0; LANES]);
         let mut at = 0;
         while at < LANES {
-            let sums = contact::sums(simd, self, at, centroid);
+            let [sums] = contact::sums(simd, self, at, centroid);
             store(simd, sums.total, &mut rows[0], at);
             store_u(simd, sums.active, &mut active, at);
             store(simd, sums.u, &mut rows[1], at);
