@@ -20,7 +20,7 @@ pub(crate) const WIDEST: usize = 65_000 / 3 * 64;
 pub(crate) const MANY: usize = 128;
 
 /// What changes from batch to batch.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Batch {
     /// Frames in this batch.

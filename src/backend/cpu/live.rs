@@ -10,6 +10,7 @@ use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
 use super::simd::{F, LANES, Row, U, load, load_u, soon_needed, with_widest};
+use super::slots::{NEAR, Slots};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
@@ -43,41 +44,6 @@ struct Narrow {
     weights: Option<Lines<f32>>,
     depths: Lines<f32>,
     areas: Lines<f32>,
-}
-
-/// A plan of fewer slots than this has them as 16-bit numbers, which need no check against a table of as many values.
-const NEAR: usize = 1 << 16;
-
-/// Slots, a row a member.
-#[derive(Clone, Debug)]
-enum Slots {
-    Near(Lines<u16>),
-    Far(Lines<u32>),
-}
-
-impl Slots {
-    /// Brings the values of all of them side by side.
-    fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
-        match self {
-            Self::Near(slots) => {
-                let Some(values) = values.first_chunk::<NEAR>() else {
-                    unreachable!("they have room for any such slot")
-                };
-                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
-                    for (value, &slot) in row.iter_mut().zip(slots) {
-                        *value = values[usize::from(slot)];
-                    }
-                }
-            }
-            Self::Far(slots) => {
-                for (row, slots) in rows.iter_mut().zip(&slots[..]) {
-                    for (value, &slot) in row.iter_mut().zip(slots) {
-                        *value = values[slot as usize];
-                    }
-                }
-            }
-        }
-    }
 }
 
 /// Where a member of each field of a group is.
@@ -117,11 +83,7 @@ impl Narrow {
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
         }
-        group.slots = if unpressed < NEAR {
-            Slots::Near(slots.iter().map(|row| row.map(|slot| slot as u16)).collect())
-        } else {
-            Slots::Far(slots)
-        };
+        group.slots = Slots::new(slots, unpressed);
         group
     }
 

@@ -25,6 +25,7 @@ mod orientation;
 mod put;
 mod rest;
 mod simd;
+mod slots;
 #[cfg(test)]
 mod tests;
 mod touch;

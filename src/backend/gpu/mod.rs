@@ -59,6 +59,8 @@ pub(crate) struct Gpu {
     capacity: usize,
     ring: Vec<Set>,
     batch: wgpu::Buffer,
+    /// What is in `batch`.
+    told: Option<layout::Batch>,
     steps: wgpu::Buffer,
     raw: wgpu::Buffer,
     /// The raw values of the frame before, where the plan has changes.
@@ -240,6 +242,7 @@ impl Gpu {
             capacity,
             ring,
             batch,
+            told: None,
             steps,
             raw,
             before,
@@ -268,8 +271,14 @@ impl Gpu {
         let frames = raw.frames as u64;
         let steps = frames * STEP;
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
-        encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
+        // Each copy waits for the one before: none that changes nothing.
+        if self.told != Some(header) {
+            encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
+            self.told = Some(header);
+        }
+        if self.plan.stages().motion || self.plan.has_changes() {
+            encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
+        }
         self.send_up(&mut encoder, upload, pack::values_at(raw.frames), raw.frames);
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
