@@ -5,12 +5,12 @@
 //! First the percepts of every shape are held to the f64 reference. Then, as JSON: what the machine copies (on the device,
 //! up, down), and for each shape and number of frames a call the programs by themselves, by the device's clock where it
 //! may be read, with the share of the copy bandwidth that their least bytes make; and whole calls, frames in memory to
-//! percepts in memory, beside an empty dispatch with the same bytes up and down.
+//! percepts in memory, in turns with empty ones: the same bytes up and down, as many groups, and nothing computed.
 
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use somatic::backend::gpu::{Bandwidth, adapters, bandwidth, device_time};
+use somatic::backend::gpu::{Bandwidth, EmptyCall, adapters, bandwidth, device_time};
 use somatic::experiments::shape::Shape;
 use somatic::{BackendKind, Body, Outputs, Result};
 
@@ -78,15 +78,24 @@ fn case(shape: &Shape, body: &Body, bandwidth: &Bandwidth) -> Result<Value> {
     let device = device_time(engine.plan(), shape.frames)?;
     let mut frames = shape.frames();
     engine.process(&frames)?;
-    let (start, mut seconds) = (Instant::now(), Vec::new());
+    // In turns, as both wobble with whatever else the machine does.
+    let mut empty = EmptyCall::new(engine.plan(), shape.frames)?;
+    empty.run()?;
+    let (start, mut seconds, mut empty_seconds) = (Instant::now(), Vec::new(), Vec::new());
     while seconds.len() < 3 || (seconds.len() < 2000 && start.elapsed() < Duration::from_secs(1)) {
         shape.advance(&mut frames);
         let call = Instant::now();
         engine.process(&frames)?;
         seconds.push(call.elapsed().as_secs_f64());
+        let call = Instant::now();
+        empty.run()?;
+        empty_seconds.push(call.elapsed().as_secs_f64());
     }
-    seconds.sort_by(f64::total_cmp);
-    let call_s = seconds[seconds.len() / 2];
+    let median = |seconds: &mut Vec<f64>| {
+        seconds.sort_by(f64::total_cmp);
+        seconds[seconds.len() / 2]
+    };
+    let (call_s, empty_s) = (median(&mut seconds), median(&mut empty_seconds));
     let memberships = shape.memberships() as f64;
     let of_submission = memberships * device.frames as f64 / shape.frames as f64;
     let moved = device.least_bytes as f64 / device.programs_s;
@@ -105,7 +114,7 @@ fn case(shape: &Shape, body: &Body, bandwidth: &Bandwidth) -> Result<Value> {
         },
         "call": {
             "us": call_s * 1e6, "memberships_per_s": memberships / call_s, "share_of_link": link_s / call_s,
-            "empty_dispatch_us": device.empty_s * 1e6,
+            "empty_dispatch_us": empty_s * 1e6,
         },
     }))
 }

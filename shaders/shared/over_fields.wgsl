@@ -31,6 +31,8 @@ override ORIENTED: bool = false;
 override AXED: bool = false;
 // Whether every member's weight is 1.
 override UNWEIGHTED: bool = false;
+// Whether there is never more than one frame: what nobody stores of a quad is then not computed, as its lanes never mix.
+override SINGLE: bool = false;
 
 fn pull_of(member: Member, pressure: vec4<f32>) -> vec4<f32> {
     if UNWEIGHTED {
@@ -46,6 +48,9 @@ fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
     let frame = quad * 4u;
     let cell = (column * batch.frames + frame) * batch.fields + index;
     results[cell] = values.x;
+    if SINGLE {
+        return;
+    }
     if frame + 1u < batch.frames {
         results[cell + batch.fields] = values.y;
     }

@@ -95,7 +95,7 @@ impl Columns {
     }
 
     /// What the program over fields is told.
-    pub(super) fn of_fields(&self, plan: &Plan) -> Vec<(&'static str, f64)> {
+    pub(super) fn of_fields(&self, plan: &Plan, single: bool) -> Vec<(&'static str, f64)> {
         let mut overrides = self.overrides(&[
             ("TOTAL_AT", Column::Total),
             ("PEAK_AT", Column::Peak),
@@ -108,12 +108,15 @@ impl Columns {
             ("ANISOTROPY_AT", Column::Anisotropy),
         ]);
         let stages = plan.stages();
-        for (name, runs) in [("CENTRED", stages.centroid), ("ORIENTED", stages.orientation), ("AXED", stages.axis)] {
-            overrides.push((name, if runs { 1.0 } else { 0.0 }));
-        }
-        overrides.push(("COMPENSATED", if plan.is_compensated() { 1.0 } else { 0.0 }));
-        let unweighted = plan.fields.iter().all(|field| field.unweighted);
-        overrides.push(("UNWEIGHTED", if unweighted { 1.0 } else { 0.0 }));
+        let said = [
+            ("CENTRED", stages.centroid),
+            ("ORIENTED", stages.orientation),
+            ("AXED", stages.axis),
+            ("COMPENSATED", plan.is_compensated()),
+            ("UNWEIGHTED", plan.fields.iter().all(|field| field.unweighted)),
+            ("SINGLE", single),
+        ];
+        overrides.extend(said.map(|(name, is_so)| (name, f64::from(u8::from(is_so)))));
         overrides
     }
 

@@ -24,7 +24,7 @@ mod tests;
 pub use adapter::{AdapterSummary, adapters};
 pub use bus::{SilentGpu, silent_gpus};
 use bytemuck::cast_slice;
-pub use report::{Bandwidth, DeviceTime, bandwidth, device_time};
+pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
 use self::adapter::Device;
 use self::columns::{Columns, NOTHING};
@@ -178,7 +178,7 @@ impl Gpu {
             let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
-        let told = columns.of_fields(plan);
+        let told = columns.of_fields(plan, capacity == 1);
         let over_fields = |direct: bool| {
             let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
             let shader = match (direct, &texels, few) {

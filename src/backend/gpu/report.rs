@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::adapter::{self, Device};
 use super::ring::Set;
 use super::stage::Over;
-use super::{Gpu, header};
+use super::{GROUP, Gpu, header};
 use crate::error::Result;
 use crate::scene::Plan;
 use crate::stage::layout;
@@ -38,11 +38,9 @@ pub struct DeviceTime {
     pub by_device: bool,
     /// Bytes that the programs must at least read and write, each once.
     pub least_bytes: u64,
-    /// An empty dispatch with the same bytes up and down, from the host's first byte to its last, s.
-    pub empty_s: f64,
-    /// Those bytes.
+    /// Raw values that go up.
     pub bytes_up: u64,
-    /// Those bytes.
+    /// Percepts that come down.
     pub bytes_down: u64,
 }
 
@@ -129,13 +127,10 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         let mapped = set.upload.get_mapped_range_mut(..(values.len() * 4) as u64);
         mapped.map_err(|e| gpu.device.lost(&e))?.slice(..).copy_from_slice(bytemuck::cast_slice(&values));
     }
-    let mut run = |over: &dyn Fn(Over) -> [u32; 3], clock: Option<&Clock>, up: u64, down: u64| {
+    let mut run = |over: &dyn Fn(Over) -> [u32; 3], clock: Option<&Clock>| {
         let start = Instant::now();
         set.upload.unmap();
         let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        if up > 0 {
-            gpu.send_up(&mut encoder, &set.upload, 0, frames);
-        }
         {
             let timestamp_writes = clock.map(Clock::writes);
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes };
@@ -149,10 +144,8 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
         }
         if let Some(clock) = clock {
             clock.resolve(&mut encoder, &set.readback);
-        } else {
-            encoder.copy_buffer_to_buffer(&gpu.results, 0, &set.readback, 0, down);
         }
-        set.submit(&gpu.device, encoder.finish(), (0, 0), down.max(16));
+        set.submit(&gpu.device, encoder.finish(), (0, 0), 16);
         let mut ticks = [0_u64; 2];
         set.collect(&gpu.device, |_, bytes| bytemuck::bytes_of_mut(&mut ticks).copy_from_slice(&bytes[..16]))?;
         let device_s = clock.map(|clock| ticks[1].wrapping_sub(ticks[0]) as f64 * clock.tick_s);
@@ -162,12 +155,11 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let (bytes_up, bytes_down) = (up as u64, cells * 4 * gpu.columns.read().len() as u64);
     let nothing = |_: Over| [0, 0, 0];
     let everything = |over: Over| over.groups(&batch);
-    let empty_s = median(ROUNDS, || run(&nothing, None, bytes_up, bytes_down))?;
     let programs_s = match &clock {
-        Some(clock) => median(ROUNDS, || run(&everything, Some(clock), 0, 0))?,
+        Some(clock) => median(ROUNDS, || run(&everything, Some(clock)))?,
         None => {
-            let still = median(ROUNDS, || run(&nothing, None, 0, 0))?;
-            (median(ROUNDS, || run(&everything, None, 0, 0))? - still).max(0.0)
+            let still = median(ROUNDS, || run(&nothing, None))?;
+            (median(ROUNDS, || run(&everything, None))? - still).max(0.0)
         }
     };
     // Raw values, pressures and statuses there and back where there are any, what is known of members, and the results.
@@ -176,7 +168,72 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let results = cells * 4 * gpu.columns.count() as u64;
     let pressures = if gpu.direct { 0 } else { 2 * slots * 5 };
     let least_bytes = bytes_up + pressures + members + results;
-    Ok(DeviceTime { frames, programs_s, by_device: clock.is_some(), least_bytes, empty_s, bytes_up, bytes_down })
+    Ok(DeviceTime { frames, programs_s, by_device: clock.is_some(), least_bytes, bytes_up, bytes_down })
+}
+
+/// A call that computes nothing, to hold a call of an engine to: as many bytes go up and come down as in a submission of a
+/// plan, and a program without a statement is dispatched in as many groups.
+pub struct EmptyCall {
+    gpu: Gpu,
+    pipeline: wgpu::ComputePipeline,
+    groups: [u32; 3],
+    frames: usize,
+    values: Vec<u8>,
+    bytes_down: u64,
+}
+
+impl EmptyCall {
+    /// In place of a call of `plan` on `frames` frames, as many of them as one submission takes.
+    ///
+    /// # Errors
+    /// No adapter, or a plan that the device cannot run.
+    pub fn new(plan: &Plan, frames: usize) -> Result<Self> {
+        let gpu = Gpu::on(adapter::shared()?, plan, frames)?;
+        let frames = frames.min(gpu.capacity);
+        let batch = header(plan, frames as u32, gpu.wide);
+        let module = gpu.device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("empty"),
+            source: wgpu::ShaderSource::Wgsl(format!("@compute @workgroup_size({GROUP}) fn main() {{}}").into()),
+        });
+        let pipeline = gpu.device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("empty"),
+            layout: None,
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        let groups = gpu.stages.first().map_or([1, 1, 1], |stage| stage.over.groups(&batch));
+        let bytes_down = (frames * plan.fields.len() * 4 * gpu.columns.read().len()) as u64;
+        Ok(Self { pipeline, groups, frames, values: vec![0; gpu.raw_bytes(frames)], bytes_down, gpu })
+    }
+
+    /// From the host's first byte to its last.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn run(&mut self) -> Result<()> {
+        let Gpu { device, ring, .. } = &mut self.gpu;
+        let mut set = ring.swap_remove(0);
+        {
+            let mapped = set.upload.get_mapped_range_mut(..self.values.len() as u64);
+            mapped.map_err(|e| device.lost(&e))?.slice(..).copy_from_slice(&self.values);
+        }
+        set.upload.unmap();
+        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.gpu.send_up(&mut encoder, &set.upload, 0, self.frames);
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.pipeline);
+            let [wide, tall, deep] = self.groups;
+            pass.dispatch_workgroups(wide, tall, deep);
+        }
+        encoder.copy_buffer_to_buffer(&self.gpu.results, 0, &set.readback, 0, self.bytes_down);
+        set.submit(&self.gpu.device, encoder.finish(), (0, 0), self.bytes_down.max(16));
+        let done = set.collect(&self.gpu.device, |_, _| ());
+        self.gpu.ring.insert(0, set);
+        done
+    }
 }
 
 /// The device's clock.

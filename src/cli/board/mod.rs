@@ -133,6 +133,8 @@ pub(super) struct Arguments {
 
 /// So long a board answers when it has sent everything, and the other side has time to read.
 const LINGER: Duration = Duration::from_millis(500);
+/// So long it waits for a plug that is pulled just then.
+const PATIENCE: Duration = Duration::from_secs(5);
 /// So often it says meanwhile that it has.
 const TELL_EVERY: Duration = Duration::from_millis(50);
 /// A byte at 57600 baud takes 0.17 ms; the other side sees some at once, as from any USB adapter.
@@ -150,7 +152,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 
     let mut feed = None;
     let (mut row, mut before, mut readings) = (0, Duration::ZERO, vec![None; play.taxels.len()]);
-    let (mut ending, mut told_again): (Option<Duration>, _) = (None, Duration::ZERO);
+    let (mut ending, mut told_again, mut pulled_at): (Option<Duration>, _, _) = (None, Duration::ZERO, Duration::ZERO);
     while !stop.load(Ordering::Relaxed) {
         let now = start.elapsed();
         if ending.is_none() {
@@ -177,8 +179,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         if over && ending.is_none() {
             ending = Some(now);
         }
+        if stations.iter().any(|station| station.plug.is_none()) {
+            pulled_at = now;
+        }
+        // A board whose plug is pulled has yet to say how many frames there were.
         if let Some(since) = ending
-            && now >= since + LINGER
+            && now >= since.max(pulled_at.min(since + PATIENCE)) + LINGER
         {
             break;
         }
