@@ -205,7 +205,7 @@ pub(super) fn block(
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
         place.announce(cells);
         let rests: [bool; LANES] = std::array::from_fn(|index| {
-            index >= place.count || tables.rest.is_field(place.first + index, |tile| tiles[tile].rests)
+            index >= place.count || tables.rest.has_at_rest(place.first + index, |tile| tiles[tile].rests)
         });
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {

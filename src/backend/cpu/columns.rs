@@ -22,19 +22,8 @@ pub(super) struct Place {
 
 impl Place {
     /// Has the memory that is going to be written fetched meanwhile.
-    pub(super) fn announce(self, cells: &CellsMut<'_>) {
-        let columns = [
-            &cells.total[..],
-            cells.peak,
-            cells.area,
-            cells.centroid_u,
-            cells.centroid_v,
-            cells.centroid_depth,
-            cells.orientation,
-            cells.axis,
-            cells.anisotropy,
-        ];
-        for column in columns {
+    pub(super) fn announce(self, cells: &mut CellsMut<'_>) {
+        for column in numbers(cells) {
             self.announce_column(column);
         }
         self.announce_column(cells.active);
@@ -70,6 +59,21 @@ impl Place {
         let start = frame * self.fields + self.first;
         &mut column[start..start + self.count]
     }
+}
+
+/// The columns that stages here fill with numbers; those that nobody wants are empty.
+fn numbers<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [f32]; 9] {
+    [
+        cells.total,
+        cells.peak,
+        cells.area,
+        cells.centroid_u,
+        cells.centroid_v,
+        cells.centroid_depth,
+        cells.orientation,
+        cells.axis,
+        cells.anisotropy,
+    ]
 }
 
 /// Writes answers where they belong.
@@ -139,18 +143,7 @@ pub(super) fn write_at_rest(fields: &[PlanField], place: Place, outputs: Outputs
             place.of_frame(cells.active, frame).fill(0);
         }
     }
-    let columns = [
-        &mut *cells.total,
-        cells.peak,
-        cells.area,
-        cells.centroid_u,
-        cells.centroid_v,
-        cells.centroid_depth,
-        cells.orientation,
-        cells.axis,
-        cells.anisotropy,
-    ];
-    for column in columns.into_iter().filter(|column| !column.is_empty()) {
+    for column in numbers(cells).into_iter().filter(|column| !column.is_empty()) {
         for frame in 0..place.frames {
             place.of_frame(column, frame).fill(0.0);
         }

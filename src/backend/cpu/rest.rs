@@ -41,7 +41,7 @@ impl Rest {
     }
 
     /// Whether field `field` rests, given which tiles do.
-    pub(super) fn is_field(&self, field: usize, rests: impl Fn(usize) -> bool) -> bool {
+    pub(super) fn has_at_rest(&self, field: usize, rests: impl Fn(usize) -> bool) -> bool {
         self.tiles[self.starts[field] as usize..self.starts[field + 1] as usize]
             .iter()
             .all(|&tile| rests(tile as usize))

@@ -130,7 +130,7 @@ fn much_of_a_skin_rests_and_has_the_same_bits() {
                 .flat_map(|frame| &raw[frame * plan.channels()..][channels.clone()])
                 .any(|value| value.number() != Some(0.0))
         };
-        (0..plan.fields.len()).filter(|&field| rest.is_field(field, |tile| !pressed(tile))).count()
+        (0..plan.fields.len()).filter(|&field| rest.has_at_rest(field, |tile| !pressed(tile))).count()
     };
     let (resting, all) = ((0..FRAMES / LANES).map(rests).sum::<usize>(), plan.fields.len() * FRAMES / LANES);
     assert!(resting > all / 3 && resting < all, "{resting} of {all}");
