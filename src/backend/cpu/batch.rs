@@ -10,7 +10,7 @@ use super::Tables;
 use super::columns::Place;
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, touch};
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, width, with_widest};
+use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
 use super::{calibrate, change, columns};
@@ -303,13 +303,19 @@ fn read<S: Simd>(
             }
         }
         let bits = &scratch.bits[ahead * LANES..][..LANES];
+        let bits = &bits[..frames];
         let mut faults = false;
-        for frame in 0..frames {
-            let (pressures, statuses) = (&mut pressures[frame], &mut statuses[frame]);
-            faults |= calibrate::tile(simd, plan, tile, slot, &bits[frame], pressures, statuses);
-        }
+        let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(
+            #[inline(always)]
+            || {
+                for ((bits, pressures), statuses) in bits.iter().zip(&mut *pressures).zip(&mut *statuses) {
+                    faults |= calibrate::tile(simd, plan, tile, slot, bits, pressures, statuses);
+                }
+                faults || pressures[..frames].as_flattened().iter().any(|&pressure| pressure > 0.0)
+            },
+        );
+        let rests = !is_pressed;
         let (abreast, kept) = (&mut scratch.pressures[place..place + LANES], &mut scratch.tiles[place / LANES]);
-        let rests = !faults && !is_pressed(simd, &pressures[..frames]);
         if !rests {
             let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
             abreast.iter_mut().zip(&turned).for_each(|(lanes, turned)| turned.store_slice(lanes));
@@ -327,18 +333,4 @@ fn read<S: Simd>(
         any |= faults;
     }
     any
-}
-
-/// Whether any of a tile's pressures is more than nothing.
-#[inline(always)]
-fn is_pressed<S: Simd>(simd: S, pressures: &[Row<f32>]) -> bool {
-    let mut any = splat(simd, 0.0);
-    for row in pressures {
-        let mut at = 0;
-        while at < LANES {
-            any = any.max(load(simd, row, at));
-            at += width::<S>();
-        }
-    }
-    any.simd_gt(splat(simd, 0.0)).any_true()
 }

@@ -6,7 +6,7 @@ use fearless_simd::prelude::*;
 use super::super::Rows;
 use super::Tables;
 use super::lines::Aligned;
-use super::simd::{F, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width, with_widest};
+use super::simd::{F, I, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width, with_widest};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -103,6 +103,90 @@ pub(super) fn tile<S: Simd>(
         at += width::<S>();
     }
     any
+}
+
+/// As [`tile`], for a row of raw bits a frame, if nothing is to be said of any value: whether any taxel is pressed. Without
+/// a word `pressures` has nothing of use.
+///
+/// What has to hold for every value is asked once, of the largest and smallest of each taxel.
+#[inline(always)]
+pub(super) fn plain<S: Simd>(
+    simd: S,
+    tile: &Tile,
+    raw: &[Row<u32>],
+    pressures: &mut [Row<f32>; LANES],
+) -> Option<bool> {
+    if !tile.straight {
+        return None;
+    }
+    let (none, mut pressed) = (splat(simd, 0.0), splat_u(simd, 0));
+    let mut at = 0;
+    while at < LANES {
+        let lanes = at..at + width::<S>();
+        let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
+        let mut sizes = Sizes::new(simd);
+        if tile.raw_is_pressure {
+            for (bits, pressures) in raw.iter().zip(&mut *pressures) {
+                let bits = U::<S>::from_slice(simd, &bits[lanes.clone()]);
+                sizes.see(simd, bits);
+                // As a whole number of either sign, whatever is negative is less than 0, −0 too.
+                let pressure = bits.bitcast::<I<S>>().max(I::<S>::splat(simd, 0)).bitcast::<U<S>>();
+                pressed |= pressure;
+                store(simd, pressure.bitcast(), pressures, at);
+            }
+            if !sizes.are_fine(simd) {
+                return None;
+            }
+        } else {
+            let (baseline, gain, dead_band) = (of(&tile.baseline), of(&tile.gain), of(&tile.dead_band));
+            let (mut low, mut high, mut most) = (of(&tile.raw_high), of(&tile.raw_low), none);
+            for (bits, pressures) in raw.iter().zip(&mut *pressures) {
+                let bits = U::<S>::from_slice(simd, &bits[lanes.clone()]);
+                let value = bits.bitcast::<F<S>>();
+                let pressure = (value - baseline) * gain;
+                sizes.see(simd, bits);
+                sizes.see(simd, pressure.bitcast());
+                (low, high, most) = (low.min(value), high.max(value), most.max(pressure));
+                let pressure = pressure.simd_gt(dead_band).select(pressure, none);
+                pressed |= pressure.bitcast::<U<S>>();
+                store(simd, pressure, pressures, at);
+            }
+            let within = low.simd_ge(of(&tile.raw_low)) & high.simd_le(of(&tile.raw_high));
+            if !(sizes.are_fine(simd) && (within & most.simd_le(of(&tile.p_max))).all_true()) {
+                return None;
+            }
+        }
+        at += width::<S>();
+    }
+    Some(pressed.simd_gt(splat_u(simd, 0)).any_true())
+}
+
+/// The largest size of numbers, and the smallest that is not 0, less one.
+struct Sizes<S: Simd> {
+    largest: U<S>,
+    smallest: U<S>,
+}
+
+impl<S: Simd> Sizes<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self { largest: splat_u(simd, 0), smallest: splat_u(simd, u32::MAX) }
+    }
+
+    #[inline(always)]
+    fn see(&mut self, simd: S, bits: U<S>) {
+        let size = bits & SIZE_BITS;
+        self.largest = self.largest.max(size);
+        // Of 0 that is the largest there is.
+        self.smallest = self.smallest.min(size - splat_u(simd, 1));
+    }
+
+    /// Whether [`fine`] held for all of them.
+    #[inline(always)]
+    fn are_fine(&self, simd: S) -> bool {
+        let fine = self.largest.simd_le(splat_u(simd, HUGE_BITS)) & self.smallest.simd_ge(splat_u(simd, TINY_BITS - 1));
+        fine.all_true()
+    }
 }
 
 /// A frame's pressures and statuses, by slot; whether any status says anything.

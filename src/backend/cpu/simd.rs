@@ -42,6 +42,8 @@ pub(super) const LANES: usize = 16;
 pub(super) type F<S> = <S as Simd>::f32s;
 /// The same of integers.
 pub(super) type U<S> = <S as Simd>::u32s;
+/// The same of whole numbers of either sign.
+pub(super) type I<S> = <S as Simd>::i32s;
 /// The same of decisions.
 pub(super) type M<S> = <S as Simd>::mask32s;
 
