@@ -100,6 +100,8 @@ pub(crate) struct Picks {
     pub(crate) near: Vec<Near>,
     /// Per [`BLOCK`] tiles of sixteen whose values lie one after the other: where they start.
     pub(crate) blocks: Vec<Option<usize>>,
+    /// The first of each sixteen values of a frame that hold any that is wanted.
+    pub(crate) lines: Vec<u32>,
     /// What [`Near::Shuffled`] refers to: which bytes of 32 values are wanted.
     pub(crate) bytes: Vec<[u8; 64]>,
     /// The same, for eight and eight of them, where each lie among sixteen.
@@ -170,7 +172,10 @@ impl Picks {
             tiles.iter().enumerate().all(follows).then_some(from)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
-        Self { near, blocks, bytes: all_bytes, halves: all_halves, channels: channels.len(), places }
+        let mut lines: Vec<u32> = places.iter().map(|place| place / 16 * 16).collect();
+        lines.sort_unstable();
+        lines.dedup();
+        Self { near, blocks, lines, bytes: all_bytes, halves: all_halves, channels: channels.len(), places }
     }
 }
 

@@ -7,10 +7,12 @@ use fearless_simd::{Level, f32x16, u32x16};
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
+use super::ahead::Ahead;
 use super::columns::Place;
 use super::lines::{Aligned, Lines};
-use super::lot::{Between, Wanted, touch};
+use super::lot::{Between, Wanted, calls, touch};
 use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::stream::Staged;
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
 use super::{calibrate, change, columns};
@@ -35,6 +37,8 @@ pub(super) struct Scratch {
     between: Box<[Between; LANES]>,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
+    /// Answers on their way past the caches, if any were.
+    pub(super) staged: Option<Staged>,
 }
 
 impl Scratch {
@@ -49,6 +53,7 @@ impl Scratch {
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
+            staged: None,
         }
     }
 }
@@ -160,6 +165,7 @@ pub(super) fn block(
     before: (Rows<'_>, usize),
     scratch: &mut Scratch,
     cells: &mut CellsMut<'_>,
+    is_staged: bool,
 ) {
     let frames = cells.frames();
     let window = &tables.window;
@@ -191,6 +197,7 @@ pub(super) fn block(
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
     let last = plan.fields.len().div_ceil(LANES).saturating_sub(1);
+    let mut ahead = Ahead::new(raw.rows, first + frames, plan.fields.len() * calls(plan.stages()));
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
         for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
@@ -203,7 +210,9 @@ pub(super) fn block(
         let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
         let values = (&pressures[..], &statuses[..]);
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
-        place.announce(cells);
+        if !is_staged {
+            place.announce(cells);
+        }
         let rests: [bool; LANES] = std::array::from_fn(|index| {
             index >= place.count || tables.rest.has_at_rest(place.first + index, |tile| tiles[tile].rests)
         });
@@ -212,7 +221,7 @@ pub(super) fn block(
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first, rests, values, faults, between, answers));
+        with_widest!(level, simd => answer(simd, plan, tables, first, rests, values, faults, &mut ahead, between, answers));
         with_widest!(level, simd => columns::write(simd, answers, place, plan.outputs, cells));
     }
 }
@@ -228,6 +237,7 @@ fn answer<S: Simd>(
     rests: &[bool],
     values: (&[Row<f32>], &[Row<u32>]),
     faults: bool,
+    ahead: &mut Ahead<'_>,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
@@ -254,6 +264,8 @@ fn answer<S: Simd>(
                     |index| lots[index],
                     LANES,
                     wanted,
+                    #[inline(always)]
+                    || ahead.step(),
                     between,
                     answers,
                 );

@@ -23,16 +23,11 @@ pub(super) struct Place {
 impl Place {
     /// Has the memory that is going to be written fetched meanwhile.
     pub(super) fn announce(self, cells: &mut CellsMut<'_>) {
-        for column in numbers(cells) {
-            self.announce_column(column);
-        }
-        self.announce_column(cells.active);
-        self.announce_column(cells.flags);
-        self.announce_column(cells.present);
+        all(cells).into_iter().for_each(|column| self.announce_column(column));
     }
 
     /// Of a row, where it begins: its end is where the one that was written before began.
-    fn announce_column<T>(self, column: &[T]) {
+    fn announce_column(self, column: &[u32]) {
         for frame in 0..self.frames {
             if let Some(cell) = column.get(frame * self.fields + self.first) {
                 simd::soon_needed(cell);
@@ -61,18 +56,22 @@ impl Place {
     }
 }
 
-/// The columns that stages here fill with numbers; those that nobody wants are empty.
-fn numbers<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [f32]; 9] {
+/// All columns that stages here fill, as bits: flags and what is present, then what is 0 where nothing presses. Those that
+/// nobody wants are empty.
+pub(super) fn all<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [u32]; 12] {
     [
-        cells.total,
-        cells.peak,
-        cells.area,
-        cells.centroid_u,
-        cells.centroid_v,
-        cells.centroid_depth,
-        cells.orientation,
-        cells.axis,
-        cells.anisotropy,
+        cast_slice_mut(cells.flags),
+        cast_slice_mut(cells.present),
+        cells.active,
+        cast_slice_mut(cells.total),
+        cast_slice_mut(cells.peak),
+        cast_slice_mut(cells.area),
+        cast_slice_mut(cells.centroid_u),
+        cast_slice_mut(cells.centroid_v),
+        cast_slice_mut(cells.centroid_depth),
+        cast_slice_mut(cells.orientation),
+        cast_slice_mut(cells.axis),
+        cast_slice_mut(cells.anisotropy),
     ]
 }
 
@@ -131,21 +130,19 @@ fn integers<S: Simd>(
 
 /// Writes what [`write`] would if none of `fields` has a pressure or a status.
 pub(super) fn write_at_rest(fields: &[PlanField], place: Place, outputs: Outputs, cells: &mut CellsMut<'_>) {
-    let (mut flags, mut present) = ([Flags::empty(); LANES], [Outputs::empty(); LANES]);
+    let (mut flags, mut present) = ([0; LANES], [0; LANES]);
     for (field, (flags, present)) in fields.iter().zip(flags.iter_mut().zip(&mut present)) {
-        let (said, given) = OneKind::new(field).untouched();
-        (*flags, *present) = (Flags::from_bits_retain(said), Outputs::from_bits_retain(given) & outputs);
+        (*flags, *present) = OneKind::new(field).untouched();
+        *present &= outputs.bits();
     }
+    let [flags_of, present_of, others @ ..] = all(cells);
     for frame in 0..place.frames {
-        place.of_frame(cells.flags, frame).copy_from_slice(&flags[..place.count]);
-        place.of_frame(cells.present, frame).copy_from_slice(&present[..place.count]);
-        if !cells.active.is_empty() {
-            place.of_frame(cells.active, frame).fill(0);
-        }
+        place.of_frame(flags_of, frame).copy_from_slice(&flags[..place.count]);
+        place.of_frame(present_of, frame).copy_from_slice(&present[..place.count]);
     }
-    for column in numbers(cells).into_iter().filter(|column| !column.is_empty()) {
+    for column in others.into_iter().filter(|column| !column.is_empty()) {
         for frame in 0..place.frames {
-            place.of_frame(column, frame).fill(0.0);
+            place.of_frame(column, frame).fill(0);
         }
     }
 }

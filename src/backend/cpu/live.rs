@@ -406,6 +406,7 @@ impl Frame<'_> {
             },
             LANES,
             wanted,
+            || {},
             &mut between[..groups.len()],
             answers,
         );

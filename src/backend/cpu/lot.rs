@@ -42,20 +42,27 @@ impl Between {
         Self { active: [0; LANES], u: [0.0; LANES], v: [0.0; LANES], found: [[0.0; LANES]; 5] };
 }
 
+/// How often [`touch`] calls `meanwhile` for each set of cells.
+pub(super) fn calls(stages: Stages) -> usize {
+    1 + 2 * usize::from(stages.orientation) + 2 * usize::from(stages.axis)
+}
+
 /// All stages for as many sets of cells as `cells` and `between` have, up to lane `lanes` of each; `lot` says where a
-/// set finds its members, and what its fields are like.
+/// set finds its members, and what its fields are like. `meanwhile` is called beside each, as often as [`calls`] says.
 #[inline(always)]
 pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     simd: S,
     lot: impl Fn(usize) -> (P, K),
     lanes: usize,
     wanted: Wanted,
+    mut meanwhile: impl FnMut(),
     between: &mut [Between],
     cells: &mut [Cells],
 ) {
     let Wanted { stages, care, .. } = wanted;
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
+        meanwhile();
         for at in (0..lanes).step_by(2 * width::<S>()) {
             let next = at + width::<S>();
             if care || next >= lanes {
@@ -85,6 +92,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     if stages.orientation {
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
+            meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
                     let far = members.farthest(simd, at, &touch);
@@ -95,6 +103,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
+            meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
                     let [r1, r2, r3, x, y] = kept(simd, at, between);
@@ -108,6 +117,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     if stages.axis {
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
+            meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
                     let axis::Moments { a, b, d } = if care {
@@ -121,6 +131,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
+            meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
                     let [a, b, d] = kept(simd, at, between);

@@ -4,6 +4,7 @@
 //! is written once ([`touch`] and the stages). Every lane does the operations of its cell in one fixed order, never
 //! fused, so that percepts have the same bits however a recording is cut and whatever instructions there are.
 
+mod ahead;
 mod angle;
 mod axis;
 mod batch;
@@ -26,6 +27,7 @@ mod put;
 mod rest;
 mod simd;
 mod slots;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -115,24 +117,40 @@ impl Cpu {
     }
 
     /// Halves the batch until a task remains, and runs the halves in parallel.
-    fn batch(&self, raw: &RawBatch<'_>, first: usize, cells: CellsMut<'_>) {
+    /// `streams` says whether answers are written past the caches.
+    fn batch(&self, raw: &RawBatch<'_>, first: usize, streams: bool, cells: CellsMut<'_>) {
         let frames = cells.frames();
         if frames > LANES && frames * self.plan.memberships() > TASK {
             let left = frames.div_ceil(2 * LANES) * LANES;
             let (left_cells, right_cells) = cells.split_at(left);
-            rayon::join(|| self.batch(raw, first, left_cells), || self.batch(raw, first + left, right_cells));
+            rayon::join(
+                || self.batch(raw, first, streams, left_cells),
+                || self.batch(raw, first + left, streams, right_cells),
+            );
             return;
         }
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
+        let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::new(&self.plan)));
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
             let (plan, tables, at) = (&self.plan, &self.tables, first + done);
             let before = the_one_before(raw.rows, at, &self.before);
-            batch::block(self.level, plan, tables, raw, at, before, &mut scratch, &mut cells);
+            let mut block = |cells: &mut CellsMut<'_>| {
+                batch::block(self.level, plan, tables, raw, at, before, &mut scratch, cells, streams);
+            };
+            if let Some(staged) = &mut staged {
+                stream::announce(&mut cells);
+                let mut staged = staged.cells(cells.frames());
+                block(&mut staged);
+                stream::copy(&mut staged, &mut cells);
+            } else {
+                block(&mut cells);
+            }
             (rest, done) = (later, done + LANES);
         }
+        scratch.staged = staged.or(scratch.staged);
         self.scratches.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
 }
@@ -218,7 +236,7 @@ impl Backend for Cpu {
                 rest = later;
             }
         } else {
-            self.batch(raw, 0, cells.reborrow());
+            self.batch(raw, 0, stream::is_worth(&self.plan, &mut cells), cells.reborrow());
         }
         if self.plan.has_changes() && raw.frames > 0 {
             self.before.clear();

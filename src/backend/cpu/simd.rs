@@ -149,6 +149,20 @@ pub(super) fn soon_needed<T>(value: &T) {
     let _ = value;
 }
 
+/// The same into the next larger cache, for what is needed later.
+#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
+pub(super) fn later_needed<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: as above.
+    unsafe {
+        use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(value).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
+
 /// Rows turned into columns: lane j of row i becomes lane i of column j. Four perfect shuffles do it.
 #[inline(always)]
 pub(super) fn transpose<S: Simd, V: SimdBase<S>>(simd: S, row: impl Fn(usize) -> Row<V::Element>) -> [V; LANES] {

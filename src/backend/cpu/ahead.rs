@@ -1,0 +1,51 @@
+//! Fetching the next block's raw values while this one is computed.
+//!
+//! A core has room for ten to sixteen lines that are on their way, and waits with the next one until there is room. Fetched
+//! all at once, a block's lines take as long as if nobody had asked for them; a few beside each field's sums, they come
+//! while it computes.
+
+use super::super::Rows;
+use super::simd::{LANES, later_needed};
+use crate::signal::Frame;
+
+/// Bytes of raw values from which on they are fetched: what is less may still be in a cache.
+const MUCH: usize = 8 << 20;
+
+/// What is still to be fetched, and how much of it at a time.
+#[derive(Clone, Debug)]
+pub(super) struct Ahead<'a> {
+    frames: &'a [Frame],
+    /// Where in a frame the lines begin.
+    lines: &'a [u32],
+    line: usize,
+    at_a_time: usize,
+}
+
+impl<'a> Ahead<'a> {
+    /// The sixteen frames of `raw` from `first` on, in so many `steps`.
+    pub(super) fn new(raw: Rows<'a>, first: usize, steps: usize) -> Self {
+        let none = Self { frames: &[], lines: &[], line: 0, at_a_time: 0 };
+        let Rows::Picked { frames, picks } = raw else { return none };
+        if frames.len() * picks.lines.len() * 64 < MUCH {
+            return none;
+        }
+        let next = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
+        let at_a_time = (next.len() * picks.lines.len()).div_ceil(steps.max(1));
+        Self { frames: next, lines: &picks.lines, line: 0, at_a_time }
+    }
+
+    /// Has the next few lines fetched.
+    #[inline(always)]
+    pub(super) fn step(&mut self) {
+        for _ in 0..self.at_a_time {
+            let Some(frame) = self.frames.first() else { return };
+            if let Some(value) = frame.values.get(self.lines[self.line] as usize) {
+                later_needed(value);
+            }
+            self.line += 1;
+            if self.line == self.lines.len() {
+                (self.frames, self.line) = (&self.frames[1..], 0);
+            }
+        }
+    }
+}
