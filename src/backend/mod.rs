@@ -102,10 +102,17 @@ pub(crate) struct Picks {
     pub(crate) blocks: Vec<Option<usize>>,
     /// The first of each sixteen values of a frame that hold any that is wanted.
     pub(crate) lines: Vec<u32>,
-    /// What [`Near::Shuffled`] refers to: which bytes of 32 values are wanted.
-    pub(crate) bytes: Vec<[u8; 64]>,
-    /// The same, for eight and eight of them, where each lie among sixteen.
-    pub(crate) halves: Vec<Option<[Half; 2]>>,
+    /// What [`Near::Shuffled`] refers to.
+    pub(crate) shuffles: Vec<Shuffle>,
+}
+
+/// Where sixteen values lie among 32 of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shuffle {
+    pub(crate) from: usize,
+    pub(crate) places: [u32; 16],
+    /// The same for eight and eight of them, where each lie among sixteen.
+    pub(crate) halves: Option<[Half; 2]>,
 }
 
 /// Where eight values lie among sixteen of a frame.
@@ -130,8 +137,8 @@ impl Half {
 pub(crate) enum Near {
     /// One after the other from here on.
     Straight(usize),
-    /// Among the 32 from here on, as so many bytes say.
-    Shuffled(usize, usize),
+    /// As this shuffle says.
+    Shuffled(usize),
     Scattered,
 }
 
@@ -139,7 +146,7 @@ impl Picks {
     /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
-        let (mut all_bytes, mut all_halves) = (Vec::new(), Vec::new());
+        let mut shuffles = Vec::new();
         // What fills up the last ones is as good a value as any.
         let near = places.chunks(16).map(|places| {
             let (low, high) = places.iter().fold((u32::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
@@ -151,18 +158,13 @@ impl Picks {
             if width < 32 || high >= from + 32 {
                 return Near::Scattered;
             }
-            let mut bytes = [0; 64];
-            let places_and_more = places.iter().chain(std::iter::repeat(&places[0]));
-            for (bytes, &place) in bytes.chunks_exact_mut(4).zip(places_and_more) {
-                let first = 4 * (place as usize - from);
-                bytes.iter_mut().zip(first..).for_each(|(byte, index)| *byte = index as u8);
-            }
-            all_bytes.push(bytes);
+            let place = |index: usize| places.get(index).unwrap_or(&places[0]) - from as u32;
             // What fills up the last ones is there twice, then.
             let [first, second] = [places, places.get(8..).filter(|rest| !rest.is_empty()).unwrap_or(places)];
             let [first, second] = [first, second].map(|half| Half::new(&half[..half.len().min(8)], width));
-            all_halves.push(first.zip(second).map(|(first, second)| [first, second]));
-            Near::Shuffled(from, all_bytes.len() - 1)
+            let halves = first.zip(second).map(|(first, second)| [first, second]);
+            shuffles.push(Shuffle { from, places: std::array::from_fn(place), halves });
+            Near::Shuffled(shuffles.len() - 1)
         });
         let near: Vec<Near> = near.collect();
         let block = |tiles: &[Near]| {
@@ -175,7 +177,7 @@ impl Picks {
         let mut lines: Vec<u32> = places.iter().map(|place| place / 16 * 16).collect();
         lines.sort_unstable();
         lines.dedup();
-        Self { near, blocks, lines, bytes: all_bytes, halves: all_halves, channels: channels.len(), places }
+        Self { near, blocks, lines, shuffles, channels: channels.len(), places }
     }
 }
 

@@ -174,7 +174,7 @@ pub(super) fn block(
     if window.is_whole() {
         there = 0..window.slots() / LANES;
         let tiles = 0..tables.tiles.len();
-        faults = with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, tiles, scratch));
+        faults = read(level, plan, tables, raw.rows, first, frames, tiles, scratch);
     }
     if plan.has_changes() {
         let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
@@ -201,7 +201,7 @@ pub(super) fn block(
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
         for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
-            faults |= with_widest!(level, simd => read(simd, plan, tables, raw.rows, first, frames, tiles, scratch));
+            faults |= read(level, plan, tables, raw.rows, first, frames, tiles, scratch);
         }
         if chunk + 1 < last {
             let ahead = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
@@ -285,16 +285,41 @@ fn answer<S: Simd>(
     }
 }
 
-/// Calibrates some tiles of up to sixteen frames, and turns them so that a taxel's frames stand abreast. Whether any value
-/// is anything but a plain number.
-#[inline(always)]
+/// Reads and calibrates some tiles of up to sixteen frames. Whether any value is anything but a plain number.
 #[expect(clippy::too_many_arguments, reason = "as `block`")]
-fn read<S: Simd>(
-    simd: S,
+fn read(
+    level: Level,
     plan: &Plan,
     tables: &Tables,
     raw: Rows<'_>,
     first: usize,
+    frames: usize,
+    mut tiles: Range<usize>,
+    scratch: &mut Scratch,
+) -> bool {
+    let mut faults = false;
+    while !tiles.is_empty() {
+        let group = tiles.start..tiles.end.min(tiles.start + GROUP);
+        tiles.start = group.end;
+        for frame in 0..frames {
+            with_widest!(level, simd => {
+                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
+                    simd::read(simd, raw, first + frame, tile, plan.calibrated(), &mut bits[frame]);
+                }
+            });
+        }
+        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, frames, group, scratch));
+    }
+    faults
+}
+
+/// Calibrates tiles whose bits are there, and turns them so that a taxel's frames stand abreast. Whether any value is
+/// anything but a plain number.
+#[inline(always)]
+fn calibrate<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tables: &Tables,
     frames: usize,
     tiles: Range<usize>,
     scratch: &mut Scratch,
@@ -302,19 +327,11 @@ fn read<S: Simd>(
     let mut any = false;
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
+    let Scratch { bits, .. } = scratch;
     for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        let ahead = (index - tiles.start) % GROUP;
-        if ahead == 0 {
-            let group = index..tiles.end.min(index + GROUP);
-            for frame in 0..frames {
-                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
-                    simd::read(simd, raw, first + frame, tile, plan.calibrated(), tables.shuffles, &mut bits[frame]);
-                }
-            }
-        }
-        let bits = &scratch.bits[ahead * LANES..][..LANES];
+        let bits = &bits[(index - tiles.start) * LANES..][..LANES];
         let bits = &bits[..frames];
         let mut faults = false;
         let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(

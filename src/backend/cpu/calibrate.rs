@@ -214,7 +214,7 @@ fn tiles<S: Simd>(
     let rows = pressures.iter_mut().zip(statuses);
     for (index, (one, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
         let Aligned(bits) = &mut Aligned([0; LANES]);
-        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
+        read(simd, raw, frame, index, plan.calibrated(), bits);
         faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
     }
     faults

@@ -149,7 +149,7 @@ impl Gate {
                 index += BLOCK;
                 continue;
             }
-            self.tile(simd, plan, tables, (raw, frame), (index, tile), pressures, statuses);
+            self.tile(simd, plan, (raw, frame), (index, tile), pressures, statuses);
             index += 1;
         }
     }
@@ -161,7 +161,6 @@ impl Gate {
         &mut self,
         simd: S,
         plan: &Plan,
-        tables: &Tables,
         (raw, frame): (Rows<'_>, usize),
         (index, tile): (usize, &Tile),
         pressures: &mut [Row<f32>],
@@ -173,7 +172,7 @@ impl Gate {
         if self.known && raw.straight(frame, index).is_some_and(|values| same(simd, values, last)) {
             return;
         }
-        read(simd, raw, frame, index, plan.calibrated(), tables.shuffles, bits);
+        read(simd, raw, frame, index, plan.calibrated(), bits);
         if self.known && same(simd, bits, last) {
             return;
         }

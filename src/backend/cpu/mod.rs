@@ -15,7 +15,6 @@ mod columns;
 mod compensated;
 mod contact;
 mod descent;
-mod eights;
 mod gate;
 mod hysteresis;
 mod lines;
@@ -23,6 +22,7 @@ mod live;
 mod lot;
 mod motion;
 mod orientation;
+mod pick;
 mod put;
 mod rest;
 mod simd;
@@ -67,8 +67,6 @@ pub(crate) struct Cpu {
 
 /// The plan as lanes read it.
 struct Tables {
-    /// Whether sixteen values are better shuffled out of 32 than read one by one.
-    shuffles: bool,
     tiles: Vec<calibrate::Tile>,
     window: window::Window,
     /// The plan's members, each with its slot's place in the window.
@@ -102,7 +100,6 @@ impl Cpu {
                 rest: rest::Rest::new(&plan.fields, &seen),
                 seen,
                 window,
-                shuffles: matches!(instructions(level), "AVX-512" | "AVX2"),
                 tiles: calibrate::Tile::all(plan),
                 wide: wide.collect(),
             },
@@ -117,18 +114,39 @@ impl Cpu {
     }
 
     /// Halves the batch until a task remains, and runs the halves in parallel.
-    /// `streams` says whether answers are written past the caches.
-    fn batch(&self, raw: &RawBatch<'_>, first: usize, streams: bool, cells: CellsMut<'_>) {
+    /// Runs a batch on all threads, this one among them: each takes a part of what is left, ever smaller ones, so that none
+    /// waits long for the others and frames that follow each other mostly stay together.
+    fn batch(&self, raw: &RawBatch<'_>, mut cells: CellsMut<'_>) {
+        let streams = stream::is_worth(&self.plan, &mut cells);
+        let least = (TASK / self.plan.memberships().max(1)).max(1).next_multiple_of(LANES);
+        let threads = rayon::current_num_threads().min(cells.frames().div_ceil(least));
+        let rest = Mutex::new((0, Some(cells)));
+        let take = || {
+            let (first, rest) = &mut *rest.lock().unwrap_or_else(PoisonError::into_inner);
+            let cells = rest.take().filter(|cells| cells.frames() > 0)?;
+            let frames = (cells.frames() / (2 * threads)).max(least).next_multiple_of(LANES).min(cells.frames());
+            let (part, later) = cells.split_at(frames);
+            *rest = Some(later);
+            *first += frames;
+            Some((*first - frames, part))
+        };
+        let work = || {
+            while let Some((first, part)) = take() {
+                self.part(raw, first, streams, part);
+            }
+        };
+        rayon::in_place_scope(|scope| {
+            for _ in 1..threads {
+                scope.spawn(|_| work());
+            }
+            work();
+        });
+    }
+
+    /// Runs the frames from `first` on, one block after the other; `streams` says whether answers are written past the
+    /// caches.
+    fn part(&self, raw: &RawBatch<'_>, first: usize, streams: bool, cells: CellsMut<'_>) {
         let frames = cells.frames();
-        if frames > LANES && frames * self.plan.memberships() > TASK {
-            let left = frames.div_ceil(2 * LANES) * LANES;
-            let (left_cells, right_cells) = cells.split_at(left);
-            rayon::join(
-                || self.batch(raw, first, streams, left_cells),
-                || self.batch(raw, first + left, streams, right_cells),
-            );
-            return;
-        }
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
         let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::new(&self.plan)));
@@ -236,7 +254,7 @@ impl Backend for Cpu {
                 rest = later;
             }
         } else {
-            self.batch(raw, 0, stream::is_worth(&self.plan, &mut cells), cells.reborrow());
+            self.batch(raw, cells.reborrow());
         }
         if self.plan.has_changes() && raw.frames > 0 {
             self.before.clear();

@@ -6,10 +6,9 @@
 //! lanes.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{u8x64, u32x16};
 
 use super::super::{Near, Rows};
-use super::eights;
+use super::pick::pick;
 
 /// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
 /// what every processor has: sets in between would cost their compilation and gain little.
@@ -95,30 +94,12 @@ pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
 
 /// Reads the bits of frame `frame` from slot 16 · `tile` on.
 #[inline(always)]
-pub(super) fn read<S: Simd>(
-    simd: S,
-    raw: Rows<'_>,
-    frame: usize,
-    tile: usize,
-    calibrated: usize,
-    shuffles: bool,
-    bits: &mut Row<u32>,
-) {
+pub(super) fn read<S: Simd>(simd: S, raw: Rows<'_>, frame: usize, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
     if let Rows::Picked { frames, picks } = raw {
         let values: &[u32] = bytemuck::cast_slice(&frames[frame].values);
         match picks.near[tile] {
-            Near::Straight(from) => {
-                bits.copy_from_slice(&values[from..from + LANES]);
-                return;
-            }
-            Near::Shuffled(_, at) if width::<S>() == 8 && eights::pick(simd, values, &picks.halves[at], bits) => return,
-            Near::Shuffled(from, bytes) if shuffles => {
-                let [low, high] = [&values[from..from + LANES], &values[from + LANES..from + 2 * LANES]];
-                let (low, high) = (u32x16::from_slice(simd, low), u32x16::from_slice(simd, high));
-                let bytes = u8x64::from_slice(simd, &picks.bytes[bytes]);
-                low.concat_swizzle_dyn(high, bytes).store_slice(bits);
-                return;
-            }
+            Near::Straight(from) => return bits.copy_from_slice(&values[from..from + LANES]),
+            Near::Shuffled(at) if pick(simd, values, &picks.shuffles[at], bits) => return,
             _ => {}
         }
     }
