@@ -18,7 +18,7 @@ use super::wide::ManyAbreast;
 use super::{calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
-use crate::stage::layout::{Member, Taxel};
+use crate::stage::layout::Member;
 
 /// Tiles whose raw bits are fetched together: frame by frame, as they lie in memory, so that the processor sees it coming.
 const GROUP: usize = 64;
@@ -67,39 +67,21 @@ struct KeptTile {
     faulty: bool,
 }
 
-/// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
+/// What fields have in common.
 #[derive(Clone, Copy)]
-struct OverFrames<'a, const WEIGHTED: bool> {
-    /// By slot.
-    members: &'a [Member],
-    /// The same, by place in the window.
-    seen: &'a [Member],
-    depths: &'a [f32],
-    taxels: &'a [Taxel],
+struct Skin<'a> {
+    plan: &'a Plan,
     pressures: &'a [Row<f32>],
     statuses: &'a [Row<u32>],
 }
 
-impl<'a, const WEIGHTED: bool> OverFrames<'a, WEIGHTED> {
-    /// Of field `field`.
-    #[inline(always)]
-    fn new(
-        plan: &'a Plan,
-        tables: &'a Tables,
-        field: usize,
-        (pressures, statuses): (&'a [Row<f32>], &'a [Row<u32>]),
-    ) -> Self {
-        let brief = &tables.briefs[field];
-        let members = brief.first..brief.first + brief.count;
-        Self {
-            members: &plan.members[members.clone()],
-            seen: &tables.seen[members],
-            depths: if brief.kind.is_charted() { &[] } else { &plan.fields[field].depths },
-            taxels: &plan.taxels,
-            pressures,
-            statuses,
-        }
-    }
+/// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
+#[derive(Clone, Copy)]
+struct OverFrames<'a, const WEIGHTED: bool> {
+    skin: &'a Skin<'a>,
+    /// By place in the window.
+    seen: &'a [Member],
+    field: usize,
 }
 
 /// What blocks have to know of every field: little, and side by side.
@@ -128,7 +110,7 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
     #[inline(always)]
     fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
         let Member { slot, weight, u, v } = self.seen[member];
-        let pressure = load(simd, &self.pressures[slot as usize], at);
+        let pressure = load(simd, &self.skin.pressures[slot as usize], at);
         Part {
             pressure,
             pull: if WEIGHTED { splat(simd, weight) * pressure } else { pressure },
@@ -139,17 +121,19 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
 
     #[inline(always)]
     fn depth(self, simd: S, member: usize, _: usize) -> F<S> {
-        splat(simd, self.depths[member])
+        splat(simd, self.skin.plan.fields[self.field].depths[member])
     }
 
     #[inline(always)]
     fn area(self, simd: S, member: usize, _: usize) -> F<S> {
-        splat(simd, self.taxels[self.members[member].slot as usize].area)
+        let plan = self.skin.plan;
+        let slot = plan.members[plan.fields[self.field].first + member].slot;
+        splat(simd, plan.taxels[slot as usize].area)
     }
 
     #[inline(always)]
     fn status(self, simd: S, member: usize, at: usize) -> U<S> {
-        load_u(simd, &self.statuses[self.seen[member].slot as usize], at)
+        load_u(simd, &self.skin.statuses[self.seen[member].slot as usize], at)
     }
 }
 
@@ -208,20 +192,21 @@ pub(super) fn block(
             ahead.for_each(|tile| (first..first + frames).for_each(|frame| simd::announce(raw.rows, frame, tile)));
         }
         let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
-        let values = (&pressures[..], &statuses[..]);
+        let skin = Skin { plan, pressures, statuses };
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
         if !is_staged {
             place.announce(cells);
         }
-        let rests: [bool; LANES] = std::array::from_fn(|index| {
-            index >= place.count || tables.rest.has_at_rest(place.first + index, |tile| tiles[tile].rests)
-        });
+        let mut rests = [true; LANES];
+        for (field, rests) in (place.first..).zip(&mut rests[..place.count]) {
+            *rests = tables.rest.has_at_rest(field, |tile| tiles[tile].rests);
+        }
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first, rests, values, faults, &mut ahead, between, answers));
+        with_widest!(level, simd => answer(simd, plan, tables, first, rests, &skin, faults, &mut ahead, between, answers));
         with_widest!(level, simd => columns::write(simd, answers, place, plan.outputs, cells));
     }
 }
@@ -235,7 +220,7 @@ fn answer<S: Simd>(
     tables: &Tables,
     first: usize,
     rests: &[bool],
-    values: (&[Row<f32>], &[Row<u32>]),
+    skin: &Skin<'_>,
     faults: bool,
     ahead: &mut Ahead<'_>,
     between: &mut [Between; LANES],
@@ -249,15 +234,19 @@ fn answer<S: Simd>(
         let alike = (start..briefs.len()).take_while(|&index| sort(index) == sort(start)).count();
         let run = start..start + alike;
         let (between, answers) = (&mut between[run.clone()], &mut answers[run.clone()]);
-        let (last, briefs) = (alike - 1, &briefs[run]);
+        let briefs = &briefs[run];
         // Once for all stages.
         macro_rules! answer {
             ($abreast:ident, $weighted:literal) => {{
-                let lots: [_; LANES] = std::array::from_fn(|index| {
-                    let index = index.min(last);
-                    let over = OverFrames::<$weighted>::new(plan, tables, first + start + index, values);
-                    ($abreast(over), briefs[index].kind)
-                });
+                let lot = |index: usize| {
+                    let Brief { first: member, count, kind, .. } = briefs[index];
+                    let (seen, field) = (&tables.seen[member..member + count], first + start + index);
+                    ($abreast(OverFrames::<$weighted> { skin, seen, field }), kind)
+                };
+                let mut lots = [lot(0); LANES];
+                for (index, one) in lots.iter_mut().enumerate().take(alike).skip(1) {
+                    *one = lot(index);
+                }
                 touch(
                     simd,
                     #[inline(always)]

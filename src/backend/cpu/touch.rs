@@ -138,10 +138,6 @@ impl OneKind {
         }
     }
 
-    pub(super) fn is_charted(&self) -> bool {
-        self.charted
-    }
-
     /// Flags and quantities of a field that nothing presses.
     pub(super) fn untouched(&self) -> (u32, u32) {
         (self.always | Flags::NO_CONTACT.bits(), self.sums)
