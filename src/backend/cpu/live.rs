@@ -97,6 +97,9 @@ impl Narrow {
     }
 }
 
+/// Bytes that stay in a core's nearest cache: in many it has 32 KiB.
+const NEAREST_CACHE: usize = 16 << 10;
+
 /// A group's values in this frame; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
 struct OverFields<'a, const WEIGHTED: bool> {
@@ -353,14 +356,17 @@ impl Frame<'_> {
             gathered.statuses = Lines::new(rows, 0);
             gathered.between.resize(groups.len(), Between::EMPTY);
         }
+        let are_far = rows * size_of::<PlaceRow>() > NEAREST_CACHE;
         let mut first = 0;
         for group in groups {
             let rows = first..first + group.places.len();
-            // They wait for stores: their places are fetched meanwhile.
-            group.places.iter().for_each(|place| {
-                soon_needed(&place.u);
-                soon_needed(&place.v);
-            });
+            if are_far {
+                // They wait for stores: their places are fetched meanwhile.
+                group.places.iter().for_each(|place| {
+                    soon_needed(&place.u);
+                    soon_needed(&place.v);
+                });
+            }
             group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
             if self.faults {
                 group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);

@@ -72,11 +72,21 @@ pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apar
     let single = touch.touched & touch.active.simd_le(one);
     let several = touch.touched & touch.active.simd_gt(one);
     // Distances are compared by their squares, as roots are dear.
-    let near = r[0].max(none).sqrt() * NEAR;
-    let limit = r[2].max(none).sqrt() + near;
-    let coincident = several & (x * x + y * y).simd_le(near * near);
+    let apart = x * x + y * y;
+    let (far, third) = (r[0].max(none), r[2].max(none));
+    let is_third = touch.active.simd_gt(two);
+    // The limits below are near² = 2⁻²⁸ far and (√third + near)² ≤ third + (2⁻¹³ + 2⁻²⁸) far, up to roundings: where there
+    // is twice as much between, as there nearly always is, both answers are no without a root.
+    let is_clear = apart.simd_gt(far * (2.0 * NEAR * NEAR)) & (!is_third | r[1].simd_gt(third + far * (4.0 * NEAR)));
+    let (coincident, tie) = if (!several | is_clear).all_true() {
+        (none.simd_gt(none), none.simd_gt(none))
+    } else {
+        let near = far.sqrt() * NEAR;
+        let limit = third.sqrt() + near;
+        let coincident = several & apart.simd_le(near * near);
+        (coincident, several & !coincident & is_third & r[1].simd_le(limit * limit))
+    };
     let found = several & !coincident;
-    let tie = found & touch.active.simd_gt(two) & r[1].simd_le(limit * limit);
     Line {
         angle: found.select(of_line(simd, x, y), none),
         flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())
