@@ -8,8 +8,19 @@ use super::super::Rows;
 use super::simd::{LANES, later_needed};
 use crate::signal::Frame;
 
-/// Bytes of raw values from which on they are fetched: what is less may still be in a cache.
-const MUCH: usize = 8 << 20;
+/// Bytes of raw values from which on they are fetched: what is less may still be in a cache. Tests have less.
+const MUCH: usize = if cfg!(test) { 1 << 16 } else { 8 << 20 };
+/// Bytes of a block's raw values that the next larger cache has room for: it has 512 KiB and more.
+const BLOCK: usize = 512 << 10;
+/// Bytes of a line.
+const LINE: usize = 64;
+
+/// Whether raw values are fetched: they lie as a source delivered them, are many, and a block's are few.
+pub(super) fn is_worth(raw: Rows<'_>) -> bool {
+    let Rows::Picked { frames, picks } = raw else { return false };
+    let frame = picks.lines.len() * LINE;
+    frames.len() * frame >= MUCH && LANES * frame <= BLOCK
+}
 
 /// What is still to be fetched, and how much of it at a time.
 #[derive(Clone, Debug)]
@@ -26,7 +37,7 @@ impl<'a> Ahead<'a> {
     pub(super) fn new(raw: Rows<'a>, first: usize, steps: usize) -> Self {
         let none = Self { frames: &[], lines: &[], line: 0, at_a_time: 0 };
         let Rows::Picked { frames, picks } = raw else { return none };
-        if frames.len() * picks.lines.len() * 64 < MUCH {
+        if !is_worth(raw) {
             return none;
         }
         let next = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
@@ -47,5 +58,10 @@ impl<'a> Ahead<'a> {
                 (self.frames, self.line) = (&self.frames[1..], 0);
             }
         }
+    }
+
+    /// As so many steps.
+    pub(super) fn skip(&mut self, steps: usize) {
+        (0..steps).for_each(|_| self.step());
     }
 }

@@ -15,12 +15,13 @@ use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_w
 use super::stream::Staged;
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
-use super::{calibrate, change, columns};
+use super::{ahead, calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
-/// Tiles whose raw bits are fetched together: frame by frame, as they lie in memory, so that the processor sees it coming.
+/// Tiles whose raw bits are read together, unless they have been fetched already: frame by frame, as they lie in memory, so
+/// that the processor sees it coming.
 const GROUP: usize = 64;
 
 /// What a task needs to work in.
@@ -203,6 +204,7 @@ pub(super) fn block(
         }
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {
+            ahead.skip(place.count * calls(plan.stages()));
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
@@ -286,29 +288,32 @@ fn read(
     mut tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    let mut faults = false;
+    let (mut faults, are_fetched) = (false, ahead::is_worth(raw));
     while !tiles.is_empty() {
-        let group = tiles.start..tiles.end.min(tiles.start + GROUP);
+        let room = if are_fetched { tiles.len() } else { GROUP };
+        let group = tiles.start..tiles.end.min(tiles.start + room);
         tiles.start = group.end;
-        for frame in 0..frames {
+        for frame in (0..frames).filter(|_| !are_fetched) {
             with_widest!(level, simd => {
                 for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
                     simd::read(simd, raw, first + frame, tile, plan.calibrated(), &mut bits[frame]);
                 }
             });
         }
-        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, frames, group, scratch));
+        let fetched = are_fetched.then_some((raw, first));
+        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, fetched, frames, group, scratch));
     }
     faults
 }
 
-/// Calibrates tiles whose bits are there, and turns them so that a taxel's frames stand abreast. Whether any value is
-/// anything but a plain number.
+/// Calibrates tiles whose bits are there, or still to be read where they are `fetched`, and turns them so that a taxel's
+/// frames stand abreast. Whether any value is anything but a plain number.
 #[inline(always)]
 fn calibrate<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
+    fetched: Option<(Rows<'_>, usize)>,
     frames: usize,
     tiles: Range<usize>,
     scratch: &mut Scratch,
@@ -320,7 +325,15 @@ fn calibrate<S: Simd>(
     for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        let bits = &bits[(index - tiles.start) * LANES..][..LANES];
+        let bits = match fetched {
+            Some((raw, first)) => {
+                for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
+                    simd::read(simd, raw, first + frame, index, plan.calibrated(), bits);
+                }
+                &bits[..LANES]
+            }
+            None => &bits[(index - tiles.start) * LANES..][..LANES],
+        };
         let bits = &bits[..frames];
         let mut faults = false;
         let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(

@@ -95,3 +95,60 @@ pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apar
         present: bits_where(simd, found, Outputs::ORIENTATION.bits()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level;
+    use proptest::prelude::*;
+
+    use super::super::simd::{LANES, Row, load, load_u, store_u, with_widest};
+    use super::*;
+
+    /// Flags of a lane, with the roots of both distances.
+    fn with_roots(active: u32, r: [f32; 3], x: f32, y: f32) -> Flags {
+        let near = r[0].max(0.0).sqrt() * NEAR;
+        let limit = r[2].max(0.0).sqrt() + near;
+        if active == 1 {
+            Flags::ONE_TAXEL
+        } else if x * x + y * y <= near * near {
+            Flags::COINCIDENT
+        } else if active > 2 && r[1] <= limit * limit {
+            Flags::TIE
+        } else {
+            Flags::empty()
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn roots_that_are_left_out_would_say_the_same(
+            active in 1_u32..5,
+            exponent in -149_i32..40,
+            far in 1.0_f32..2.0,
+            // How far the second and the third stay behind, and the two points' distance, as powers of two of the first.
+            behind in prop::array::uniform3(-32.0_f32..0.5),
+            shares in prop::array::uniform2(0.0_f32..1.0),
+        ) {
+            let first = far * 2.0_f32.powi(exponent);
+            let second = first - first * behind[0].exp2().min(1.0) * shares[0];
+            let third = second - second * behind[1].exp2().min(1.0) * shares[1];
+            let (x, y) = (first.sqrt() * behind[2].exp2() * 0.6, first.sqrt() * behind[2].exp2() * 0.8);
+            let level = Level::new();
+            let mut flags: Row<u32> = [0; LANES];
+            with_widest!(level, simd => {
+                let all = |value: f32| load(simd, &[value; LANES], 0);
+                let touch = Touch {
+                    active: load_u(simd, &[active; LANES], 0),
+                    touched: all(1.0).simd_gt(all(0.0)),
+                    total: all(1.0),
+                    scale: all(1.0),
+                    u: all(0.0),
+                    v: all(0.0),
+                };
+                let apart = Apart { r: [all(first), all(second), all(third)], x: all(x), y: all(y) };
+                store_u(simd, line(simd, &touch, &apart).flags, &mut flags, 0);
+            });
+            prop_assert_eq!(Flags::from_bits_retain(flags[0]), with_roots(active, [first, second, third], x, y));
+        }
+    }
+}

@@ -9,9 +9,9 @@ use super::simd::{LANES, soon_needed};
 use crate::percept::{CellsMut, Percepts, Precision};
 use crate::scene::Plan;
 
-/// Bytes of percepts from which on they are written past the caches. What is less may soon be read from there.
-const MUCH: usize = 16 << 20;
-
+/// Bytes of percepts from which on they are written past the caches. What is less may soon be read from there. Tests have
+/// less.
+const MUCH: usize = if cfg!(test) { 1 << 16 } else { 16 << 20 };
 /// Bytes of a block's percepts that a cache has room for beside everything else.
 const LITTLE: usize = 256 << 10;
 
@@ -81,5 +81,38 @@ pub(super) fn copy(staged: &mut CellsMut<'_>, cells: &mut CellsMut<'_>) {
 pub(super) fn copy(staged: &mut CellsMut<'_>, cells: &mut CellsMut<'_>) {
     for (from, to) in columns::all(staged).into_iter().zip(columns::all(cells)) {
         to.copy_from_slice(from);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::percept::Outputs;
+
+    #[test]
+    fn all_is_copied_wherever_lines_begin() {
+        let cells = |fields: usize, frames: usize, first: u32| {
+            let mut percepts = Percepts::new(Outputs::USUAL, fields, Precision::F32);
+            percepts.reset(frames);
+            let mut bits = first..;
+            for column in columns::all(&mut percepts.cells_f32().unwrap()) {
+                column.fill_with(|| bits.next().unwrap());
+            }
+            percepts
+        };
+        let bits = |cells: &mut CellsMut<'_>| columns::all(cells).map(|column| column.to_vec());
+        for (fields, frames, before) in (1..40).flat_map(|fields| [(fields, 16, 0), (fields, 3, 1), (fields, 16, 5)]) {
+            let mut from = cells(fields, frames, 1);
+            let mut to = cells(fields, before + frames + 1, 1_000_000);
+            let untouched = bits(&mut to.cells_f32().unwrap());
+            let (mut earlier, rest) = to.cells_f32().unwrap().split_at(before);
+            let (mut part, mut later) = rest.split_at(frames);
+            copy(&mut from.cells_f32().unwrap(), &mut part);
+            assert_eq!(bits(&mut part), bits(&mut from.cells_f32().unwrap()), "{fields} fields");
+            for (column, untouched) in untouched.iter().enumerate().filter(|(_, untouched)| !untouched.is_empty()) {
+                assert_eq!(bits(&mut earlier)[column], untouched[..before * fields]);
+                assert_eq!(bits(&mut later)[column], untouched[(before + frames) * fields..]);
+            }
+        }
     }
 }

@@ -4,12 +4,12 @@ use fearless_simd::Level;
 use glam::{DAffine3, DVec3};
 
 use super::*;
-use crate::backend::Step;
+use crate::backend::{Near, Picks, Step};
 use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
 use crate::scene::{Arithmetic, Knobs, PlanField, Scene};
-use crate::signal::{Calibration, Letter, Receptor};
+use crate::signal::{Calibration, Frame, Letter, Receptor};
 
 const HAND: &[u8] = include_bytes!("../../../bodies/hand.glb");
 const HUMANOID: &[u8] = include_bytes!("../../../bodies/humanoid.glb");
@@ -182,6 +182,48 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
         let right = run(&plan, Level::new(), &raw, FRAMES, 1);
         for level in levels() {
             assert!(right == run(&plan, level, &raw, FRAMES, FRAMES), "{level:?}");
+        }
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_what_is_fetched_and_where_answers_go() {
+    const FRAMES: usize = 217;
+    let body = sheet(1000);
+    let scene = Scene { outputs: Outputs::USUAL - Outputs::MOTION, ..Scene::default() };
+    let calibration = Calibration::identity(body.taxels.len());
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+    // In frames as they come some values are nobody's, some lie one after the other and some the other way round.
+    let place = |channel: u32| match channel {
+        0..500 => channel * 5 / 4,
+        500..800 => channel + 200,
+        _ => 2000 - channel,
+    };
+    let channels: Vec<u32> = (0..plan.channels() as u32).map(place).collect();
+    let picks = Picks::new(&channels, plan.calibrated(), 1203);
+    assert!(picks.near.iter().any(|near| matches!(near, Near::Straight(_))));
+    assert!(picks.near.iter().any(|near| matches!(near, Near::Shuffled(_))));
+    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; FRAMES];
+    let all_over = values(&plan, FRAMES);
+    for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
+        let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+        let frames: Vec<Frame> = raw
+            .chunks(plan.channels())
+            .map(|values| {
+                let mut frame = Frame::missing(0.0, 1203);
+                channels.iter().zip(values).for_each(|(&place, &value)| frame.values[place as usize] = value);
+                frame
+            })
+            .collect();
+        let rows = Rows::Picked { frames: &frames, picks: &picks };
+        for level in levels() {
+            let mut percepts =
+                Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns, 0);
+            percepts.reset(FRAMES);
+            assert!(ahead::is_worth(rows) && stream::is_worth(&plan, &mut percepts.cells_f32().unwrap()));
+            let raw = RawBatch { first: 0, frames: FRAMES, rows, steps: &steps };
+            Cpu::with_level(&plan, level).run(&raw, &mut percepts).unwrap();
+            assert!(right == percepts, "{level:?}");
         }
     }
 }
