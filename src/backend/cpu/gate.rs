@@ -156,7 +156,6 @@ impl Gate {
 
     /// Calibrates a tile if it has changed.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "as `pass`, and which")]
     fn tile<S: Simd>(
         &mut self,
         simd: S,
