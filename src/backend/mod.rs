@@ -108,9 +108,10 @@ pub(crate) struct Picks {
 
 /// Where sixteen values lie among 32 of a frame.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(crate) struct Shuffle {
-    pub(crate) from: usize,
     pub(crate) places: [u32; 16],
+    pub(crate) from: usize,
     /// The same for eight and eight of them, where each lie among sixteen.
     pub(crate) halves: Option<[Half; 2]>,
 }

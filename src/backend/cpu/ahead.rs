@@ -1,10 +1,14 @@
-//! Fetching the next block's raw values while this one is computed.
+//! Fetching raw values that are needed next while fields are computed: the next block's, or where a skin is looked at through a
+//! window, those that come into it.
 //!
 //! A core has room for ten to sixteen lines that are on their way, and waits with the next one until there is room. Fetched
 //! all at once, a block's lines take as long as if nobody had asked for them; a few beside each field's sums, they come
 //! while it computes.
 
-use super::super::Rows;
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::super::{Near, Rows};
 use super::simd::{LANES, later_needed};
 use crate::signal::Frame;
 
@@ -27,7 +31,7 @@ pub(super) fn is_worth(raw: Rows<'_>) -> bool {
 pub(super) struct Ahead<'a> {
     frames: &'a [Frame],
     /// Where in a frame the lines begin.
-    lines: &'a [u32],
+    lines: Cow<'a, [u32]>,
     line: usize,
     at_a_time: usize,
 }
@@ -35,26 +39,49 @@ pub(super) struct Ahead<'a> {
 impl<'a> Ahead<'a> {
     /// The sixteen frames of `raw` from `first` on, in so many `steps`.
     pub(super) fn new(raw: Rows<'a>, first: usize, steps: usize) -> Self {
-        let none = Self { frames: &[], lines: &[], line: 0, at_a_time: 0 };
-        let Rows::Picked { frames, picks } = raw else { return none };
-        if !is_worth(raw) {
-            return none;
+        let Some(Rows::Picked { frames, picks }) = Some(raw).filter(|&raw| is_worth(raw)) else {
+            return Self { frames: &[], lines: Cow::Borrowed(&[]), line: 0, at_a_time: 0 };
+        };
+        let frames = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
+        let at_a_time = (frames.len() * picks.lines.len()).div_ceil(steps.max(1));
+        Self { frames, lines: Cow::Borrowed(&picks.lines), line: 0, at_a_time }
+    }
+
+    /// Now those of `tiles` in `frames`, in so many `steps`.
+    pub(super) fn turn_to(
+        &mut self,
+        raw: Rows<'a>,
+        frames: Range<usize>,
+        tiles: impl Iterator<Item = usize>,
+        steps: usize,
+    ) {
+        let Rows::Picked { frames: all, picks } = raw else { return };
+        let lines = self.lines.to_mut();
+        lines.clear();
+        for tile in tiles {
+            let (from, values) = match picks.near[tile] {
+                Near::Straight(from) => (from, LANES),
+                Near::Shuffled(at) => (picks.shuffles[at].from, 2 * LANES),
+                Near::Scattered => continue,
+            };
+            lines.extend((from / LANES..(from + values).div_ceil(LANES)).map(|line| (line * LANES) as u32));
         }
-        let next = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
-        let at_a_time = (next.len() * picks.lines.len()).div_ceil(steps.max(1));
-        Self { frames: next, lines: &picks.lines, line: 0, at_a_time }
+        lines.dedup();
+        self.at_a_time = (frames.len() * lines.len()).div_ceil(steps.max(1));
+        (self.frames, self.line) = (if lines.is_empty() { &[] } else { &all[frames] }, 0);
     }
 
     /// Has the next few lines fetched.
     #[inline(always)]
     pub(super) fn step(&mut self) {
+        let lines = &*self.lines;
         for _ in 0..self.at_a_time {
             let Some(frame) = self.frames.first() else { return };
-            if let Some(value) = frame.values.get(self.lines[self.line] as usize) {
+            if let Some(value) = frame.values.get(lines[self.line] as usize) {
                 later_needed(value);
             }
             self.line += 1;
-            if self.line == self.lines.len() {
+            if self.line == lines.len() {
                 (self.frames, self.line) = (&self.frames[1..], 0);
             }
         }

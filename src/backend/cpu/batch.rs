@@ -11,7 +11,8 @@ use super::ahead::Ahead;
 use super::columns::Place;
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
-use super::simd::{self, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::pick::OneFrame;
+use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::stream::Staged;
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
@@ -188,9 +189,10 @@ pub(super) fn block(
         for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
             faults |= read(level, plan, tables, raw.rows, first, frames, tiles, scratch);
         }
-        if chunk + 1 < last {
-            let ahead = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
-            ahead.for_each(|tile| (first..first + frames).for_each(|frame| simd::announce(raw.rows, frame, tile)));
+        let steps = fields.len() * calls(plan.stages());
+        if !window.is_whole() && chunk + 1 < last {
+            let tiles = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
+            ahead.turn_to(raw.rows, first..first + frames, tiles, steps);
         }
         let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
         let skin = Skin { plan, pressures, statuses };
@@ -204,7 +206,7 @@ pub(super) fn block(
         }
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {
-            ahead.skip(place.count * calls(plan.stages()));
+            ahead.skip(steps);
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
@@ -294,9 +296,10 @@ fn read(
         let group = tiles.start..tiles.end.min(tiles.start + room);
         tiles.start = group.end;
         for frame in (0..frames).filter(|_| !are_fetched) {
+            let values = OneFrame::new(raw, first + frame);
             with_widest!(level, simd => {
                 for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
-                    simd::read(simd, raw, first + frame, tile, plan.calibrated(), &mut bits[frame]);
+                    values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
                 }
             });
         }
@@ -328,7 +331,7 @@ fn calibrate<S: Simd>(
         let bits = match fetched {
             Some((raw, first)) => {
                 for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
-                    simd::read(simd, raw, first + frame, index, plan.calibrated(), bits);
+                    OneFrame::new(raw, first + frame).read(simd, index, plan.calibrated(), bits);
                 }
                 &bits[..LANES]
             }

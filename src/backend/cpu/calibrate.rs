@@ -6,7 +6,8 @@ use fearless_simd::prelude::*;
 use super::super::Rows;
 use super::Tables;
 use super::lines::Aligned;
-use super::simd::{F, I, LANES, Row, U, bits_where, read, splat, splat_u, store, store_u, width, with_widest};
+use super::pick::OneFrame;
+use super::simd::{F, I, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -210,11 +211,11 @@ fn tiles<S: Simd>(
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    let mut faults = false;
+    let (mut faults, values) = (false, OneFrame::new(raw, frame));
     let rows = pressures.iter_mut().zip(statuses);
     for (index, (one, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
         let Aligned(bits) = &mut Aligned([0; LANES]);
-        read(simd, raw, frame, index, plan.calibrated(), bits);
+        values.read(simd, index, plan.calibrated(), bits);
         faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
     }
     faults

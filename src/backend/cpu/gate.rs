@@ -11,7 +11,8 @@ use super::super::{BLOCK, Rows};
 use super::Tables;
 use super::calibrate::{self, Tile};
 use super::lines::{Aligned, Lines};
-use super::simd::{LANES, Row, load, load_u, read, width, with_widest};
+use super::pick::OneFrame;
+use super::simd::{LANES, Row, load, load_u, width, with_widest};
 use crate::scene::{Cadence, Coverage, Knobs, Plan};
 
 /// A plan of fewer values than this is computed before a gate has looked at it.
@@ -171,7 +172,7 @@ impl Gate {
         if self.known && raw.straight(frame, index).is_some_and(|values| same(simd, values, last)) {
             return;
         }
-        read(simd, raw, frame, index, plan.calibrated(), bits);
+        OneFrame::new(raw, frame).read(simd, index, plan.calibrated(), bits);
         if self.known && same(simd, bits, last) {
             return;
         }

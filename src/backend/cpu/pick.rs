@@ -1,17 +1,51 @@
-//! Picking values that do not lie in a plan's order, but near each other: by shuffles of whole lanes, sixteen of 32 with
+//! Reading a frame's values, and picking those that do not lie in a plan's order, but near each other: by shuffles of whole lanes, sixteen of 32 with
 //! AVX-512 and twice eight of sixteen with AVX2. They take a third and a quarter of the instructions of shuffling their
 //! bytes, which is what there is for every machine.
 
 use fearless_simd::prelude::*;
 
-use super::super::Shuffle;
-use super::simd::Row;
+use super::super::{Near, Picks, Rows, Shuffle};
+use super::simd::{LANES, Row};
+
+/// A frame's raw values, for reading several tiles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OneFrame<'a> {
+    raw: Rows<'a>,
+    frame: usize,
+    /// As the source delivered them, if it did.
+    picked: Option<(&'a [u32], &'a Picks)>,
+}
+
+impl<'a> OneFrame<'a> {
+    /// Frame `frame` of `raw`.
+    #[inline(always)]
+    pub(super) fn new(raw: Rows<'a>, frame: usize) -> Self {
+        let picked = match raw {
+            Rows::Packed { .. } => None,
+            Rows::Picked { frames, picks } => Some((bytemuck::cast_slice(&frames[frame].values), picks)),
+        };
+        Self { raw, frame, picked }
+    }
+
+    /// Reads the bits from slot 16 · `tile` on.
+    #[inline(always)]
+    pub(super) fn read<S: Simd>(self, simd: S, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
+        if let Some((values, picks)) = self.picked {
+            match picks.near[tile] {
+                Near::Straight(from) => return bits.copy_from_slice(&values[from..from + LANES]),
+                Near::Shuffled(at) if pick(simd, values, &picks.shuffles[at], bits) => return,
+                _ => {}
+            }
+        }
+        self.raw.read(self.frame, tile * LANES, calibrated, bits);
+    }
+}
 
 /// Reads those of `values` that `shuffle` says; whether they lie near enough for it, and the machine has instructions
 /// that pay.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
-pub(super) fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle, bits: &mut Row<u32>) -> bool {
+fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle, bits: &mut Row<u32>) -> bool {
     use fearless_simd::{u32x8, u32x16};
 
     if let Some(avx512) = simd.level().as_avx512() {
@@ -31,7 +65,7 @@ pub(super) fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle, bits: &m
 
 #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
 #[inline(always)]
-pub(super) fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle, _: &mut Row<u32>) -> bool {
+fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle, _: &mut Row<u32>) -> bool {
     false
 }
 

@@ -7,9 +7,6 @@
 
 use fearless_simd::prelude::*;
 
-use super::super::{Near, Rows};
-use super::pick::pick;
-
 /// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
 /// what every processor has: sets in between would cost their compilation and gain little.
 macro_rules! with_widest {
@@ -90,29 +87,6 @@ pub(super) fn splat_u<S: Simd>(simd: S, value: u32) -> U<S> {
 #[inline(always)]
 pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
     mask.select(splat_u(simd, bits), splat_u(simd, 0))
-}
-
-/// Reads the bits of frame `frame` from slot 16 · `tile` on.
-#[inline(always)]
-pub(super) fn read<S: Simd>(simd: S, raw: Rows<'_>, frame: usize, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
-    if let Rows::Picked { frames, picks } = raw {
-        let values: &[u32] = bytemuck::cast_slice(&frames[frame].values);
-        match picks.near[tile] {
-            Near::Straight(from) => return bits.copy_from_slice(&values[from..from + LANES]),
-            Near::Shuffled(at) if pick(simd, values, &picks.shuffles[at], bits) => return,
-            _ => {}
-        }
-    }
-    raw.read(frame, tile * LANES, calibrated, bits);
-}
-
-/// Has frame `frame` fetched from slot 16 · `tile` on, where it lies together.
-#[inline(always)]
-pub(super) fn announce(raw: Rows<'_>, frame: usize, tile: usize) {
-    if let Some(bits) = raw.straight(frame, tile) {
-        soon_needed(bits);
-        soon_needed(&bits[LANES - 1]);
-    }
 }
 
 /// Has the cache fetch the line that `value` begins in, to be read or written soon. A core that writes to memory waits for

@@ -168,6 +168,26 @@ fn sheet(taxels: u32) -> Body {
     }
 }
 
+/// `raw` in frames of `width` values as a source would deliver them, each channel's at the place in `channels`.
+fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
+    raw.chunks(channels.len())
+        .map(|values| {
+            let mut frame = Frame::missing(0.0, width);
+            channels.iter().zip(values).for_each(|(&place, &value)| frame.values[place as usize] = value);
+            frame
+        })
+        .collect()
+}
+
+/// All of `rows` at once.
+fn run_rows(plan: &Plan, level: Level, rows: Rows<'_>, frames: usize) -> Percepts {
+    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns, 0);
+    percepts.reset(frames);
+    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
+    Cpu::with_level(plan, level).run(&RawBatch { first: 0, frames, rows, steps: &steps }, &mut percepts).unwrap();
+    percepts
+}
+
 #[test]
 fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     const FRAMES: usize = 37;
@@ -180,8 +200,13 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
         // A frame alone has all of it.
         let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+        let channels: Vec<u32> = (0..plan.channels() as u32).map(|channel| channel + channel / 7).collect();
+        let width = 35_000;
+        let (frames, picks) = (delivered(&raw, &channels, width), Picks::new(&channels, plan.calibrated(), width));
         for level in levels() {
             assert!(right == run(&plan, level, &raw, FRAMES, FRAMES), "{level:?}");
+            let rows = Rows::Picked { frames: &frames, picks: &picks };
+            assert!(right == run_rows(&plan, level, rows, FRAMES), "{level:?}, as delivered");
         }
     }
 }
@@ -203,27 +228,15 @@ fn bits_do_not_depend_on_what_is_fetched_and_where_answers_go() {
     let picks = Picks::new(&channels, plan.calibrated(), 1203);
     assert!(picks.near.iter().any(|near| matches!(near, Near::Straight(_))));
     assert!(picks.near.iter().any(|near| matches!(near, Near::Shuffled(_))));
-    let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; FRAMES];
     let all_over = values(&plan, FRAMES);
     for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
         let right = run(&plan, Level::new(), &raw, FRAMES, 1);
-        let frames: Vec<Frame> = raw
-            .chunks(plan.channels())
-            .map(|values| {
-                let mut frame = Frame::missing(0.0, 1203);
-                channels.iter().zip(values).for_each(|(&place, &value)| frame.values[place as usize] = value);
-                frame
-            })
-            .collect();
+        let frames = delivered(&raw, &channels, 1203);
         let rows = Rows::Picked { frames: &frames, picks: &picks };
         for level in levels() {
-            let mut percepts =
-                Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns, 0);
-            percepts.reset(FRAMES);
-            assert!(ahead::is_worth(rows) && stream::is_worth(&plan, &mut percepts.cells_f32().unwrap()));
-            let raw = RawBatch { first: 0, frames: FRAMES, rows, steps: &steps };
-            Cpu::with_level(&plan, level).run(&raw, &mut percepts).unwrap();
+            let mut percepts = run_rows(&plan, level, rows, FRAMES);
             assert!(right == percepts, "{level:?}");
+            assert!(ahead::is_worth(rows) && stream::is_worth(&plan, &mut percepts.cells_f32().unwrap()));
         }
     }
 }
