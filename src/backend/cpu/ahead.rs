@@ -1,5 +1,5 @@
-//! Fetching raw values that are needed next while fields are computed: the next block's, or where a skin is looked at through a
-//! window, those that come into it.
+//! Fetching raw values that are needed next while fields are computed: the next block's, or where a skin is looked at
+//! through a window, those that come into it.
 //!
 //! A core has room for ten to sixteen lines that are on their way, and waits with the next one until there is room. Fetched
 //! all at once, a block's lines take as long as if nobody had asked for them; a few beside each field's sums, they come
@@ -8,7 +8,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::super::{Near, Rows};
+use super::super::{Near, Picks, Rows};
 use super::simd::{LANES, later_needed};
 use crate::signal::Frame;
 
@@ -19,11 +19,15 @@ const BLOCK: usize = 512 << 10;
 /// Bytes of a line.
 const LINE: usize = 64;
 
-/// Whether raw values are fetched: they lie as a source delivered them, are many, and a block's are few.
+/// Whether a whole block's raw values are fetched: they lie as a source delivered them, are many, and a block's are few.
 pub(super) fn is_worth(raw: Rows<'_>) -> bool {
-    let Rows::Picked { frames, picks } = raw else { return false };
+    worth(raw).is_some()
+}
+
+fn worth(raw: Rows<'_>) -> Option<(&[Frame], &Picks)> {
+    let Rows::Picked { frames, picks } = raw else { return None };
     let frame = picks.lines.len() * LINE;
-    frames.len() * frame >= MUCH && LANES * frame <= BLOCK
+    (frames.len() * frame >= MUCH && LANES * frame <= BLOCK).then_some((frames, picks))
 }
 
 /// What is still to be fetched, and how much of it at a time.
@@ -39,7 +43,7 @@ pub(super) struct Ahead<'a> {
 impl<'a> Ahead<'a> {
     /// The sixteen frames of `raw` from `first` on, in so many `steps`.
     pub(super) fn new(raw: Rows<'a>, first: usize, steps: usize) -> Self {
-        let Some(Rows::Picked { frames, picks }) = Some(raw).filter(|&raw| is_worth(raw)) else {
+        let Some((frames, picks)) = worth(raw) else {
             return Self { frames: &[], lines: Cow::Borrowed(&[]), line: 0, at_a_time: 0 };
         };
         let frames = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
@@ -87,8 +91,8 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// As so many steps.
-    pub(super) fn skip(&mut self, steps: usize) {
-        (0..steps).for_each(|_| self.step());
+    /// Takes so many steps at once.
+    pub(super) fn steps(&mut self, count: usize) {
+        (0..count).for_each(|_| self.step());
     }
 }

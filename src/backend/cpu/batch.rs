@@ -206,7 +206,7 @@ pub(super) fn block(
         }
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {
-            ahead.skip(steps);
+            ahead.steps(steps);
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
@@ -295,13 +295,15 @@ fn read(
         let room = if are_fetched { tiles.len() } else { GROUP };
         let group = tiles.start..tiles.end.min(tiles.start + room);
         tiles.start = group.end;
-        for frame in (0..frames).filter(|_| !are_fetched) {
-            let values = OneFrame::new(raw, first + frame);
-            with_widest!(level, simd => {
-                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
-                    values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
-                }
-            });
+        if !are_fetched {
+            for frame in 0..frames {
+                let values = OneFrame::new(raw, first + frame);
+                with_widest!(level, simd => {
+                    for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
+                        values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
+                    }
+                });
+            }
         }
         let fetched = are_fetched.then_some((raw, first));
         faults |= with_widest!(level, simd => calibrate(simd, plan, tables, fetched, frames, group, scratch));

@@ -97,7 +97,7 @@ impl Narrow {
     }
 }
 
-/// Bytes that stay in a core's nearest cache: in many it has 32 KiB.
+/// Bytes of places that stay in a core's nearest cache beside all else: in many it has 32 KiB.
 const NEAREST_CACHE: usize = 16 << 10;
 
 /// A group's values in this frame; `WEIGHTED` where weights are not all 1.

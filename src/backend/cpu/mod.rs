@@ -113,7 +113,6 @@ impl Cpu {
         }
     }
 
-    /// Halves the batch until a task remains, and runs the halves in parallel.
     /// Runs a batch on all threads, this one among them: each takes a part of what is left, ever smaller ones, so that none
     /// waits long for the others and frames that follow each other mostly stay together.
     fn batch(&self, raw: &RawBatch<'_>, mut cells: CellsMut<'_>) {

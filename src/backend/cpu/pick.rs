@@ -1,6 +1,7 @@
-//! Reading a frame's values, and picking those that do not lie in a plan's order, but near each other: by shuffles of whole lanes, sixteen of 32 with
-//! AVX-512 and twice eight of sixteen with AVX2. They take a third and a quarter of the instructions of shuffling their
-//! bytes, which is what there is for every machine.
+//! Reading a frame's values.
+//!
+//! Those that do not lie in a plan's order, but near each other, are picked by shuffles of whole lanes: sixteen of 32 with
+//! AVX-512, twice eight of sixteen with AVX2. They take a third and a quarter of the instructions of shuffling bytes.
 
 use fearless_simd::prelude::*;
 

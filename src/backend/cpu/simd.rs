@@ -92,27 +92,25 @@ pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
 /// Has the cache fetch the line that `value` begins in, to be read or written soon. A core that writes to memory waits for
 /// what was there before, too: a tenth of a batch's time.
 #[inline(always)]
-#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
 pub(super) fn soon_needed<T>(value: &T) {
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: a hint reads and writes nothing, and the address is that of a living value.
-    unsafe {
-        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = value;
+    fetch::<T, true>(value);
 }
 
 /// The same into the next larger cache, for what is needed later.
 #[inline(always)]
-#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
 pub(super) fn later_needed<T>(value: &T) {
+    fetch::<T, false>(value);
+}
+
+#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
+fn fetch<T, const SOON: bool>(value: &T) {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: as above.
+    // SAFETY: a hint reads and writes nothing, and the address is that of a living value.
     unsafe {
-        use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(value).cast());
+        use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
+        let line = std::ptr::from_ref(value).cast();
+        if SOON { _mm_prefetch::<_MM_HINT_T0>(line) } else { _mm_prefetch::<_MM_HINT_T1>(line) }
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
