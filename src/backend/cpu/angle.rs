@@ -1,36 +1,34 @@
 //! Angles of lines in lanes: what [`crate::stage::angle`] does one by one, bit for bit.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use fearless_simd::prelude::*;
 
-use super::simd::{F, splat};
+use super::simd::{F, I, splat};
 use crate::stage::angle::ATAN;
 
-/// The angle of the line along (x, y), in [0, π).
+/// The angle of the line along (x, y), in [0, π); not a number where both are 0.
 #[inline(always)]
 pub(super) fn of_line<S: Simd>(simd: S, x: F<S>, y: F<S>) -> F<S> {
-    let none = splat(simd, 0.0);
-    let flip = y.simd_lt(none) | (y.simd_eq(none) & x.simd_lt(none));
-    let (x, y) = (flip.select(none - x, x), flip.select(none - y, y));
-    let turned = atan2(simd, y, x);
-    turned.simd_ge(splat(simd, std::f32::consts::PI)).select(none, turned)
+    let turned = up_to_pi(simd, x, y);
+    turned.simd_ge(splat(simd, PI)).select(splat(simd, 0.0), turned)
 }
 
-/// atan2(y, x) for y ≥ 0, in [0, π].
+/// The same, where a line that leans to the left by too little to tell may have π.
 #[inline(always)]
-fn atan2<S: Simd>(simd: S, y: F<S>, x: F<S>) -> F<S> {
-    let none = splat(simd, 0.0);
-    let wide = x.max(none - x);
-    let steep = y.simd_gt(wide);
-    let (low, high) = (steep.select(wide, y), steep.select(y, wide));
-    let a = high.simd_gt(none).select(low / high, none);
+fn up_to_pi<S: Simd>(simd: S, x: F<S>, y: F<S>) -> F<S> {
+    let (wide, tall) = (x.abs(), y.abs());
+    let a = wide.min(tall) / wide.max(tall);
     let z = a * a;
     let pair = |k: usize| splat(simd, ATAN[k]) + splat(simd, ATAN[k + 1]) * z;
     let z2 = z * z;
     let z4 = z2 * z2;
     let q = (pair(0) + pair(2) * z2) + (pair(4) + pair(6) * z2) * z4 + splat(simd, ATAN[8]) * (z4 * z4);
     let octant = a + (a * z) * q;
-    let quadrant = steep.select(splat(simd, std::f32::consts::FRAC_PI_2) - octant, octant);
-    x.simd_lt(none).select(splat(simd, std::f32::consts::PI) - quadrant, quadrant)
+    let quadrant = tall.simd_gt(wide).select(splat(simd, FRAC_PI_2) - octant, octant);
+    // The signs alone tell which way it leans: where one of the two is 0, both ways are the same line.
+    let leans_left = (x.bitcast::<I<S>>() ^ y.bitcast::<I<S>>()).simd_lt(I::<S>::splat(simd, 0));
+    leans_left.select(splat(simd, PI) - quadrant, quadrant)
 }
 
 #[cfg(test)]
@@ -61,7 +59,10 @@ mod tests {
                 y[lane] *= 10.0_f32.powi(lane as i32 - 8);
             }
             if step < 3 {
-                (x[3], y[3], x[5], y[5], x[6], y[6]) = (-1.0, 0.0, 0.0, 0.0, -1.0, -0.0);
+                let seams = [(-1.0, 0.0), (-1.0, -0.0), (1.0, 0.0), (0.0, 2.0), (-0.0, 2.0), (0.0, -2.0), (-0.0, -2.0)];
+                for (lane, seam) in seams.into_iter().enumerate() {
+                    (x[lane], y[lane]) = seam;
+                }
             }
             let angles = with_widest!(Level::new(), simd => row(simd, &x, &y));
             for lane in 0..LANES {

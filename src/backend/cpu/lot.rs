@@ -95,9 +95,8 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
                 if let Some(touch) = so_far(simd, &kind, at, between, cells) {
-                    let far = members.farthest(simd, at, &touch);
-                    let found = [far.r[0], far.r[1], far.r[2], far.x[0] - far.x[1], far.y[0] - far.y[1]];
-                    keep(simd, found, at, between);
+                    let Apart { r: [r1, r2, r3], x, y } = members.farthest(simd, at, &touch);
+                    keep(simd, [r1, r2, r3, x, y], at, between);
                 }
             }
         }

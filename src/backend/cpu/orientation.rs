@@ -10,30 +10,24 @@ use crate::percept::{Flags, Outputs};
 /// 2⁻¹⁴.
 const NEAR: f32 = 1.0 / 16_384.0;
 
-/// The two farthest points, and the three largest squared distances; 0 or −1 where there are no more.
-pub(super) struct Farthest<S: Simd> {
-    pub(super) r: [F<S>; 3],
-    pub(super) x: [F<S>; 2],
-    pub(super) y: [F<S>; 2],
-}
-
-/// How far they lie apart.
+/// How far the two farthest points lie from the centroid, and from each other.
 pub(super) struct Apart<S: Simd> {
-    /// The three largest squared distances.
+    /// The three largest squared distances from the centroid; 0 or −1 where there are no more.
     pub(super) r: [F<S>; 3],
-    /// From the second farthest point to the farthest.
+    /// From one of the two farthest points to the other: to which does not matter to a line.
     pub(super) x: F<S>,
     pub(super) y: F<S>,
 }
 
-/// Finds them.
+/// Finds the two farthest points.
 ///
 /// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
 /// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
 #[inline(always)]
-pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Farthest<S> {
+pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
     let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
-    let mut far = Farthest::<S> { r: [unset; 3], x: [none; 2], y: [none; 2] };
+    let mut far = Apart::<S> { r: [unset; 3], x: none, y: none };
+    let (mut farthest_x, mut farthest_y) = (none, none);
     for member in 0..members.count() {
         // Strictly larger, so that the lower id stays.
         let (r, x, y) = point(simd, members, member, at, touch);
@@ -41,10 +35,11 @@ pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, t
         far.r[2] = far.r[2].max(far.r[1].min(r));
         far.r[1] = far.r[1].max(far.r[0].min(r));
         far.r[0] = far.r[0].max(r);
-        far.x[1] = first.select(far.x[0], second.select(x, far.x[1]));
-        far.y[1] = first.select(far.y[0], second.select(y, far.y[1]));
-        far.x[0] = first.select(x, far.x[0]);
-        far.y[0] = first.select(y, far.y[0]);
+        // Whether it is the farthest now or the second, the other one is what was the farthest before.
+        far.x = second.select(x - farthest_x, far.x);
+        far.y = second.select(y - farthest_y, far.y);
+        farthest_x = first.select(x, farthest_x);
+        farthest_y = first.select(y, farthest_y);
     }
     far
 }

@@ -9,7 +9,7 @@ use super::axis::{self, Moments};
 use super::centroid;
 use super::compensated::Compensated;
 use super::contact::{self, Sums};
-use super::orientation::{self, Farthest};
+use super::orientation::{self, Apart};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, width};
 use crate::percept::{Flags, Outputs};
 use crate::scene::PlanField;
@@ -52,7 +52,7 @@ pub(super) trait Sweep<S: Simd>: Compensated<S> {
     fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>);
     /// The numerator of the centroid's third coordinate.
     fn depth(self, simd: S, at: usize) -> F<S>;
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S>;
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S>;
     fn moments(self, simd: S, at: usize, touch: &Touch<S>) -> Moments<S>;
 }
 
@@ -89,7 +89,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S> {
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
         orientation::farthest(simd, self.0, at, touch)
     }
 

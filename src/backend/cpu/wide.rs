@@ -12,7 +12,7 @@ use super::centroid;
 use super::contact::{self, Sums};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
-use super::orientation::{Farthest, point};
+use super::orientation::{Apart, point};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
 use super::touch::{Abreast, Cells, Members, OneKind, Part, Sweep, Touch};
 use crate::scene::Plan;
@@ -245,7 +245,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S> {
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
         // In the members' order, which is that of the ids.
         Abreast(self.0).farthest(simd, at, touch)
     }
@@ -334,7 +334,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, _: usize, touch: &Touch<S>) -> Farthest<S> {
+    fn farthest(self, simd: S, _: usize, touch: &Touch<S>) -> Apart<S> {
         let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
         let mut third = -1.0_f32;
         let mut candidates = [Candidate::NONE; 2 * LANES];
@@ -366,10 +366,13 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
             at += width::<S>();
         }
         let [first, second] = two_farthest(&candidates, &mut third);
-        Farthest {
-            r: [splat(simd, first.r), splat(simd, second.r), splat(simd, third)],
-            x: [splat(simd, first.x), splat(simd, second.x)],
-            y: [splat(simd, first.y), splat(simd, second.y)],
+        Apart {
+            r: [first.r, second.r, third].map(
+                #[inline(always)]
+                |r| splat(simd, r),
+            ),
+            x: splat(simd, first.x - second.x),
+            y: splat(simd, first.y - second.y),
         }
     }
 
