@@ -11,24 +11,18 @@ use super::ahead::Ahead;
 use super::columns::Place;
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
-use super::pick::OneFrame;
+use super::pick::SomeFrames;
 use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
 use super::stream::Staged;
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
-use super::{ahead, calibrate, change, columns};
+use super::{calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
-/// Tiles whose raw bits are read together, unless they have been fetched already: frame by frame, as they lie in memory, so
-/// that the processor sees it coming.
-const GROUP: usize = 64;
-
 /// What a task needs to work in.
 pub(super) struct Scratch {
-    /// Raw bits of a few tiles, a row a frame.
-    bits: Lines<u32>,
     /// By slot, as far as the window reaches, a lane a frame.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
@@ -48,7 +42,6 @@ impl Scratch {
         let kept = tables.window.slots();
         let before = if plan.has_changes() { kept / LANES } else { 0 };
         Self {
-            bits: Lines::new(GROUP * LANES, 0),
             pressures: Lines::new(kept, 0.0),
             statuses: Lines::new(kept, 0),
             tiles: vec![KeptTile { rests: true, faulty: false }; kept / LANES],
@@ -287,28 +280,11 @@ fn read(
     raw: Rows<'_>,
     first: usize,
     frames: usize,
-    mut tiles: Range<usize>,
+    tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    let (mut faults, are_fetched) = (false, ahead::is_worth(raw));
-    while !tiles.is_empty() {
-        let room = if are_fetched { tiles.len() } else { GROUP };
-        let group = tiles.start..tiles.end.min(tiles.start + room);
-        tiles.start = group.end;
-        if !are_fetched {
-            for frame in 0..frames {
-                let values = OneFrame::new(raw, first + frame);
-                with_widest!(level, simd => {
-                    for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
-                        values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
-                    }
-                });
-            }
-        }
-        let fetched = are_fetched.then_some((raw, first));
-        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, fetched, frames, group, scratch));
-    }
-    faults
+    let raw = SomeFrames::new(raw, first, frames);
+    with_widest!(level, simd => calibrate(simd, plan, tables, &raw, frames, tiles, scratch))
 }
 
 /// Calibrates tiles whose bits are there, or still to be read where they are `fetched`, and turns them so that a taxel's
@@ -318,7 +294,7 @@ fn calibrate<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
-    fetched: Option<(Rows<'_>, usize)>,
+    raw: &SomeFrames<'_>,
     frames: usize,
     tiles: Range<usize>,
     scratch: &mut Scratch,
@@ -326,19 +302,11 @@ fn calibrate<S: Simd>(
     let mut any = false;
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
-    let Scratch { bits, .. } = scratch;
+    let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
     for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        let bits = match fetched {
-            Some((raw, first)) => {
-                for (frame, bits) in bits.iter_mut().take(frames).enumerate() {
-                    OneFrame::new(raw, first + frame).read(simd, index, plan.calibrated(), bits);
-                }
-                &bits[..LANES]
-            }
-            None => &bits[(index - tiles.start) * LANES..][..LANES],
-        };
+        raw.read(simd, index, plan.calibrated(), bits);
         let bits = &bits[..frames];
         let mut faults = false;
         let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(

@@ -42,6 +42,61 @@ impl<'a> OneFrame<'a> {
     }
 }
 
+/// Up to sixteen frames' raw values, for reading a tile of all of them at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SomeFrames<'a> {
+    raw: Rows<'a>,
+    first: usize,
+    frames: usize,
+    /// By frame: as the source delivered them, or by channel.
+    values: [&'a [u32]; LANES],
+}
+
+impl<'a> SomeFrames<'a> {
+    /// As many frames of `raw`, from `first` on.
+    pub(super) fn new(raw: Rows<'a>, first: usize, frames: usize) -> Self {
+        let mut values: [&[u32]; LANES] = [&[]; LANES];
+        for (frame, values) in (first..first + frames).zip(&mut values) {
+            *values = bytemuck::cast_slice(match raw {
+                Rows::Packed { values, channels } => &values[frame * channels..][..channels],
+                Rows::Picked { frames, .. } => &frames[frame].values,
+            });
+        }
+        Self { raw, first, frames, values }
+    }
+
+    /// Where the values from slot 16 · `tile` on lie.
+    #[inline(always)]
+    fn near(&self, tile: usize) -> Near {
+        match self.raw {
+            Rows::Packed { channels, .. } if (tile + 1) * LANES <= channels => Near::Straight(tile * LANES),
+            Rows::Packed { .. } => Near::Scattered,
+            Rows::Picked { picks, .. } => picks.near[tile],
+        }
+    }
+
+    /// Reads the bits from slot 16 · `tile` on, a row a frame.
+    #[inline(always)]
+    pub(super) fn read<S: Simd>(&self, simd: S, tile: usize, calibrated: usize, bits: &mut [Row<u32>; LANES]) {
+        let rows = self.values[..self.frames].iter().zip(bits);
+        match (self.near(tile), self.raw) {
+            (Near::Straight(from), _) => rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from..][..LANES])),
+            (Near::Shuffled(at), Rows::Picked { picks, .. }) => {
+                for (frame, (values, bits)) in (self.first..).zip(rows) {
+                    if !pick(simd, values, &picks.shuffles[at], bits) {
+                        self.raw.read(frame, tile * LANES, calibrated, bits);
+                    }
+                }
+            }
+            _ => {
+                for (frame, (_, bits)) in (self.first..).zip(rows) {
+                    self.raw.read(frame, tile * LANES, calibrated, bits);
+                }
+            }
+        }
+    }
+}
+
 /// Reads those of `values` that `shuffle` says; whether they lie near enough for it, and the machine has instructions
 /// that pay.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
