@@ -19,15 +19,17 @@ const BLOCK: usize = 512 << 10;
 /// Bytes of a line.
 const LINE: usize = 64;
 
-/// Whether a whole block's raw values are fetched: they lie as a source delivered them, are many, and a block's are few.
-pub(super) fn is_worth(raw: Rows<'_>) -> bool {
-    worth(raw).is_some()
-}
-
-fn worth(raw: Rows<'_>) -> Option<(&[Frame], &Picks)> {
+/// The frames, where a whole block's raw values are fetched: they lie as a source delivered them, are many, and a block's are
+/// few.
+pub(super) fn worth(raw: Rows<'_>) -> Option<(&[Frame], &Picks)> {
     let Rows::Picked { frames, picks } = raw else { return None };
     let frame = picks.lines.len() * LINE;
     (frames.len() * frame >= MUCH && LANES * frame <= BLOCK).then_some((frames, picks))
+}
+
+/// How many of each frame's `lines` are fetched in a step, of which none takes lines of two `frames`.
+fn at_a_time(frames: usize, lines: usize, steps: usize) -> usize {
+    lines.div_ceil((steps / frames.max(1)).max(1))
 }
 
 /// What is still to be fetched, and how much of it at a time.
@@ -47,7 +49,7 @@ impl<'a> Ahead<'a> {
             return Self { frames: &[], lines: Cow::Borrowed(&[]), line: 0, at_a_time: 0 };
         };
         let frames = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
-        let at_a_time = (frames.len() * picks.lines.len()).div_ceil(steps.max(1));
+        let at_a_time = at_a_time(frames.len(), picks.lines.len(), steps);
         Self { frames, lines: Cow::Borrowed(&picks.lines), line: 0, at_a_time }
     }
 
@@ -71,28 +73,20 @@ impl<'a> Ahead<'a> {
             lines.extend((from / LANES..(from + values).div_ceil(LANES)).map(|line| (line * LANES) as u32));
         }
         lines.dedup();
-        self.at_a_time = (frames.len() * lines.len()).div_ceil(steps.max(1));
+        self.at_a_time = at_a_time(frames.len(), lines.len(), steps);
         (self.frames, self.line) = (if lines.is_empty() { &[] } else { &all[frames] }, 0);
     }
 
-    /// Has the next few lines fetched.
+    /// Has the next few lines of a frame fetched.
     #[inline(always)]
     pub(super) fn step(&mut self) {
-        let lines = &*self.lines;
-        for _ in 0..self.at_a_time {
-            let Some(frame) = self.frames.first() else { return };
-            if let Some(value) = frame.values.get(lines[self.line] as usize) {
-                later_needed(value);
-            }
-            self.line += 1;
-            if self.line == lines.len() {
-                (self.frames, self.line) = (&self.frames[1..], 0);
-            }
+        let Some((frame, later)) = self.frames.split_first() else { return };
+        let lines = &self.lines[self.line..];
+        let count = self.at_a_time.min(lines.len());
+        lines[..count].iter().for_each(|&line| later_needed(frame.values.as_ptr().wrapping_add(line as usize)));
+        self.line += count;
+        if self.line == self.lines.len() {
+            (self.frames, self.line) = (later, 0);
         }
-    }
-
-    /// Takes so many steps at once.
-    pub(super) fn steps(&mut self, count: usize) {
-        (0..count).for_each(|_| self.step());
     }
 }

@@ -13,7 +13,7 @@ use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
 use super::pick::SomeFrames;
 use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
-use super::stream::Staged;
+use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::wide::ManyAbreast;
 use super::{calibrate, change, columns};
@@ -34,7 +34,7 @@ pub(super) struct Scratch {
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
     /// Answers on their way past the caches, if any were.
-    pub(super) staged: Option<Staged>,
+    pub(super) staged: Option<[Staged; 2]>,
 }
 
 impl Scratch {
@@ -144,7 +144,7 @@ pub(super) fn block(
     before: (Rows<'_>, usize),
     scratch: &mut Scratch,
     cells: &mut CellsMut<'_>,
-    is_staged: bool,
+    outgoing: Option<&mut Outgoing<'_>>,
 ) {
     let frames = cells.frames();
     let window = &tables.window;
@@ -176,7 +176,8 @@ pub(super) fn block(
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
     let last = plan.fields.len().div_ceil(LANES).saturating_sub(1);
-    let mut ahead = Ahead::new(raw.rows, first + frames, plan.fields.len() * calls(plan.stages()));
+    let ahead = Ahead::new(raw.rows, first + frames, plan.fields.len() * calls(plan.stages()));
+    let mut meanwhile = Meanwhile { ahead, outgoing };
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
         for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
@@ -185,12 +186,12 @@ pub(super) fn block(
         let steps = fields.len() * calls(plan.stages());
         if !window.is_whole() && chunk + 1 < last {
             let tiles = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
-            ahead.turn_to(raw.rows, first..first + frames, tiles, steps);
+            meanwhile.ahead.turn_to(raw.rows, first..first + frames, tiles, steps);
         }
         let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
         let skin = Skin { plan, pressures, statuses };
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
-        if !is_staged {
+        if meanwhile.outgoing.is_none() {
             place.announce(cells);
         }
         let mut rests = [true; LANES];
@@ -199,12 +200,28 @@ pub(super) fn block(
         }
         let (first, rests) = (place.first, &rests[..place.count]);
         if rests.iter().all(|&rests| rests) {
-            ahead.steps(steps);
+            (0..steps).for_each(|_| meanwhile.step());
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first, rests, &skin, faults, &mut ahead, between, answers));
+        with_widest!(level, simd => answer(simd, plan, tables, first, rests, &skin, faults, &mut meanwhile, between, answers));
         with_widest!(level, simd => columns::write(simd, answers, place, plan.outputs, cells));
+    }
+}
+
+/// What a core does beside computing, a little at a time.
+struct Meanwhile<'a, 'b, 'c> {
+    ahead: Ahead<'a>,
+    outgoing: Option<&'b mut Outgoing<'c>>,
+}
+
+impl Meanwhile<'_, '_, '_> {
+    #[inline(always)]
+    fn step(&mut self) {
+        self.ahead.step();
+        if let Some(outgoing) = &mut self.outgoing {
+            outgoing.step();
+        }
     }
 }
 
@@ -219,7 +236,7 @@ fn answer<S: Simd>(
     rests: &[bool],
     skin: &Skin<'_>,
     faults: bool,
-    ahead: &mut Ahead<'_>,
+    meanwhile: &mut Meanwhile<'_, '_, '_>,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
@@ -251,7 +268,7 @@ fn answer<S: Simd>(
                     LANES,
                     wanted,
                     #[inline(always)]
-                    || ahead.step(),
+                    || meanwhile.step(),
                     between,
                     answers,
                 );

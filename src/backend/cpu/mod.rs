@@ -148,24 +148,37 @@ impl Cpu {
         let frames = cells.frames();
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
-        let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::new(&self.plan)));
+        let plan = &self.plan;
+        let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::pair(plan)));
+        let steps = plan.fields.len() * lot::calls(plan.stages());
+        // What the block before has left to be written.
+        let mut last: Option<CellsMut<'_>> = None;
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
-            let (plan, tables, at) = (&self.plan, &self.tables, first + done);
+            let at = first + done;
             let before = the_one_before(raw.rows, at, &self.before);
-            let mut block = |cells: &mut CellsMut<'_>| {
-                batch::block(self.level, plan, tables, raw, at, before, &mut scratch, cells, streams);
+            let mut block = |cells: &mut CellsMut<'_>, outgoing: Option<&mut stream::Outgoing<'_>>| {
+                batch::block(self.level, plan, &self.tables, raw, at, before, &mut scratch, cells, outgoing);
             };
-            if let Some(staged) = &mut staged {
+            if let Some([now, earlier]) = &mut staged {
                 stream::announce(&mut cells);
-                let mut staged = staged.cells(cells.frames());
-                block(&mut staged);
-                stream::copy(&mut staged, &mut cells);
+                let mut earlier_cells = last.as_ref().map(|last| earlier.cells(last.frames()));
+                let mut outgoing = match earlier_cells.as_mut().zip(last.as_mut()) {
+                    Some((from, to)) => stream::Outgoing::new(from, to, steps),
+                    None => stream::Outgoing::default(),
+                };
+                block(&mut now.cells(cells.frames()), Some(&mut outgoing));
+                outgoing.finish();
+                std::mem::swap(now, earlier);
+                last = Some(cells);
             } else {
-                block(&mut cells);
+                block(&mut cells, None);
             }
             (rest, done) = (later, done + LANES);
+        }
+        if let (Some([_, earlier]), Some(mut last)) = (&mut staged, last) {
+            stream::Outgoing::new(&mut earlier.cells(last.frames()), &mut last, steps).finish();
         }
         scratch.staged = staged.or(scratch.staged);
         self.scratches.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);

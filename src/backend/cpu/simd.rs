@@ -96,21 +96,20 @@ pub(super) fn soon_needed<T>(value: &T) {
     fetch::<T, true>(value);
 }
 
-/// The same into the next larger cache, for what is needed later.
+/// The same into the next larger cache, for what is needed later, if there is anything.
 #[inline(always)]
-pub(super) fn later_needed<T>(value: &T) {
+pub(super) fn later_needed<T>(value: *const T) {
     fetch::<T, false>(value);
 }
 
 #[inline(always)]
 #[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
-fn fetch<T, const SOON: bool>(value: &T) {
+fn fetch<T, const SOON: bool>(value: *const T) {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: a hint reads and writes nothing, and the address is that of a living value.
+    // SAFETY: a hint reads and writes nothing, wherever it points.
     unsafe {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
-        let line = std::ptr::from_ref(value).cast();
-        if SOON { _mm_prefetch::<_MM_HINT_T0>(line) } else { _mm_prefetch::<_MM_HINT_T1>(line) }
+        if SOON { _mm_prefetch::<_MM_HINT_T0>(value.cast()) } else { _mm_prefetch::<_MM_HINT_T1>(value.cast()) }
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;

@@ -5,7 +5,7 @@
 //! a block's answers are first put together in the cache; there a column's lie one after the other, as in the percepts.
 
 use super::columns;
-use super::simd::{LANES, soon_needed};
+use super::simd::{LANES, Row, soon_needed};
 use crate::percept::{CellsMut, Percepts, Precision};
 use crate::scene::Plan;
 
@@ -27,7 +27,12 @@ pub(super) fn is_worth(plan: &Plan, cells: &mut CellsMut<'_>) -> bool {
 pub(super) struct Staged(Percepts);
 
 impl Staged {
-    pub(super) fn new(plan: &Plan) -> Self {
+    /// For one block that is computed, and for the one before it, which is on its way.
+    pub(super) fn pair(plan: &Plan) -> [Self; 2] {
+        std::array::from_fn(|_| Self::new(plan))
+    }
+
+    fn new(plan: &Plan) -> Self {
         let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32).with_columns(plan.columns, 0);
         percepts.reset(LANES);
         Self(percepts)
@@ -40,7 +45,7 @@ impl Staged {
     }
 }
 
-/// Has the lines fetched of which [`copy`] writes only a part.
+/// Has the lines fetched of which [`Outgoing`] writes only a part.
 pub(super) fn announce(cells: &mut CellsMut<'_>) {
     for column in columns::all(cells) {
         if let (Some(first), Some(last)) = (column.first(), column.last()) {
@@ -50,37 +55,94 @@ pub(super) fn announce(cells: &mut CellsMut<'_>) {
     }
 }
 
-/// Copies the answers of `staged` to the same columns of `cells`.
-#[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "there is no safe word for such stores")]
-pub(super) fn copy(staged: &mut CellsMut<'_>, cells: &mut CellsMut<'_>) {
-    use core::arch::x86_64::{__m128i, _mm_loadu_si128, _mm_sfence, _mm_stream_si128};
-    #[repr(align(64))]
-    struct Line([__m128i; 4]);
-    for (from, to) in columns::all(staged).into_iter().zip(columns::all(cells)) {
-        // SAFETY: any bits are a line.
-        let (head, lines, tail) = unsafe { to.align_to_mut::<Line>() };
-        let (from_head, from) = from.split_at(head.len());
-        let (from_lines, from_tail) = from.split_at(from.len() - tail.len());
-        head.copy_from_slice(from_head);
-        tail.copy_from_slice(from_tail);
-        for (line, from) in lines.iter_mut().zip(from_lines.as_chunks::<16>().0) {
-            for (part, from) in line.0.iter_mut().zip(from.as_chunks::<4>().0) {
-                // SAFETY: every processor of this architecture has these instructions, and a line begins where such a
-                // store has to. Nobody else has `cells` until the fence below.
-                unsafe { _mm_stream_si128(part, _mm_loadu_si128(from.as_ptr().cast::<__m128i>())) };
-            }
-        }
+/// A line of memory.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Line([u32; LANES]);
+
+/// A block's answers on their way from where they were put together to the same columns of percepts, a few lines at a time
+/// while the next block is computed: memory takes a line in the time of some ten others' work, and a core waits where it
+/// has to take many.
+#[derive(Default)]
+pub(super) struct Outgoing<'a> {
+    /// By column, what is still to be written, and where.
+    columns: [(&'a [Row<u32>], &'a mut [Line]); 12],
+    column: usize,
+    at_a_time: usize,
+}
+
+impl<'a> Outgoing<'a> {
+    /// Those of `staged`, for the same columns of `cells`, in so many `steps`.
+    pub(super) fn new(staged: &'a mut CellsMut<'_>, cells: &'a mut CellsMut<'_>, steps: usize) -> Self {
+        let mut lines = 0;
+        let mut from = columns::all(staged).into_iter();
+        let columns = columns::all(cells).map(|to| {
+            let from: &[u32] = from.next().unwrap_or_default();
+            let (head, middle, tail) = in_lines(to);
+            head.copy_from_slice(&from[..head.len()]);
+            tail.copy_from_slice(&from[from.len() - tail.len()..]);
+            lines += middle.len();
+            (from[head.len()..].as_chunks().0, middle)
+        });
+        // A step never goes on with the next column.
+        let steps = steps.saturating_sub(columns.len()).max(1);
+        Self { columns, column: 0, at_a_time: lines.div_ceil(steps) }
     }
-    // SAFETY: every processor of this architecture has it. From here on all stores are there for whoever looks.
-    unsafe { _mm_sfence() };
+
+    /// Writes the next few lines.
+    #[inline(always)]
+    pub(super) fn step(&mut self) {
+        let Some((from, to)) = self.columns.get_mut(self.column) else { return };
+        let count = self.at_a_time.min(to.len());
+        let (now, later) = std::mem::take(to).split_at_mut(count);
+        let (now_from, later_from) = from.split_at(count);
+        now.iter_mut().zip(now_from).for_each(|(line, from)| write_past(line, from));
+        (*from, *to) = (later_from, later);
+        self.column += usize::from(to.is_empty());
+    }
+
+    /// Writes all that is left.
+    pub(super) fn finish(mut self) {
+        self.at_a_time = usize::MAX;
+        while self.column < self.columns.len() {
+            self.step();
+        }
+        done();
+    }
+}
+
+/// `column` without the lines that it has a part of: what comes before them, they, and what comes after.
+#[expect(unsafe_code, reason = "there is no safe word for whole lines of something smaller")]
+fn in_lines(column: &mut [u32]) -> (&mut [u32], &mut [Line], &mut [u32]) {
+    // SAFETY: any bits are a line.
+    unsafe { column.align_to_mut() }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+#[expect(unsafe_code, reason = "there is no safe word for such stores")]
+fn write_past(line: &mut Line, from: &Row<u32>) {
+    use core::arch::x86_64::{__m128i, _mm_loadu_si128, _mm_stream_si128};
+    for (part, from) in line.0.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks::<4>().0) {
+        // SAFETY: every processor of this architecture has these instructions, and a quarter of a line begins where such a
+        // store has to. Nobody else has the line until `done`.
+        unsafe { _mm_stream_si128(part.as_mut_ptr().cast::<__m128i>(), _mm_loadu_si128(from.as_ptr().cast())) };
+    }
 }
 
 /// As there is no need to.
 #[cfg(not(target_arch = "x86_64"))]
-pub(super) fn copy(staged: &mut CellsMut<'_>, cells: &mut CellsMut<'_>) {
-    for (from, to) in columns::all(staged).into_iter().zip(columns::all(cells)) {
-        to.copy_from_slice(from);
+fn write_past(line: &mut Line, from: &Row<u32>) {
+    line.0 = *from;
+}
+
+/// From here on all lines are there for whoever looks.
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "there is no safe word for it"))]
+fn done() {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: every processor of this architecture has it.
+    unsafe {
+        core::arch::x86_64::_mm_sfence();
     }
 }
 
@@ -107,7 +169,10 @@ mod tests {
             let untouched = bits(&mut to.cells_f32().unwrap());
             let (mut earlier, rest) = to.cells_f32().unwrap().split_at(before);
             let (mut part, mut later) = rest.split_at(frames);
-            copy(&mut from.cells_f32().unwrap(), &mut part);
+            let mut staged = from.cells_f32().unwrap();
+            let mut outgoing = Outgoing::new(&mut staged, &mut part, 30);
+            (0..fields).for_each(|_| outgoing.step());
+            outgoing.finish();
             assert_eq!(bits(&mut part), bits(&mut from.cells_f32().unwrap()), "{fields} fields");
             for (column, untouched) in untouched.iter().enumerate().filter(|(_, untouched)| !untouched.is_empty()) {
                 assert_eq!(bits(&mut earlier)[column], untouched[..before * fields]);
