@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use bytemuck::{cast_ref, cast_slice_mut};
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, f32x16, u32x16};
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
@@ -12,9 +13,10 @@ use super::columns::Place;
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
 use super::pick::SomeFrames;
-use super::simd::{F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::simd::{F, LANES, Row, U, load, load_u, splat, with_widest};
 use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
+use super::transpose::transpose;
 use super::wide::ManyAbreast;
 use super::{calibrate, change, columns};
 use crate::percept::CellsMut;
@@ -338,15 +340,13 @@ fn calibrate<S: Simd>(
         let rests = !is_pressed;
         let (abreast, kept) = (&mut scratch.pressures[place..place + LANES], &mut scratch.tiles[place / LANES]);
         if !rests {
-            let turned: [f32x16<S>; LANES] = transpose(simd, |frame| pressures[frame]);
-            abreast.iter_mut().zip(&turned).for_each(|(lanes, turned)| turned.store_slice(lanes));
+            transpose(simd, |frame| cast_ref(&pressures[frame]), cast_slice_mut::<Row<f32>, Row<u32>>(abreast));
         } else if !kept.rests {
             abreast.fill([0.0; LANES]);
         }
         let abreast = &mut scratch.statuses[place..place + LANES];
         if faults {
-            let turned: [u32x16<S>; LANES] = transpose(simd, |frame| statuses[frame]);
-            abreast.iter_mut().zip(&turned).for_each(|(lanes, turned)| turned.store_slice(lanes));
+            transpose(simd, |frame| &statuses[frame], abreast);
         } else if kept.faulty {
             abreast.fill([0; LANES]);
         }

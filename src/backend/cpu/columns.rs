@@ -1,11 +1,12 @@
 //! From sixteen fields' answers, a lane a frame, to the columns of percepts.
 
-use bytemuck::cast_slice_mut;
+use bytemuck::{cast_ref, cast_slice_mut};
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x16, u32x16};
+use fearless_simd::u32x16;
 
-use super::simd::{self, LANES, Row, transpose};
+use super::simd::{self, LANES, Row};
 use super::touch::{Cells, OneKind};
+use super::transpose::{Columns, transpose};
 use crate::percept::{CellsMut, Flags, Outputs};
 use crate::scene::PlanField;
 
@@ -35,16 +36,17 @@ impl Place {
         }
     }
 
-    /// Writes a row for each frame.
+    /// Writes the row of `frame`, if there is such a frame.
     #[inline(always)]
-    fn put<S: Simd, V: SimdBase<S>>(self, rows: &[V; LANES], column: &mut [V::Element]) {
-        for (frame, row) in rows.iter().take(self.frames).enumerate() {
-            let start = frame * self.fields + self.first;
-            // A whole row, though it may reach into the next frame: what belongs there is written later.
-            match column.get_mut(start..start + LANES) {
-                Some(cells) if self.fields >= LANES => row.store_slice(cells),
-                _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
-            }
+    fn put<S: Simd>(self, frame: usize, row: u32x16<S>, column: &mut [u32]) {
+        if frame >= self.frames {
+            return;
+        }
+        let start = frame * self.fields + self.first;
+        // A whole row, though it may reach into the next frame: what belongs there is written later.
+        match column.get_mut(start..start + LANES) {
+            Some(cells) if self.fields >= LANES => row.store_slice(cells),
+            _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
         }
     }
 
@@ -75,6 +77,21 @@ pub(super) fn all<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [u32]; 12] {
     ]
 }
 
+/// A column, and where in it answers go.
+struct Target<'a> {
+    column: &'a mut [u32],
+    place: Place,
+    mask: u32,
+}
+
+impl Columns for Target<'_> {
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, _: S, frame: usize, lanes: u32x16<S>) {
+        let lanes = if self.mask == u32::MAX { lanes } else { lanes & self.mask };
+        self.place.put(frame, lanes, self.column);
+    }
+}
+
 /// Writes answers where they belong.
 #[inline(always)]
 pub(super) fn write<S: Simd>(
@@ -94,9 +111,9 @@ pub(super) fn write<S: Simd>(
     floats(simd, answers, place, cells.axis, |cells| &cells.axis);
     floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
     integers(simd, answers, place, cells.active, |cells| &cells.active, u32::MAX);
-    integers(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    words(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
     let present = cast_slice_mut::<Outputs, u32>(cells.present);
-    integers(simd, answers, place, present, |cells| &cells.present, outputs.bits());
+    words(simd, answers, place, present, |cells| &cells.present, outputs.bits());
 }
 
 #[inline(always)]
@@ -107,10 +124,7 @@ fn floats<S: Simd>(
     column: &mut [f32],
     of: impl Fn(&Cells) -> &Row<f32>,
 ) {
-    if !column.is_empty() {
-        let rows: [f32x16<S>; LANES] = transpose(simd, |field| *of(&answers[field]));
-        place.put(&rows, column);
-    }
+    integers(simd, answers, place, cast_slice_mut(column), |cells| cast_ref(of(cells)), u32::MAX);
 }
 
 #[inline(always)]
@@ -123,8 +137,30 @@ fn integers<S: Simd>(
     mask: u32,
 ) {
     if !column.is_empty() {
-        let rows: [u32x16<S>; LANES] = transpose(simd, |field| of(&answers[field]).map(|bits| bits & mask));
-        place.put(&rows, column);
+        transpose(simd, |field| of(&answers[field]), &mut Target { column, place, mask });
+    }
+}
+
+/// [`integers`] for what is often the same in all fields and frames.
+#[inline(always)]
+fn words<S: Simd>(
+    simd: S,
+    answers: &[Cells; LANES],
+    place: Place,
+    column: &mut [u32],
+    of: impl Fn(&Cells) -> &Row<u32>,
+    mask: u32,
+) {
+    let first = u32x16::splat(simd, of(&answers[0])[0]);
+    let mut others = u32x16::splat(simd, 0);
+    for answer in &answers[..place.count] {
+        others |= u32x16::from_slice(simd, of(answer)) ^ first;
+    }
+    if others.simd_gt(u32x16::splat(simd, 0)).any_true() {
+        integers(simd, answers, place, column, of, mask);
+    } else {
+        let row = first & mask;
+        (0..place.frames).for_each(|frame| place.put(frame, row, column));
     }
 }
 

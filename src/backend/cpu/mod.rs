@@ -31,6 +31,7 @@ mod stream;
 #[cfg(test)]
 mod tests;
 mod touch;
+mod transpose;
 mod wide;
 mod window;
 

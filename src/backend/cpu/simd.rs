@@ -114,25 +114,3 @@ fn fetch<T, const SOON: bool>(value: *const T) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
 }
-
-/// Rows turned into columns: lane j of row i becomes lane i of column j. Four perfect shuffles do it.
-#[inline(always)]
-pub(super) fn transpose<S: Simd, V: SimdBase<S>>(simd: S, row: impl Fn(usize) -> Row<V::Element>) -> [V; LANES] {
-    let mut now = [V::from_slice(simd, &row(0)); LANES];
-    let mut i = 1;
-    while i < LANES {
-        now[i] = V::from_slice(simd, &row(i));
-        i += 1;
-    }
-    let mut round = 0;
-    while round < 4 {
-        let before = now;
-        let mut i = 0;
-        while i < LANES / 2 {
-            (now[2 * i], now[2 * i + 1]) = before[i].interleave(before[i + LANES / 2]);
-            i += 1;
-        }
-        round += 1;
-    }
-    now
-}
