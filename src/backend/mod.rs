@@ -90,6 +90,18 @@ pub(crate) struct RawBatch<'a> {
 /// Tiles of sixteen values that are looked at together.
 pub(crate) const BLOCK: usize = 16;
 
+/// Where in a frame a few cache lines begin.
+pub(crate) type FewLines = [u32; 4];
+
+/// `lines` in ascending order, each once but for what fills up the last few.
+pub(crate) fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
+    lines.sort_unstable();
+    lines.dedup();
+    let last = lines.last().copied().unwrap_or_default();
+    lines.resize(lines.len().next_multiple_of(4), last);
+    lines.as_chunks().0.to_vec()
+}
+
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
@@ -101,7 +113,7 @@ pub(crate) struct Picks {
     /// Per [`BLOCK`] tiles of sixteen whose values lie one after the other: where they start.
     pub(crate) blocks: Vec<Option<usize>>,
     /// The first of each sixteen values of a frame that hold any that is wanted.
-    pub(crate) lines: Vec<u32>,
+    pub(crate) lines: Vec<FewLines>,
     /// What [`Near::Shuffled`] refers to.
     pub(crate) shuffles: Vec<Shuffle>,
 }
@@ -175,9 +187,7 @@ impl Picks {
             tiles.iter().enumerate().all(follows).then_some(from)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
-        let mut lines: Vec<u32> = places.iter().map(|place| place / 16 * 16).collect();
-        lines.sort_unstable();
-        lines.dedup();
+        let lines = few_at_a_time(places.iter().map(|place| place / 16 * 16).collect());
         Self { near, blocks, lines, shuffles, channels: channels.len(), places }
     }
 }

@@ -8,9 +8,9 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::super::{Near, Picks, Rows};
+use super::super::{FewLines, Near, Picks, Rows, few_at_a_time};
 use super::simd::{LANES, later_needed};
-use crate::signal::Frame;
+use crate::signal::{Frame, RawValue};
 
 /// Bytes of raw values from which on they are fetched: what is less may still be in a cache. Tests have less.
 const MUCH: usize = if cfg!(test) { 1 << 16 } else { 8 << 20 };
@@ -23,34 +23,29 @@ const LINE: usize = 64;
 /// few.
 pub(super) fn worth(raw: Rows<'_>) -> Option<(&[Frame], &Picks)> {
     let Rows::Picked { frames, picks } = raw else { return None };
-    let frame = picks.lines.len() * LINE;
+    let frame = picks.lines.as_flattened().len() * LINE;
     (frames.len() * frame >= MUCH && LANES * frame <= BLOCK).then_some((frames, picks))
 }
 
-/// How many of each frame's `lines` are fetched in a step, of which none takes lines of two `frames`.
-fn at_a_time(frames: usize, lines: usize, steps: usize) -> usize {
-    lines.div_ceil((steps / frames.max(1)).max(1))
-}
-
 /// What is still to be fetched, and how much of it at a time.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Ahead<'a> {
+    /// The frame whose lines are fetched, and those after it.
+    values: &'a [RawValue],
     frames: &'a [Frame],
-    /// Where in a frame the lines begin.
-    lines: Cow<'a, [u32]>,
-    line: usize,
+    /// Where in each frame the lines begin, a few at a time.
+    lines: Cow<'a, [FewLines]>,
+    next: usize,
     at_a_time: usize,
 }
 
 impl<'a> Ahead<'a> {
     /// The sixteen frames of `raw` from `first` on, in so many `steps`.
     pub(super) fn new(raw: Rows<'a>, first: usize, steps: usize) -> Self {
-        let Some((frames, picks)) = worth(raw) else {
-            return Self { frames: &[], lines: Cow::Borrowed(&[]), line: 0, at_a_time: 0 };
-        };
-        let frames = &frames[first.min(frames.len())..frames.len().min(first + LANES)];
-        let at_a_time = at_a_time(frames.len(), picks.lines.len(), steps);
-        Self { frames, lines: Cow::Borrowed(&picks.lines), line: 0, at_a_time }
+        let Some((frames, picks)) = worth(raw) else { return Self::default() };
+        let mut ahead = Self { lines: Cow::Borrowed(&picks.lines), ..Self::default() };
+        ahead.begin(&frames[first.min(frames.len())..frames.len().min(first + LANES)], steps);
+        ahead
     }
 
     /// Now those of `tiles` in `frames`, in so many `steps`.
@@ -62,31 +57,32 @@ impl<'a> Ahead<'a> {
         steps: usize,
     ) {
         let Rows::Picked { frames: all, picks } = raw else { return };
-        let lines = self.lines.to_mut();
-        lines.clear();
-        for tile in tiles {
-            let (from, values) = match picks.near[tile] {
-                Near::Straight(from) => (from, LANES),
-                Near::Shuffled(at) => (picks.shuffles[at].from, 2 * LANES),
-                Near::Scattered => continue,
-            };
-            lines.extend((from / LANES..(from + values).div_ceil(LANES)).map(|line| (line * LANES) as u32));
-        }
-        lines.dedup();
-        self.at_a_time = at_a_time(frames.len(), lines.len(), steps);
-        (self.frames, self.line) = (if lines.is_empty() { &[] } else { &all[frames] }, 0);
+        let tiles = tiles.filter_map(|tile| match picks.near[tile] {
+            Near::Straight(from) => Some((from, LANES)),
+            Near::Shuffled(at) => Some((picks.shuffles[at].from, 2 * LANES)),
+            Near::Scattered => None,
+        });
+        let lines = tiles.flat_map(|(from, values)| from / LANES..(from + values).div_ceil(LANES));
+        self.lines = Cow::Owned(few_at_a_time(lines.map(|line| (line * LANES) as u32).collect()));
+        self.begin(&all[frames], steps);
     }
 
-    /// Has the next few lines of a frame fetched.
+    fn begin(&mut self, frames: &'a [Frame], steps: usize) {
+        self.at_a_time = (frames.len() * self.lines.len()).div_ceil(steps.max(1));
+        (self.frames, self.next) = (frames, self.lines.len());
+    }
+
+    /// Has the next few lines fetched.
     #[inline(always)]
     pub(super) fn step(&mut self) {
-        let Some((frame, later)) = self.frames.split_first() else { return };
-        let lines = &self.lines[self.line..];
-        let count = self.at_a_time.min(lines.len());
-        lines[..count].iter().for_each(|&line| later_needed(frame.values.as_ptr().wrapping_add(line as usize)));
-        self.line += count;
-        if self.line == self.lines.len() {
-            (self.frames, self.line) = (later, 0);
+        for _ in 0..self.at_a_time {
+            if self.next == self.lines.len() {
+                let Some((first, later)) = self.frames.split_first() else { return };
+                (self.values, self.frames, self.next) = (&first.values, later, 0);
+            }
+            let Some(lines) = self.lines.get(self.next) else { return };
+            lines.iter().for_each(|&line| later_needed(self.values.as_ptr().wrapping_add(line as usize)));
+            self.next += 1;
         }
     }
 }
