@@ -1,17 +1,20 @@
 //! calibrate in lanes: sixteen taxels of one frame abreast; see [`crate::stage::calibrate`].
 
-use fearless_simd::Level;
 use fearless_simd::prelude::*;
+use fearless_simd::{Level, f32x16, i32x16, u32x16};
 
 use super::super::Rows;
 use super::Tables;
 use super::lines::Aligned;
 use super::pick::OneFrame;
-use super::simd::{F, I, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
 use crate::stage::layout::{FIRST_CURVE, Knot, MASKED, STRAIGHT, Taxel};
+
+/// Tiles of a frame that are asked together whether all is plain.
+const TOGETHER: usize = 16;
 
 /// Sixteen taxels' calibration, quantity by quantity.
 #[derive(Clone, Copy, Debug)]
@@ -120,72 +123,72 @@ pub(super) fn plain<S: Simd>(
     if !tile.straight {
         return None;
     }
-    let (none, mut pressed) = (splat(simd, 0.0), splat_u(simd, 0));
-    let mut at = 0;
-    while at < LANES {
-        let lanes = at..at + width::<S>();
-        let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
-        let mut sizes = Sizes::new(simd);
-        if tile.raw_is_pressure {
-            for (bits, pressures) in raw.iter().zip(&mut *pressures) {
-                let bits = U::<S>::from_slice(simd, &bits[lanes.clone()]);
-                sizes.see(simd, bits);
-                // As a whole number of either sign, whatever is negative is less than 0, −0 too.
-                let pressure = bits.bitcast::<I<S>>().max(I::<S>::splat(simd, 0)).bitcast::<U<S>>();
-                pressed |= pressure;
-                store(simd, pressure.bitcast(), pressures, at);
-            }
-            if !sizes.are_fine(simd) {
-                return None;
-            }
-        } else {
-            let (baseline, gain, dead_band) = (of(&tile.baseline), of(&tile.gain), of(&tile.dead_band));
-            let (mut low, mut high, mut most) = (of(&tile.raw_high), of(&tile.raw_low), none);
-            for (bits, pressures) in raw.iter().zip(&mut *pressures) {
-                let bits = U::<S>::from_slice(simd, &bits[lanes.clone()]);
-                let value = bits.bitcast::<F<S>>();
-                let pressure = (value - baseline) * gain;
-                sizes.see(simd, bits);
-                sizes.see(simd, pressure.bitcast());
-                (low, high, most) = (low.min(value), high.max(value), most.max(pressure));
-                let pressure = pressure.simd_gt(dead_band).select(pressure, none);
-                pressed |= pressure.bitcast::<U<S>>();
-                store(simd, pressure, pressures, at);
-            }
-            let within = low.simd_ge(of(&tile.raw_low)) & high.simd_le(of(&tile.raw_high));
-            if !(sizes.are_fine(simd) && (within & most.simd_le(of(&tile.p_max))).all_true()) {
-                return None;
-            }
+    let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
+    let (none, mut pressed, mut sizes) = (f32x16::splat(simd, 0.0), u32x16::splat(simd, 0), Sizes::new(simd));
+    if tile.raw_is_pressure {
+        for (bits, pressures) in raw.iter().zip(pressures) {
+            let bits = u32x16::from_slice(simd, bits);
+            sizes.see(simd, bits);
+            let pressure = unsigned(simd, bits);
+            pressed |= pressure.bitcast::<u32x16<S>>();
+            pressure.store_slice(pressures);
         }
-        at += width::<S>();
+        if !sizes.are_fine(simd) {
+            return None;
+        }
+    } else {
+        let (baseline, gain, dead_band) = (of(&tile.baseline), of(&tile.gain), of(&tile.dead_band));
+        let (mut low, mut high, mut most) = (of(&tile.raw_high), of(&tile.raw_low), none);
+        for (bits, pressures) in raw.iter().zip(pressures) {
+            let bits = u32x16::from_slice(simd, bits);
+            let value = bits.bitcast::<f32x16<S>>();
+            let pressure = (value - baseline) * gain;
+            sizes.see(simd, bits);
+            sizes.see(simd, pressure.bitcast());
+            (low, high, most) = (low.min(value), high.max(value), most.max(pressure));
+            let pressure = pressure.simd_gt(dead_band).select(pressure, none);
+            pressed |= pressure.bitcast::<u32x16<S>>();
+            pressure.store_slice(pressures);
+        }
+        let within = low.simd_ge(of(&tile.raw_low)) & high.simd_le(of(&tile.raw_high));
+        if !(sizes.are_fine(simd) && (within & most.simd_le(of(&tile.p_max))).all_true()) {
+            return None;
+        }
     }
-    Some(pressed.simd_gt(splat_u(simd, 0)).any_true())
+    Some(pressed.simd_gt(u32x16::splat(simd, 0)).any_true())
+}
+
+/// A number of these `bits`, or 0 where that is negative: as a whole number of either sign it is less than 0 then, −0 too.
+#[inline(always)]
+fn unsigned<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
+    bits.bitcast::<i32x16<S>>().max(i32x16::splat(simd, 0)).bitcast()
 }
 
 /// The largest size of numbers, and the smallest that is not 0, less one.
 struct Sizes<S: Simd> {
-    largest: U<S>,
-    smallest: U<S>,
+    largest: u32x16<S>,
+    smallest: u32x16<S>,
 }
 
 impl<S: Simd> Sizes<S> {
     #[inline(always)]
     fn new(simd: S) -> Self {
-        Self { largest: splat_u(simd, 0), smallest: splat_u(simd, u32::MAX) }
+        Self { largest: u32x16::splat(simd, 0), smallest: u32x16::splat(simd, u32::MAX) }
     }
 
     #[inline(always)]
-    fn see(&mut self, simd: S, bits: U<S>) {
+    fn see(&mut self, simd: S, bits: u32x16<S>) {
         let size = bits & SIZE_BITS;
         self.largest = self.largest.max(size);
         // Of 0 that is the largest there is.
-        self.smallest = self.smallest.min(size - splat_u(simd, 1));
+        self.smallest = self.smallest.min(size - u32x16::splat(simd, 1));
     }
 
     /// Whether [`fine`] held for all of them.
     #[inline(always)]
     fn are_fine(&self, simd: S) -> bool {
-        let fine = self.largest.simd_le(splat_u(simd, HUGE_BITS)) & self.smallest.simd_ge(splat_u(simd, TINY_BITS - 1));
+        let huge = u32x16::splat(simd, HUGE_BITS);
+        let fine = self.largest.simd_le(huge) & self.smallest.simd_ge(u32x16::splat(simd, TINY_BITS - 1));
         fine.all_true()
     }
 }
@@ -212,13 +215,59 @@ fn tiles<S: Simd>(
     statuses: &mut [Row<u32>],
 ) -> bool {
     let (mut faults, values) = (false, OneFrame::new(raw, frame));
-    let rows = pressures.iter_mut().zip(statuses);
-    for (index, (one, (pressures, statuses))) in tables.tiles.iter().zip(rows).enumerate() {
-        let Aligned(bits) = &mut Aligned([0; LANES]);
-        values.read(simd, index, plan.calibrated(), bits);
-        faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
+    let rows = pressures.chunks_mut(TOGETHER).zip(statuses.chunks_mut(TOGETHER));
+    for (group, (tiles, (pressures, statuses))) in tables.tiles.chunks(TOGETHER).zip(rows).enumerate() {
+        let first = group * TOGETHER;
+        if plain_tiles(simd, plan, tiles, values, first, pressures) {
+            statuses[..tiles.len()].fill([0; LANES]);
+            continue;
+        }
+        for (index, (one, (pressures, statuses))) in (first..).zip(tiles.iter().zip(pressures.iter_mut().zip(statuses))) {
+            let Aligned(bits) = &mut Aligned([0; LANES]);
+            values.read(simd, index, plan.calibrated(), bits);
+            faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
+        }
     }
     faults
+}
+
+/// As [`tile`], for `tiles` of a frame, which begin with tile `first`, if nothing is to be said of any value: whether that is
+/// so. If not `pressures` has nothing of use.
+///
+/// What has to hold for every value is asked once.
+#[inline(always)]
+fn plain_tiles<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    tiles: &[Tile],
+    values: OneFrame<'_>,
+    first: usize,
+    pressures: &mut [Row<f32>],
+) -> bool {
+    let (none, mut sizes, mut beyond) = (f32x16::splat(simd, 0.0), Sizes::new(simd), u32x16::splat(simd, 0));
+    for (index, (tile, pressures)) in (first..).zip(tiles.iter().zip(pressures)) {
+        if !tile.straight {
+            return false;
+        }
+        let Aligned(bits) = &mut Aligned([0; LANES]);
+        values.read(simd, index, plan.calibrated(), bits);
+        let bits = u32x16::from_slice(simd, bits);
+        sizes.see(simd, bits);
+        if tile.raw_is_pressure {
+            unsigned(simd, bits).store_slice(pressures);
+            continue;
+        }
+        let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
+        let value = bits.bitcast::<f32x16<S>>();
+        let pressure = (value - of(&tile.baseline)) * of(&tile.gain);
+        sizes.see(simd, pressure.bitcast());
+        let within = value.simd_ge(of(&tile.raw_low))
+            & value.simd_le(of(&tile.raw_high))
+            & pressure.simd_le(of(&tile.p_max));
+        beyond |= within.select(u32x16::splat(simd, 0), u32x16::splat(simd, 1));
+        pressure.simd_gt(of(&tile.dead_band)).select(pressure, none).store_slice(pressures);
+    }
+    sizes.are_fine(simd) && !beyond.simd_gt(u32x16::splat(simd, 0)).any_true()
 }
 
 /// Where a number is 0 or neither tiny nor unbelievable.

@@ -275,9 +275,13 @@ fn say<S: Simd>(simd: S, line: &Line<S>, at: usize, cells: &mut Cells) {
     store_u(simd, present, &mut cells.present, at);
 }
 
-/// The power of two that brings `total` into [1, 2).
+/// 1 where `total` is neither under 1 nor so large that squares would be none; the power of two that brings it into [1, 2)
+/// elsewhere.
 #[inline(always)]
 fn scale_of<S: Simd>(simd: S, total: F<S>) -> F<S> {
+    const ONE: u32 = 127 << 23;
+    const LARGE: u32 = (127 + 40) << 23;
     let exponent = total.bitcast::<U<S>>() & 0x7F80_0000;
-    (splat_u(simd, 254 << 23) - exponent).bitcast()
+    let is_fit = (exponent - splat_u(simd, ONE)).simd_lt(splat_u(simd, LARGE - ONE));
+    is_fit.select(splat_u(simd, ONE), splat_u(simd, 2 * ONE) - exponent).bitcast()
 }

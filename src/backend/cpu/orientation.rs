@@ -25,12 +25,22 @@ pub(super) struct Apart<S: Simd> {
 /// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
 #[inline(always)]
 pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
+    if touch.scale.simd_eq(splat(simd, 1.0)).all_true() {
+        search::<S, P, false>(simd, members, at, touch)
+    } else {
+        search::<S, P, true>(simd, members, at, touch)
+    }
+}
+
+/// The same; not `SCALED` where every scale is 1, which saves a twentieth of the work.
+#[inline(always)]
+fn search<S: Simd, P: Members<S>, const SCALED: bool>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
     let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
     let mut far = Apart::<S> { r: [unset; 3], x: none, y: none };
     let (mut farthest_x, mut farthest_y) = (none, none);
     for member in 0..members.count() {
         // Strictly larger, so that the lower id stays.
-        let (r, x, y) = point(simd, members, member, at, touch);
+        let (r, x, y) = point::<S, P, SCALED>(simd, members, member, at, touch);
         let (first, second) = (r.simd_gt(far.r[0]), r.simd_gt(far.r[1]));
         far.r[2] = far.r[2].max(far.r[1].min(r));
         far.r[1] = far.r[1].max(far.r[0].min(r));
@@ -46,7 +56,7 @@ pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, t
 
 /// A member's point e − c, and its squared distance.
 #[inline(always)]
-pub(super) fn point<S: Simd, P: Members<S>>(
+pub(super) fn point<S: Simd, P: Members<S>, const SCALED: bool>(
     simd: S,
     members: P,
     member: usize,
@@ -54,7 +64,7 @@ pub(super) fn point<S: Simd, P: Members<S>>(
     touch: &Touch<S>,
 ) -> (F<S>, F<S>, F<S>) {
     let part = members.part(simd, member, at);
-    let q = part.pull * touch.scale;
+    let q = if SCALED { part.pull * touch.scale } else { part.pull };
     let x = (part.u - touch.u) * q;
     let y = (part.v - touch.v) * q;
     (x * x + y * y, x, y)

@@ -290,7 +290,7 @@ pub(super) struct Touch<S: Simd> {
     pub(super) active: U<S>,
     pub(super) touched: M<S>,
     pub(super) total: F<S>,
-    /// The power of two that brings the total into [1, 2).
+    /// A power of two that brings the total where squares of its parts are numbers.
     pub(super) scale: F<S>,
     /// In the field's unit.
     pub(super) u: F<S>,

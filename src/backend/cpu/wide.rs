@@ -344,7 +344,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
             let (mut x1, mut y1, mut x2, mut y2) = (none, none, none, none);
             let (mut i1, mut i2) = (splat_u(simd, 0), splat_u(simd, 0));
             for member in 0..Members::<S>::count(self) {
-                let (r, x, y) = point(simd, self, member, at, touch);
+                let (r, x, y) = point::<S, Self, true>(simd, self, member, at, touch);
                 let here = splat_u(simd, member as u32);
                 let (first, second) = (r.simd_gt(r1), r.simd_gt(r2));
                 r3 = r3.max(r2.min(r));
