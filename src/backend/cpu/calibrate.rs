@@ -249,9 +249,7 @@ fn plain_tiles<S: Simd>(
         if !tile.straight {
             return false;
         }
-        let Aligned(bits) = &mut Aligned([0; LANES]);
-        values.read(simd, index, plan.calibrated(), bits);
-        let bits = u32x16::from_slice(simd, bits);
+        let bits = values.row(simd, index, plan.calibrated());
         sizes.see(simd, bits);
         if tile.raw_is_pressure {
             unsigned(simd, bits).store_slice(pressures);

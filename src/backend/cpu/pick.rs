@@ -4,8 +4,10 @@
 //! AVX-512, twice eight of sixteen with AVX2. They take a third and a quarter of the instructions of shuffling bytes.
 
 use fearless_simd::prelude::*;
+use fearless_simd::u32x16;
 
 use super::super::{Near, Picks, Rows, Shuffle};
+use super::lines::Aligned;
 use super::simd::{LANES, Row};
 
 /// A frame's raw values, for reading several tiles.
@@ -28,18 +30,36 @@ impl<'a> OneFrame<'a> {
         Self { raw, frame, picked }
     }
 
-    /// Reads the bits from slot 16 · `tile` on.
+    /// The bits from slot 16 · `tile` on.
     #[inline(always)]
-    pub(super) fn read<S: Simd>(self, simd: S, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
+    pub(super) fn row<S: Simd>(self, simd: S, tile: usize, calibrated: usize) -> u32x16<S> {
         if let Some((values, picks)) = self.picked {
             match picks.near[tile] {
-                Near::Straight(from) => return bits.copy_from_slice(&values[from..from + LANES]),
-                Near::Shuffled(at) if pick(simd, values, &picks.shuffles[at], bits) => return,
-                _ => {}
+                Near::Straight(from) => return u32x16::from_slice(simd, &values[from..from + LANES]),
+                Near::Shuffled(at) => {
+                    if let Some(row) = pick(simd, values, &picks.shuffles[at]) {
+                        return row;
+                    }
+                }
+                Near::Scattered => {}
             }
         }
-        self.raw.read(self.frame, tile * LANES, calibrated, bits);
+        u32x16::from_slice(simd, &one_by_one(self.raw, self.frame, tile, calibrated))
     }
+
+    /// Reads them.
+    #[inline(always)]
+    pub(super) fn read<S: Simd>(self, simd: S, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
+        self.row(simd, tile, calibrated).store_slice(bits);
+    }
+}
+
+/// The bits of frame `frame` of `raw` from slot 16 · `tile` on, wherever they lie.
+#[inline(never)]
+fn one_by_one(raw: Rows<'_>, frame: usize, tile: usize, calibrated: usize) -> Row<u32> {
+    let mut bits = [0; LANES];
+    raw.read(frame, tile * LANES, calibrated, &mut bits);
+    bits
 }
 
 /// Up to sixteen frames' raw values, for reading a tile of all of them at a time.
@@ -83,46 +103,48 @@ impl<'a> SomeFrames<'a> {
             (Near::Straight(from), _) => rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from..][..LANES])),
             (Near::Shuffled(at), Rows::Picked { picks, .. }) => {
                 for (frame, (values, bits)) in (self.first..).zip(rows) {
-                    if !pick(simd, values, &picks.shuffles[at], bits) {
-                        self.raw.read(frame, tile * LANES, calibrated, bits);
+                    match pick(simd, values, &picks.shuffles[at]) {
+                        Some(row) => row.store_slice(bits),
+                        None => *bits = one_by_one(self.raw, frame, tile, calibrated),
                     }
                 }
             }
             _ => {
                 for (frame, (_, bits)) in (self.first..).zip(rows) {
-                    self.raw.read(frame, tile * LANES, calibrated, bits);
+                    *bits = one_by_one(self.raw, frame, tile, calibrated);
                 }
             }
         }
     }
 }
 
-/// Reads those of `values` that `shuffle` says; whether they lie near enough for it, and the machine has instructions
-/// that pay.
+/// Those of `values` that `shuffle` says, if they lie near enough for it, and the machine has instructions that pay.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
-fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle, bits: &mut Row<u32>) -> bool {
-    use fearless_simd::{u32x8, u32x16};
+fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>> {
+    use fearless_simd::u32x8;
 
+    let Aligned(bits) = &mut Aligned([0; LANES]);
     if let Some(avx512) = simd.level().as_avx512() {
-        let Some(both) = values.get(shuffle.from..).and_then(|values| values.first_chunk::<32>()) else { return false };
+        let both = values.get(shuffle.from..)?.first_chunk::<32>()?;
         let lanes = |lanes: &[u32]| u32x16::from_slice(avx512, lanes);
         x86::of_32(avx512, lanes(&both[..16]), lanes(&both[16..]), lanes(&shuffle.places)).store_slice(bits);
-        return true;
+    } else {
+        let (avx2, halves) = (simd.level().as_avx2()?, shuffle.halves.as_ref()?);
+        for (half, bits) in halves.iter().zip(bits.as_chunks_mut::<8>().0) {
+            let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
+            let (low, high) = values[half.from..half.from + 16].split_at(8);
+            x86::of_sixteen(avx2, lanes(low), lanes(high), lanes(&half.places)).store_slice(bits);
+        }
     }
-    let (Some(avx2), Some(halves)) = (simd.level().as_avx2(), &shuffle.halves) else { return false };
-    for (half, bits) in halves.iter().zip(bits.as_chunks_mut::<8>().0) {
-        let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
-        let (low, high) = values[half.from..half.from + 16].split_at(8);
-        x86::of_sixteen(avx2, lanes(low), lanes(high), lanes(&half.places)).store_slice(bits);
-    }
-    true
+    // The same lanes under another name: nothing is stored.
+    Some(u32x16::from_slice(simd, bits))
 }
 
 #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
 #[inline(always)]
-fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle, _: &mut Row<u32>) -> bool {
-    false
+fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle) -> Option<u32x16<S>> {
+    None
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
