@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use super::super::{RawBatch, Rows};
 use super::Tables;
 use super::ahead::Ahead;
-use super::columns::Place;
+use super::columns::{Announcement, Place};
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
 use super::pick::SomeFrames;
@@ -179,7 +179,16 @@ pub(super) fn block(
     // written finds its way to memory while the next ones are computed.
     let last = plan.fields.len().div_ceil(LANES).saturating_sub(1);
     let ahead = Ahead::new(raw.rows, first + frames, plan.fields.len() * calls(plan.stages()));
-    let mut meanwhile = Meanwhile { ahead, outgoing };
+    let answers = outgoing.map_or_else(
+        || {
+            let mut announced = Announcement::of(cells);
+            announced.turn_to(last * LANES, frames, 1);
+            announced.step();
+            Answers::ToBeWritten(announced)
+        },
+        Answers::OnTheirWay,
+    );
+    let mut meanwhile = Meanwhile { ahead, answers };
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
         for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
@@ -193,8 +202,8 @@ pub(super) fn block(
         let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
         let skin = Skin { plan, pressures, statuses };
         let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
-        if meanwhile.outgoing.is_none() {
-            place.announce(cells);
+        if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
+            announced.turn_to(if chunk == last { 0 } else { place.first + LANES }, frames, steps);
         }
         let mut rests = [true; LANES];
         for (field, rests) in (place.first..).zip(&mut rests[..place.count]) {
@@ -214,15 +223,24 @@ pub(super) fn block(
 /// What a core does beside computing, a little at a time.
 struct Meanwhile<'a, 'b, 'c> {
     ahead: Ahead<'a>,
-    outgoing: Option<&'b mut Outgoing<'c>>,
+    answers: Answers<'b, 'c>,
+}
+
+/// What answers ask for.
+enum Answers<'b, 'c> {
+    /// The next ones are written where the cache does not have it yet.
+    ToBeWritten(Announcement),
+    /// The last block's are on their way past the caches.
+    OnTheirWay(&'b mut Outgoing<'c>),
 }
 
 impl Meanwhile<'_, '_, '_> {
     #[inline(always)]
     fn step(&mut self) {
         self.ahead.step();
-        if let Some(outgoing) = &mut self.outgoing {
-            outgoing.step();
+        match &mut self.answers {
+            Answers::ToBeWritten(announced) => announced.step(),
+            Answers::OnTheirWay(outgoing) => outgoing.step(),
         }
     }
 }

@@ -222,7 +222,8 @@ fn tiles<S: Simd>(
             statuses[..tiles.len()].fill([0; LANES]);
             continue;
         }
-        for (index, (one, (pressures, statuses))) in (first..).zip(tiles.iter().zip(pressures.iter_mut().zip(statuses))) {
+        for (index, (one, (pressures, statuses))) in (first..).zip(tiles.iter().zip(pressures.iter_mut().zip(statuses)))
+        {
             let Aligned(bits) = &mut Aligned([0; LANES]);
             values.read(simd, index, plan.calibrated(), bits);
             faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
@@ -259,9 +260,8 @@ fn plain_tiles<S: Simd>(
         let value = bits.bitcast::<f32x16<S>>();
         let pressure = (value - of(&tile.baseline)) * of(&tile.gain);
         sizes.see(simd, pressure.bitcast());
-        let within = value.simd_ge(of(&tile.raw_low))
-            & value.simd_le(of(&tile.raw_high))
-            & pressure.simd_le(of(&tile.p_max));
+        let within =
+            value.simd_ge(of(&tile.raw_low)) & value.simd_le(of(&tile.raw_high)) & pressure.simd_le(of(&tile.p_max));
         beyond |= within.select(u32x16::splat(simd, 0), u32x16::splat(simd, 1));
         pressure.simd_gt(of(&tile.dead_band)).select(pressure, none).store_slice(pressures);
     }

@@ -22,20 +22,6 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Has the memory that is going to be written fetched meanwhile.
-    pub(super) fn announce(self, cells: &mut CellsMut<'_>) {
-        all(cells).into_iter().for_each(|column| self.announce_column(column));
-    }
-
-    /// Of a row, where it begins: its end is where the one that was written before began.
-    fn announce_column(self, column: &[u32]) {
-        for frame in 0..self.frames {
-            if let Some(cell) = column.get(frame * self.fields + self.first) {
-                simd::soon_needed(cell);
-            }
-        }
-    }
-
     /// Writes the row of `frame`, if there is such a frame.
     #[inline(always)]
     fn put<S: Simd>(self, frame: usize, row: u32x16<S>, column: &mut [u32]) {
@@ -75,6 +61,53 @@ pub(super) fn all<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [u32]; 12] {
         cast_slice_mut(cells.axis),
         cast_slice_mut(cells.anisotropy),
     ]
+}
+
+/// Memory that is soon written, fetched a few lines at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Announcement {
+    /// The columns that there are, and how many.
+    columns: [*const u32; 12],
+    count: usize,
+    /// Where the next row begins, and in which of them.
+    at: usize,
+    column: usize,
+    /// From a row to the next frame's.
+    stride: usize,
+    rows: usize,
+    at_a_time: usize,
+}
+
+impl Announcement {
+    pub(super) fn of(cells: &mut CellsMut<'_>) -> Self {
+        let (mut columns, mut count) = ([std::ptr::null(); 12], 0);
+        for column in all(cells).into_iter().filter(|column| !column.is_empty()) {
+            columns[count] = column.as_ptr();
+            count += 1;
+        }
+        Self { columns, count, at: 0, column: 0, stride: cells.fields(), rows: 0, at_a_time: 0 }
+    }
+
+    /// Now the rows of the sixteen fields from `first` on, in so many `steps`. Of a row where it begins: its end is where the
+    /// one that was written before began.
+    pub(super) fn turn_to(&mut self, first: usize, frames: usize, steps: usize) {
+        let rows = self.count * frames;
+        (self.at, self.column, self.rows, self.at_a_time) = (first, 0, rows, rows.div_ceil(steps.max(1)));
+    }
+
+    /// Has the next few rows fetched.
+    #[inline(always)]
+    pub(super) fn step(&mut self) {
+        let rows = self.at_a_time.min(self.rows);
+        self.rows -= rows;
+        for _ in 0..rows {
+            simd::soon_needed(self.columns[self.column].wrapping_add(self.at));
+            self.column += 1;
+            if self.column == self.count {
+                (self.column, self.at) = (0, self.at + self.stride);
+            }
+        }
+    }
 }
 
 /// A column, and where in it answers go.

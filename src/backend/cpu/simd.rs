@@ -89,14 +89,14 @@ pub(super) fn bits_where<S: Simd>(simd: S, mask: M<S>, bits: u32) -> U<S> {
     mask.select(splat_u(simd, bits), splat_u(simd, 0))
 }
 
-/// Has the cache fetch the line that `value` begins in, to be read or written soon. A core that writes to memory waits for
-/// what was there before, too: a tenth of a batch's time.
+/// Has the cache fetch the line that `value` begins in, if there is such a thing, to be read or written soon. A core that
+/// writes to memory waits for what was there before, too: a tenth of a batch's time.
 #[inline(always)]
-pub(super) fn soon_needed<T>(value: &T) {
+pub(super) fn soon_needed<T>(value: *const T) {
     fetch::<T, true>(value);
 }
 
-/// The same into the next larger cache, for what is needed later, if there is anything.
+/// The same into the next larger cache, for what is needed later.
 #[inline(always)]
 pub(super) fn later_needed<T>(value: *const T) {
     fetch::<T, false>(value);
