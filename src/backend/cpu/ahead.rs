@@ -13,7 +13,7 @@ use super::simd::{LANES, later_needed};
 use crate::signal::{Frame, RawValue};
 
 /// Bytes of raw values from which on they are fetched: what is less may still be in a cache. Tests have less.
-const MUCH: usize = if cfg!(test) { 1 << 16 } else { 8 << 20 };
+const MUCH: usize = if cfg!(test) { 1 << 16 } else { 1 << 20 };
 /// Bytes of a block's raw values that the next larger cache has room for: it has 512 KiB and more.
 const BLOCK: usize = 512 << 10;
 /// Bytes of a line.
