@@ -12,19 +12,25 @@ use super::ahead::Ahead;
 use super::columns::{Announcement, Place};
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
-use super::pick::SomeFrames;
-use super::simd::{F, LANES, Row, U, load, load_u, splat, with_widest};
+use super::pick::{OneFrame, SomeFrames};
+use super::simd::{F, LANES, Row, U, load, load_u, reads_rows_abreast, splat, with_widest};
 use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::transpose::transpose;
 use super::wide::ManyAbreast;
-use super::{calibrate, change, columns};
+use super::{ahead, calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
+/// Tiles whose raw bits are read together where rows are not read abreast: frame by frame, as they lie in memory, so that the
+/// processor sees it coming.
+const GROUP: usize = 64;
+
 /// What a task needs to work in.
 pub(super) struct Scratch {
+    /// Raw bits of a few tiles, a row a frame.
+    bits: Lines<u32>,
     /// By slot, as far as the window reaches, a lane a frame.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
@@ -44,6 +50,7 @@ impl Scratch {
         let kept = tables.window.slots();
         let before = if plan.has_changes() { kept / LANES } else { 0 };
         Self {
+            bits: Lines::new(GROUP * LANES, 0),
             pressures: Lines::new(kept, 0.0),
             statuses: Lines::new(kept, 0),
             tiles: vec![KeptTile { rests: true, faulty: false }; kept / LANES],
@@ -320,18 +327,34 @@ fn read(
     tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    let raw = SomeFrames::new(raw, first, frames);
-    with_widest!(level, simd => calibrate(simd, plan, tables, &raw, frames, tiles, scratch))
+    if ahead::worth(raw).is_some() || reads_rows_abreast(level) {
+        let raw = SomeFrames::new(raw, first, frames);
+        return with_widest!(level, simd => calibrate(simd, plan, tables, Some(&raw), frames, tiles, scratch));
+    }
+    let mut faults = false;
+    for start in tiles.clone().step_by(GROUP) {
+        let group = start..tiles.end.min(start + GROUP);
+        for frame in 0..frames {
+            let values = OneFrame::new(raw, first + frame);
+            with_widest!(level, simd => {
+                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
+                    values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
+                }
+            });
+        }
+        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, None, frames, group, scratch));
+    }
+    faults
 }
 
-/// Calibrates tiles whose bits are there, or still to be read where they are `fetched`, and turns them so that a taxel's
-/// frames stand abreast. Whether any value is anything but a plain number.
+/// Calibrates tiles whose bits are there, or read from `raw` where they are not, and turns them so that a taxel's frames stand
+/// abreast. Whether any value is anything but a plain number.
 #[inline(always)]
 fn calibrate<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
-    raw: &SomeFrames<'_>,
+    raw: Option<&SomeFrames<'_>>,
     frames: usize,
     tiles: Range<usize>,
     scratch: &mut Scratch,
@@ -340,11 +363,17 @@ fn calibrate<S: Simd>(
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
+    let Scratch { bits: kept, .. } = scratch;
     for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        raw.read(simd, index, plan.calibrated(), bits);
-        let bits = &bits[..frames];
+        let bits = match raw {
+            Some(raw) => {
+                raw.read(simd, index, plan.calibrated(), bits);
+                &bits[..frames]
+            }
+            None => &kept[(index - tiles.start) * LANES..][..frames],
+        };
         let mut faults = false;
         let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(
             #[inline(always)]

@@ -93,7 +93,7 @@ impl Cpu {
                 (member.slot, [member.weight, member.u, member.v, depth, area])
             }))
         });
-        let window = window::Window::new(plan);
+        let window = window::Window::new(plan, level);
         let seen = window.members(plan);
         Self {
             tables: Tables {

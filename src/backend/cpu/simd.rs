@@ -5,6 +5,7 @@
 //! in registers. What stands in one is compiled once for each set of instructions, so there are few, none in a loop over
 //! lanes.
 
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 /// Runs an expression with the widest instructions of `level`, which `simd` stands for. On x86 these are AVX-512, AVX2 and
@@ -30,6 +31,19 @@ macro_rules! with_widest {
     }};
 }
 pub(super) use with_widest;
+
+/// Whether a machine with the instructions of `level` keeps values coming where rows of sixteen frames are read side by side,
+/// each in another page. Of two machines that were measured the one with AVX-512 does: recordings of 12,000 and of 10⁵ taxels
+/// took 0.6 and 0.5 times as long. The one without waited for memory a third of the time.
+pub(super) fn reads_rows_abreast(level: Level) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return level.as_avx512().is_some();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    {
+        let _ = level;
+        false
+    }
+}
 
 /// Lanes side by side.
 pub(super) const LANES: usize = 16;

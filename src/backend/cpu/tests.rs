@@ -195,7 +195,9 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     let scene = Scene { outputs: Outputs::USUAL, ..Scene::default() };
     let calibration = Calibration::identity(body.taxels.len());
     let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
-    assert!(!window::Window::new(&plan).is_whole());
+    let has_window = |level: Level| !window::Window::new(&plan, level).is_whole();
+    assert!(levels().into_iter().all(|level| has_window(level) != simd::reads_rows_abreast(level)));
+    assert!(levels().into_iter().any(has_window));
     let all_over = values(&plan, FRAMES);
     for raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
         // A frame alone has all of it.

@@ -7,7 +7,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::simd::LANES;
+use fearless_simd::Level;
+
+use super::simd::{LANES, reads_rows_abreast};
 use crate::scene::Plan;
 use crate::stage::layout::Member;
 
@@ -28,7 +30,8 @@ pub(super) struct Window {
 }
 
 impl Window {
-    pub(super) fn new(plan: &Plan) -> Self {
+    /// For a machine with the instructions of `level`.
+    pub(super) fn new(plan: &Plan, level: Level) -> Self {
         let needs: Vec<Range<usize>> = plan
             .fields
             .chunks(LANES)
@@ -40,8 +43,9 @@ impl Window {
             .collect();
         let all = plan.slots().next_multiple_of(LANES);
         let whole = Self { needs, slots: all, mask: usize::MAX };
-        // Changes and whoever wants all pressures go through all slots.
-        if all <= SMALL || plan.has_changes() || plan.kept_pressures() > 0 {
+        // Changes and whoever wants all pressures go through all slots. A machine that reads rows abreast reads all of them as
+        // fast as it reads a window's, and saves the search for what comes into it.
+        if all <= SMALL || reads_rows_abreast(level) || plan.has_changes() || plan.kept_pressures() > 0 {
             return whole;
         }
         let few = SIZES.into_iter().find_map(|slots| {
