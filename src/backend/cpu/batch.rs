@@ -363,7 +363,7 @@ fn calibrate<S: Simd>(
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
-    let Scratch { bits: kept, .. } = scratch;
+    let Scratch { bits: there, .. } = scratch;
     for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
         let slot = index * LANES;
         let place = slot & tables.window.mask();
@@ -372,7 +372,7 @@ fn calibrate<S: Simd>(
                 raw.read(simd, index, plan.calibrated(), bits);
                 &bits[..frames]
             }
-            None => &kept[(index - tiles.start) * LANES..][..frames],
+            None => &there[(index - tiles.start) * LANES..][..frames],
         };
         let mut faults = false;
         let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(

@@ -143,10 +143,11 @@ pub(super) fn write<S: Simd>(
     floats(simd, answers, place, cells.orientation, |cells| &cells.orientation);
     floats(simd, answers, place, cells.axis, |cells| &cells.axis);
     floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
-    integers(simd, answers, place, cells.active, |cells| &cells.active, u32::MAX);
-    words(simd, answers, place, cast_slice_mut::<Flags, u32>(cells.flags), |cells| &cells.flags, u32::MAX);
+    let to = |column, mask| Target { column, place, mask };
+    turn(simd, answers, |cells| &cells.active, to(&mut *cells.active, u32::MAX));
+    turn_or_fill(simd, answers, |cells| &cells.flags, to(cast_slice_mut::<Flags, u32>(cells.flags), u32::MAX));
     let present = cast_slice_mut::<Outputs, u32>(cells.present);
-    words(simd, answers, place, present, |cells| &cells.present, outputs.bits());
+    turn_or_fill(simd, answers, |cells| &cells.present, to(present, outputs.bits()));
 }
 
 #[inline(always)]
@@ -157,43 +158,31 @@ fn floats<S: Simd>(
     column: &mut [f32],
     of: impl Fn(&Cells) -> &Row<f32>,
 ) {
-    integers(simd, answers, place, cast_slice_mut(column), |cells| cast_ref(of(cells)), u32::MAX);
+    let to = Target { column: cast_slice_mut(column), place, mask: u32::MAX };
+    turn(simd, answers, |cells| cast_ref(of(cells)), to);
 }
 
+/// Turns the rows that `of` gives into those of a column.
 #[inline(always)]
-fn integers<S: Simd>(
-    simd: S,
-    answers: &[Cells; LANES],
-    place: Place,
-    column: &mut [u32],
-    of: impl Fn(&Cells) -> &Row<u32>,
-    mask: u32,
-) {
-    if !column.is_empty() {
-        transpose(simd, |field| of(&answers[field]), &mut Target { column, place, mask });
+fn turn<S: Simd>(simd: S, answers: &[Cells; LANES], of: impl Fn(&Cells) -> &Row<u32>, mut to: Target<'_>) {
+    if !to.column.is_empty() {
+        transpose(simd, |field| of(&answers[field]), &mut to);
     }
 }
 
-/// [`integers`] for what is often the same in all fields and frames.
+/// [`turn`] for what is often the same in all fields and frames.
 #[inline(always)]
-fn words<S: Simd>(
-    simd: S,
-    answers: &[Cells; LANES],
-    place: Place,
-    column: &mut [u32],
-    of: impl Fn(&Cells) -> &Row<u32>,
-    mask: u32,
-) {
+fn turn_or_fill<S: Simd>(simd: S, answers: &[Cells; LANES], of: impl Fn(&Cells) -> &Row<u32>, to: Target<'_>) {
     let first = u32x16::splat(simd, of(&answers[0])[0]);
     let mut others = u32x16::splat(simd, 0);
-    for answer in &answers[..place.count] {
+    for answer in &answers[..to.place.count] {
         others |= u32x16::from_slice(simd, of(answer)) ^ first;
     }
     if others.simd_gt(u32x16::splat(simd, 0)).any_true() {
-        integers(simd, answers, place, column, of, mask);
+        turn(simd, answers, of, to);
     } else {
-        let row = first & mask;
-        (0..place.frames).for_each(|frame| place.put(frame, row, column));
+        let row = first & to.mask;
+        (0..to.place.frames).for_each(|frame| to.place.put(frame, row, to.column));
     }
 }
 

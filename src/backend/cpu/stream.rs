@@ -23,7 +23,7 @@ pub(super) fn is_worth(plan: &Plan, cells: &mut CellsMut<'_>) -> bool {
     cfg!(target_arch = "x86_64") && !again && bytes >= MUCH && bytes / cells.frames() * LANES <= LITTLE
 }
 
-/// A block's answers, on their way.
+/// A block's answers, put together.
 pub(super) struct Staged(Percepts);
 
 impl Staged {
