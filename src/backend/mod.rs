@@ -118,14 +118,50 @@ pub(crate) struct Picks {
     pub(crate) shuffles: Vec<Shuffle>,
 }
 
-/// Where sixteen values lie among 32 of a frame.
+/// Where up to sixteen values lie among 32 of a frame.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Shuffle {
+    /// [`ELSEWHERE`] for those that do not lie there.
     pub(crate) places: [u32; 16],
     pub(crate) from: usize,
     /// The same for eight and eight of them, where each lie among sixteen.
     pub(crate) halves: Option<[Half; 2]>,
+}
+
+/// Not among 32 values.
+pub(crate) const ELSEWHERE: u32 = 63;
+
+/// So many shuffles bring sixteen values together faster than one by one.
+const SHUFFLES: usize = 4;
+
+impl Shuffle {
+    /// As few as together bring the values at `places` of a frame of `width` side by side, which is 32 or more; what fills up
+    /// the last ones is as good a value as any.
+    fn all(places: &[u32], width: usize) -> Vec<Self> {
+        let filled: [u32; 16] = std::array::from_fn(|lane| *places.get(lane).unwrap_or(&places[0]));
+        let mut sorted = filled;
+        sorted.sort_unstable();
+        let mut shuffles = Vec::<Self>::new();
+        for low in sorted {
+            if shuffles.last().is_some_and(|last| (low as usize) < last.from + 32) {
+                continue;
+            }
+            let from = (low as usize).min(width - 32);
+            let place = |lane: usize| match (filled[lane] as usize).checked_sub(from) {
+                Some(place) if place < 32 => place as u32,
+                _ => ELSEWHERE,
+            };
+            shuffles.push(Self { from, places: std::array::from_fn(place), halves: None });
+        }
+        if let [only] = &mut shuffles[..] {
+            // What fills up the last ones is there twice, then.
+            let [first, second] = [places, places.get(8..).filter(|rest| !rest.is_empty()).unwrap_or(places)];
+            let [first, second] = [first, second].map(|half| Half::new(&half[..half.len().min(8)], width));
+            only.halves = first.zip(second).map(|(first, second)| [first, second]);
+        }
+        shuffles
+    }
 }
 
 /// Where eight values lie among sixteen of a frame.
@@ -150,8 +186,11 @@ impl Half {
 pub(crate) enum Near {
     /// One after the other from here on.
     Straight(usize),
-    /// As this shuffle says.
-    Shuffled(usize),
+    /// As these shuffles say, each of some of them.
+    Shuffled {
+        first: usize,
+        count: usize,
+    },
     Scattered,
 }
 
@@ -160,24 +199,21 @@ impl Picks {
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
         let mut shuffles = Vec::new();
-        // What fills up the last ones is as good a value as any.
         let near = places.chunks(16).map(|places| {
-            let (low, high) = places.iter().fold((u32::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
-            let (low, high) = (low as usize, high as usize);
+            let low = places[0] as usize;
             if low + 16 <= width && places.iter().zip(low..).all(|(&place, at)| place as usize == at) {
                 return Near::Straight(low);
             }
-            let from = low.min(width.saturating_sub(32));
-            if width < 32 || high >= from + 32 {
+            if width < 32 {
                 return Near::Scattered;
             }
-            let place = |index: usize| places.get(index).unwrap_or(&places[0]) - from as u32;
-            // What fills up the last ones is there twice, then.
-            let [first, second] = [places, places.get(8..).filter(|rest| !rest.is_empty()).unwrap_or(places)];
-            let [first, second] = [first, second].map(|half| Half::new(&half[..half.len().min(8)], width));
-            let halves = first.zip(second).map(|(first, second)| [first, second]);
-            shuffles.push(Shuffle { from, places: std::array::from_fn(place), halves });
-            Near::Shuffled(shuffles.len() - 1)
+            let those = Shuffle::all(places, width);
+            if those.len() > SHUFFLES {
+                return Near::Scattered;
+            }
+            let (first, count) = (shuffles.len(), those.len());
+            shuffles.extend(those);
+            Near::Shuffled { first, count }
         });
         let near: Vec<Near> = near.collect();
         let block = |tiles: &[Near]| {

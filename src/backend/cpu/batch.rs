@@ -8,7 +8,7 @@ use fearless_simd::prelude::*;
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::ahead::Ahead;
+use super::ahead::{Ahead, Coming};
 use super::columns::{Announcement, Place};
 use super::lines::{Aligned, Lines};
 use super::lot::{Between, Wanted, calls, touch};
@@ -18,6 +18,7 @@ use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::transpose::transpose;
 use super::wide::ManyAbreast;
+use super::window::Stretch;
 use super::{ahead, calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
@@ -43,6 +44,8 @@ pub(super) struct Scratch {
     before: (Lines<f32>, Lines<u32>),
     /// Answers on their way past the caches, if any were.
     pub(super) staged: Option<[Staged; 2]>,
+    /// Whether any value of these frames so far is anything but a plain number.
+    faults: bool,
 }
 
 impl Scratch {
@@ -58,6 +61,7 @@ impl Scratch {
             between: Box::new([Between::EMPTY; LANES]),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
             staged: None,
+            faults: false,
         }
     }
 }
@@ -141,37 +145,46 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
     }
 }
 
-/// All stages for the frames of `raw` from `first` on, as many as `cells` has, which is at most sixteen; the one before
-/// them is in `before`.
+/// Where a stretch's frames are, and what is done beside computing them.
+pub(super) struct Job<'a, 'b> {
+    pub(super) raw: &'b RawBatch<'a>,
+    /// The first of up to sixteen frames.
+    pub(super) first: usize,
+    /// The one before them.
+    pub(super) before: (Rows<'b>, usize),
+    /// What is fetched for the next one.
+    pub(super) ahead: Ahead<'a>,
+}
+
+/// All stages for the fields of `stretch`, in as many frames as `cells` has, which is at most sixteen. Those before have their
+/// answers by then.
 #[expect(clippy::too_many_arguments, reason = "what a plan is run with, and where")]
-pub(super) fn block(
+pub(super) fn stretch(
     level: Level,
     plan: &Plan,
     tables: &Tables,
-    raw: &RawBatch<'_>,
-    first: usize,
-    before: (Rows<'_>, usize),
+    job: Job<'_, '_>,
+    stretch: &Stretch,
     scratch: &mut Scratch,
     cells: &mut CellsMut<'_>,
     outgoing: Option<&mut Outgoing<'_>>,
 ) {
+    let Job { raw, first, before, ahead } = job;
     let frames = cells.frames();
-    let window = &tables.window;
-    let mut faults = false;
-    let mut there = 0..0;
-    if window.is_whole() {
-        there = 0..window.slots() / LANES;
-        let tiles = 0..tables.tiles.len();
-        faults = read(level, plan, tables, raw.rows, first, frames, tiles, scratch);
+    if stretch.fields.start == 0 {
+        scratch.faults = false;
     }
-    if plan.has_changes() {
+    for tiles in stretch.reads.iter().filter(|tiles| !tiles.is_empty()) {
+        scratch.faults |= read(level, plan, tables, raw.rows, first, frames, tiles.clone(), scratch);
+    }
+    if stretch.fields.start == 0 && plan.has_changes() {
         let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
         calibrate::frame(level, plan, tables, before, was, said);
         let before = (was.as_flattened(), said.as_flattened());
-        faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
+        scratch.faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
         scratch.tiles.iter_mut().for_each(|tile| tile.rests = false);
     }
-    if !cells.pressures.is_empty() {
+    if stretch.fields.start == 0 && !cells.pressures.is_empty() {
         let slots = plan.slots();
         let tiles = scratch.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&scratch.tiles).enumerate();
         // Those at rest are 0 there already.
@@ -184,53 +197,60 @@ pub(super) fn block(
     }
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
-    let last = plan.fields.len().div_ceil(LANES).saturating_sub(1);
-    let ahead = Ahead::new(raw.rows, first + frames, plan.fields.len() * calls(plan.stages()));
+    let all = &plan.fields[stretch.fields.clone()];
+    let last = all.len().div_ceil(LANES).saturating_sub(1);
     let answers = outgoing.map_or_else(
         || {
             let mut announced = Announcement::of(cells);
-            announced.turn_to(last * LANES, frames, 1);
+            announced.turn_to(stretch.fields.start + last * LANES, frames, 1);
             announced.step();
             Answers::ToBeWritten(announced)
         },
         Answers::OnTheirWay,
     );
-    let mut meanwhile = Meanwhile { ahead, answers };
+    let Scratch { pressures, statuses, tiles, cells: of_fields, between, faults, .. } = scratch;
+    let skin = Skin { plan, pressures, statuses };
+    let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::default() };
     for chunk in std::iter::once(last).chain(0..last) {
-        let fields = &plan.fields[chunk * LANES..plan.fields.len().min((chunk + 1) * LANES)];
-        for tiles in window.slide(&mut there, chunk).into_iter().filter(|tiles| !tiles.is_empty()) {
-            faults |= read(level, plan, tables, raw.rows, first, frames, tiles, scratch);
-        }
+        let fields = &all[chunk * LANES..all.len().min((chunk + 1) * LANES)];
         let steps = fields.len() * calls(plan.stages());
-        if !window.is_whole() && chunk + 1 < last {
-            let tiles = window.slide(&mut there.clone(), chunk + 1).into_iter().flatten();
-            meanwhile.ahead.turn_to(raw.rows, first..first + frames, tiles, steps);
-        }
-        let Scratch { pressures, statuses, tiles, cells: answers, between, .. } = &mut *scratch;
-        let skin = Skin { plan, pressures, statuses };
-        let place = Place { fields: cells.fields(), first: chunk * LANES, count: fields.len(), frames };
+        let first_field = stretch.fields.start + chunk * LANES;
+        let place = Place {
+            fields: cells.fields(),
+            first: first_field,
+            count: fields.len(),
+            frames,
+            // Of later stretches the next frame's first fields have their answers.
+            whole_rows: stretch.fields.start == 0,
+        };
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
-            announced.turn_to(if chunk == last { 0 } else { place.first + LANES }, frames, steps);
+            let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
+            announced.turn_to(next, frames, steps);
+        }
+        if tables.window.is_far() {
+            let next = if chunk == last { all } else { &all[(chunk + 1) * LANES..last * LANES] };
+            meanwhile.coming = Coming::new(next, tables, pressures, steps);
         }
         let mut rests = [true; LANES];
-        for (field, rests) in (place.first..).zip(&mut rests[..place.count]) {
+        for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
             *rests = tables.rest.has_at_rest(field, |tile| tiles[tile].rests);
         }
-        let (first, rests) = (place.first, &rests[..place.count]);
+        let rests = &rests[..place.count];
         if rests.iter().all(|&rests| rests) {
             (0..steps).for_each(|_| meanwhile.step());
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first, rests, &skin, faults, &mut meanwhile, between, answers));
-        with_widest!(level, simd => columns::write(simd, answers, place, plan.outputs, cells));
+        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, *faults, &mut meanwhile, between, of_fields));
+        with_widest!(level, simd => columns::write(simd, of_fields, place, plan.outputs, cells));
     }
 }
 
 /// What a core does beside computing, a little at a time.
-struct Meanwhile<'a, 'b, 'c> {
+struct Meanwhile<'a, 'b, 'c, 'd> {
     ahead: Ahead<'a>,
     answers: Answers<'b, 'c>,
+    coming: Coming<'d>,
 }
 
 /// What answers ask for.
@@ -241,10 +261,11 @@ enum Answers<'b, 'c> {
     OnTheirWay(&'b mut Outgoing<'c>),
 }
 
-impl Meanwhile<'_, '_, '_> {
+impl Meanwhile<'_, '_, '_, '_> {
     #[inline(always)]
     fn step(&mut self) {
         self.ahead.step();
+        self.coming.step();
         match &mut self.answers {
             Answers::ToBeWritten(announced) => announced.step(),
             Answers::OnTheirWay(outgoing) => outgoing.step(),
@@ -263,7 +284,7 @@ fn answer<S: Simd>(
     rests: &[bool],
     skin: &Skin<'_>,
     faults: bool,
-    meanwhile: &mut Meanwhile<'_, '_, '_>,
+    meanwhile: &mut Meanwhile<'_, '_, '_, '_>,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
@@ -327,7 +348,7 @@ fn read(
     tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    if ahead::worth(raw).is_some() || reads_rows_abreast(level) {
+    if ahead::worth(raw, tiles.clone()).is_some() || reads_rows_abreast(level) {
         let raw = SomeFrames::new(raw, first, frames);
         return with_widest!(level, simd => calibrate(simd, plan, tables, Some(&raw), frames, tiles, scratch));
     }

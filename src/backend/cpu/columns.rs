@@ -19,6 +19,8 @@ pub(super) struct Place {
     pub(super) first: usize,
     pub(super) count: usize,
     pub(super) frames: usize,
+    /// Whether a row may reach beyond its frame's last field.
+    pub(super) whole_rows: bool,
 }
 
 impl Place {
@@ -31,7 +33,7 @@ impl Place {
         let start = frame * self.fields + self.first;
         // A whole row, though it may reach into the next frame: what belongs there is written later.
         match column.get_mut(start..start + LANES) {
-            Some(cells) if self.fields >= LANES => row.store_slice(cells),
+            Some(cells) if self.fields >= LANES && (self.whole_rows || self.count == LANES) => row.store_slice(cells),
             _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
         }
     }

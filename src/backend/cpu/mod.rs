@@ -39,6 +39,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use fearless_simd::Level;
 
+use self::ahead::Ahead;
 use self::simd::LANES;
 use super::{Backend, RawBatch, Rows, Step};
 use crate::error::Result;
@@ -93,7 +94,7 @@ impl Cpu {
                 (member.slot, [member.weight, member.u, member.v, depth, area])
             }))
         });
-        let window = window::Window::new(plan, level);
+        let window = window::Window::new(plan);
         let seen = window.members(plan);
         Self {
             tables: Tables {
@@ -143,43 +144,49 @@ impl Cpu {
         });
     }
 
-    /// Runs the frames from `first` on, one block after the other; `streams` says whether answers are written past the
-    /// caches.
+    /// Runs the frames from `first` on, sixteen after the other; `streams` says whether answers are written past the caches.
     fn part(&self, raw: &RawBatch<'_>, first: usize, streams: bool, cells: CellsMut<'_>) {
         let frames = cells.frames();
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
-        let plan = &self.plan;
+        let (plan, tables, stretches) = (&self.plan, &self.tables, self.tables.window.stretches());
         let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::pair(plan)));
-        let steps = plan.fields.len() * lot::calls(plan.stages());
+        let steps = |fields: usize| fields * lot::calls(plan.stages());
+        let mut block = |at: usize, cells: &mut CellsMut<'_>, mut outgoing: Option<&mut stream::Outgoing<'_>>| {
+            let before = the_one_before(raw.rows, at, &self.before);
+            for (index, stretch) in stretches.iter().enumerate() {
+                let (next, frames) = match stretches.get(index + 1) {
+                    Some(next) => (next, at..at + LANES),
+                    None => (&stretches[0], at + LANES..at + 2 * LANES),
+                };
+                let ahead = Ahead::new(raw.rows, frames, next.most_read(), steps(stretch.fields.len()));
+                let job = batch::Job { raw, first: at, before, ahead };
+                batch::stretch(self.level, plan, tables, job, stretch, &mut scratch, cells, outgoing.as_deref_mut());
+            }
+        };
         // What the block before has left to be written.
         let mut last: Option<CellsMut<'_>> = None;
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
-            let at = first + done;
-            let before = the_one_before(raw.rows, at, &self.before);
-            let mut block = |cells: &mut CellsMut<'_>, outgoing: Option<&mut stream::Outgoing<'_>>| {
-                batch::block(self.level, plan, &self.tables, raw, at, before, &mut scratch, cells, outgoing);
-            };
             if let Some([now, earlier]) = &mut staged {
                 stream::announce(&mut cells);
                 let mut earlier_cells = last.as_ref().map(|last| earlier.cells(last.frames()));
                 let mut outgoing = match earlier_cells.as_mut().zip(last.as_mut()) {
-                    Some((from, to)) => stream::Outgoing::new(from, to, steps),
+                    Some((from, to)) => stream::Outgoing::new(from, to, steps(plan.fields.len())),
                     None => stream::Outgoing::default(),
                 };
-                block(&mut now.cells(cells.frames()), Some(&mut outgoing));
+                block(first + done, &mut now.cells(cells.frames()), Some(&mut outgoing));
                 outgoing.finish();
                 std::mem::swap(now, earlier);
                 last = Some(cells);
             } else {
-                block(&mut cells, None);
+                block(first + done, &mut cells, None);
             }
             (rest, done) = (later, done + LANES);
         }
         if let (Some([_, earlier]), Some(mut last)) = (&mut staged, last) {
-            stream::Outgoing::new(&mut earlier.cells(last.frames()), &mut last, steps).finish();
+            stream::Outgoing::new(&mut earlier.cells(last.frames()), &mut last, steps(plan.fields.len())).finish();
         }
         scratch.staged = staged.or(scratch.staged);
         self.scratches.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);

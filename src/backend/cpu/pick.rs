@@ -6,7 +6,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
-use super::super::{Near, Picks, Rows, Shuffle};
+use super::super::{ELSEWHERE, Near, Picks, Rows, Shuffle};
 use super::lines::Aligned;
 use super::simd::{LANES, Row};
 
@@ -36,8 +36,8 @@ impl<'a> OneFrame<'a> {
         if let Some((values, picks)) = self.picked {
             match picks.near[tile] {
                 Near::Straight(from) => return u32x16::from_slice(simd, &values[from..from + LANES]),
-                Near::Shuffled(at) => {
-                    if let Some(row) = pick(simd, values, &picks.shuffles[at]) {
+                Near::Shuffled { first, count } => {
+                    if let Some(row) = pick_all(simd, values, &picks.shuffles[first..first + count]) {
                         return row;
                     }
                 }
@@ -101,9 +101,13 @@ impl<'a> SomeFrames<'a> {
         let rows = self.values[..self.frames].iter().zip(bits);
         match (self.near(tile), self.raw) {
             (Near::Straight(from), _) => rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from..][..LANES])),
-            (Near::Shuffled(at), Rows::Picked { picks, .. }) => {
+            (Near::Shuffled { first, count }, Rows::Picked { picks, .. }) => {
+                let shuffles = &picks.shuffles[first..first + count];
                 for (frame, (values, bits)) in (self.first..).zip(rows) {
-                    match pick(simd, values, &picks.shuffles[at]) {
+                    // Mostly one is enough, and knows it beforehand.
+                    let row =
+                        if let [one] = shuffles { pick(simd, values, one) } else { pick_all(simd, values, shuffles) };
+                    match row {
                         Some(row) => row.store_slice(bits),
                         None => *bits = one_by_one(self.raw, frame, tile, calibrated),
                     }
@@ -118,7 +122,19 @@ impl<'a> SomeFrames<'a> {
     }
 }
 
-/// Those of `values` that `shuffle` says, if they lie near enough for it, and the machine has instructions that pay.
+/// Those of `values` that `shuffles` say together, if the machine has instructions that pay.
+#[inline(always)]
+fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u32x16<S>> {
+    let (first, others) = shuffles.split_first()?;
+    let mut row = pick(simd, values, first)?;
+    for shuffle in others {
+        let there = u32x16::from_slice(simd, &shuffle.places).simd_lt(u32x16::splat(simd, ELSEWHERE));
+        row = there.select(pick(simd, values, shuffle)?, row);
+    }
+    Some(row)
+}
+
+/// Those of `values` that `shuffle` says, if the machine has instructions that pay; anything for those that lie elsewhere.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
 fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>> {

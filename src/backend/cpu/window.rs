@@ -2,36 +2,50 @@
 //!
 //! Sixteen frames of a million taxels are 64 MB of pressures. Written by calibration and read again by fields, they would
 //! go to memory and back. Where fields that follow each other have taxels that do, it is enough to keep some thousands of
-//! them: fields are gone through in order, and the window on their taxels slides along.
+//! them: fields are gone through in order, a stretch of them at a time, and the window on their taxels slides along. What comes
+//! into it next is known, and fetched meanwhile.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use fearless_simd::Level;
-
-use super::simd::{LANES, reads_rows_abreast};
+use super::simd::LANES;
 use crate::scene::Plan;
 use crate::stage::layout::Member;
 
-/// Slots that a skin may have before it is looked at through a window: with 1 MiB of pressures there is nothing to gain.
-const SMALL: usize = 1 << 14;
+/// Slots that a skin may have before it is looked at through a window.
+const SMALL: usize = 1 << 13;
 /// Slots that a window has, the first that does: 256 KiB of pressures and more.
 const SIZES: [usize; 3] = [1 << 12, 1 << 13, 1 << 14];
 
-/// Which tiles each sixteen fields need, and how many are kept.
+/// Which fields are computed together, what is read before, and how many slots are kept.
 #[derive(Clone, Debug)]
 pub(super) struct Window {
-    /// Per sixteen fields.
-    needs: Vec<Range<usize>>,
+    stretches: Vec<Stretch>,
     /// Slots that are kept: a power of two, or all there are.
     slots: usize,
     /// What a slot's number is cut to for its place among those that are kept.
     mask: usize,
 }
 
+/// Fields that follow each other.
+#[derive(Clone, Debug)]
+pub(super) struct Stretch {
+    /// From a multiple of [`LANES`] on.
+    pub(super) fields: Range<usize>,
+    /// Tiles that come into the window for them.
+    pub(super) reads: [Range<usize>; 2],
+}
+
+impl Stretch {
+    /// The larger part of [`Self::reads`]; the other is nearly always nothing.
+    pub(super) fn most_read(&self) -> Range<usize> {
+        let [below, above] = &self.reads;
+        if below.len() > above.len() { below.clone() } else { above.clone() }
+    }
+}
+
 impl Window {
-    /// For a machine with the instructions of `level`.
-    pub(super) fn new(plan: &Plan, level: Level) -> Self {
+    pub(super) fn new(plan: &Plan) -> Self {
         let needs: Vec<Range<usize>> = plan
             .fields
             .chunks(LANES)
@@ -42,18 +56,25 @@ impl Window {
             })
             .collect();
         let all = plan.slots().next_multiple_of(LANES);
-        let whole = Self { needs, slots: all, mask: usize::MAX };
-        // Changes and whoever wants all pressures go through all slots. A machine that reads rows abreast reads all of them as
-        // fast as it reads a window's, and saves the search for what comes into it.
-        if all <= SMALL || reads_rows_abreast(level) || plan.has_changes() || plan.kept_pressures() > 0 {
-            return whole;
+        // Changes and whoever wants all pressures go through all slots.
+        if all > SMALL && !needs.is_empty() && !plan.has_changes() && plan.kept_pressures() == 0 {
+            for slots in SIZES {
+                let Some(stretches) = cut(&needs, slots / LANES, plan.fields.len()) else { continue };
+                let reads =
+                    stretches.iter().flat_map(|stretch| &stretch.reads).map(ExactSizeIterator::len).sum::<usize>();
+                // Reading a little twice is better than keeping all.
+                if reads <= all / LANES + all / LANES / 4 {
+                    return Self { stretches, slots, mask: slots - 1 };
+                }
+            }
         }
-        let few = SIZES.into_iter().find_map(|slots| {
-            let part = Self { slots, mask: slots - 1, needs: whole.needs.clone() };
-            // Reading a little twice is better than keeping all.
-            part.reads().is_some_and(|tiles| tiles <= all / LANES + all / LANES / 4).then_some(part)
-        });
-        few.unwrap_or(whole)
+        let stretch = Stretch { fields: 0..plan.fields.len(), reads: [0..plan.calibrated().div_ceil(LANES), 0..0] };
+        Self { stretches: vec![stretch], slots: all, mask: usize::MAX }
+    }
+
+    /// All fields, in order.
+    pub(super) fn stretches(&self) -> &[Stretch] {
+        &self.stretches
     }
 
     /// Slots that are kept.
@@ -70,6 +91,11 @@ impl Window {
         self.mask == usize::MAX
     }
 
+    /// Whether what is kept is more than a cache has room for.
+    pub(super) fn is_far(&self) -> bool {
+        self.is_whole() && self.slots > SMALL
+    }
+
     /// The plan's members, each with its slot's place among those that are kept.
     pub(super) fn members(&self, plan: &Plan) -> Arc<[Member]> {
         if self.is_whole() {
@@ -78,41 +104,62 @@ impl Window {
         let placed = |&member: &Member| Member { slot: (member.slot as usize & self.mask) as u32, ..member };
         plan.members.iter().map(placed).collect()
     }
+}
 
-    /// Makes what the fields of chunk `chunk` need be there, where `there` is so far: which tiles are to be read.
-    pub(super) fn slide(&self, there: &mut Range<usize>, chunk: usize) -> [Range<usize>; 2] {
-        let (need, room) = (self.needs[chunk].clone(), self.slots / LANES);
-        let apart = need.end < there.start || there.end < need.start;
-        if need.is_empty() {
-            return [0..0, 0..0];
-        }
-        if Range::is_empty(there) || (apart && !self.is_whole()) {
-            *there = need.clone();
-            return [need, 0..0];
-        }
-        let (below, above) = (need.start..there.start.max(need.start), there.end.min(need.end)..need.end);
-        let all = there.start.min(need.start)..there.end.max(need.end);
-        *there = match all.len() > room {
-            // What is farthest from what was needed now makes room.
-            true if need.start == all.start => all.start..all.start + room,
-            true => all.end - room..all.end,
-            false => all,
-        };
-        [below, above]
-    }
-
-    /// How many tiles are read for all fields, from the first on; none where some do not fit.
-    fn reads(&self) -> Option<usize> {
-        let mut there = 0..0;
-        let mut reads = 0;
-        for chunk in 0..self.needs.len() {
-            if self.needs[chunk].len() * LANES > self.slots {
-                return None;
+/// As many fields in a stretch as have room in a window of so many tiles together, where each sixteen of all `fields` have
+/// their `needs`. At most half of a window is read at a time, so that what is read next has room in a cache beside it. None
+/// where sixteen fields do not fit alone.
+fn cut(needs: &[Range<usize>], room: usize, fields: usize) -> Option<Vec<Stretch>> {
+    let (mut stretches, mut there, mut start) = (Vec::new(), 0..0, 0);
+    while start < needs.len() {
+        let mut need = needs[start].clone();
+        let mut end = start + 1;
+        while let Some(next) = needs.get(end) {
+            let both = around(&need, next);
+            let new = slide(&mut there.clone(), both.clone(), room).iter().map(ExactSizeIterator::len).sum::<usize>();
+            if both.len() > room || new > room / 2 {
+                break;
             }
-            reads += self.slide(&mut there, chunk).iter().map(ExactSizeIterator::len).sum::<usize>();
+            (need, end) = (both, end + 1);
         }
-        Some(reads)
+        if need.len() > room {
+            return None;
+        }
+        let reads = slide(&mut there, need, room);
+        stretches.push(Stretch { fields: start * LANES..fields.min(end * LANES), reads });
+        start = end;
     }
+    Some(stretches)
+}
+
+/// All that is in either, and between them.
+fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+    match (one.is_empty(), other.is_empty()) {
+        (true, _) => other.clone(),
+        (_, true) => one.clone(),
+        _ => one.start.min(other.start)..one.end.max(other.end),
+    }
+}
+
+/// Makes what is needed be there, where `there` is so far, with room for so many tiles: which are to be read.
+fn slide(there: &mut Range<usize>, need: Range<usize>, room: usize) -> [Range<usize>; 2] {
+    let apart = need.end < there.start || there.end < need.start;
+    if need.is_empty() {
+        return [0..0, 0..0];
+    }
+    if Range::is_empty(there) || apart {
+        *there = need.clone();
+        return [need, 0..0];
+    }
+    let (below, above) = (need.start..there.start.max(need.start), there.end.min(need.end)..need.end);
+    let all = around(there, &need);
+    *there = match all.len() > room {
+        // What is farthest from what was needed now makes room.
+        true if need.start == all.start => all.start..all.start + room,
+        true => all.end - room..all.end,
+        false => all,
+    };
+    [below, above]
 }
 
 #[cfg(test)]
@@ -121,44 +168,39 @@ mod tests {
 
     use super::*;
 
-    fn window(needs: Vec<Range<usize>>, tiles: usize) -> Window {
-        Window { needs, slots: tiles * LANES, mask: tiles * LANES - 1 }
-    }
-
     proptest! {
         #[test]
         fn what_fields_need_is_always_there(
             starts in prop::collection::vec((0_usize..60, 0_usize..=8), 1..40),
-            is_whole: bool,
         ) {
+            const ROOM: usize = 8;
             let needs: Vec<Range<usize>> = starts.iter().map(|&(start, length)| start..start + length).collect();
-            let mut window = window(needs.clone(), if is_whole { 128 } else { 8 });
-            if is_whole {
-                window.mask = usize::MAX;
-            }
             // Which tile each place has, as a ring of so many keeps them.
-            let mut kept = vec![usize::MAX; window.slots() / LANES];
-            let mut there = 0..0;
-            let mut reads = vec![0; 70];
-            for (chunk, need) in needs.into_iter().enumerate() {
-                for tile in window.slide(&mut there, chunk).into_iter().flatten() {
-                    let place = ((tile * LANES) & window.mask()) / LANES;
-                    kept[place] = tile;
-                    reads[tile] += 1;
+            let mut kept = [usize::MAX; ROOM];
+            let mut next = 0;
+            for Stretch { fields, reads } in cut(&needs, ROOM, needs.len() * LANES).unwrap() {
+                prop_assert_eq!(fields.start, next * LANES);
+                next = fields.end / LANES;
+                for tile in reads.into_iter().flatten() {
+                    kept[tile % ROOM] = tile;
                 }
-                prop_assert!(need.clone().all(|tile| kept[((tile * LANES) & window.mask()) / LANES] == tile));
-                prop_assert!(there.clone().all(|tile| kept[((tile * LANES) & window.mask()) / LANES] == tile));
+                prop_assert!(needs[fields.start / LANES..next].iter().cloned().flatten().all(|tile| kept[tile % ROOM] == tile));
             }
-            prop_assert!(!is_whole || reads.iter().all(|&reads| reads <= 1), "nothing is read twice where all has room");
+            prop_assert_eq!(next, needs.len());
         }
     }
 
     #[test]
-    fn rows_of_fields_are_read_about_once() {
+    fn rows_of_fields_are_read_about_once_and_little_at_a_time() {
+        let reads = |needs: &[Range<usize>], room| -> Option<Vec<usize>> {
+            let tiles = |stretch: &Stretch| stretch.reads.iter().map(ExactSizeIterator::len).sum();
+            Some(cut(needs, room, needs.len() * LANES)?.iter().map(tiles).collect())
+        };
         // Each beside the one before and a little over it.
-        let sliding = window((0..100).map(|chunk| chunk * 3..chunk * 3 + 5).collect(), 8);
-        assert_eq!(sliding.reads(), Some(302));
-        assert_eq!(window(vec![0..3, 50..53, 0..3], 8).reads(), Some(9));
-        assert_eq!(window(vec![0..3, 0..9], 8).reads(), None);
+        let sliding: Vec<Range<usize>> = (0..100).map(|chunk| chunk * 3..chunk * 3 + 5).collect();
+        let read = reads(&sliding, 32).unwrap();
+        assert_eq!((read.iter().sum::<usize>(), read.iter().max()), (302, Some(&15)));
+        assert_eq!(reads(&[0..3, 50..53, 0..3], 8), Some(vec![3, 3, 3]));
+        assert_eq!(reads(&[0..3, 0..9], 8), None);
     }
 }
