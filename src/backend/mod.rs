@@ -94,7 +94,7 @@ pub(crate) const BLOCK: usize = 16;
 pub(crate) type FewLines = [u32; 4];
 
 /// `lines` in ascending order, each once but for what fills up the last few.
-pub(crate) fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
+fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
     lines.sort_unstable();
     lines.dedup();
     let last = lines.last().copied().unwrap_or_default();

@@ -87,7 +87,7 @@ impl Window {
     }
 
     /// Whether all slots are kept.
-    pub(super) fn is_whole(&self) -> bool {
+    fn is_whole(&self) -> bool {
         self.mask == usize::MAX
     }
 
