@@ -171,20 +171,21 @@ pub(super) fn stretch(
 ) {
     let Job { raw, first, before, ahead } = job;
     let frames = cells.frames();
-    if stretch.fields.start == 0 {
+    let is_first = stretch.fields.start == 0;
+    if is_first {
         scratch.faults = false;
     }
     for tiles in stretch.reads.iter().filter(|tiles| !tiles.is_empty()) {
         scratch.faults |= read(level, plan, tables, raw.rows, first, frames, tiles.clone(), scratch);
     }
-    if stretch.fields.start == 0 && plan.has_changes() {
+    if is_first && plan.has_changes() {
         let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
         calibrate::frame(level, plan, tables, before, was, said);
         let before = (was.as_flattened(), said.as_flattened());
         scratch.faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
         scratch.tiles.iter_mut().for_each(|tile| tile.rests = false);
     }
-    if stretch.fields.start == 0 && !cells.pressures.is_empty() {
+    if is_first && !cells.pressures.is_empty() {
         let slots = plan.slots();
         let tiles = scratch.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&scratch.tiles).enumerate();
         // Those at rest are 0 there already.
@@ -221,7 +222,7 @@ pub(super) fn stretch(
             count: fields.len(),
             frames,
             // Of later stretches the next frame's first fields have their answers.
-            whole_rows: stretch.fields.start == 0,
+            whole_rows: is_first,
         };
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
             let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
