@@ -107,6 +107,14 @@ impl Brief {
         let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
         Self { first: field.first, count: field.count, is_wide, unweighted: field.unweighted, kind }
     }
+
+    pub(super) fn members(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    pub(super) fn is_wide(&self) -> bool {
+        self.is_wide
+    }
 }
 
 impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
@@ -224,13 +232,10 @@ pub(super) fn stretch(
             // Of later stretches the next frame's first fields have their answers.
             whole_rows: is_first,
         };
+        let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
+        meanwhile.coming = Coming::new(tables, next..stretch.fields.start + last * LANES, pressures, steps);
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
-            let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
             announced.turn_to(next, frames, steps);
-        }
-        if tables.window.is_far() {
-            let next = if chunk == last { all } else { &all[(chunk + 1) * LANES..last * LANES] };
-            meanwhile.coming = Coming::new(next, tables, pressures, steps);
         }
         let mut rests = [true; LANES];
         for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
@@ -302,9 +307,8 @@ fn answer<S: Simd>(
         macro_rules! answer {
             ($abreast:ident, $weighted:literal) => {{
                 let lot = |index: usize| {
-                    let Brief { first: member, count, kind, .. } = briefs[index];
-                    let (seen, field) = (&tables.seen[member..member + count], first + start + index);
-                    ($abreast(OverFrames::<$weighted> { skin, seen, field }), kind)
+                    let (seen, field) = (&tables.seen[briefs[index].members()], first + start + index);
+                    ($abreast(OverFrames::<$weighted> { skin, seen, field }), briefs[index].kind)
                 };
                 let mut lots = [lot(0); LANES];
                 for (index, one) in lots.iter_mut().enumerate().take(alike).skip(1) {
@@ -386,7 +390,8 @@ fn calibrate<S: Simd>(
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
     let Scratch { bits: there, .. } = scratch;
-    for (index, tile) in tiles.clone().zip(&tables.tiles[tiles.clone()]) {
+    for (index, &sort) in tiles.clone().zip(&tables.tiles.sorts[tiles.clone()]) {
+        let tile = &tables.tiles.all[index];
         let slot = index * LANES;
         let place = slot & tables.window.mask();
         let bits = match raw {
@@ -397,7 +402,7 @@ fn calibrate<S: Simd>(
             None => &there[(index - tiles.start) * LANES..][..frames],
         };
         let mut faults = false;
-        let is_pressed = calibrate::plain(simd, tile, bits, pressures).unwrap_or_else(
+        let is_pressed = calibrate::plain(simd, sort, tile, bits, pressures).unwrap_or_else(
             #[inline(always)]
             || {
                 for ((bits, pressures), statuses) in bits.iter().zip(&mut *pressures).zip(&mut *statuses) {

@@ -27,41 +27,64 @@ pub(super) struct Tile {
     raw_low: Row<f32>,
     raw_high: Row<f32>,
     response: Row<u32>,
-    /// Whether P is the raw value of all of them, with nothing to check but that it is a number.
-    raw_is_pressure: bool,
-    /// Whether none has a curve or is masked.
-    straight: bool,
+    sort: Sort,
+}
+
+/// What has to be done for sixteen taxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sort {
+    /// P is the raw value of all of them, with nothing to check but that it is a number.
+    Raw,
+    /// None has a curve or is masked.
+    Straight,
+    Any,
+}
+
+/// All of a plan's taxels, by ascending slot.
+pub(super) struct Tiles {
+    pub(super) all: Vec<Tile>,
+    /// Each one's sort, again: where that is all there is to know, eight lines a tile need not come from memory.
+    pub(super) sorts: Vec<Sort>,
+}
+
+impl Tiles {
+    /// Those of `plan`; what fills up the last tile is unpressed.
+    pub(super) fn new(plan: &Plan) -> Self {
+        let all: Vec<Tile> = plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect();
+        let sorts = all.iter().map(|tile| tile.sort).collect();
+        Self { all, sorts }
+    }
 }
 
 impl Tile {
-    /// All of the plan's taxels, by ascending slot; what fills up the last tile is unpressed.
-    pub(super) fn all(plan: &Plan) -> Vec<Self> {
-        plan.taxels[..plan.calibrated()]
-            .chunks(LANES)
-            .map(|taxels| {
-                let mut tile = Self {
-                    baseline: [0.0; LANES],
-                    gain: [0.0; LANES],
-                    dead_band: [0.0; LANES],
-                    p_max: [f32::MAX; LANES],
-                    raw_low: [f32::MIN; LANES],
-                    raw_high: [f32::MAX; LANES],
-                    response: [0; LANES],
-                    raw_is_pressure: taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure),
-                    straight: taxels.iter().all(|taxel| taxel.response == STRAIGHT),
-                };
-                for (lane, taxel) in taxels.iter().enumerate() {
-                    tile.baseline[lane] = taxel.baseline;
-                    tile.gain[lane] = taxel.gain;
-                    tile.dead_band[lane] = taxel.dead_band;
-                    tile.p_max[lane] = taxel.p_max;
-                    tile.raw_low[lane] = taxel.raw_low;
-                    tile.raw_high[lane] = taxel.raw_high;
-                    tile.response[lane] = taxel.response;
-                }
-                tile
-            })
-            .collect()
+    fn new(taxels: &[Taxel]) -> Self {
+        let sort = if taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure) {
+            Sort::Raw
+        } else if taxels.iter().all(|taxel| taxel.response == STRAIGHT) {
+            Sort::Straight
+        } else {
+            Sort::Any
+        };
+        let mut tile = Self {
+            baseline: [0.0; LANES],
+            gain: [0.0; LANES],
+            dead_band: [0.0; LANES],
+            p_max: [f32::MAX; LANES],
+            raw_low: [f32::MIN; LANES],
+            raw_high: [f32::MAX; LANES],
+            response: [0; LANES],
+            sort,
+        };
+        for (lane, taxel) in taxels.iter().enumerate() {
+            tile.baseline[lane] = taxel.baseline;
+            tile.gain[lane] = taxel.gain;
+            tile.dead_band[lane] = taxel.dead_band;
+            tile.p_max[lane] = taxel.p_max;
+            tile.raw_low[lane] = taxel.raw_low;
+            tile.raw_high[lane] = taxel.raw_high;
+            tile.response[lane] = taxel.response;
+        }
+        tile
     }
 }
 
@@ -82,7 +105,7 @@ pub(super) fn tile<S: Simd>(
         let lanes = at..at + width::<S>();
         let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
         let bits = U::<S>::from_slice(simd, &raw[lanes.clone()]);
-        if tile.raw_is_pressure && fine(simd, bits).all_true() {
+        if tile.sort == Sort::Raw && fine(simd, bits).all_true() {
             let (value, none) = (bits.bitcast::<F<S>>(), splat(simd, 0.0));
             // Not the larger of the two, which might be −0.
             store(simd, value.simd_gt(none).select(value, none), pressures, at);
@@ -97,7 +120,7 @@ pub(super) fn tile<S: Simd>(
             & bits.bitcast::<F<S>>().simd_ge(of(&tile.raw_low))
             & bits.bitcast::<F<S>>().simd_le(of(&tile.raw_high))
             & pressure.simd_le(of(&tile.p_max));
-        if tile.straight && plain.all_true() {
+        if tile.sort != Sort::Any && plain.all_true() {
             let over = pressure.simd_gt(of(&tile.dead_band));
             store(simd, over.select(pressure, splat(simd, 0.0)), pressures, at);
             store_u(simd, splat_u(simd, 0), statuses, at);
@@ -112,20 +135,21 @@ pub(super) fn tile<S: Simd>(
 /// As [`tile`], for a row of raw bits a frame, if nothing is to be said of any value: whether any taxel is pressed. Without
 /// a word `pressures` has nothing of use.
 ///
-/// What has to hold for every value is asked once, of the largest and smallest of each taxel.
+/// What has to hold for every value is asked once, of the largest and smallest of each taxel. `sort` is the tile's.
 #[inline(always)]
 pub(super) fn plain<S: Simd>(
     simd: S,
+    sort: Sort,
     tile: &Tile,
     raw: &[Row<u32>],
     pressures: &mut [Row<f32>; LANES],
 ) -> Option<bool> {
-    if !tile.straight {
+    if sort == Sort::Any {
         return None;
     }
     let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
     let (none, mut pressed, mut sizes) = (f32x16::splat(simd, 0.0), u32x16::splat(simd, 0), Sizes::new(simd));
-    if tile.raw_is_pressure {
+    if sort == Sort::Raw {
         for (bits, pressures) in raw.iter().zip(pressures) {
             let bits = u32x16::from_slice(simd, bits);
             sizes.see(simd, bits);
@@ -216,7 +240,7 @@ fn tiles<S: Simd>(
 ) -> bool {
     let (mut faults, values) = (false, OneFrame::new(raw, frame));
     let rows = pressures.chunks_mut(TOGETHER).zip(statuses.chunks_mut(TOGETHER));
-    for (group, (tiles, (pressures, statuses))) in tables.tiles.chunks(TOGETHER).zip(rows).enumerate() {
+    for (group, (tiles, (pressures, statuses))) in tables.tiles.all.chunks(TOGETHER).zip(rows).enumerate() {
         let first = group * TOGETHER;
         if plain_tiles(simd, plan, tiles, values, first, pressures) {
             statuses[..tiles.len()].fill([0; LANES]);
@@ -247,12 +271,12 @@ fn plain_tiles<S: Simd>(
 ) -> bool {
     let (none, mut sizes, mut beyond) = (f32x16::splat(simd, 0.0), Sizes::new(simd), u32x16::splat(simd, 0));
     for (index, (tile, pressures)) in (first..).zip(tiles.iter().zip(pressures)) {
-        if !tile.straight {
+        if tile.sort == Sort::Any {
             return false;
         }
         let bits = values.row(simd, index, plan.calibrated());
         sizes.see(simd, bits);
-        if tile.raw_is_pressure {
+        if tile.sort == Sort::Raw {
             unsigned(simd, bits).store_slice(pressures);
             continue;
         }
@@ -302,7 +326,7 @@ fn with_care<S: Simd>(
     let value = is_tiny(size).select(none, value);
     let above = value - of(&tile.baseline);
     let mut pressure = above * of(&tile.gain);
-    if !tile.straight {
+    if tile.sort == Sort::Any {
         for lane in 0..width::<S>() {
             let slot = first + at + lane;
             if tile.response[at + lane] >= FIRST_CURVE {

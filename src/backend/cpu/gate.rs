@@ -140,7 +140,7 @@ impl Gate {
         statuses: &mut [Row<u32>],
     ) {
         let mut index = 0;
-        while let Some(tile) = tables.tiles.get(index) {
+        while let Some(tile) = tables.tiles.all.get(index) {
             // Many at once, while they are the same.
             if self.known
                 && index % BLOCK == 0

@@ -69,7 +69,7 @@ pub(crate) struct Cpu {
 
 /// The plan as lanes read it.
 struct Tables {
-    tiles: Vec<calibrate::Tile>,
+    tiles: calibrate::Tiles,
     window: window::Window,
     /// The plan's members, each with its slot's place in the window.
     seen: Arc<[Member]>,
@@ -102,7 +102,7 @@ impl Cpu {
                 rest: rest::Rest::new(&plan.fields, &seen),
                 seen,
                 window,
-                tiles: calibrate::Tile::all(plan),
+                tiles: calibrate::Tiles::new(plan),
                 wide: wide.collect(),
             },
             level,
@@ -247,7 +247,7 @@ impl Backend for Cpu {
 
     fn recalibrate(&mut self, plan: &Plan) {
         self.plan.recalibrate(plan);
-        self.tables.tiles = calibrate::Tile::all(plan);
+        self.tables.tiles = calibrate::Tiles::new(plan);
         self.live.forget();
     }
 
