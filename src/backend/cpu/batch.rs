@@ -27,6 +27,8 @@ use crate::stage::layout::Member;
 /// Tiles whose raw bits are read together where rows are not read abreast: frame by frame, as they lie in memory, so that the
 /// processor sees it coming.
 const GROUP: usize = 64;
+/// Tiles that are read together where nobody has fetched them: the next ones are, meanwhile.
+const FETCHED: usize = 16;
 
 /// What a task needs to work in.
 pub(super) struct Scratch {
@@ -353,13 +355,23 @@ fn read(
     tiles: Range<usize>,
     scratch: &mut Scratch,
 ) -> bool {
-    if ahead::worth(raw, tiles.clone()).is_some() || reads_rows_abreast(level) {
-        let raw = SomeFrames::new(raw, first, frames);
-        return with_widest!(level, simd => calibrate(simd, plan, tables, Some(&raw), frames, tiles, scratch));
+    let groups_of = |count: usize| {
+        let tiles = tiles.clone();
+        tiles.clone().step_by(count).map(move |start| start..tiles.end.min(start + count))
+    };
+    let comes_at_once = ahead::worth(raw, tiles.clone()).is_some();
+    let count = if comes_at_once { tiles.len() } else { FETCHED };
+    if comes_at_once || reads_rows_abreast(level) || groups_of(count).any(|group| ahead::worth(raw, group).is_some()) {
+        let (some, mut faults) = (SomeFrames::new(raw, first, frames), false);
+        for group in groups_of(count) {
+            let next = group.end..tiles.end.min(group.end + count);
+            let mut ahead = Ahead::new(raw, first..first + frames, next, group.len());
+            faults |= with_widest!(level, simd => calibrate(simd, plan, tables, Some((&some, &mut ahead)), frames, group, scratch));
+        }
+        return faults;
     }
     let mut faults = false;
-    for start in tiles.clone().step_by(GROUP) {
-        let group = start..tiles.end.min(start + GROUP);
+    for group in groups_of(GROUP) {
         for frame in 0..frames {
             let values = OneFrame::new(raw, first + frame);
             with_widest!(level, simd => {
@@ -373,14 +385,14 @@ fn read(
     faults
 }
 
-/// Calibrates tiles whose bits are there, or read from `raw` where they are not, and turns them so that a taxel's frames stand
-/// abreast. Whether any value is anything but a plain number.
+/// Calibrates tiles whose bits are there, or read from `raw` where they are not, while others are fetched; and turns them so
+/// that a taxel's frames stand abreast. Whether any value is anything but a plain number.
 #[inline(always)]
 fn calibrate<S: Simd>(
     simd: S,
     plan: &Plan,
     tables: &Tables,
-    raw: Option<&SomeFrames<'_>>,
+    mut raw: Option<(&SomeFrames<'_>, &mut Ahead<'_>)>,
     frames: usize,
     tiles: Range<usize>,
     scratch: &mut Scratch,
@@ -394,8 +406,9 @@ fn calibrate<S: Simd>(
         let tile = &tables.tiles.all[index];
         let slot = index * LANES;
         let place = slot & tables.window.mask();
-        let bits = match raw {
-            Some(raw) => {
+        let bits = match &mut raw {
+            Some((raw, ahead)) => {
+                ahead.step();
                 raw.read(simd, index, plan.calibrated(), bits);
                 &bits[..frames]
             }

@@ -13,7 +13,9 @@ use crate::scene::Plan;
 use crate::stage::layout::Member;
 
 /// Slots that a skin may have before it is looked at through a window.
-const SMALL: usize = 1 << 13;
+const SMALL: usize = 1 << 12;
+/// Slots from which on those that are kept are more than a cache has room for.
+const FAR: usize = 1 << 13;
 /// Slots that a window has, the first that does: 256 KiB of pressures and more.
 const SIZES: [usize; 3] = [1 << 12, 1 << 13, 1 << 14];
 
@@ -93,7 +95,7 @@ impl Window {
 
     /// Whether what is kept is more than a cache has room for.
     pub(super) fn is_far(&self) -> bool {
-        self.is_whole() && self.slots > SMALL
+        self.is_whole() && self.slots > FAR
     }
 
     /// The plan's members, each with its slot's place among those that are kept.
