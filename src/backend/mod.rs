@@ -110,6 +110,8 @@ pub(crate) struct Picks {
     pub(crate) channels: usize,
     /// Per sixteen slots.
     pub(crate) near: Vec<Near>,
+    /// The lowest and the highest of their places.
+    pub(crate) spans: Vec<[u32; 2]>,
     /// Per [`BLOCK`] tiles of sixteen whose values lie one after the other: where they start.
     pub(crate) blocks: Vec<Option<usize>>,
     /// The first of each sixteen values of a frame that hold any that is wanted.
@@ -223,8 +225,13 @@ impl Picks {
             tiles.iter().enumerate().all(follows).then_some(from)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
+        let spans = places.chunks(16).map(|places| {
+            let (low, high) = (places.iter().min(), places.iter().max());
+            [low, high].map(|place| place.copied().unwrap_or_default())
+        });
+        let spans = spans.collect();
         let lines = few_at_a_time(places.iter().map(|place| place / 16 * 16).collect());
-        Self { near, blocks, lines, shuffles, channels: channels.len(), places }
+        Self { near, spans, blocks, lines, shuffles, channels: channels.len(), places }
     }
 }
 

@@ -36,8 +36,8 @@ pub(super) fn worth(raw: Rows<'_>, tiles: Range<usize>) -> Option<(&[Frame], &[F
     let lines = if tiles.len() == picks.near.len() {
         &picks.lines[..]
     } else {
-        let places = &picks.places[tiles.start * LANES..picks.places.len().min(tiles.end * LANES)];
-        let (low, high) = places.iter().fold((u32::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
+        let spans = &picks.spans[tiles];
+        let (low, high) = spans.iter().fold((u32::MAX, 0), |(low, high), &[from, to]| (low.min(from), high.max(to)));
         let from = picks.lines.partition_point(|lines| lines[3] + LANES as u32 <= low);
         let to = picks.lines.partition_point(|lines| lines[0] <= high);
         &picks.lines[from..to]

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use bytemuck::{cast_ref, cast_slice_mut};
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
@@ -10,38 +9,28 @@ use super::super::{RawBatch, Rows};
 use super::Tables;
 use super::ahead::{Ahead, Coming};
 use super::columns::{Announcement, Place};
-use super::lines::{Aligned, Lines};
+use super::in_view::InView;
+use super::lines::Lines;
 use super::lot::{Between, Wanted, calls, touch};
-use super::pick::{OneFrame, SomeFrames};
-use super::simd::{F, LANES, Row, U, load, load_u, reads_rows_abreast, splat, with_widest};
+use super::sections::Found;
+use super::simd::{F, LANES, Row, U, load, load_u, splat, with_widest};
+use super::sixteen::ManyAbreast;
 use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
-use super::transpose::transpose;
-use super::wide::ManyAbreast;
-use super::window::Stretch;
-use super::{ahead, calibrate, change, columns};
+use super::window::{Stretch, Window};
+use super::{calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
-/// Tiles whose raw bits are read together where rows are not read abreast: frame by frame, as they lie in memory, so that the
-/// processor sees it coming.
-const GROUP: usize = 64;
-/// Tiles that are read together where nobody has fetched them: the next ones are, meanwhile.
-const FETCHED: usize = 16;
-
 /// What a task needs to work in.
 pub(super) struct Scratch {
-    /// Raw bits of a few tiles, a row a frame.
-    bits: Lines<u32>,
-    /// By slot, as far as the window reaches, a lane a frame.
-    pressures: Lines<f32>,
-    statuses: Lines<u32>,
-    /// By tile, as far as the window reaches.
-    tiles: Vec<KeptTile>,
+    pub(super) in_view: InView,
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     between: Box<[Between; LANES]>,
+    /// Answers of the fields that are gone over in sections.
+    pub(super) found: Vec<Box<Found>>,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
     /// Answers on their way past the caches, if any were.
@@ -52,15 +41,12 @@ pub(super) struct Scratch {
 
 impl Scratch {
     pub(super) fn new(plan: &Plan, tables: &Tables) -> Self {
-        let kept = tables.window.slots();
-        let before = if plan.has_changes() { kept / LANES } else { 0 };
+        let before = if plan.has_changes() { tables.window.slots() / LANES } else { 0 };
         Self {
-            bits: Lines::new(GROUP * LANES, 0),
-            pressures: Lines::new(kept, 0.0),
-            statuses: Lines::new(kept, 0),
-            tiles: vec![KeptTile { rests: true, faulty: false }; kept / LANES],
+            in_view: InView::new(tables.window.slots()),
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
+            found: tables.window.in_sections().iter().map(|_| Found::new()).collect(),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
             staged: None,
             faults: false,
@@ -68,30 +54,34 @@ impl Scratch {
     }
 }
 
-/// What is known of sixteen taxels in sixteen frames.
-#[derive(Clone, Copy)]
-struct KeptTile {
-    /// All pressures and statuses are 0.
-    rests: bool,
-    /// Statuses say something.
-    faulty: bool,
-}
-
 /// What fields have in common.
 #[derive(Clone, Copy)]
-struct Skin<'a> {
+pub(super) struct Skin<'a> {
     plan: &'a Plan,
     pressures: &'a [Row<f32>],
     statuses: &'a [Row<u32>],
 }
 
+impl<'a> Skin<'a> {
+    pub(super) fn new(plan: &'a Plan, in_view: &'a InView) -> Self {
+        Self { plan, pressures: &in_view.pressures, statuses: &in_view.statuses }
+    }
+}
+
 /// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
-struct OverFrames<'a, const WEIGHTED: bool> {
+pub(super) struct OverFrames<'a, const WEIGHTED: bool> {
     skin: &'a Skin<'a>,
     /// By place in the window.
     seen: &'a [Member],
     field: usize,
+}
+
+impl<'a> OverFrames<'a, true> {
+    /// Those of field `field`.
+    pub(super) fn of(skin: &'a Skin<'a>, tables: &'a Tables, field: usize) -> Self {
+        Self { skin, seen: &tables.seen[tables.briefs[field].members()], field }
+    }
 }
 
 /// What blocks have to know of every field: little, and side by side.
@@ -101,13 +91,24 @@ pub(super) struct Brief {
     count: usize,
     is_wide: bool,
     unweighted: bool,
-    kind: OneKind,
+    pub(super) kind: OneKind,
+    /// Its place among those that are gone over in sections.
+    section: Option<usize>,
 }
 
 impl Brief {
-    pub(super) fn new(field: &PlanField) -> Self {
-        let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
-        Self { first: field.first, count: field.count, is_wide, unweighted: field.unweighted, kind }
+    /// Of all fields of `plan`.
+    pub(super) fn all(plan: &Plan, window: &Window) -> Vec<Self> {
+        let of = |field: &PlanField| {
+            let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
+            let (first, count, unweighted) = (field.first, field.count, field.unweighted);
+            Self { first, count, is_wide, unweighted, kind, section: None }
+        };
+        let mut all: Vec<Self> = plan.fields.iter().map(of).collect();
+        for (place, far) in window.in_sections().iter().enumerate() {
+            all[far.field].section = Some(place);
+        }
+        all
     }
 
     pub(super) fn members(&self) -> Range<usize> {
@@ -186,18 +187,28 @@ pub(super) fn stretch(
         scratch.faults = false;
     }
     for tiles in stretch.reads.iter().filter(|tiles| !tiles.is_empty()) {
-        scratch.faults |= read(level, plan, tables, raw.rows, first, frames, tiles.clone(), scratch);
+        let frames = first..first + frames;
+        scratch.faults |= scratch.in_view.read(level, plan, tables, raw.rows, frames, tiles.clone());
     }
     if is_first && plan.has_changes() {
-        let Scratch { pressures, statuses, before: (was, said), .. } = scratch;
+        let Scratch { in_view, before: (was, said), .. } = scratch;
         calibrate::frame(level, plan, tables, before, was, said);
         let before = (was.as_flattened(), said.as_flattened());
-        scratch.faults |= change::frames(plan, &raw.steps[first..first + frames], before, pressures, statuses);
-        scratch.tiles.iter_mut().for_each(|tile| tile.rests = false);
+        scratch.faults |= change::frames(
+            plan,
+            &raw.steps[first..first + frames],
+            before,
+            &mut in_view.pressures,
+            &mut in_view.statuses,
+        );
+        in_view.tiles.iter_mut().for_each(|tile| tile.rests = false);
     }
     if is_first && !cells.pressures.is_empty() {
         let slots = plan.slots();
-        let tiles = scratch.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&scratch.tiles).enumerate();
+        let tiles = scratch.in_view.pressures[..slots.next_multiple_of(LANES)]
+            .chunks(LANES)
+            .zip(&scratch.in_view.tiles)
+            .enumerate();
         // Those at rest are 0 there already.
         for (tile, (rows, _)) in tiles.filter(|(_, (_, kept))| !kept.rests) {
             for frame in 0..frames {
@@ -219,8 +230,8 @@ pub(super) fn stretch(
         },
         Answers::OnTheirWay,
     );
-    let Scratch { pressures, statuses, tiles, cells: of_fields, between, faults, .. } = scratch;
-    let skin = Skin { plan, pressures, statuses };
+    let Scratch { in_view, cells: of_fields, between, found, faults, .. } = scratch;
+    let skin = Skin::new(plan, in_view);
     let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::default() };
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &all[chunk * LANES..all.len().min((chunk + 1) * LANES)];
@@ -235,13 +246,16 @@ pub(super) fn stretch(
             whole_rows: is_first,
         };
         let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
-        meanwhile.coming = Coming::new(tables, next..stretch.fields.start + last * LANES, pressures, steps);
+        meanwhile.coming = Coming::new(tables, next..stretch.fields.start + last * LANES, &in_view.pressures, steps);
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
             announced.turn_to(next, frames, steps);
         }
         let mut rests = [true; LANES];
         for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
-            *rests = tables.rest.has_at_rest(field, |tile| tiles[tile].rests);
+            *rests = match tables.briefs[field].section {
+                Some(place) => found[place].rests,
+                None => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
+            };
         }
         let rests = &rests[..place.count];
         if rests.iter().all(|&rests| rests) {
@@ -249,7 +263,7 @@ pub(super) fn stretch(
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, *faults, &mut meanwhile, between, of_fields));
+        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, found, *faults, &mut meanwhile, between, of_fields));
         with_widest!(level, simd => columns::write(simd, of_fields, place, plan.outputs, cells));
     }
 }
@@ -291,6 +305,7 @@ fn answer<S: Simd>(
     first: usize,
     rests: &[bool],
     skin: &Skin<'_>,
+    found: &[Box<Found>],
     faults: bool,
     meanwhile: &mut Meanwhile<'_, '_, '_, '_>,
     between: &mut [Between; LANES],
@@ -298,7 +313,10 @@ fn answer<S: Simd>(
 ) {
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let briefs = &tables.briefs[first..first + rests.len()];
-    let sort = |index: usize| (rests[index], briefs[index].is_wide, briefs[index].unweighted);
+    let sort = |index: usize| {
+        let Brief { is_wide, unweighted, section, .. } = briefs[index];
+        (rests[index], section, is_wide, unweighted)
+    };
     let mut start = 0;
     while start < briefs.len() {
         let alike = (start..briefs.len()).take_while(|&index| sort(index) == sort(start)).count();
@@ -335,110 +353,11 @@ fn answer<S: Simd>(
                     *cells = Cells::at_rest(&brief.kind);
                 }
             }
-            (_, true, _) => answer!(ManyAbreast, true),
-            (_, _, true) => answer!(Abreast, false),
+            (_, Some(place), ..) => answers.fill(found[place].cells),
+            (_, _, true, _) => answer!(ManyAbreast, true),
+            (.., true) => answer!(Abreast, false),
             _ => answer!(Abreast, true),
         }
         start += alike;
     }
-}
-
-/// Reads and calibrates some tiles of up to sixteen frames. Whether any value is anything but a plain number.
-#[expect(clippy::too_many_arguments, reason = "as `block`")]
-fn read(
-    level: Level,
-    plan: &Plan,
-    tables: &Tables,
-    raw: Rows<'_>,
-    first: usize,
-    frames: usize,
-    tiles: Range<usize>,
-    scratch: &mut Scratch,
-) -> bool {
-    let groups_of = |count: usize| {
-        let tiles = tiles.clone();
-        tiles.clone().step_by(count).map(move |start| start..tiles.end.min(start + count))
-    };
-    let comes_at_once = ahead::worth(raw, tiles.clone()).is_some();
-    let count = if comes_at_once { tiles.len() } else { FETCHED };
-    if comes_at_once || reads_rows_abreast(level) || groups_of(count).any(|group| ahead::worth(raw, group).is_some()) {
-        let (some, mut faults) = (SomeFrames::new(raw, first, frames), false);
-        for group in groups_of(count) {
-            let next = group.end..tiles.end.min(group.end + count);
-            let mut ahead = Ahead::new(raw, first..first + frames, next, group.len());
-            faults |= with_widest!(level, simd => calibrate(simd, plan, tables, Some((&some, &mut ahead)), frames, group, scratch));
-        }
-        return faults;
-    }
-    let mut faults = false;
-    for group in groups_of(GROUP) {
-        for frame in 0..frames {
-            let values = OneFrame::new(raw, first + frame);
-            with_widest!(level, simd => {
-                for (tile, bits) in group.clone().zip(scratch.bits.chunks_mut(LANES)) {
-                    values.read(simd, tile, plan.calibrated(), &mut bits[frame]);
-                }
-            });
-        }
-        faults |= with_widest!(level, simd => calibrate(simd, plan, tables, None, frames, group, scratch));
-    }
-    faults
-}
-
-/// Calibrates tiles whose bits are there, or read from `raw` where they are not, while others are fetched; and turns them so
-/// that a taxel's frames stand abreast. Whether any value is anything but a plain number.
-#[inline(always)]
-fn calibrate<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    tables: &Tables,
-    mut raw: Option<(&SomeFrames<'_>, &mut Ahead<'_>)>,
-    frames: usize,
-    tiles: Range<usize>,
-    scratch: &mut Scratch,
-) -> bool {
-    let mut any = false;
-    let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
-    let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
-    let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
-    let Scratch { bits: there, .. } = scratch;
-    for (index, &sort) in tiles.clone().zip(&tables.tiles.sorts[tiles.clone()]) {
-        let tile = &tables.tiles.all[index];
-        let slot = index * LANES;
-        let place = slot & tables.window.mask();
-        let bits = match &mut raw {
-            Some((raw, ahead)) => {
-                ahead.step();
-                raw.read(simd, index, plan.calibrated(), bits);
-                &bits[..frames]
-            }
-            None => &there[(index - tiles.start) * LANES..][..frames],
-        };
-        let mut faults = false;
-        let is_pressed = calibrate::plain(simd, sort, tile, bits, pressures).unwrap_or_else(
-            #[inline(always)]
-            || {
-                for ((bits, pressures), statuses) in bits.iter().zip(&mut *pressures).zip(&mut *statuses) {
-                    faults |= calibrate::tile(simd, plan, tile, slot, bits, pressures, statuses);
-                }
-                faults || pressures[..frames].as_flattened().iter().any(|&pressure| pressure > 0.0)
-            },
-        );
-        let rests = !is_pressed;
-        let (abreast, kept) = (&mut scratch.pressures[place..place + LANES], &mut scratch.tiles[place / LANES]);
-        if !rests {
-            transpose(simd, |frame| cast_ref(&pressures[frame]), cast_slice_mut::<Row<f32>, Row<u32>>(abreast));
-        } else if !kept.rests {
-            abreast.fill([0.0; LANES]);
-        }
-        let abreast = &mut scratch.statuses[place..place + LANES];
-        if faults {
-            transpose(simd, |frame| &statuses[frame], abreast);
-        } else if kept.faulty {
-            abreast.fill([0; LANES]);
-        }
-        *kept = KeptTile { rests, faulty: faults };
-        any |= faults;
-    }
-    any
 }

@@ -8,8 +8,9 @@ use fearless_simd::prelude::*;
 use super::axis::Moments;
 use super::contact::{Sums, pressed};
 use super::simd::{F, LANES, M, Row, U, splat, splat_u, store, store_u, width};
+use super::sixteen::{ManyAbreast, in_sixteen};
 use super::touch::{Abreast, Members, Part, Touch};
-use super::wide::{ManyAbreast, Wide, add_up, in_sixteen};
+use super::wide::{Wide, add_up};
 
 /// A sum, and what it has too much.
 type Pair<S> = [F<S>; 2];

@@ -233,7 +233,13 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
 
 /// What is known of touches in charts after the centroid, if there are any.
 #[inline(always)]
-fn so_far<S: Simd>(simd: S, kind: &impl Kind<S>, at: usize, between: &Between, cells: &Cells) -> Option<Touch<S>> {
+pub(super) fn so_far<S: Simd>(
+    simd: S,
+    kind: &impl Kind<S>,
+    at: usize,
+    between: &Between,
+    cells: &Cells,
+) -> Option<Touch<S>> {
     let total = load(simd, &cells.total, at);
     let touched = total.simd_gt(splat(simd, 0.0));
     if !(touched.any_true() && kind.any_charted()) {

@@ -17,6 +17,8 @@ mod contact;
 mod descent;
 mod gate;
 mod hysteresis;
+mod in_view;
+
 mod lines;
 mod live;
 mod lot;
@@ -25,7 +27,9 @@ mod orientation;
 mod pick;
 mod put;
 mod rest;
+mod sections;
 mod simd;
+mod sixteen;
 mod slots;
 mod stream;
 #[cfg(test)]
@@ -98,7 +102,7 @@ impl Cpu {
         let seen = window.members(plan);
         Self {
             tables: Tables {
-                briefs: plan.fields.iter().map(batch::Brief::new).collect(),
+                briefs: batch::Brief::all(plan, &window),
                 rest: rest::Rest::new(&plan.fields, &seen),
                 seen,
                 window,
@@ -154,6 +158,8 @@ impl Cpu {
         let steps = |fields: usize| fields * lot::calls(plan.stages());
         let mut block = |at: usize, cells: &mut CellsMut<'_>, mut outgoing: Option<&mut stream::Outgoing<'_>>| {
             let before = the_one_before(raw.rows, at, &self.before);
+            let (frames, batch::Scratch { in_view, found, .. }) = (at..at + cells.frames(), &mut scratch);
+            sections::go_over(self.level, plan, tables, raw.rows, frames, in_view, found);
             for (index, stretch) in stretches.iter().enumerate() {
                 let (next, frames) = match stretches.get(index + 1) {
                     Some(next) => (next, at..at + LANES),

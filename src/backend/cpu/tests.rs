@@ -136,6 +136,9 @@ fn much_of_a_skin_rests_and_has_the_same_bits() {
     assert!(resting > all / 3 && resting < all, "{resting} of {all}");
 }
 
+/// Where [`sheet`] is folded back.
+const FOLD: u32 = 20_000;
+
 /// Rows of taxels on a sheet, and fields of sixteen that follow each other, each over half of the one before.
 fn sheet(taxels: u32) -> Body {
     const COLUMNS: u32 = 100;
@@ -143,7 +146,7 @@ fn sheet(taxels: u32) -> Body {
         id,
         link: 0,
         position_in_link: DVec3::new(f64::from(id % COLUMNS), 0.0, f64::from(id / COLUMNS)) * 0.005,
-        normal_in_link: DVec3::Y,
+        normal_in_link: if id < FOLD { DVec3::Y } else { -DVec3::Y },
         area: 25e-6,
         modality: Modality::Pressure,
     };
@@ -197,6 +200,31 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     for outputs in [Outputs::USUAL, Outputs::USUAL - Outputs::MOTION] {
         let scene = Scene { outputs, ..Scene::default() };
         let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        large_skins_agree(&plan, FRAMES);
+    }
+}
+
+#[test]
+fn fields_wider_than_what_is_at_hand_have_the_same_bits() {
+    const FRAMES: usize = 37;
+    let wide = |name: &str, members: Vec<u32>| FieldSpec {
+        name: name.to_owned(),
+        members: members.into_iter().map(|id| (id, MemberSpec { weight: 1.0 + f64::from(id % 7), uv: None })).collect(),
+        ..FieldSpec::default()
+    };
+    let mut body = sheet(30_000);
+    // Among the others, as charted fields and on both sides of the fold, where there is no chart.
+    body.fields.insert(5, wide("all", (0..30_000).step_by(2).collect()));
+    body.fields.push(wide("one side", (0..FOLD).filter(|id| id % 5 != 1).collect()));
+    let calibration = Calibration::identity(body.taxels.len());
+    let all = Outputs::USUAL | Outputs::AXIS | Outputs::ANISOTROPY | Outputs::PEAK | Outputs::AREA;
+    for outputs in [all, Outputs::TOTAL, Outputs::CENTROID, Outputs::AXIS] {
+        let scene = Scene { outputs, ..Scene::default() };
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let window = window::Window::new(&plan);
+        assert_eq!(window.in_sections().len(), 2);
+        let charted: Vec<bool> = window.in_sections().iter().map(|far| plan.fields[far.field].charted).collect();
+        assert_eq!(charted, [false, true]);
         large_skins_agree(&plan, FRAMES);
     }
 }

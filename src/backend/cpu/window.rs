@@ -3,13 +3,15 @@
 //! Sixteen frames of a million taxels are 64 MB of pressures. Written by calibration and read again by fields, they would
 //! go to memory and back. Where fields that follow each other have taxels that do, it is enough to keep some thousands of
 //! them: fields are gone through in order, a stretch of them at a time, and the window on their taxels slides along. What comes
-//! into it next is known, and fetched meanwhile.
+//! into it next is known, and fetched meanwhile. Fields that are wider than any window are gone over before, section by
+//! section.
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::sections::InSections;
 use super::simd::LANES;
-use crate::scene::Plan;
+use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
 /// Slots that a skin may have before it is looked at through a window.
@@ -19,6 +21,10 @@ const FAR: usize = 1 << 13;
 /// Slots that a window has, the first that does: 256 KiB of pressures and more.
 const SIZES: [usize; 3] = [1 << 12, 1 << 13, 1 << 14];
 
+/// Slots from which on it takes less time to read a field's raw values twice than to keep its pressures: those are 16 MiB.
+/// Tests have fewer.
+const VAST: usize = if cfg!(test) { 1 << 14 } else { 1 << 18 };
+
 /// Which fields are computed together, what is read before, and how many slots are kept.
 #[derive(Clone, Debug)]
 pub(super) struct Window {
@@ -27,6 +33,7 @@ pub(super) struct Window {
     slots: usize,
     /// What a slot's number is cut to for its place among those that are kept.
     mask: usize,
+    in_sections: Vec<InSections>,
 }
 
 /// Fields that follow each other.
@@ -48,16 +55,16 @@ impl Stretch {
 
 impl Window {
     pub(super) fn new(plan: &Plan) -> Self {
-        let needs: Vec<Range<usize>> = plan
-            .fields
-            .chunks(LANES)
-            .map(|fields| {
-                let slots = fields.iter().flat_map(|field| plan.members_of(field)).map(|member| member.slot as usize);
-                let (low, high) = slots.fold((usize::MAX, 0), |(low, high), slot| (low.min(slot), high.max(slot + 1)));
-                low.min(high) / LANES..high.div_ceil(LANES)
-            })
-            .collect();
-        let all = plan.slots().next_multiple_of(LANES);
+        let ([.., widest], all) = (SIZES, plan.slots().next_multiple_of(LANES));
+        let may_be = all > VAST && !plan.is_compensated();
+        let is_far = |field: &PlanField| field.is_wide() && tiles_of(plan.members_of(field)).len() > widest / LANES;
+        let far: Vec<usize> = (0..plan.fields.len()).filter(|&field| may_be && is_far(&plan.fields[field])).collect();
+        let mut needs = Vec::new();
+        for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
+            let near = (chunk * LANES..).zip(fields).filter(|(index, _)| !far.contains(index));
+            let needed = near.map(|(_, field)| tiles_of(plan.members_of(field)));
+            needs.push(needed.reduce(|one, other| around(&one, &other)).unwrap_or_default());
+        }
         // Changes and whoever wants all pressures go through all slots.
         if all > SMALL && !needs.is_empty() && !plan.has_changes() && plan.kept_pressures() == 0 {
             for slots in SIZES {
@@ -65,18 +72,26 @@ impl Window {
                 let reads =
                     stretches.iter().flat_map(|stretch| &stretch.reads).map(ExactSizeIterator::len).sum::<usize>();
                 // Reading a little twice is better than keeping all.
-                if reads <= all / LANES + all / LANES / 4 {
-                    return Self { stretches, slots, mask: slots - 1 };
+                let few = all / LANES + all / LANES / 4;
+                let in_sections: Option<Vec<InSections>> =
+                    far.iter().map(|&field| InSections::new(plan, field, few)).collect();
+                if let Some(in_sections) = in_sections.filter(|_| reads <= few) {
+                    return Self { stretches, slots, mask: slots - 1, in_sections };
                 }
             }
         }
         let stretch = Stretch { fields: 0..plan.fields.len(), reads: [0..plan.calibrated().div_ceil(LANES), 0..0] };
-        Self { stretches: vec![stretch], slots: all, mask: usize::MAX }
+        Self { stretches: vec![stretch], slots: all, mask: usize::MAX, in_sections: Vec::new() }
     }
 
     /// All fields, in order.
     pub(super) fn stretches(&self) -> &[Stretch] {
         &self.stretches
+    }
+
+    /// The fields that are gone over before, section by section.
+    pub(super) fn in_sections(&self) -> &[InSections] {
+        &self.in_sections
     }
 
     /// Slots that are kept.
@@ -134,8 +149,15 @@ fn cut(needs: &[Range<usize>], room: usize, fields: usize) -> Option<Vec<Stretch
     Some(stretches)
 }
 
+/// From the first to the last tile in which `members` have their taxels.
+pub(super) fn tiles_of(members: &[Member]) -> Range<usize> {
+    let slots = members.iter().map(|member| member.slot as usize);
+    let (low, high) = slots.fold((usize::MAX, 0), |(low, high), slot| (low.min(slot), high.max(slot + 1)));
+    low.min(high) / LANES..high.div_ceil(LANES)
+}
+
 /// All that is in either, and between them.
-fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+pub(super) fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     match (one.is_empty(), other.is_empty()) {
         (true, _) => other.clone(),
         (_, true) => one.clone(),
