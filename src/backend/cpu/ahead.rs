@@ -112,6 +112,11 @@ impl<'a> Coming<'a> {
         Self { members, pressures, at_a_time: whole_lines }
     }
 
+    /// `members` themselves, so many at a time.
+    pub(super) fn members(members: &'a [Member], at_a_time: usize) -> Self {
+        Self { members, pressures: None, at_a_time }
+    }
+
     /// Has the next few fetched.
     #[inline(always)]
     pub(super) fn step(&mut self) {

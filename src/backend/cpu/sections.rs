@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 
 use super::super::Rows;
 use super::Tables;
-use super::ahead::Ahead;
+use super::ahead::{Ahead, Coming};
 use super::axis::{self, Moments};
 use super::batch::{OverFrames, Skin};
 use super::compensated::Compensated;
@@ -21,7 +21,7 @@ use super::in_view::InView;
 use super::lot::{Between, Wanted, so_far, touch};
 use super::orientation::{Apart, Search, UNSEEN};
 use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
-use super::sixteen::{add_area, add_depth, add_in_sixteen, add_touch, as_a_tree, calls};
+use super::sixteen::{BLOCK, add_area, add_depth, add_in_sixteen, add_touch, as_a_tree, calls};
 use super::touch::{Cells, Kind, Members, OneKind, Sweep, Touch};
 use super::window::{around, tiles_of};
 use crate::percept::Outputs;
@@ -119,7 +119,8 @@ pub(super) fn go_over(
 ) {
     for (InSections { field, sections }, found) in tables.window.in_sections().iter().zip(all) {
         *found = Found::new();
-        let kind = tables.briefs[*field].kind;
+        let brief = &tables.briefs[*field];
+        let (kind, seen) = (brief.kind, &tables.seen[brief.members()]);
         let (stages, outputs) = (plan.stages(), plan.columns);
         let sums_only = Stages { orientation: false, axis: false, ..stages };
         let mut wanted = Wanted { stages: sums_only, outputs, faults: false, care: false };
@@ -128,6 +129,11 @@ pub(super) fn go_over(
             let next = sections.get(index + 1).unwrap_or(&sections[0]).tiles.clone();
             let faults = in_view.read(level, plan, tables, raw, frames.clone(), sections[index].tiles.clone());
             (faults, Ahead::new(raw, frames.clone(), next, steps))
+        };
+        // Members are as many bytes as their raw values in four frames.
+        let coming = |members: &Range<usize>| {
+            let [start, end] = [members.start, members.end].map(|member| seen.len().min(member + BLOCK));
+            Coming::members(&seen[start..end], LANES)
         };
         for (index, Section { members, tiles }) in sections.iter().enumerate() {
             let (faults, mut ahead) = read(index, calls(members.len()), in_view);
@@ -139,9 +145,14 @@ pub(super) fn go_over(
             }
             (found.rests, wanted.faults) = (false, wanted.faults | faults);
             let (skin, sums) = (Skin::new(plan, in_view), &mut found.sums);
-            let seen = OverFrames::of(&skin, tables, *field);
-            let (members, step) = (members.clone(), || ahead.step());
-            with_widest!(level, simd => sum_up(simd, seen, members, wanted, faults, &kind, sums, step));
+            let members_of = OverFrames::of(&skin, tables, *field);
+            let mut coming = coming(members);
+            let step = || {
+                ahead.step();
+                coming.step();
+            };
+            let members = members.clone();
+            with_widest!(level, simd => sum_up(simd, members_of, members, wanted, faults, &kind, sums, step));
         }
         if found.rests {
             found.cells = Cells::at_rest(&kind);
@@ -155,9 +166,14 @@ pub(super) fn go_over(
         for (index, Section { members, .. }) in sections.iter().enumerate() {
             let (_, mut ahead) = read(index, members.len().div_ceil(LANES), in_view);
             let skin = Skin::new(plan, in_view);
-            let seen = OverFrames::of(&skin, tables, *field);
-            let (members, step) = (members.clone(), || ahead.step());
-            with_widest!(level, simd => look_from_centroid(simd, seen, members, stages, &kind, found, step));
+            let members_of = OverFrames::of(&skin, tables, *field);
+            let mut coming = coming(members);
+            let step = || {
+                ahead.step();
+                coming.step();
+            };
+            let members = members.clone();
+            with_widest!(level, simd => look_from_centroid(simd, members_of, members, stages, &kind, found, step));
         }
         with_widest!(level, simd => answer(simd, wanted, &kind, found));
     }

@@ -15,7 +15,7 @@ use super::touch::{Abreast, Members, Sweep, Touch};
 pub(super) struct ManyAbreast<P>(pub(super) P);
 
 /// Members whose parts stay in the nearest cache while sixteen sums go over them in turn; a multiple of [`LANES`].
-const BLOCK: usize = 256;
+pub(super) const BLOCK: usize = 256;
 
 /// `K` sums over all members to which `add` adds one's part, each as sixteen that are then added up as a tree.
 #[inline(always)]
