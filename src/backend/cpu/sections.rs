@@ -1,8 +1,8 @@
 //! A wide field whose taxels are more than a window keeps, section by section.
 //!
-//! Sixteen frames of a million taxels' pressures are 64 MB: in_view, they go to memory once and come back with each pass over
-//! the field. It takes half of that to read the raw values again, a section after the other: a first time for sums, and once
-//! the centroid is known for what hangs on it. Sums go on where the section before left them, in the same order as if all
+//! Sixteen frames of a million taxels' pressures are 64 MB: if they are kept, they go to memory once and come back with each
+//! pass over the field. Half of that is enough to read the raw values twice, a section after the other: a first time for sums,
+//! and once the centroid is known for what hangs on it. Sums go on where the section before left them, in the same order as if all
 //! were there, and have the same bits.
 
 use std::ops::Range;
@@ -48,9 +48,8 @@ struct Section {
 }
 
 impl InSections {
-    /// Field `field` of `plan`, if that takes no more than so many tiles: where members that follow each other have taxels that
-    /// do.
-    pub(super) fn new(plan: &Plan, field: usize, most: usize) -> Option<Self> {
+    /// Field `field` of `plan`, if members that follow each other have taxels that do.
+    pub(super) fn new(plan: &Plan, field: usize) -> Option<Self> {
         let members = plan.members_of(&plan.fields[field]);
         let mut sections = Vec::<Section>::new();
         for (index, sixteen) in members.chunks(LANES).enumerate() {
@@ -64,8 +63,12 @@ impl InSections {
                 _ => sections.push(Section { members, tiles }),
             }
         }
-        let read = sections.iter().map(|section| section.tiles.len()).sum::<usize>();
-        (read <= most).then_some(Self { field, sections })
+        Some(Self { field, sections })
+    }
+
+    /// How many tiles are read, each time.
+    pub(super) fn tiles(&self) -> usize {
+        self.sections.iter().map(|section| section.tiles.len()).sum()
     }
 }
 

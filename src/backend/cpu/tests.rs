@@ -227,6 +227,11 @@ fn fields_wider_than_what_is_at_hand_have_the_same_bits() {
         assert_eq!(charted, [false, true]);
         large_skins_agree(&plan, FRAMES);
     }
+    // Fields that lie over each other are better kept.
+    body.fields.push(wide("again", (0..30_000).collect()));
+    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &Scene::default(), &calibration).unwrap();
+    let window = window::Window::new(&plan);
+    assert_eq!((window.in_sections().len(), window.slots()), (0, plan.slots()));
 }
 
 fn large_skins_agree(plan: &Plan, frames: usize) {

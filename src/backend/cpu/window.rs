@@ -61,7 +61,7 @@ impl Window {
         let far: Vec<usize> = (0..plan.fields.len()).filter(|&field| may_be && is_far(&plan.fields[field])).collect();
         let mut needs = Vec::new();
         for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
-            let near = (chunk * LANES..).zip(fields).filter(|(index, _)| !far.contains(index));
+            let near = (chunk * LANES..).zip(fields).filter(|(index, _)| far.binary_search(index).is_err());
             let needed = near.map(|(_, field)| tiles_of(plan.members_of(field)));
             needs.push(needed.reduce(|one, other| around(&one, &other)).unwrap_or_default());
         }
@@ -71,11 +71,13 @@ impl Window {
                 let Some(stretches) = cut(&needs, slots / LANES, plan.fields.len()) else { continue };
                 let reads =
                     stretches.iter().flat_map(|stretch| &stretch.reads).map(ExactSizeIterator::len).sum::<usize>();
-                // Reading a little twice is better than keeping all.
-                let few = all / LANES + all / LANES / 4;
-                let in_sections: Option<Vec<InSections>> =
-                    far.iter().map(|&field| InSections::new(plan, field, few)).collect();
-                if let Some(in_sections) = in_sections.filter(|_| reads <= few) {
+                let in_sections = far.iter().map(|&field| InSections::new(plan, field)).collect::<Option<Vec<_>>>();
+                let Some(in_sections) = in_sections else { break };
+                let more = in_sections.iter().map(InSections::tiles).sum::<usize>();
+                // Reading a little twice is better than keeping all; reading all for each of many fields that lie over each
+                // other is not.
+                let tiles = all / LANES;
+                if reads <= tiles + tiles / 4 && more <= 2 * tiles {
                     return Self { stretches, slots, mask: slots - 1, in_sections };
                 }
             }
