@@ -110,6 +110,21 @@ impl Found {
     }
 }
 
+/// What is fetched while a section is gone over: the next one's raw values, and members, which are as many bytes as their raw
+/// values in four frames.
+struct Beside<'a> {
+    ahead: Ahead<'a>,
+    coming: Coming<'a>,
+}
+
+impl Beside<'_> {
+    #[inline(always)]
+    fn step(&mut self) {
+        self.ahead.step();
+        self.coming.step();
+    }
+}
+
 /// All stages for the fields that are gone over in sections, in those `frames` of `raw`, which are at most sixteen.
 pub(super) fn go_over(
     level: Level,
@@ -127,35 +142,27 @@ pub(super) fn go_over(
         let (stages, outputs) = (plan.stages(), plan.columns);
         let sums_only = Stages { orientation: false, axis: false, ..stages };
         let mut wanted = Wanted { stages: sums_only, outputs, faults: false, care: false };
-        // Whether calibration says anything of a section's values, and the next one, which is fetched meanwhile.
+        // Whether calibration says anything of a section's values, and what is fetched while it is gone over.
         let read = |index: usize, steps: usize, in_view: &mut InView| {
+            let Section { members, tiles } = &sections[index];
             let next = sections.get(index + 1).unwrap_or(&sections[0]).tiles.clone();
-            let faults = in_view.read(level, plan, tables, raw, frames.clone(), sections[index].tiles.clone());
-            (faults, Ahead::new(raw, frames.clone(), next, steps))
-        };
-        // Members are as many bytes as their raw values in four frames.
-        let coming = |members: &Range<usize>| {
+            let faults = in_view.read(level, plan, tables, raw, frames.clone(), tiles.clone());
             let [start, end] = [members.start, members.end].map(|member| seen.len().min(member + BLOCK));
-            Coming::members(&seen[start..end], LANES)
+            let ahead = Ahead::new(raw, frames.clone(), next, steps);
+            (faults, Beside { ahead, coming: Coming::members(&seen[start..end], LANES) })
         };
         for (index, Section { members, tiles }) in sections.iter().enumerate() {
-            let (faults, mut ahead) = read(index, calls(members.len()), in_view);
+            let (faults, mut beside) = read(index, calls(members.len()), in_view);
             if in_view.rests(&tables.window, tiles.clone()) {
                 // Sums stay what they are, and some members are usable.
                 found.sums.statuses[1] = [0; LANES];
-                (0..calls(members.len())).for_each(|_| ahead.step());
+                (0..calls(members.len())).for_each(|_| beside.step());
                 continue;
             }
             (found.rests, wanted.faults) = (false, wanted.faults | faults);
             let (skin, sums) = (Skin::new(plan, in_view), &mut found.sums);
-            let members_of = OverFrames::of(&skin, tables, *field);
-            let mut coming = coming(members);
-            let step = || {
-                ahead.step();
-                coming.step();
-            };
-            let members = members.clone();
-            with_widest!(level, simd => sum_up(simd, members_of, members, wanted, faults, &kind, sums, step));
+            let (members_of, members) = (OverFrames::of(&skin, tables, *field), members.clone());
+            with_widest!(level, simd => sum_up(simd, members_of, members, wanted, faults, &kind, sums, || beside.step()));
         }
         if found.rests {
             found.cells = Cells::at_rest(&kind);
@@ -167,16 +174,10 @@ pub(super) fn go_over(
         }
         wanted.stages = stages;
         for (index, Section { members, .. }) in sections.iter().enumerate() {
-            let (_, mut ahead) = read(index, members.len().div_ceil(LANES), in_view);
+            let (_, mut beside) = read(index, members.len().div_ceil(LANES), in_view);
             let skin = Skin::new(plan, in_view);
-            let members_of = OverFrames::of(&skin, tables, *field);
-            let mut coming = coming(members);
-            let step = || {
-                ahead.step();
-                coming.step();
-            };
-            let members = members.clone();
-            with_widest!(level, simd => look_from_centroid(simd, members_of, members, stages, &kind, found, step));
+            let (members_of, members) = (OverFrames::of(&skin, tables, *field), members.clone());
+            with_widest!(level, simd => look_from_centroid(simd, members_of, members, stages, &kind, found, || beside.step()));
         }
         with_widest!(level, simd => answer(simd, wanted, &kind, found));
     }
