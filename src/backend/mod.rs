@@ -229,7 +229,7 @@ impl Picks {
             let (low, high) = (places.iter().min(), places.iter().max());
             [low, high].map(|place| place.copied().unwrap_or_default())
         });
-        let spans = spans.collect();
+        let spans: Vec<[u32; 2]> = spans.collect();
         let lines = few_at_a_time(places.iter().map(|place| place / 16 * 16).collect());
         Self { near, spans, blocks, lines, shuffles, channels: channels.len(), places }
     }

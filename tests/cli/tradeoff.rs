@@ -72,9 +72,10 @@ fn a_pick_is_written_into_the_scene_and_used_and_told() {
     assert!(said.is_empty(), "{said}");
     // Damaged, it is told in a line, and measured anew.
     // Rates may be kept beside, and in any order.
-    let folder_of = std::fs::read_dir(folder.path().join("cache/somatic/tradeoff")).unwrap();
-    let kept = folder_of.map(|file| file.unwrap().path());
-    let mut kept = kept.filter(|path| !path.file_name().unwrap().to_str().unwrap().starts_with("rates-"));
+    let files = std::fs::read_dir(folder.path().join("cache/somatic/tradeoff")).unwrap();
+    let mut kept = files
+        .map(|file| file.unwrap().path())
+        .filter(|path| !path.file_name().unwrap().to_str().unwrap().starts_with("rates-"));
     std::fs::write(kept.next().unwrap(), "{").unwrap();
     let (_, said) = done(folder.path(), &["plan", &path, "--json"]);
     assert!(said.contains("damaged; measured anew") && said.lines().count() == 1, "{said}");

@@ -21,9 +21,9 @@ const BLOCK: usize = 1 << 20;
 /// Bytes of a line.
 const LINE: usize = 64;
 /// Members that a line has.
-const A_LINE: usize = LINE / size_of::<Member>();
+const MEMBERS_A_LINE: usize = LINE / size_of::<Member>();
 /// Members from which on they are fetched: all of a plan's are more than a cache holds. Tests have fewer.
-const MANY: usize = if cfg!(test) { 1 << 10 } else { 1 << 18 };
+const MANY_MEMBERS: usize = if cfg!(test) { 1 << 10 } else { 1 << 18 };
 
 /// Where in each of the frames lie the lines of `tiles`, where they are fetched: frames lie as a source delivered them, are
 /// many, and the lines of sixteen are few.
@@ -96,7 +96,7 @@ impl<'a> Coming<'a> {
     /// For the first sixteen of `fields`, in so many `steps`.
     pub(super) fn new(tables: &'a Tables, fields: Range<usize>, pressures: &'a [Row<f32>], steps: usize) -> Self {
         let pressures = tables.window.is_far().then_some(pressures);
-        if pressures.is_none() && tables.seen.len() < MANY {
+        if pressures.is_none() && tables.seen.len() < MANY_MEMBERS {
             return Self::default();
         }
         let (briefs, later) = tables.briefs[fields].split_at_checked(LANES).unwrap_or_default();
@@ -108,11 +108,13 @@ impl<'a> Coming<'a> {
         }
         let members = &tables.seen[first.members().start..last.members().end];
         let at_a_time = members.len().div_ceil(steps.max(1));
-        let whole_lines = if pressures.is_none() { at_a_time.next_multiple_of(A_LINE) } else { at_a_time };
-        Self { members, pressures, at_a_time: whole_lines }
+        match pressures {
+            Some(_) => Self { members, pressures, at_a_time },
+            None => Self::members(members, at_a_time.next_multiple_of(MEMBERS_A_LINE)),
+        }
     }
 
-    /// `members` themselves, so many at a time.
+    /// `members` themselves, so many at a time: a whole number of lines.
     pub(super) fn members(members: &'a [Member], at_a_time: usize) -> Self {
         Self { members, pressures: None, at_a_time }
     }
@@ -123,7 +125,7 @@ impl<'a> Coming<'a> {
         let (now, later) = self.members.split_at(self.at_a_time.min(self.members.len()));
         match self.pressures {
             Some(rows) => now.iter().for_each(|member| later_needed(rows.as_ptr().wrapping_add(member.slot as usize))),
-            None => now.iter().step_by(A_LINE).for_each(|member| soon_needed(member)),
+            None => now.iter().step_by(MEMBERS_A_LINE).for_each(|member| soon_needed(member)),
         }
         self.members = later;
     }

@@ -93,7 +93,7 @@ pub(super) struct Brief {
     unweighted: bool,
     pub(super) kind: OneKind,
     /// Its place among those that are gone over in sections.
-    section: Option<usize>,
+    in_sections: Option<usize>,
 }
 
 impl Brief {
@@ -102,11 +102,11 @@ impl Brief {
         let of = |field: &PlanField| {
             let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
             let (first, count, unweighted) = (field.first, field.count, field.unweighted);
-            Self { first, count, is_wide, unweighted, kind, section: None }
+            Self { first, count, is_wide, unweighted, kind, in_sections: None }
         };
         let mut all: Vec<Self> = plan.fields.iter().map(of).collect();
         for (place, far) in window.in_sections().iter().enumerate() {
-            all[far.field].section = Some(place);
+            all[far.field].in_sections = Some(place);
         }
         all
     }
@@ -252,7 +252,7 @@ pub(super) fn stretch(
         }
         let mut rests = [true; LANES];
         for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
-            *rests = match tables.briefs[field].section {
+            *rests = match tables.briefs[field].in_sections {
                 Some(place) => found[place].rests,
                 None => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
             };
@@ -314,8 +314,8 @@ fn answer<S: Simd>(
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let briefs = &tables.briefs[first..first + rests.len()];
     let sort = |index: usize| {
-        let Brief { is_wide, unweighted, section, .. } = briefs[index];
-        (rests[index], section, is_wide, unweighted)
+        let Brief { is_wide, unweighted, in_sections, .. } = briefs[index];
+        (rests[index], in_sections, is_wide, unweighted)
     };
     let mut start = 0;
     while start < briefs.len() {

@@ -20,7 +20,7 @@ use crate::scene::Plan;
 /// processor sees it coming.
 const GROUP: usize = 64;
 /// Tiles that are read together where nobody has fetched them: the next ones are, meanwhile.
-const FETCHED: usize = 16;
+const UNFETCHED: usize = 16;
 
 /// Values of up to sixteen frames, as far as the window reaches.
 pub(super) struct InView {
@@ -71,12 +71,9 @@ impl InView {
             let tiles = tiles.clone();
             tiles.clone().step_by(count).map(move |start| start..tiles.end.min(start + count))
         };
-        let comes_at_once = ahead::worth(raw, tiles.clone()).is_some();
-        let count = if comes_at_once { tiles.len() } else { FETCHED };
-        if comes_at_once
-            || reads_rows_abreast(level)
-            || groups_of(count).any(|group| ahead::worth(raw, group).is_some())
-        {
+        let is_fetched = ahead::worth(raw, tiles.clone()).is_some();
+        let count = if is_fetched { tiles.len() } else { UNFETCHED };
+        if is_fetched || reads_rows_abreast(level) || groups_of(count).any(|group| ahead::worth(raw, group).is_some()) {
             let (some, mut faults) = (SomeFrames::new(raw, frames.start, frames.len()), false);
             for group in groups_of(count) {
                 let next = group.end..tiles.end.min(group.end + count);

@@ -18,7 +18,6 @@ mod descent;
 mod gate;
 mod hysteresis;
 mod in_view;
-
 mod lines;
 mod live;
 mod lot;

@@ -44,8 +44,11 @@ impl<S: Simd> Search<S> {
     /// Of none.
     #[inline(always)]
     fn new(simd: S) -> Self {
-        let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
-        Self { far: Apart { r: [unset; 3], x: none, y: none }, x: none, y: none }
+        // Without a loop, which would go through memory.
+        let [r1, r2, r3, far_x, far_y, x, y] = UNSEEN;
+        let (far_x, far_y) = (splat(simd, far_x), splat(simd, far_y));
+        let r = [splat(simd, r1), splat(simd, r2), splat(simd, r3)];
+        Self { far: Apart { r, x: far_x, y: far_y }, x: splat(simd, x), y: splat(simd, y) }
     }
 
     /// As numbers, to go on with later.

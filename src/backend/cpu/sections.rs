@@ -169,7 +169,8 @@ pub(super) fn go_over(
             continue;
         }
         with_widest!(level, simd => answer(simd, wanted, &kind, found));
-        if stages == sums_only {
+        // Without a chart there is nothing to see from a centroid.
+        if stages == sums_only || !plan.fields[*field].charted {
             continue;
         }
         wanted.stages = stages;
