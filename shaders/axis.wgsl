@@ -5,16 +5,16 @@ const ISOTROPIC_UNDER = 1e-3f;
 
 // The moments (a b; b d).
 struct Moments {
-    a: vec4<f32>,
-    b: vec4<f32>,
-    d: vec4<f32>,
+    a: Numbers,
+    b: Numbers,
+    d: Numbers,
 }
 
 fn no_moments() -> Moments {
-    return Moments(vec4<f32>(), vec4<f32>(), vec4<f32>());
+    return Moments(Numbers(), Numbers(), Numbers());
 }
 
-fn add_moments(so_far: Moments, member: Member, q: vec4<f32>, place: Place) -> Moments {
+fn add_moments(so_far: Moments, member: Member, q: Numbers, place: Place) -> Moments {
     let x = member.u - place.u;
     let y = member.v - place.v;
     let qx = q * x;
@@ -26,29 +26,29 @@ fn join_moments(a: Moments, b: Moments) -> Moments {
 }
 
 struct Axis {
-    angle: vec4<f32>,
-    anisotropy: vec4<f32>,
-    status: vec4<u32>,
+    angle: Numbers,
+    anisotropy: Numbers,
+    status: Words,
 }
 
 // `scaled` is the total as the moments' weights are scaled; `lined`, where more than one taxel of a chart is pressed.
-fn axis_of(moments: Moments, scaled: vec4<f32>, lined: vec4<bool>) -> Axis {
+fn axis_of(moments: Moments, scaled: Numbers, lined: Truths) -> Axis {
     let trace = moments.a + moments.d;
     let together = trace <= TOGETHER * scaled;
     let x = moments.a - moments.d;
     let y = 2.0 * moments.b;
     let h = sqrt(x * x + y * y);
-    let anisotropy = min(h / trace, vec4<f32>(1.0));
-    let isotropic = anisotropy < vec4<f32>(ISOTROPIC_UNDER);
+    let anisotropy = min(h / trace, Numbers(1.0));
+    let isotropic = anisotropy < Numbers(ISOTROPIC_UNDER);
     // Half the angle of (x, y), as a line's: of two equal forms the one that adds numbers of one sign.
-    let broad = x >= vec4<f32>();
+    let broad = x >= Numbers();
     let angle = line_angle(select(y, h + x, broad), select(h - x, y, broad));
-    let some = vec4<u32>(ISOTROPIC | (ANISOTROPY << PRESENT));
-    let status = select(vec4<u32>((AXIS | ANISOTROPY) << PRESENT), some, isotropic);
-    let nothing = vec4<f32>();
+    let some = Words(ISOTROPIC | (ANISOTROPY << PRESENT));
+    let status = select(Words((AXIS | ANISOTROPY) << PRESENT), some, isotropic);
+    let nothing = Numbers();
     return Axis(
         select(angle, nothing, isotropic | together | !lined),
         select(anisotropy, nothing, together | !lined),
-        select(vec4<u32>(), select(status, vec4<u32>(COINCIDENT), together), lined),
+        select(Words(), select(status, Words(COINCIDENT), together), lined),
     );
 }

@@ -2,16 +2,16 @@
 
 // Sums of wPx, then the means.
 struct Place {
-    u: vec4<f32>,
-    v: vec4<f32>,
-    depth: vec4<f32>,
+    u: Numbers,
+    v: Numbers,
+    depth: Numbers,
 }
 
 fn no_place() -> Place {
-    return Place(vec4<f32>(), vec4<f32>(), vec4<f32>());
+    return Place(Numbers(), Numbers(), Numbers());
 }
 
-fn add_place(so_far: Place, m: u32, member: Member, pull: vec4<f32>, charted: bool) -> Place {
+fn add_place(so_far: Place, m: u32, member: Member, pull: Numbers, charted: bool) -> Place {
     var place = so_far;
     place.u += pull * member.u;
     place.v += pull * member.v;
@@ -26,8 +26,8 @@ fn join_places(a: Place, b: Place) -> Place {
     return Place(a.u + b.u, a.v + b.v, a.depth + b.depth);
 }
 
-fn mean_place(sum: Place, total: vec4<f32>, touched: vec4<bool>) -> Place {
-    let nowhere = vec4<f32>();
+fn mean_place(sum: Place, total: Numbers, touched: Truths) -> Place {
+    let nowhere = Numbers();
     return Place(
         select(nowhere, sum.u / total, touched),
         select(nowhere, sum.v / total, touched),
@@ -36,7 +36,7 @@ fn mean_place(sum: Place, total: vec4<f32>, touched: vec4<bool>) -> Place {
 }
 
 // What is present where a field is touched.
-fn present_places(field: Field, touched: vec4<bool>) -> vec4<u32> {
+fn present_places(field: Field, touched: Truths) -> Words {
     let present = select(POSITION, CENTROID | POSITION | NORMAL, field.charted != 0u) << PRESENT;
-    return select(vec4<u32>(), vec4<u32>(present), touched);
+    return select(Words(), Words(present), touched);
 }

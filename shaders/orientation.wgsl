@@ -6,32 +6,32 @@ const NOBODY = 0xffffffffu;
 // The three largest squared distances, and the points and members of the two largest. Of equals the lower member is the
 // larger.
 struct Farthest {
-    r1: vec4<f32>,
-    r2: vec4<f32>,
-    r3: vec4<f32>,
-    m1: vec4<u32>,
-    m2: vec4<u32>,
-    e1u: vec4<f32>,
-    e1v: vec4<f32>,
-    e2u: vec4<f32>,
-    e2v: vec4<f32>,
+    r1: Numbers,
+    r2: Numbers,
+    r3: Numbers,
+    m1: Words,
+    m2: Words,
+    e1u: Numbers,
+    e1v: Numbers,
+    e2u: Numbers,
+    e2v: Numbers,
 }
 
 fn nobody_far() -> Farthest {
-    let nothing = vec4<f32>(-1.0);
-    let nobody = vec4<u32>(NOBODY);
-    return Farthest(nothing, nothing, nothing, nobody, nobody, vec4<f32>(), vec4<f32>(), vec4<f32>(), vec4<f32>());
+    let nothing = Numbers(-1.0);
+    let nobody = Words(NOBODY);
+    return Farthest(nothing, nothing, nothing, nobody, nobody, Numbers(), Numbers(), Numbers(), Numbers());
 }
 
 // Takes in a point that is the farthest where `first`, and else the second farthest where `second`.
 fn put(
     so_far: Farthest,
-    r: vec4<f32>,
-    m: vec4<u32>,
-    u: vec4<f32>,
-    v: vec4<f32>,
-    first: vec4<bool>,
-    second: vec4<bool>,
+    r: Numbers,
+    m: Words,
+    u: Numbers,
+    v: Numbers,
+    first: Truths,
+    second: Truths,
 ) -> Farthest {
     var far = so_far;
     far.r3 = select(max(far.r3, r), far.r2, first | second);
@@ -47,14 +47,14 @@ fn put(
 }
 
 // Members come in rising order: of equals the one that is there is the lower.
-fn add_far(so_far: Farthest, m: u32, member: Member, pressure: vec4<f32>, q: vec4<f32>, place: Place) -> Farthest {
+fn add_far(so_far: Farthest, m: u32, member: Member, pressure: Numbers, q: Numbers, place: Place) -> Farthest {
     let u = (member.u - place.u) * q;
     let v = (member.v - place.v) * q;
-    let r = select(vec4<f32>(-1.0), u * u + v * v, pressure > vec4<f32>());
-    return put(so_far, r, vec4<u32>(m), u, v, r > so_far.r1, r > so_far.r2);
+    let r = select(Numbers(-1.0), u * u + v * v, pressure > Numbers());
+    return put(so_far, r, Words(m), u, v, r > so_far.r1, r > so_far.r2);
 }
 
-fn put_any(far: Farthest, r: vec4<f32>, m: vec4<u32>, u: vec4<f32>, v: vec4<f32>) -> Farthest {
+fn put_any(far: Farthest, r: Numbers, m: Words, u: Numbers, v: Numbers) -> Farthest {
     let first = (r > far.r1) | ((r == far.r1) & (m < far.m1));
     let second = (r > far.r2) | ((r == far.r2) & (m < far.m2));
     return put(far, r, m, u, v, first, second);
@@ -67,18 +67,18 @@ fn join_far(a: Farthest, b: Farthest) -> Farthest {
 }
 
 struct Line {
-    angle: vec4<f32>,
-    status: vec4<u32>,
+    angle: Numbers,
+    status: Words,
 }
 
 // `lined` is where more than one taxel of a chart is pressed.
-fn orientation_of(far: Farthest, lined: vec4<bool>) -> Line {
+fn orientation_of(far: Farthest, lined: Truths) -> Line {
     let along_u = far.e1u - far.e2u;
     let along_v = far.e1v - far.e2v;
     let near = NEAR * sqrt(far.r1);
     let together = sqrt(along_u * along_u + along_v * along_v) <= near;
-    let tie = (far.r3 >= vec4<f32>()) & (sqrt(far.r2) - sqrt(max(far.r3, vec4<f32>())) <= near);
-    let status = select(vec4<u32>(), vec4<u32>(TIE), tie) | vec4<u32>(ORIENTATION << PRESENT);
-    let angle = select(line_angle(along_u, along_v), vec4<f32>(), together | !lined);
-    return Line(angle, select(vec4<u32>(), select(status, vec4<u32>(COINCIDENT), together), lined));
+    let tie = (far.r3 >= Numbers()) & (sqrt(far.r2) - sqrt(max(far.r3, Numbers())) <= near);
+    let status = select(Words(), Words(TIE), tie) | Words(ORIENTATION << PRESENT);
+    let angle = select(line_angle(along_u, along_v), Numbers(), together | !lined);
+    return Line(angle, select(Words(), select(status, Words(COINCIDENT), together), lined));
 }

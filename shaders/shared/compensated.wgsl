@@ -4,17 +4,17 @@ override COMPENSATED: bool = false;
 
 // A sum, and what it has too much.
 struct Kept {
-    sum: vec4<f32>,
-    over: vec4<f32>,
+    sum: Numbers,
+    over: Numbers,
 }
 
 // `x`, about which a compiler knows nothing: (a + b) - a would be b to it, and nothing left to carry. No batch has 2^31
 // frames.
-fn opaque(x: vec4<f32>) -> vec4<f32> {
-    return bitcast<vec4<f32>>(bitcast<vec4<u32>>(x) ^ vec4<u32>(batch.frames >> 31u));
+fn opaque(x: Numbers) -> Numbers {
+    return bitcast<Numbers>(bitcast<Words>(x) ^ Words(batch.frames >> 31u));
 }
 
-fn add_kept(sum: vec4<f32>, over: vec4<f32>, term: vec4<f32>) -> Kept {
+fn add_kept(sum: Numbers, over: Numbers, term: Numbers) -> Kept {
     let more = opaque(term - over);
     let next = opaque(sum + more);
     return Kept(next, opaque(next - sum) - more);
@@ -22,31 +22,31 @@ fn add_kept(sum: vec4<f32>, over: vec4<f32>, term: vec4<f32>) -> Kept {
 
 // What sums over a field have too much.
 struct Over {
-    total: vec4<f32>,
-    u: vec4<f32>,
-    v: vec4<f32>,
-    depth: vec4<f32>,
+    total: Numbers,
+    u: Numbers,
+    v: Numbers,
+    depth: Numbers,
 }
 
 fn nothing_over() -> Over {
-    return Over(vec4<f32>(), vec4<f32>(), vec4<f32>(), vec4<f32>());
+    return Over(Numbers(), Numbers(), Numbers(), Numbers());
 }
 
 // A total and a place, and what they have too much.
 struct Kepts {
-    total: vec4<f32>,
+    total: Numbers,
     place: Place,
     over: Over,
 }
 
 // Adds a member to `total` and `place` with care.
 fn add_with_care(
-    total: vec4<f32>,
+    total: Numbers,
     place: Place,
     over: Over,
     m: u32,
     member: Member,
-    pull: vec4<f32>,
+    pull: Numbers,
     charted: bool,
 ) -> Kepts {
     var kepts = Kepts(total, place, over);
@@ -79,7 +79,7 @@ struct KeptMoments {
     over: Moments,
 }
 
-fn add_moments_with_care(so_far: Moments, over: Moments, member: Member, q: vec4<f32>, place: Place) -> KeptMoments {
+fn add_moments_with_care(so_far: Moments, over: Moments, member: Member, q: Numbers, place: Place) -> KeptMoments {
     let x = member.u - place.u;
     let y = member.v - place.v;
     let qx = q * x;

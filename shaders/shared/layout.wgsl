@@ -7,7 +7,7 @@ struct Batch {
     changes: u32,
     fields: u32,
     wide: u32,
-    // Quads of a block: two to this power, up to GROUP. Divisions are dear where vectors have none.
+    // Quads of a block: two to this power, up to 16. Divisions are dear where vectors have none.
     lanes_log2: u32,
 }
 
@@ -131,29 +131,4 @@ fn lanes() -> u32 {
 fn at(slot: u32, quad: u32) -> u32 {
     let slots = batch.calibrated + batch.changes;
     return ((((quad >> batch.lanes_log2) * slots) + slot) << batch.lanes_log2) + (quad & (lanes() - 1u));
-}
-
-// A pressure is never negative: its sign says that there is a status to look up. Where there is none, none is written.
-const SAID = 0x80000000u;
-const NUMBER = 0x7fffffffu;
-
-fn marked(pressures: vec4<f32>, statuses: vec4<u32>) -> vec4<u32> {
-    return bitcast<vec4<u32>>(pressures) | select(vec4<u32>(), vec4<u32>(SAID), statuses != vec4<u32>());
-}
-
-fn unmarked(pressures: vec4<u32>) -> vec4<f32> {
-    return bitcast<vec4<f32>>(pressures & vec4<u32>(NUMBER));
-}
-
-fn is_marked(pressures: vec4<u32>) -> bool {
-    return any(pressures > vec4<u32>(NUMBER));
-}
-
-// Four statuses in one word.
-fn packed(statuses: vec4<u32>) -> u32 {
-    return statuses.x | (statuses.y << 8u) | (statuses.z << 16u) | (statuses.w << 24u);
-}
-
-fn unpacked(statuses: u32) -> vec4<u32> {
-    return (vec4<u32>(statuses) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
 }

@@ -31,39 +31,16 @@ override ORIENTED: bool = false;
 override AXED: bool = false;
 // Whether every member's weight is 1.
 override UNWEIGHTED: bool = false;
-// Whether there is never more than one frame: what nobody stores of a quad is then not computed, as its lanes never mix.
-override SINGLE: bool = false;
 
-fn pull_of(member: Member, pressure: vec4<f32>) -> vec4<f32> {
+fn pull_of(member: Member, pressure: Numbers) -> Numbers {
     if UNWEIGHTED {
         return pressure;
     }
     return member.weight * pressure;
 }
 
-fn store(column: u32, index: u32, quad: u32, values: vec4<u32>) {
-    if column == NOWHERE {
-        return;
-    }
-    let frame = quad * 4u;
-    let cell = (column * batch.frames + frame) * batch.fields + index;
-    results[cell] = values.x;
-    if SINGLE {
-        return;
-    }
-    if frame + 1u < batch.frames {
-        results[cell + batch.fields] = values.y;
-    }
-    if frame + 2u < batch.frames {
-        results[cell + 2u * batch.fields] = values.z;
-    }
-    if frame + 3u < batch.frames {
-        results[cell + 3u * batch.fields] = values.w;
-    }
-}
-
-fn store_numbers(column: u32, index: u32, quad: u32, values: vec4<f32>) {
-    store(column, index, quad, bitcast<vec4<u32>>(values));
+fn store_numbers(column: u32, index: u32, quad: u32, values: Numbers) {
+    store(column, index, quad, bitcast<Words>(values));
 }
 
 // Adds what the taxels have to say of a field's members `start`, `start + step` and so on.
@@ -71,7 +48,7 @@ fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Su
     var sums = so_far;
     sums.unusable = 0xffffffffu;
     for (var m = start; m < end; m += step) {
-        let status = status_at(first + (members[m].slot << batch.lanes_log2));
+        let status = status_at(first + (member_at(m).slot << batch.lanes_log2));
         sums.status |= status;
         sums.unusable &= status;
     }
@@ -80,12 +57,12 @@ fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Su
 
 // What a field's later stages are told of its earlier ones.
 struct Found {
-    status: vec4<u32>,
-    total: vec4<f32>,
-    scale: vec4<f32>,
+    status: Words,
+    total: Numbers,
+    scale: Numbers,
     place: Place,
     // More than one taxel of a chart is pressed.
-    lined: vec4<bool>,
+    lined: Truths,
 }
 
 fn found_of(field: Field, sums: Sums, place_sum: Place) -> Found {
@@ -93,16 +70,16 @@ fn found_of(field: Field, sums: Sums, place_sum: Place) -> Found {
     found.status = status_of(sums, field);
     found.total = sums.total;
     if CENTRED {
-        let touched = sums.pressed > vec4<u32>();
+        let touched = sums.pressed > Words();
         found.place = mean_place(place_sum, sums.total, touched);
         found.status |= present_places(field, touched);
     }
     if ORIENTED || AXED {
-        let charted = vec4<bool>(field.charted != 0u);
+        let charted = Truths(field.charted != 0u);
         found.scale = scale_of(sums.total);
-        found.lined = (sums.pressed > vec4<u32>(1u)) & charted;
-        let alone = (sums.pressed == vec4<u32>(1u)) & charted;
-        found.status |= select(vec4<u32>(), vec4<u32>(ONE_TAXEL), alone);
+        found.lined = (sums.pressed > Words(1u)) & charted;
+        let alone = (sums.pressed == Words(1u)) & charted;
+        found.status |= select(Words(), Words(ONE_TAXEL), alone);
     }
     return found;
 }
@@ -149,7 +126,7 @@ fn touch_of(begin: u32, end: u32, step: u32, first: u32, charted: bool) -> Touch
     var over = nothing_over();
     var said = NOTHING_SAID;
     for (var m = begin; m < end; m += step) {
-        let member = members[m];
+        let member = member_at(m);
         let bits = bits_at(first + (member.slot << batch.lanes_log2));
         let pressure = pressure_of(bits);
         let pull = pull_of(member, pressure);
@@ -189,7 +166,7 @@ fn spread_of(begin: u32, end: u32, step: u32, first: u32, found: Found) -> Sprea
     var over = no_moments();
     if ORIENTED || AXED {
         for (var m = begin; m < end; m += step) {
-            let member = members[m];
+            let member = member_at(m);
             let pressure = pressure_of(bits_at(first + (member.slot << batch.lanes_log2)));
             let q = pull_of(member, pressure) * found.scale;
             if ORIENTED {
@@ -244,27 +221,33 @@ fn main(
 
 // What an invocation has found so far, as bits: of one kind after the other, as there is no room for all.
 const WIDEST = 9u;
-var<workgroup> parts: array<array<vec4<u32>, WIDEST>, GROUP>;
+var<workgroup> parts: array<array<Words, WIDEST>, GROUP>;
 
 fn put_sums(local: u32, sums: Sums, place: Place) {
-    parts[local][0] = bitcast<vec4<u32>>(sums.total);
-    parts[local][1] = bitcast<vec4<u32>>(sums.peak);
-    parts[local][2] = bitcast<vec4<u32>>(sums.area);
+    parts[local][0] = bitcast<Words>(sums.total);
+    parts[local][1] = bitcast<Words>(sums.peak);
+    parts[local][2] = bitcast<Words>(sums.area);
     parts[local][3] = sums.pressed;
-    parts[local][4] = vec4<u32>(sums.status, sums.unusable, 0u, 0u);
-    parts[local][5] = bitcast<vec4<u32>>(place.u);
-    parts[local][6] = bitcast<vec4<u32>>(place.v);
-    parts[local][7] = bitcast<vec4<u32>>(place.depth);
+    parts[local][4] = Words(sums.status);
+    parts[local][5] = bitcast<Words>(place.u);
+    parts[local][6] = bitcast<Words>(place.v);
+    parts[local][7] = bitcast<Words>(place.depth);
+    parts[local][8] = Words(sums.unusable);
 }
 
-fn number_at(local: u32, part: u32) -> vec4<f32> {
-    return bitcast<vec4<f32>>(parts[local][part]);
+fn number_at(local: u32, part: u32) -> Numbers {
+    return bitcast<Numbers>(parts[local][part]);
 }
 
 fn sums_at(local: u32) -> Sums {
-    let statuses = parts[local][4];
-    let pressed = parts[local][3];
-    return Sums(number_at(local, 0u), number_at(local, 1u), number_at(local, 2u), pressed, statuses.x, statuses.y);
+    return Sums(
+        number_at(local, 0u),
+        number_at(local, 1u),
+        number_at(local, 2u),
+        parts[local][3],
+        first_of(parts[local][4]),
+        first_of(parts[local][8]),
+    );
 }
 
 fn place_at(local: u32) -> Place {
@@ -272,15 +255,15 @@ fn place_at(local: u32) -> Place {
 }
 
 fn put_far(local: u32, far: Farthest) {
-    parts[local][0] = bitcast<vec4<u32>>(far.r1);
-    parts[local][1] = bitcast<vec4<u32>>(far.r2);
-    parts[local][2] = bitcast<vec4<u32>>(far.r3);
+    parts[local][0] = bitcast<Words>(far.r1);
+    parts[local][1] = bitcast<Words>(far.r2);
+    parts[local][2] = bitcast<Words>(far.r3);
     parts[local][3] = far.m1;
     parts[local][4] = far.m2;
-    parts[local][5] = bitcast<vec4<u32>>(far.e1u);
-    parts[local][6] = bitcast<vec4<u32>>(far.e1v);
-    parts[local][7] = bitcast<vec4<u32>>(far.e2u);
-    parts[local][8] = bitcast<vec4<u32>>(far.e2v);
+    parts[local][5] = bitcast<Words>(far.e1u);
+    parts[local][6] = bitcast<Words>(far.e1v);
+    parts[local][7] = bitcast<Words>(far.e2u);
+    parts[local][8] = bitcast<Words>(far.e2v);
 }
 
 fn far_at(local: u32) -> Farthest {
@@ -298,9 +281,9 @@ fn far_at(local: u32) -> Farthest {
 }
 
 fn put_moments(local: u32, moments: Moments) {
-    parts[local][0] = bitcast<vec4<u32>>(moments.a);
-    parts[local][1] = bitcast<vec4<u32>>(moments.b);
-    parts[local][2] = bitcast<vec4<u32>>(moments.d);
+    parts[local][0] = bitcast<Words>(moments.a);
+    parts[local][1] = bitcast<Words>(moments.b);
+    parts[local][2] = bitcast<Words>(moments.d);
 }
 
 fn moments_at(local: u32) -> Moments {

@@ -1,5 +1,5 @@
-@group(0) @binding(5) var<storage, read> raw: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read> raw: array<Words>;
 
-fn bits_at(here: u32) -> vec4<u32> {
+fn bits_at(here: u32) -> Words {
     return raw[here];
 }

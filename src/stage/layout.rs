@@ -39,10 +39,15 @@ pub(crate) struct Batch {
     pub(crate) lanes_log2: u32,
 }
 
-/// Quads of a block, for a batch of `frames` frames: as many as a group has invocations, or so few as there are.
+/// Quads of a block at most: enough to fill lines and a GPU's vectors, few enough for a block of a whole robot's taxels to
+/// stay in a core's cache.
+#[cfg(feature = "gpu")]
+pub(crate) const LANES: u32 = 16;
+
+/// Quads of a block, for a batch of `frames` frames: [`LANES`], or so few as there are.
 #[cfg(feature = "gpu")]
 pub(crate) fn lanes(frames: usize) -> u32 {
-    (frames.div_ceil(4).max(1)).next_power_of_two().min(64) as u32
+    (frames.div_ceil(4).max(1)).next_power_of_two().min(LANES as usize) as u32
 }
 
 /// Quads of a batch of `frames` frames with those that fill up its last block.

@@ -95,7 +95,7 @@ impl Columns {
     }
 
     /// What the program over fields is told.
-    pub(super) fn of_fields(&self, plan: &Plan, single: bool) -> Vec<(&'static str, f64)> {
+    pub(super) fn of_fields(&self, plan: &Plan) -> Vec<(&'static str, f64)> {
         let mut overrides = self.overrides(&[
             ("TOTAL_AT", Column::Total),
             ("PEAK_AT", Column::Peak),
@@ -114,7 +114,6 @@ impl Columns {
             ("AXED", stages.axis),
             ("COMPENSATED", plan.is_compensated()),
             ("UNWEIGHTED", plan.fields.iter().all(|field| field.unweighted)),
-            ("SINGLE", single),
         ];
         overrides.extend(said.map(|(name, is_so)| (name, f64::from(u8::from(is_so)))));
         overrides

@@ -9,6 +9,7 @@
 pub(crate) mod adapter;
 mod bus;
 mod columns;
+mod members;
 mod pack;
 #[cfg(feature = "cli")]
 pub(crate) mod raster;
@@ -28,8 +29,11 @@ pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
 use self::adapter::Device;
 use self::columns::{Columns, NOTHING};
+use self::members::MemberTable;
+use self::pack::Form;
 use self::ring::{SETS, Set};
-use self::stage::{Over, Stage, table, table_as};
+use self::shaders::{Abreast, Values};
+use self::stage::{Over, Stage, table};
 use super::{Backend, RawBatch};
 use crate::error::{Error, Result};
 use crate::percept::Percepts;
@@ -49,7 +53,7 @@ const ENOUGH: usize = 4 << 20;
 /// Frames of a submission at most: dispatches count quads along one side, of 65,535 groups.
 const MOST: usize = 1 << 17;
 /// Frames of a full block.
-const BLOCK: usize = 4 * GROUP as usize;
+const BLOCK: usize = 4 * layout::LANES as usize;
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -69,8 +73,8 @@ pub(crate) struct Gpu {
     stages: Vec<Stage>,
     /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
     careful: (usize, Vec<Stage>),
-    /// Whether fields read raw values, which go up four frames of a taxel side by side.
-    direct: bool,
+    /// How raw values go up.
+    form: Form,
     /// Where those go, if not into `raw`.
     texture: Option<wgpu::Texture>,
     /// Number of wide fields.
@@ -120,21 +124,20 @@ impl Gpu {
         let row = layout::padded_channels(plan.channels()) as u64 * 4;
         let plain = is_plain(plan);
         let direct = plain && !plan.has_changes() && !plan.stages().touches && plan.calibrated() == plan.channels();
+        let form = match (direct, capacity) {
+            (false, _) => Form::Rows,
+            (true, 1) => Form::One,
+            (true, _) => Form::Quads,
+        };
         // Should the plan cease to be plain, they go up in rows.
-        let up = [false, direct].map(|direct| pack::raw_bytes(plan.channels(), capacity, direct));
+        let up = [Form::Rows, form].map(|form| form.bytes(plan.channels(), capacity));
         let up = up[0].max(up[1]) as u64;
         let raw = working("raw", up);
-        let on_processor = device.info.device_type == wgpu::DeviceType::Cpu;
-        let texture = (direct && on_processor).then(|| pack::texture(&device, up));
+        let texture = (direct && is_processor(&device)).then(|| pack::texture(&device, "raw", up, form.texel()));
         let taxels = table(&device, "taxels", &plan.taxels);
         let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
         let field_table = table(&device, "fields", &gpu_fields);
-        let few = plan.members.len() <= layout::FEW;
-        let (usage, least) = match few {
-            true => (wgpu::BufferUsages::UNIFORM, layout::FEW * size_of::<layout::Member>()),
-            false => (wgpu::BufferUsages::STORAGE, 0),
-        };
-        let members = table_as(&device, "members", &plan.members, usage, least as u64);
+        let members = MemberTable::new(&device, &plan.members);
         let all_depths: Vec<f32> = plan.fields.iter().flat_map(|field| field.depths.iter().copied()).collect();
         let depths = table(&device, "depths", &all_depths);
         let quads = layout::padded_quads(capacity) as u64;
@@ -178,29 +181,32 @@ impl Gpu {
             let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
-        let told = columns.of_fields(plan, capacity == 1);
+        let told = columns.of_fields(plan);
+        let abreast = if capacity == 1 { Abreast::One } else { Abreast::Four };
         let over_fields = |direct: bool| {
             let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
-            let shader = match (direct, &texels, few) {
-                (false, _, false) => &shaders::FIELDS,
-                (false, _, true) => &shaders::FEW_FIELDS,
-                (true, None, false) => &shaders::RAW_FIELDS,
-                (true, None, true) => &shaders::FEW_RAW_FIELDS,
-                (true, Some(_), false) => &shaders::TEXTURE_FIELDS,
-                (true, Some(_), true) => &shaders::FEW_TEXTURE_FIELDS,
+            let tables = [(0, &batch), (1, &field_table), (3, &depths), (4, &taxels), (7, &results)];
+            let mut bound: Vec<_> = tables.map(|(binding, table)| (binding, table.as_entire_binding())).into();
+            bound.push((2, members.binding()));
+            let values = match &texels {
+                Some(texels) => {
+                    bound.push((5, wgpu::BindingResource::TextureView(texels)));
+                    Values::RawTexture
+                }
+                None if direct => {
+                    bound.push((5, raw.as_entire_binding()));
+                    Values::Raw
+                }
+                None => {
+                    bound.extend([(5, pressures.as_entire_binding()), (6, statuses.as_entire_binding())]);
+                    Values::Pressures
+                }
             };
-            let tables = [&batch, &field_table, &members, &depths, &taxels];
-            let mut bound: Vec<_> = (0..).zip(tables.map(wgpu::Buffer::as_entire_binding)).collect();
-            match &texels {
-                Some(texels) => bound.push((5, wgpu::BindingResource::TextureView(texels))),
-                None if direct => bound.push((5, raw.as_entire_binding())),
-                None => bound.extend([(5, pressures.as_entire_binding()), (6, statuses.as_entire_binding())]),
-            }
-            bound.push((7, results.as_entire_binding()));
-            let mut stages = vec![Stage::bound(&device, shader, "main", Over::Quads, &told, &bound)];
+            let shader = shaders::fields(abreast, values, members.kind());
+            let mut stages = vec![Stage::bound(&device, &shader, "main", Over::Quads, &told, &bound)];
             if !wide.is_empty() {
                 bound.push((8, wide_fields.as_entire_binding()));
-                stages.push(Stage::bound(&device, shader, "wide", Over::WideFields, &told, &bound));
+                stages.push(Stage::bound(&device, &shader, "wide", Over::WideFields, &told, &bound));
             }
             stages
         };
@@ -249,7 +255,7 @@ impl Gpu {
             taxels,
             stages,
             careful,
-            direct,
+            form,
             texture,
             wide: wide.len() as u32,
             columns,
@@ -382,7 +388,7 @@ impl Backend for Gpu {
         if !is_plain(&self.plan) {
             let (replaced, careful) = std::mem::take(&mut self.careful);
             self.stages.splice(..replaced, careful);
-            self.direct = false;
+            self.form = Form::Rows;
             self.texture = None;
         }
     }
@@ -412,6 +418,11 @@ impl Gpu {
         }
         Ok(())
     }
+}
+
+/// Whether a processor stands in for a GPU: it reads textures in place of buffers.
+fn is_processor(device: &Device) -> bool {
+    device.info.device_type == wgpu::DeviceType::Cpu
 }
 
 /// Whether raw values are pressures, with nothing to check but that they are numbers.

@@ -12,16 +12,47 @@ use crate::error::Result;
 use crate::signal::RawValue;
 use crate::stage::layout;
 
-/// Bytes of a row of the texture, 16 for each texel, as many as `shaders/shared/raw_texture.wgsl` says.
-const ROW: usize = 16 << 10;
+/// Texels of a row of a texture, as many as `shaders/shared/texels.wgsl` says.
+pub(super) const TEXELS: usize = 1024;
 /// Frames and slots of a tile that is turned at once: what is read of a frame, and written of a slot, fills a line.
 const TOGETHER: usize = 16;
 const SLOTS: usize = 16;
 
+/// How raw values go up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    /// Frame by frame, as calibrate reads them.
+    Rows,
+    /// As fields read what are pressures: four frames of a taxel side by side.
+    Quads,
+    /// The same where there is never more than one frame.
+    One,
+}
+
+impl Form {
+    /// Bytes of `frames` frames of `channels` values: where a texture may take them, whole rows of one.
+    pub(super) fn bytes(self, channels: usize, frames: usize) -> usize {
+        match self {
+            Self::Rows => frames * layout::padded_channels(channels) * 4,
+            Self::Quads => (layout::padded_quads(frames) * channels * self.texel()).next_multiple_of(self.row()),
+            Self::One => (channels * self.texel()).next_multiple_of(self.row()),
+        }
+    }
+
+    /// Bytes of a texel.
+    pub(super) fn texel(self) -> usize {
+        if self == Self::One { 4 } else { 16 }
+    }
+
+    fn row(self) -> usize {
+        TEXELS * self.texel()
+    }
+}
+
 impl Gpu {
     /// Bytes that the raw values of `frames` frames go up in.
     pub(super) fn raw_bytes(&self, frames: usize) -> usize {
-        raw_bytes(self.plan.channels(), frames, self.direct)
+        self.form.bytes(self.plan.channels(), frames)
     }
 
     /// Has the raw values of `frames` frames copied to where the programs read them, from byte `at` of `upload` on.
@@ -32,10 +63,14 @@ impl Gpu {
         };
         let from = wgpu::TexelCopyBufferInfo {
             buffer: upload,
-            layout: wgpu::TexelCopyBufferLayout { offset: at, bytes_per_row: Some(ROW as u32), rows_per_image: None },
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: at,
+                bytes_per_row: Some(self.form.row() as u32),
+                rows_per_image: None,
+            },
         };
-        let height = self.raw_bytes(frames).div_ceil(ROW) as u32;
-        encoder.copy_buffer_to_texture(from, texture.as_image_copy(), size_of(height));
+        let height = self.raw_bytes(frames) / self.form.row();
+        encoder.copy_buffer_to_texture(from, texture.as_image_copy(), rows(height as u32));
     }
 
     /// Fills a set's upload buffer.
@@ -51,9 +86,9 @@ impl Gpu {
         mapped.slice(..HEADER as usize).copy_from_slice(bytes_of(header));
         mapped.slice(HEADER as usize..steps).copy_from_slice(cast_slice(&self.packed_steps));
         let mapped = mapped.slice(values..);
-        match self.direct {
-            true => pack_quads(raw, self.plan.channels(), &mut self.packed, mapped),
-            false => pack_rows(raw, self.plan.channels(), &mut self.packed, mapped),
+        match self.form {
+            Form::Quads => pack_quads(raw, self.plan.channels(), &mut self.packed, mapped),
+            Form::Rows | Form::One => pack_rows(raw, self.plan.channels(), &mut self.packed, mapped),
         }
         Ok(())
     }
@@ -64,30 +99,23 @@ pub(super) fn values_at(frames: usize) -> u64 {
     (HEADER + frames as u64 * STEP).next_multiple_of(16)
 }
 
-/// A texture that holds `bytes`, four frames of a taxel a texel.
-pub(super) fn texture(device: &Device, bytes: u64) -> wgpu::Texture {
+/// A texture for `bytes` in texels of so many, of which a program reads whole words.
+pub(super) fn texture(device: &Device, name: &str, bytes: u64, texel: usize) -> wgpu::Texture {
+    let height = bytes.div_ceil((TEXELS * texel) as u64).max(1);
     device.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("raw"),
-        size: size_of(bytes.div_ceil(ROW as u64) as u32),
+        label: Some(name),
+        size: rows(height as u32),
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Uint,
+        format: if texel == 4 { wgpu::TextureFormat::R32Uint } else { wgpu::TextureFormat::Rgba32Uint },
         usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::STORAGE_BINDING,
         view_formats: &[],
     })
 }
 
-fn size_of(height: u32) -> wgpu::Extent3d {
-    wgpu::Extent3d { width: (ROW / 16) as u32, height, depth_or_array_layers: 1 }
-}
-
-/// Bytes of `frames` frames in quads or in rows; whole rows of a texture.
-pub(super) fn raw_bytes(channels: usize, frames: usize, in_quads: bool) -> usize {
-    match in_quads {
-        true => (layout::padded_quads(frames) * channels * 16).next_multiple_of(ROW),
-        false => frames * layout::padded_channels(channels) * 4,
-    }
+fn rows(height: u32) -> wgpu::Extent3d {
+    wgpu::Extent3d { width: TEXELS as u32, height, depth_or_array_layers: 1 }
 }
 
 fn pack_rows(raw: &RawBatch<'_>, channels: usize, row: &mut Vec<RawValue>, mut mapped: wgpu::WriteOnly<'_, [u8]>) {

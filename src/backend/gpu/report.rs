@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use super::adapter::{self, Device};
+use super::pack::Form;
 use super::ring::Set;
 use super::stage::Over;
 use super::{GROUP, Gpu, header};
@@ -166,7 +167,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let members = (plan.members.len() * size_of::<layout::Member>()) as u64;
     let slots = (frames * plan.slots()) as u64;
     let results = cells * 4 * gpu.columns.count() as u64;
-    let pressures = if gpu.direct { 0 } else { 2 * slots * 5 };
+    let pressures = if gpu.form != Form::Rows { 0 } else { 2 * slots * 5 };
     let least_bytes = bytes_up + pressures + members + results;
     Ok(DeviceTime { frames, programs_s, by_device: clock.is_some(), least_bytes, bytes_up, bytes_down })
 }

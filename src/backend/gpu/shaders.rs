@@ -1,4 +1,7 @@
-//! The shaders' text: one file a stage, after what they share. The stages from contact to axis are one program.
+//! The shaders' text: one file a stage, after what they share. The stages from contact to axis are one program, put together
+//! for where it reads and for how many frames it takes at once.
+
+use std::borrow::Cow;
 
 /// A program's name, the stages that it computes, and its whole WGSL.
 pub(crate) struct Shader {
@@ -8,59 +11,102 @@ pub(crate) struct Shader {
     #[cfg_attr(not(test), expect(dead_code, reason = "tests hold the files of the stages to it"))]
     pub(crate) stages: &'static [&'static str],
     /// WGSL, ready to compile.
-    pub(crate) source: &'static str,
+    pub(crate) source: Cow<'static, str>,
+}
+
+/// The text of some files that are shared.
+macro_rules! shared {
+    ($($name:literal),*) => {
+        concat!($(include_str!(concat!("../../../shaders/shared/", $name, ".wgsl"))),*)
+    };
 }
 
 macro_rules! shader {
-    ($name:literal: $($stage:literal),+; $($shared:literal),*) => {
+    ($name:literal; $($shared:literal),*) => {
         Shader {
             name: $name,
-            stages: &[$($stage),+],
-            source: concat!(
-                include_str!("../../../shaders/shared/layout.wgsl"),
-                $(include_str!(concat!("../../../shaders/shared/", $shared, ".wgsl")),)*
-                $(include_str!(concat!("../../../shaders/", $stage, ".wgsl")),)+
-            ),
+            stages: &[$name],
+            source: Cow::Borrowed(concat!(
+                shared!("layout" $(, $shared)*),
+                include_str!(concat!("../../../shaders/", $name, ".wgsl")),
+            )),
         }
     };
 }
 
-pub(crate) const CALIBRATE: Shader = shader!("calibrate": "calibrate";);
-pub(crate) const CHANGE: Shader = shader!("change": "change";);
-pub(crate) const FIELDS: Shader = shader!(
-    "fields": "contact", "centroid", "orientation", "axis"; "pressures", "members", "angle", "line", "over_fields",
-    "compensated");
-/// The same for plans of at most [`crate::stage::layout::FEW`] memberships.
-pub(crate) const FEW_FIELDS: Shader = shader!(
-    "few fields": "contact", "centroid", "orientation", "axis"; "pressures", "few_members", "angle", "line", "over_fields", "compensated");
-/// Both where raw values are pressures, which are then read as they came.
-pub(crate) const RAW_FIELDS: Shader = shader!(
-    "raw fields": "contact", "centroid", "orientation", "axis"; "raw_buffer", "raw_pressures", "members", "angle", "line",
-    "over_fields", "compensated");
-pub(crate) const FEW_RAW_FIELDS: Shader = shader!(
-    "few raw fields": "contact", "centroid", "orientation", "axis"; "raw_buffer", "raw_pressures", "few_members", "angle", "line",
-    "over_fields", "compensated");
-/// Those on processors that stand in for a GPU.
-pub(crate) const TEXTURE_FIELDS: Shader = shader!(
-    "texture fields": "contact", "centroid", "orientation", "axis"; "raw_texture", "raw_pressures", "members", "angle", "line",
-    "over_fields", "compensated");
-pub(crate) const FEW_TEXTURE_FIELDS: Shader = shader!(
-    "few texture fields": "contact", "centroid", "orientation", "axis"; "raw_texture", "raw_pressures", "few_members", "angle", "line",
-    "over_fields", "compensated");
-pub(crate) const HYSTERESIS: Shader = shader!("hysteresis": "hysteresis";);
-pub(crate) const MOTION: Shader = shader!("motion": "motion"; "angle");
+pub(crate) const CALIBRATE: Shader = shader!("calibrate"; "four_frames", "marks");
+pub(crate) const CHANGE: Shader = shader!("change"; "four_frames", "marks");
+pub(crate) const HYSTERESIS: Shader = shader!("hysteresis";);
+pub(crate) const MOTION: Shader = shader!("motion"; "angle");
+
+/// Frames that an invocation of the program over fields takes at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Abreast {
+    Four,
+    /// Where there is never more than one.
+    One,
+}
+
+/// Where it reads what taxels say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Values {
+    /// What calibrate has written.
+    Pressures,
+    /// Raw values that are pressures, as they went up.
+    Raw,
+    /// The same, on a processor that stands in for a GPU.
+    RawTexture,
+}
+
+/// Where it reads members.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Members {
+    Many,
+    /// At most [`crate::stage::layout::FEW`] memberships.
+    Few,
+    /// However many, on a processor that stands in for a GPU.
+    Texture,
+}
+
+/// Contact, centroid, orientation and axis.
+pub(crate) fn fields(abreast: Abreast, values: Values, members: Members) -> Shader {
+    let abreast = match abreast {
+        Abreast::Four => shared!("four_frames", "four_cells"),
+        Abreast::One => shared!("one_frame", "one_cell"),
+    };
+    let values = match values {
+        Values::Pressures => shared!("marks", "pressures"),
+        Values::Raw => shared!("raw_buffer", "raw_pressures"),
+        Values::RawTexture => shared!("raw_texture", "raw_pressures"),
+    };
+    let members = match members {
+        Members::Many => shared!("members"),
+        Members::Few => shared!("few_members"),
+        Members::Texture => shared!("member_texture"),
+    };
+    const SHARED: &str = shared!("texels", "angle", "scale", "over_fields", "compensated");
+    const STAGES: &str = concat!(
+        include_str!("../../../shaders/contact.wgsl"),
+        include_str!("../../../shaders/centroid.wgsl"),
+        include_str!("../../../shaders/orientation.wgsl"),
+        include_str!("../../../shaders/axis.wgsl"),
+    );
+    Shader {
+        name: "fields",
+        stages: &["contact", "centroid", "orientation", "axis"],
+        source: [shared!("layout"), abreast, values, members, SHARED, STAGES].concat().into(),
+    }
+}
 
 /// All of them, in the order they run.
 #[cfg(test)]
-pub(crate) const ALL: [Shader; 10] = [
-    CALIBRATE,
-    CHANGE,
-    FIELDS,
-    FEW_FIELDS,
-    RAW_FIELDS,
-    FEW_RAW_FIELDS,
-    TEXTURE_FIELDS,
-    FEW_TEXTURE_FIELDS,
-    HYSTERESIS,
-    MOTION,
-];
+pub(crate) fn all() -> Vec<Shader> {
+    let mut all = vec![CALIBRATE, CHANGE];
+    for abreast in [Abreast::Four, Abreast::One] {
+        for values in [Values::Pressures, Values::Raw, Values::RawTexture] {
+            all.extend([Members::Many, Members::Few, Members::Texture].map(|members| fields(abreast, values, members)));
+        }
+    }
+    all.extend([HYSTERESIS, MOTION]);
+    all
+}

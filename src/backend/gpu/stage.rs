@@ -124,7 +124,7 @@ pub(super) fn pipeline(
 ) -> wgpu::ComputePipeline {
     let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(shader.name),
-        source: wgpu::ShaderSource::Wgsl(shader.source.into()),
+        source: wgpu::ShaderSource::Wgsl(shader.source.clone()),
     });
     device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(shader.name),

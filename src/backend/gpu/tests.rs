@@ -6,7 +6,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, TypeInner};
 
 use super::columns::NOTHING;
-use super::shaders::{ALL, Shader};
+use super::pack::Form;
+use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, fields};
 use super::stage::{folded, pipeline};
 use super::unpack::PRESENT;
 use super::{GROUP, Gpu, adapter};
@@ -19,8 +20,8 @@ use crate::signal::{Calibration, RawValue};
 use crate::stage::{calibrate, layout};
 
 fn parse(shader: &Shader) -> Module {
-    naga::front::wgsl::parse_str(shader.source)
-        .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(shader.source)))
+    naga::front::wgsl::parse_str(&shader.source)
+        .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(&shader.source)))
 }
 
 /// (name, offset) of every member of the WGSL struct `name`, and its size.
@@ -41,7 +42,7 @@ macro_rules! same_layout {
 
 #[test]
 fn structs_lie_as_naga_lays_them() {
-    let module = parse(&super::shaders::FIELDS);
+    let module = parse(&fields(Abreast::Four, Values::Pressures, Members::Many));
     same_layout!(&module, Batch { frames, channels, calibrated, changes, fields, wide, lanes_log2 });
     same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, response });
     same_layout!(&module, Curve { first, count });
@@ -62,7 +63,7 @@ fn constant(module: &Module, name: &str) -> Option<u32> {
 
 #[test]
 fn bits_have_one_meaning() {
-    let module = parse(&ALL[0]);
+    let module = parse(&CALIBRATE);
     for (name, flag) in Flags::all().iter_names() {
         // A shader names the flags it sets; whatever it names must be the same bit.
         if let Some(bits) = constant(&module, name) {
@@ -96,7 +97,7 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "TURNS"), Some(super::stage::TURNS));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
-    let change = parse(&super::shaders::CHANGE);
+    let change = parse(&CHANGE);
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
     assert_eq!(constant(&module, "MISSING"), Some(RawValue::MISSING.to_bits()));
@@ -104,7 +105,7 @@ fn bits_have_one_meaning() {
 
 #[test]
 fn every_shader_validates_with_no_optional_capability() {
-    for shader in &ALL {
+    for shader in &all() {
         let module = parse(shader);
         let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
         assert!(validated.is_ok(), "{}: {:?}", shader.name, validated.err());
@@ -122,7 +123,8 @@ fn every_shader_is_the_file_of_its_stage() {
         .unwrap()
         .filter_map(|entry| Some(entry.unwrap().file_name().to_str()?.strip_suffix(".wgsl")?.to_owned()))
         .collect();
-    let mut stages: Vec<String> = ALL.iter().flat_map(|shader| shader.stages).map(|&stage| stage.to_owned()).collect();
+    let mut stages: Vec<String> =
+        all().iter().flat_map(|shader| shader.stages).map(|&stage| stage.to_owned()).collect();
     files.sort();
     stages.sort();
     stages.dedup();
@@ -136,7 +138,7 @@ fn every_shader_is_the_file_of_its_stage() {
 #[test]
 fn pipelines_build_without_any_driver() {
     let device = adapter::open(wgpu::Backends::NOOP).expect("noop is always there");
-    for shader in &ALL {
+    for shader in &all() {
         for entry in parse(shader).entry_points {
             let built = pipeline(&device, shader, &entry.name, NOTHING);
             assert!(format!("{built:?}").contains("ComputePipeline"));
@@ -146,8 +148,9 @@ fn pipelines_build_without_any_driver() {
 
 #[test]
 fn a_shader_that_is_wrong_is_caught() {
-    let broken = super::shaders::FIELDS.source.replace("sums.total += pull;", "sums.total += vec4<u32>(status);");
-    assert!(broken != super::shaders::FIELDS.source);
+    let sound = fields(Abreast::Four, Values::Pressures, Members::Many).source;
+    let broken = sound.replace("sums.total += pull;", "sums.total += Words(status);");
+    assert!(broken != sound);
     assert!(
         naga::front::wgsl::parse_str(&broken).is_err() || {
             let module = naga::front::wgsl::parse_str(&broken).unwrap();
@@ -170,7 +173,7 @@ fn a_long_dispatch_is_folded() {
 fn a_batch_is_cut_into_blocks_that_hold_it() {
     for frames in [1, 2, 4, 5, 9, 64, 130, 255, 256, 257, 1000, 9984] {
         let (lanes, quads) = (layout::lanes(frames), layout::padded_quads(frames));
-        assert!(lanes.is_power_of_two() && lanes <= GROUP);
+        assert!(lanes.is_power_of_two() && lanes <= layout::LANES && layout::LANES <= GROUP);
         assert!(quads * 4 >= frames && quads % lanes as usize == 0);
         // A shorter batch never needs more than there is room for.
         assert!((1..frames).all(|fewer| layout::padded_quads(fewer) <= quads));
@@ -257,11 +260,11 @@ fn raw_values_are_read_alike_from_buffers_from_textures_and_through_calibration(
             let mut device = device.clone();
             device.info.device_type = device_type;
             let mut gpu = Gpu::on(device, &plan, frames).unwrap();
-            assert!(gpu.direct && gpu.texture.is_some() == (device_type == wgpu::DeviceType::Cpu));
+            assert!(gpu.form != Form::Rows && gpu.texture.is_some() == (device_type == wgpu::DeviceType::Cpu));
             let percepts = percepts_of_odd_values(&mut gpu, frames);
             gpu.restart();
             gpu.recalibrate(&careful);
-            assert!(!gpu.direct);
+            assert!(gpu.form == Form::Rows);
             assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames, {device_type:?}");
             percepts
         });

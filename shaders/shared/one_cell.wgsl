@@ -1,0 +1,13 @@
+// The same for one frame's.
+
+alias Texels = texture_storage_2d<r32uint, read>;
+
+fn store(column: u32, index: u32, quad: u32, value: Words) {
+    if column != NOWHERE {
+        results[column * batch.fields + index] = value;
+    }
+}
+
+fn line_angle(x: Numbers, y: Numbers) -> Numbers {
+    return angle_of_line(x, y);
+}
