@@ -1,6 +1,8 @@
 //! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
 
-use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor};
+use somatic::experiments::shape::Shape;
+use somatic::scene::{Arithmetic, Knobs};
+use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor, Scene};
 
 use crate::common::{backends, frame};
 
@@ -17,7 +19,7 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
     let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
     let outputs = somatic::Outputs::all();
-    let scene = somatic::Scene { outputs, max_age_s: 0.1, letters, ..somatic::Scene::default() };
+    let scene = Scene { outputs, max_age_s: 0.1, letters, ..Scene::default() };
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {
@@ -81,7 +83,7 @@ fn percepts_do_not_depend_on_how_a_long_call_streams() {
     let frames = recording(&body, 2300);
     let wanted = somatic::Outputs::TOTAL | somatic::Outputs::CENTROID | somatic::Outputs::ORIENTATION;
     let run = |kind: BackendKind, cut: usize| {
-        let scene = somatic::Scene { outputs: wanted | somatic::Outputs::SPEED, ..somatic::Scene::default() };
+        let scene = Scene { outputs: wanted | somatic::Outputs::SPEED, ..Scene::default() };
         let options = Options { backend: kind, batch: cut, scene, ..Options::default() };
         let mut engine = Engine::new(&body, options).unwrap();
         let mut seen = Vec::new();
@@ -97,6 +99,54 @@ fn percepts_do_not_depend_on_how_a_long_call_streams() {
         for cut in [230, 1] {
             let differs = whole.iter().zip(&run(kind, cut)).position(|(a, b)| a != b);
             assert_eq!(differs, None, "{kind:?} cut by {cut}");
+        }
+    }
+}
+
+/// The GPU's programs for one frame at a time take what others take four of: fields small and wide, plain values and
+/// calibrated ones, sums with care and without.
+#[test]
+fn percepts_of_a_frame_at_a_time_are_those_of_many() {
+    let shape = Shape { sensors: 6000, fields: 200, members: 40, wide: 5000, local: true, frames: 9, seed: 7 };
+    let body = shape.body();
+    let mut frames = shape.frames();
+    for (number, value) in frames.iter_mut().flat_map(|frame| &mut frame.values).enumerate().step_by(97) {
+        *value = [RawValue::MISSING, RawValue::FAULTY, RawValue::new(0.0), RawValue::new(1e-30)][number / 97 % 4];
+    }
+    frames[3].values.fill(RawValue::MISSING);
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibrated = somatic::Calibration::parse("[all]\np_max = 900\ndead_band = 20", &ids).unwrap();
+    let outputs = somatic::Outputs::USUAL | somatic::Outputs::SPEED;
+    for kind in backends().into_iter().filter(|kind| *kind != BackendKind::Reference) {
+        for (calibration, arithmetic) in [
+            (None, Arithmetic::OnePass),
+            (None, Arithmetic::Compensated),
+            (Some(calibrated.clone()), Arithmetic::OnePass),
+            (Some(calibrated.clone()), Arithmetic::Compensated),
+        ] {
+            let scene = Scene {
+                outputs,
+                knobs: Knobs { arithmetic: Some(arithmetic), ..Knobs::default() },
+                ..Scene::default()
+            };
+            let run = |cut: usize| {
+                let (calibration, scene) = (calibration.clone(), scene.clone());
+                let options = Options { backend: kind, batch: cut, calibration, scene, ..Options::default() };
+                let mut engine = Engine::new(&body, options).unwrap();
+                let mut seen = Vec::new();
+                for part in frames.chunks(cut) {
+                    let percepts = engine.process(part).unwrap();
+                    for frame in 0..part.len() {
+                        let is_missing = seen.len() == 3;
+                        assert!(percepts.frame(frame).all(|percept| percept.total.is_none() == is_missing));
+                        seen.push(bits(percepts, frame));
+                    }
+                }
+                seen
+            };
+            let (whole, apart) = (run(frames.len()), run(1));
+            let differs = whole.iter().zip(&apart).position(|(a, b)| a != b);
+            assert_eq!(differs, None, "{kind:?}, {arithmetic:?}, calibrated: {}", calibration.is_some());
         }
     }
 }
