@@ -1,0 +1,54 @@
+//! How many frames a submission takes, and what is more than any takes.
+
+use super::BLOCK;
+use super::adapter::Device;
+use super::columns::Columns;
+use crate::error::{Error, Result};
+use crate::scene::Plan;
+use crate::stage::layout;
+
+/// Bytes of raw values in a submission, about: enough for the device to be busy, little enough to stay in caches and to
+/// have several on their way.
+const ENOUGH: usize = 4 << 20;
+/// Frames of a submission at most: dispatches count quads along one side, of 65,535 groups.
+const MOST: usize = 1 << 17;
+
+/// Frames that a submission takes for calls of `batch`.
+pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) -> Result<usize> {
+    let limits = device.device.limits();
+    let limit = limits.max_storage_buffer_binding_size as usize;
+    let tables = [
+        plan.members.len() * size_of::<layout::Member>(),
+        plan.taxels.len() * size_of::<layout::Taxel>(),
+        plan.fields.len() * size_of::<layout::Field>(),
+        plan.curves.knots.len() * size_of::<layout::Knot>(),
+    ];
+    // A frame of every column, and a quad of every slot.
+    let (cells, quad) = (plan.fields.len() * 4 * columns.count(), plan.slots() * 16);
+    if tables.into_iter().chain([cells, quad]).any(|bytes| bytes > limit) {
+        return Err(Error::failed(format!(
+            "{} memberships and {} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+            plan.members.len(),
+            plan.channels()
+        )));
+    }
+    if let Some(field) = plan.fields.iter().find(|field| field.count > layout::WIDEST) {
+        return Err(Error::failed(format!(
+            "field `{}` has {} taxels, and the GPU takes {} at most; use the cpu backend",
+            field.name,
+            field.count,
+            layout::WIDEST
+        )));
+    }
+    let in_blocks = |frames: usize| match frames {
+        BLOCK.. => frames / BLOCK * BLOCK,
+        // The largest power of two that is not more.
+        _ => 1 << frames.max(1).ilog2(),
+    };
+    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(BLOCK, MOST);
+    let held = in_blocks(limit / quad * 4);
+    // What comes back, in one buffer.
+    let back = cells + if plan.stages().touches { 2 * quad } else { 0 };
+    let most = held.min(limit / cells).min(limits.max_buffer_size as usize / back).max(1);
+    Ok(batch.clamp(1, enough.min(most)))
+}
