@@ -27,6 +27,8 @@ mod pick;
 mod put;
 mod rest;
 mod sections;
+#[cfg(feature = "gpu")]
+pub(super) mod side_by_side;
 mod simd;
 mod sixteen;
 mod slots;

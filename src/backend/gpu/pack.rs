@@ -1,12 +1,11 @@
 //! From frames to the upload buffer: raw values frame by frame where the device calibrates them, and where they are
 //! pressures four frames of a taxel side by side, as fields read them.
 
-use std::array;
-
-use bytemuck::{bytes_of, cast_slice};
+use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
 use super::adapter::Device;
 use super::{Gpu, HEADER, STEP};
+use crate::backend::cpu::side_by_side;
 use crate::backend::{RawBatch, Rows};
 use crate::error::Result;
 use crate::signal::RawValue;
@@ -14,10 +13,6 @@ use crate::stage::layout;
 
 /// Texels of a row of a texture, as many as `shaders/shared/texels.wgsl` says.
 pub(super) const TEXELS: usize = 1024;
-/// Frames and slots of a tile that is turned at once: what is read of a frame, and written of a slot, fills a line.
-const TOGETHER: usize = 16;
-const SLOTS: usize = 16;
-
 /// How raw values go up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {
@@ -141,31 +136,9 @@ fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, 
     scratch.resize(block * channels, RawValue::new(0.0));
     for (index, start) in (0..raw.frames).step_by(block).enumerate() {
         let end = raw.frames.min(start + block);
-        for first in (start..end).step_by(TOGETHER) {
-            // The last quad is filled up with the last frame.
-            let count = (end - first).next_multiple_of(4).min(TOGETHER);
-            let rows: [&[RawValue]; TOGETHER] = array::from_fn(|i| {
-                let frame = (first + i).min(raw.frames - 1);
-                match raw.rows {
-                    Rows::Packed { values, channels } => &values[frame * channels..][..channels],
-                    Rows::Picked { frames, .. } => &frames[frame].values[..],
-                }
-            });
-            for some in (0..channels).step_by(SLOTS) {
-                let slots = some..channels.min(some + SLOTS);
-                for (lane, values) in (first - start..).zip(&rows[..count]) {
-                    let to = scratch[some * block..slots.end * block].chunks_exact_mut(block);
-                    match raw.rows {
-                        Rows::Packed { .. } => {
-                            to.zip(&values[slots.clone()]).for_each(|(to, &value)| to[lane] = value);
-                        }
-                        Rows::Picked { picks, .. } => {
-                            let places = &picks.places[slots.clone()];
-                            to.zip(places).for_each(|(to, &place)| to[lane] = values[place as usize]);
-                        }
-                    }
-                }
-            }
+        for first in (start..end).step_by(side_by_side::FRAMES) {
+            let frames = first..end.min(first + side_by_side::FRAMES);
+            side_by_side::write(raw.rows, frames, channels, cast_slice_mut(scratch), first - start);
         }
         let bytes = block * channels * 4;
         mapped.slice(index * bytes..(index + 1) * bytes).copy_from_slice(cast_slice(scratch));
