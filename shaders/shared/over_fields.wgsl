@@ -189,7 +189,7 @@ fn spread_of(begin: u32, end: u32, step: u32, first: u32, found: Found) -> Sprea
     return Spread(far, moments);
 }
 
-@compute @workgroup_size(GROUP)
+@compute @workgroup_size(FIELDS_GROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
@@ -197,7 +197,7 @@ fn main(
 ) {
     // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
     // same block, which so stays in the cache.
-    let index = (group_number(group, groups) * GROUP + local) >> batch.lanes_log2;
+    let index = (group_number(group, groups) * FIELDS_GROUP + local) >> batch.lanes_log2;
     let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
     if index >= batch.fields || quad >= quads() {
         return;

@@ -178,7 +178,8 @@ impl Gpu {
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
         let told = columns.of_fields(plan);
-        let abreast = if capacity == 1 { Abreast::One } else { Abreast::Four };
+        let (abreast, quads_or_one) =
+            if capacity == 1 { (Abreast::One, Over::OneFrame) } else { (Abreast::Four, Over::Quads) };
         let over_fields = |direct: bool| {
             let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
             let tables = [(0, &batch), (1, &field_table), (3, &depths), (4, &taxels), (7, &results)];
@@ -199,7 +200,7 @@ impl Gpu {
                 }
             };
             let shader = shaders::fields(abreast, values, members.kind());
-            let mut stages = vec![Stage::bound(&device, &shader, "main", Over::Quads, &told, &bound)];
+            let mut stages = vec![Stage::bound(&device, &shader, "main", quads_or_one, &told, &bound)];
             if !wide.is_empty() {
                 bound.push((8, wide_fields.as_entire_binding()));
                 stages.push(Stage::bound(&device, &shader, "wide", Over::WideFields, &told, &bound));

@@ -10,6 +10,9 @@ use crate::stage::layout;
 /// Quads that an invocation of calibrate takes at most, as its shader says.
 pub(super) const TURNS: u32 = 4;
 
+/// Invocations a group of the program over fields for one frame at a time, as `shaders/shared/one_cell.wgsl` has it.
+pub(super) const FIELDS_GROUP: u32 = 128;
+
 /// Values of a program's overrides, by name.
 pub(super) type Constants<'a> = &'a [(&'a str, f64)];
 
@@ -32,6 +35,8 @@ pub(super) enum Over {
     Changes,
     /// One invocation a field and quad; those of wide fields return at once.
     Quads,
+    /// The same for one frame, in larger groups.
+    OneFrame,
     /// One group a wide field and quad.
     WideFields,
     /// One invocation a field and frame.
@@ -51,6 +56,7 @@ impl Over {
             Self::CalibratedOnce => (vectors.div_ceil(GROUP), 1),
             Self::Changes => (batch.changes.div_ceil(GROUP), quads),
             Self::Quads => (batch.fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
+            Self::OneFrame => (batch.fields.div_ceil(FIELDS_GROUP), 1),
             Self::WideFields => (batch.wide, quads),
             Self::Cells => ((batch.fields * batch.frames).div_ceil(GROUP), 1),
             Self::Fields => (batch.fields.div_ceil(GROUP), 1),

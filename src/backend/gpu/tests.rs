@@ -85,6 +85,8 @@ fn bits_have_one_meaning() {
     assert_eq!(Flags::all().bits() - shared, (Flags::HELD | Flags::JUMPED).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
+    let one = parse(&fields(Abreast::One, Values::Raw, Members::Few));
+    assert_eq!(constant(&one, "FIELDS_GROUP"), Some(super::stage::FIELDS_GROUP));
     assert_eq!(constant(&module, "WIDE"), Some(layout::WIDE as u32));
     assert_eq!(constant(&module, "STRAIGHT"), Some(layout::STRAIGHT));
     assert_eq!(constant(&module, "MASKED"), Some(layout::MASKED));
