@@ -1,4 +1,4 @@
-// What of a quad's cells is no vector's business.
+// What differs between a quad's cells: each is stored where its frame is, and has an angle of its own.
 
 // Invocations of a group that takes fields.
 const FIELDS_GROUP = GROUP;

@@ -1,4 +1,5 @@
-// What an invocation takes at once: four frames, a quad.
+// What an invocation takes at once: four frames, a quad. The stages say Numbers, Words and Truths where they mean one for
+// each of those, and are compiled with one_frame.wgsl, too.
 
 alias Numbers = vec4<f32>;
 alias Words = vec4<u32>;

@@ -1,4 +1,4 @@
-// The same for one frame's.
+// The same for a single frame's cell.
 
 // More than elsewhere: what a group costs by itself is a part of a live call.
 const FIELDS_GROUP = 128u;
