@@ -13,6 +13,7 @@ use crate::stage::layout;
 
 /// Texels of a row of a texture, as many as `shaders/shared/texels.wgsl` says.
 pub(super) const TEXELS: usize = 1024;
+
 /// How raw values go up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {

@@ -99,6 +99,8 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "TURNS"), Some(super::stage::TURNS));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
+    let textures = parse(&fields(Abreast::One, Values::RawTexture, Members::Texture));
+    assert_eq!(constant(&textures, "ROW_LOG2"), Some(super::pack::TEXELS.ilog2()));
     let change = parse(&CHANGE);
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
