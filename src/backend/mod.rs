@@ -120,19 +120,18 @@ pub(crate) struct Picks {
     pub(crate) shuffles: Vec<Shuffle>,
 }
 
-/// Where up to sixteen values lie among 32 of a frame.
+/// Where up to sixteen values lie among 32 of a frame. A skin has many, and each is read with its values: it is small.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
 pub(crate) struct Shuffle {
-    /// [`ELSEWHERE`] for those that do not lie there.
-    pub(crate) places: [u32; 16],
-    pub(crate) from: usize,
-    /// The same for eight and eight of them, where each lie among sixteen.
-    pub(crate) halves: Option<[Half; 2]>,
+    pub(crate) from: u32,
+    /// From `from` on; [`ELSEWHERE`] for those that do not lie there.
+    pub(crate) places: [u8; 16],
+    /// How far behind `from` the sixteen begin among which the first eight lie, and the last eight, if all do.
+    pub(crate) halves: Option<[u8; 2]>,
 }
 
 /// Not among 32 values.
-pub(crate) const ELSEWHERE: u32 = 63;
+pub(crate) const ELSEWHERE: u8 = 63;
 
 /// So many shuffles bring sixteen values together faster than one by one.
 const SHUFFLES: usize = 4;
@@ -140,46 +139,36 @@ const SHUFFLES: usize = 4;
 impl Shuffle {
     /// As few as together bring the values at `places` of a frame of `width` side by side, which is 32 or more; what fills up
     /// the last ones is as good a value as any.
-    fn all(places: &[u32], width: usize) -> Vec<Self> {
-        let filled: [u32; 16] = std::array::from_fn(|lane| *places.get(lane).unwrap_or(&places[0]));
+    fn all(places: &[u32], width: u32) -> Vec<Self> {
+        // Of the same eight, if these have any.
+        let filling = |lane: usize| places.get(lane / 8 * 8).unwrap_or(&places[0]);
+        let filled: [u32; 16] = std::array::from_fn(|lane| *places.get(lane).unwrap_or(filling(lane)));
         let mut sorted = filled;
         sorted.sort_unstable();
         let mut shuffles = Vec::<Self>::new();
         for low in sorted {
-            if shuffles.last().is_some_and(|last| (low as usize) < last.from + 32) {
+            if shuffles.last().is_some_and(|last| low < last.from + 32) {
                 continue;
             }
-            let from = (low as usize).min(width - 32);
-            let place = |lane: usize| match (filled[lane] as usize).checked_sub(from) {
-                Some(place) if place < 32 => place as u32,
+            let from = low.min(width - 32);
+            let place = |lane: usize| match filled[lane].checked_sub(from) {
+                Some(place) if place < 32 => place as u8,
                 _ => ELSEWHERE,
             };
             shuffles.push(Self { from, places: std::array::from_fn(place), halves: None });
         }
         if let [only] = &mut shuffles[..] {
-            // What fills up the last ones is there twice, then.
-            let [first, second] = [places, places.get(8..).filter(|rest| !rest.is_empty()).unwrap_or(places)];
-            let [first, second] = [first, second].map(|half| Half::new(&half[..half.len().min(8)], width));
+            let [first, second] = [&only.places[..8], &only.places[8..]].map(|half| only.half(half, width));
             only.halves = first.zip(second).map(|(first, second)| [first, second]);
         }
         shuffles
     }
-}
 
-/// Where eight values lie among sixteen of a frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Half {
-    pub(crate) from: usize,
-    pub(crate) places: [u32; 8],
-}
-
-impl Half {
-    /// For a frame of `width` values, of which those at `places` are wanted.
-    fn new(places: &[u32], width: usize) -> Option<Self> {
-        let (low, high) = (*places.iter().min()? as usize, *places.iter().max()? as usize);
-        let from = low.min(width.checked_sub(16)?);
-        let place = |index: usize| places.get(index).map_or(0, |&place| place - from as u32);
-        (high < from + 16).then(|| Self { from, places: std::array::from_fn(place) })
+    /// Where among those of a frame of `width` sixteen begin that have all of the eight at `places`.
+    fn half(&self, places: &[u8], width: u32) -> Option<u8> {
+        let (low, high) = (*places.iter().min()?, *places.iter().max()?);
+        let start = u32::from(low).min(width - 16 - self.from) as u8;
+        (high < start + 16).then_some(start)
     }
 }
 
@@ -187,11 +176,11 @@ impl Half {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Near {
     /// One after the other from here on.
-    Straight(usize),
+    Straight(u32),
     /// As these shuffles say, each of some of them.
     Shuffled {
-        first: usize,
-        count: usize,
+        first: u32,
+        count: u32,
     },
     Scattered,
 }
@@ -200,20 +189,22 @@ impl Picks {
     /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
+        // Places beyond are none.
+        let end = u32::try_from(width).unwrap_or(u32::MAX);
         let mut shuffles = Vec::new();
         let near = places.chunks(16).map(|places| {
-            let low = places[0] as usize;
-            if low + 16 <= width && places.iter().zip(low..).all(|(&place, at)| place as usize == at) {
+            let low = places[0];
+            if end.saturating_sub(low) >= 16 && places.iter().zip(low..).all(|(&place, at)| place == at) {
                 return Near::Straight(low);
             }
-            if width < 32 {
+            if end < 32 {
                 return Near::Scattered;
             }
-            let those = Shuffle::all(places, width);
+            let those = Shuffle::all(places, end);
             if those.len() > SHUFFLES {
                 return Near::Scattered;
             }
-            let (first, count) = (shuffles.len(), those.len());
+            let (first, count) = (shuffles.len() as u32, those.len() as u32);
             shuffles.extend(those);
             Near::Shuffled { first, count }
         });
@@ -221,8 +212,8 @@ impl Picks {
         let block = |tiles: &[Near]| {
             let Some(&Near::Straight(from)) = tiles.first().filter(|_| tiles.len() == BLOCK) else { return None };
             let follows =
-                |(index, near): (usize, &Near)| matches!(near, Near::Straight(at) if *at == from + index * 16);
-            tiles.iter().enumerate().all(follows).then_some(from)
+                |(index, near): (usize, &Near)| matches!(near, Near::Straight(at) if *at == from + index as u32 * 16);
+            tiles.iter().enumerate().all(follows).then_some(from as usize)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
         let spans = places.chunks(16).map(|places| {
@@ -264,7 +255,7 @@ impl<'a> Rows<'a> {
                 (&values[frame * channels..][..channels], straight.then_some(first)?)
             }
             Self::Picked { frames, picks } => match picks.near[tile] {
-                Near::Straight(from) => (&frames[frame].values[..], from),
+                Near::Straight(from) => (&frames[frame].values[..], from as usize),
                 _ => return None,
             },
         };

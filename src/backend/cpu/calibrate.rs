@@ -1,5 +1,7 @@
 //! calibrate in lanes: sixteen taxels of one frame abreast; see [`crate::stage::calibrate`].
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, i32x16, u32x16};
 
@@ -217,7 +219,8 @@ impl<S: Simd> Sizes<S> {
     }
 }
 
-/// A frame's pressures and statuses, by slot; whether any status says anything.
+/// A frame's pressures, by slot, and whether any status says anything. Where none does, statuses are of no use, unless the
+/// plan has changes, which look at them in any case.
 pub(super) fn frame(
     level: Level,
     plan: &Plan,
@@ -226,60 +229,68 @@ pub(super) fn frame(
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    with_widest!(level, simd => tiles(simd, plan, tables, raw, pressures, statuses))
+    with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, pressures, statuses))
 }
 
 #[inline(always)]
 fn tiles<S: Simd>(
     simd: S,
     plan: &Plan,
-    tables: &Tables,
+    tiles: &Tiles,
     (raw, frame): (Rows<'_>, usize),
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
     let (mut faults, values) = (false, OneFrame::new(raw, frame));
-    let rows = pressures.chunks_mut(TOGETHER).zip(statuses.chunks_mut(TOGETHER));
-    for (group, (tiles, (pressures, statuses))) in tables.tiles.all.chunks(TOGETHER).zip(rows).enumerate() {
-        let first = group * TOGETHER;
-        if plain_tiles(simd, plan, tiles, values, first, pressures) {
-            statuses[..tiles.len()].fill([0; LANES]);
+    let count = tiles.all.len();
+    for first in (0..count).step_by(TOGETHER) {
+        let group = first..count.min(first + TOGETHER);
+        if plain_tiles(simd, plan, tiles, values, group.clone(), pressures) {
+            if faults || plan.has_changes() {
+                statuses[group].fill([0; LANES]);
+            }
             continue;
         }
-        for (index, (one, (pressures, statuses))) in (first..).zip(tiles.iter().zip(pressures.iter_mut().zip(statuses)))
-        {
+        let were_plain = !faults;
+        for index in group {
             let Aligned(bits) = &mut Aligned([0; LANES]);
             values.read(simd, index, plan.calibrated(), bits);
-            faults |= tile(simd, plan, one, index * LANES, bits, pressures, statuses);
+            let (pressures, statuses) = (&mut pressures[index], &mut statuses[index]);
+            faults |= tile(simd, plan, &tiles.all[index], index * LANES, bits, pressures, statuses);
+        }
+        if were_plain && faults {
+            statuses[..first].fill([0; LANES]);
         }
     }
     faults
 }
 
-/// As [`tile`], for `tiles` of a frame, which begin with tile `first`, if nothing is to be said of any value: whether that is
-/// so. If not `pressures` has nothing of use.
+/// As [`tile`], for the tiles `group` of a frame, if nothing is to be said of any value: whether that is so. If not their
+/// `pressures` are of no use.
 ///
 /// What has to hold for every value is asked once.
 #[inline(always)]
 fn plain_tiles<S: Simd>(
     simd: S,
     plan: &Plan,
-    tiles: &[Tile],
+    tiles: &Tiles,
     values: OneFrame<'_>,
-    first: usize,
+    group: Range<usize>,
     pressures: &mut [Row<f32>],
 ) -> bool {
     let (none, mut sizes, mut beyond) = (f32x16::splat(simd, 0.0), Sizes::new(simd), u32x16::splat(simd, 0));
-    for (index, (tile, pressures)) in (first..).zip(tiles.iter().zip(pressures)) {
-        if tile.sort == Sort::Any {
+    let sorts = &tiles.sorts[group.clone()];
+    for (index, (sort, pressures)) in group.clone().zip(sorts.iter().zip(&mut pressures[group])) {
+        if *sort == Sort::Any {
             return false;
         }
         let bits = values.row(simd, index, plan.calibrated());
         sizes.see(simd, bits);
-        if tile.sort == Sort::Raw {
+        if *sort == Sort::Raw {
             unsigned(simd, bits).store_slice(pressures);
             continue;
         }
+        let tile = &tiles.all[index];
         let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
         let value = bits.bitcast::<f32x16<S>>();
         let pressure = (value - of(&tile.baseline)) * of(&tile.gain);

@@ -10,7 +10,7 @@ use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
 use super::simd::{F, LANES, Row, U, load, load_u, soon_needed, with_widest};
-use super::slots::{NEAR, Slots};
+use super::slots::{NEAR, Slots, inserting_pays};
 use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
@@ -177,10 +177,12 @@ pub(super) struct Live {
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
     shared: bool,
+    /// Whether members' pressures are brought side by side by way of registers.
+    inserts: bool,
 }
 
 impl Live {
-    pub(super) fn new(plan: &Plan) -> Self {
+    pub(super) fn new(level: Level, plan: &Plan) -> Self {
         let tiles = plan.slots().div_ceil(LANES);
         let (wide, mut narrow): (Vec<usize>, Vec<usize>) =
             (0..plan.fields.len()).partition(|&field| plan.fields[field].is_wide());
@@ -226,6 +228,7 @@ impl Live {
             },
             gathered: Gathered::default(),
             shared: plan.memberships() >= SHARED && rayon::current_num_threads() > 1,
+            inserts: inserting_pays(level),
         }
     }
 
@@ -265,6 +268,7 @@ impl Live {
             pressures: self.pressures.as_flattened(),
             statuses: self.statuses.as_flattened(),
             faults,
+            inserts: self.inserts,
         };
         for pass in 0..self.descent.as_ref().map_or(1, Descent::passes) {
             let stale = match (&mut self.descent, &gate) {
@@ -325,6 +329,7 @@ struct Frame<'a> {
     pressures: &'a [f32],
     statuses: &'a [u32],
     faults: bool,
+    inserts: bool,
 }
 
 impl Frame<'_> {
@@ -367,7 +372,12 @@ impl Frame<'_> {
                     soon_needed(&place.v);
                 });
             }
-            group.slots.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
+            group.slots.gather_pressures(
+                self.level,
+                self.inserts,
+                self.pressures,
+                &mut gathered.pressures[rows.clone()],
+            );
             if self.faults {
                 group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
                 self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);

@@ -94,7 +94,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let (members, kind) = lot(index);
             meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
-                if let Some(touch) = so_far(simd, &kind, at, between, cells) {
+                if let Some(touch) = so_far::<S, 2>(simd, &kind, at, between, cells) {
                     let Apart { r: [r1, r2, r3], x, y } = members.farthest(simd, at, &touch);
                     keep(simd, [r1, r2, r3, x, y], at, between);
                 }
@@ -104,7 +104,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let (_, kind) = lot(index);
             meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
-                if let Some(touch) = so_far(simd, &kind, at, between, cells) {
+                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let [r1, r2, r3, x, y] = kept(simd, at, between);
                     let line = orientation::line(simd, &touch, &Apart { r: [r1, r2, r3], x, y });
                     store(simd, line.angle, &mut cells.orientation, at);
@@ -118,7 +118,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let (members, kind) = lot(index);
             meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
-                if let Some(touch) = so_far(simd, &kind, at, between, cells) {
+                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let axis::Moments { a, b, d } = if care {
                         members.moments_with_care(simd, at, &touch)
                     } else {
@@ -132,7 +132,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let (_, kind) = lot(index);
             meanwhile();
             for at in (0..lanes).step_by(width::<S>()) {
-                if let Some(touch) = so_far(simd, &kind, at, between, cells) {
+                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let [a, b, d] = kept(simd, at, between);
                     let (line, anisotropy) = axis::line(simd, &touch, &axis::Moments { a, b, d });
                     store(simd, line.angle, &mut cells.axis, at);
@@ -231,9 +231,9 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     store(simd, depth, &mut cells.depth, at);
 }
 
-/// What is known of touches in charts after the centroid, if there are any.
+/// What is known of touches in charts after the centroid, if there are any of `LEAST` taxels and more.
 #[inline(always)]
-pub(super) fn so_far<S: Simd>(
+pub(super) fn so_far<S: Simd, const LEAST: u32>(
     simd: S,
     kind: &impl Kind<S>,
     at: usize,
@@ -242,12 +242,14 @@ pub(super) fn so_far<S: Simd>(
 ) -> Option<Touch<S>> {
     let total = load(simd, &cells.total, at);
     let touched = total.simd_gt(splat(simd, 0.0));
-    if !(touched.any_true() && kind.any_charted()) {
+    let active = load_u(simd, &between.active, at);
+    let enough = if LEAST > 1 { touched & active.simd_ge(splat_u(simd, LEAST)) } else { touched };
+    if !(enough.any_true() && kind.any_charted()) {
         return None;
     }
     let charted = (kind.found(simd, at) & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
     Some(Touch {
-        active: load_u(simd, &between.active, at),
+        active,
         touched: touched & charted,
         total,
         scale: scale_of(simd, total),

@@ -111,7 +111,7 @@ impl Cpu {
                 wide: wide.collect(),
             },
             level,
-            live: live::Live::new(plan),
+            live: live::Live::new(level, plan),
             scratches: Mutex::new(Vec::new()),
             before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],

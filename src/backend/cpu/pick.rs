@@ -35,9 +35,9 @@ impl<'a> OneFrame<'a> {
     pub(super) fn row<S: Simd>(self, simd: S, tile: usize, calibrated: usize) -> u32x16<S> {
         if let Some((values, picks)) = self.picked {
             match picks.near[tile] {
-                Near::Straight(from) => return u32x16::from_slice(simd, &values[from..from + LANES]),
+                Near::Straight(from) => return u32x16::from_slice(simd, &values[from as usize..][..LANES]),
                 Near::Shuffled { first, count } => {
-                    if let Some(row) = pick_all(simd, values, &picks.shuffles[first..first + count]) {
+                    if let Some(row) = pick_all(simd, values, &picks.shuffles[first as usize..][..count as usize]) {
                         return row;
                     }
                 }
@@ -89,7 +89,7 @@ impl<'a> SomeFrames<'a> {
     #[inline(always)]
     fn near(&self, tile: usize) -> Near {
         match self.raw {
-            Rows::Packed { channels, .. } if (tile + 1) * LANES <= channels => Near::Straight(tile * LANES),
+            Rows::Packed { channels, .. } if (tile + 1) * LANES <= channels => Near::Straight((tile * LANES) as u32),
             Rows::Packed { .. } => Near::Scattered,
             Rows::Picked { picks, .. } => picks.near[tile],
         }
@@ -100,9 +100,11 @@ impl<'a> SomeFrames<'a> {
     pub(super) fn read<S: Simd>(&self, simd: S, tile: usize, calibrated: usize, bits: &mut [Row<u32>; LANES]) {
         let rows = self.values[..self.frames].iter().zip(bits);
         match (self.near(tile), self.raw) {
-            (Near::Straight(from), _) => rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from..][..LANES])),
+            (Near::Straight(from), _) => {
+                rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from as usize..][..LANES]));
+            }
             (Near::Shuffled { first, count }, Rows::Picked { picks, .. }) => {
-                let shuffles = &picks.shuffles[first..first + count];
+                let shuffles = &picks.shuffles[first as usize..][..count as usize];
                 for (frame, (values, bits)) in (self.first..).zip(rows) {
                     // Mostly one is enough, and knows it beforehand.
                     let row =
@@ -128,7 +130,8 @@ fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u3
     let (first, others) = shuffles.split_first()?;
     let mut row = pick(simd, values, first)?;
     for shuffle in others {
-        let there = u32x16::from_slice(simd, &shuffle.places).simd_lt(u32x16::splat(simd, ELSEWHERE));
+        let Aligned(places) = &Aligned(shuffle.places.map(u32::from));
+        let there = u32x16::from_slice(simd, places).simd_lt(u32x16::splat(simd, ELSEWHERE.into()));
         row = there.select(pick(simd, values, shuffle)?, row);
     }
     Some(row)
@@ -138,19 +141,22 @@ fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u3
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
 fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>> {
-    use fearless_simd::u32x8;
+    use fearless_simd::{u8x16, u32x8};
 
     let Aligned(bits) = &mut Aligned([0; LANES]);
+    let values = &values[shuffle.from as usize..];
     if let Some(avx512) = simd.level().as_avx512() {
-        let both = values.get(shuffle.from..)?.first_chunk::<32>()?;
+        let both = values.first_chunk::<32>()?;
         let lanes = |lanes: &[u32]| u32x16::from_slice(avx512, lanes);
-        x86::of_32(avx512, lanes(&both[..16]), lanes(&both[16..]), lanes(&shuffle.places)).store_slice(bits);
+        let places = u8x16::from_slice(avx512, &shuffle.places);
+        x86::of_32(avx512, lanes(&both[..16]), lanes(&both[16..]), places).store_slice(bits);
     } else {
-        let (avx2, halves) = (simd.level().as_avx2()?, shuffle.halves.as_ref()?);
-        for (half, bits) in halves.iter().zip(bits.as_chunks_mut::<8>().0) {
+        let (avx2, starts) = (simd.level().as_avx2()?, shuffle.halves?);
+        let (places, _) = shuffle.places.as_chunks();
+        for ((start, places), bits) in starts.into_iter().zip(places).zip(bits.as_chunks_mut::<8>().0) {
             let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
-            let (low, high) = values[half.from..half.from + 16].split_at(8);
-            x86::of_sixteen(avx2, lanes(low), lanes(high), lanes(&half.places)).store_slice(bits);
+            let (low, high) = values[usize::from(start)..][..16].split_at(8);
+            x86::of_sixteen(avx2, lanes(low), lanes(high), places, start).store_slice(bits);
         }
     }
     // The same lanes under another name: nothing is stored.
@@ -172,7 +178,7 @@ mod x86 {
 
     use fearless_simd::prelude::*;
     use fearless_simd::x86::{Avx2, Avx512};
-    use fearless_simd::{u32x8, u32x16};
+    use fearless_simd::{u8x16, u32x8, u32x16};
 
     fearless_simd::kernel!(
         /// Those of 32 lanes that `places` says.
@@ -181,17 +187,24 @@ mod x86 {
             token: Avx512,
             low: u32x16<Avx512>,
             high: u32x16<Avx512>,
-            places: u32x16<Avx512>,
+            places: u8x16<Avx512>,
         ) -> u32x16<Avx512> {
-            _mm512_permutex2var_epi32(low.into(), places.into(), high.into()).simd_into(token)
+            _mm512_permutex2var_epi32(low.into(), _mm512_cvtepu8_epi32(places.into()), high.into()).simd_into(token)
         }
     );
 
     fearless_simd::kernel!(
-        /// Those of sixteen lanes that `places` says.
+        /// Those of sixteen lanes that `places` says, which count from `start` places before them.
         #[inline(always)]
-        pub(super) fn of_sixteen(token: Avx2, low: u32x8<Avx2>, high: u32x8<Avx2>, places: u32x8<Avx2>) -> u32x8<Avx2> {
-            let places: __m256i = places.into();
+        pub(super) fn of_sixteen(
+            token: Avx2,
+            low: u32x8<Avx2>,
+            high: u32x8<Avx2>,
+            places: &[u8; 8],
+            start: u8,
+        ) -> u32x8<Avx2> {
+            let places = _mm256_cvtepu8_epi32(_mm_set_epi64x(0, i64::from_ne_bytes(*places)));
+            let places = _mm256_sub_epi32(places, _mm256_set1_epi32(start.into()));
             let [low, high] =
                 [low, high].map(|lanes| _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(lanes.into(), places)));
             // Eight and more is the bit that becomes the sign.

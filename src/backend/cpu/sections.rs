@@ -270,7 +270,7 @@ fn look_from_centroid<S: Simd>(
 ) {
     let Found { cells, between, sums, .. } = found;
     for at in (0..LANES).step_by(width::<S>()) {
-        let Some(touch) = so_far(simd, kind, at, between, cells) else { continue };
+        let Some(touch) = so_far::<S, 1>(simd, kind, at, between, cells) else { continue };
         if stages.orientation {
             let mut search = Search::of_numbers(loaded(simd, &sums.search, at));
             for start in members.clone().step_by(LANES) {
