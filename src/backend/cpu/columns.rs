@@ -71,7 +71,7 @@ pub(super) struct Announcement {
     /// The columns that there are, and how many.
     columns: [*const u32; 12],
     count: usize,
-    /// Where the next row begins, and in which of them.
+    /// Where the next row ends, and in which of them.
     at: usize,
     column: usize,
     /// From a row to the next frame's.
@@ -90,11 +90,11 @@ impl Announcement {
         Self { columns, count, at: 0, column: 0, stride: cells.fields(), rows: 0, at_a_time: 0 }
     }
 
-    /// Now the rows of the sixteen fields from `first` on, in so many `steps`. Of a row where it begins: its end is where the
-    /// one that was written before began.
+    /// Now the rows of the sixteen fields from `first` on, in so many `steps`. Of a row where it ends: it begins in the line
+    /// where the one that was written before ended.
     pub(super) fn turn_to(&mut self, first: usize, frames: usize, steps: usize) {
-        let rows = self.count * frames;
-        (self.at, self.column, self.rows, self.at_a_time) = (first, 0, rows, rows.div_ceil(steps.max(1)));
+        let (rows, last) = (self.count * frames, first + LANES - 1);
+        (self.at, self.column, self.rows, self.at_a_time) = (last, 0, rows, rows.div_ceil(steps.max(1)));
     }
 
     /// Has the next few rows fetched.

@@ -8,19 +8,23 @@ use super::columns;
 use super::simd::{LANES, Row, soon_needed};
 use crate::percept::{CellsMut, Percepts, Precision};
 use crate::scene::Plan;
+use crate::signal::RawValue;
 
-/// Bytes of percepts from which on they are written past the caches. What is less may soon be read from there. Tests have
-/// less.
+/// Bytes of percepts from which on they are written past the caches, or half the bytes of percepts and raw values together.
+/// What is less may soon be read from there. Tests have less.
 const MUCH: usize = if cfg!(test) { 1 << 16 } else { 16 << 20 };
 /// Bytes of a block's percepts that a cache has room for beside everything else.
 const LITTLE: usize = 256 << 10;
 
-/// Whether answers to `cells` are better written past the caches: they are many, and no stage goes through them again.
+/// Whether answers to `cells` are better written past the caches: they, or the values that they are made of, are more than
+/// caches keep, and no stage goes through them again.
 pub(super) fn is_worth(plan: &Plan, cells: &mut CellsMut<'_>) -> bool {
     let stages = plan.stages();
     let again = stages.motion || stages.hysteresis || plan.kept_pressures() > 0;
     let bytes = columns::all(cells).iter().map(|column| size_of_val(*column)).sum::<usize>();
-    cfg!(target_arch = "x86_64") && !again && bytes >= MUCH && bytes / cells.frames() * LANES <= LITTLE
+    let values = cells.frames() * plan.channels() * size_of::<RawValue>();
+    let is_much = bytes >= MUCH || bytes + values >= 2 * MUCH;
+    cfg!(target_arch = "x86_64") && !again && is_much && bytes / cells.frames() * LANES <= LITTLE
 }
 
 /// A block's answers, put together.
