@@ -153,11 +153,13 @@ fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>
     } else {
         let (avx2, starts) = (simd.level().as_avx2()?, shuffle.halves?);
         let (places, _) = shuffle.places.as_chunks();
-        for ((start, places), bits) in starts.into_iter().zip(places).zip(bits.as_chunks_mut::<8>().0) {
+        let half = |index: usize| {
             let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
-            let (low, high) = values[usize::from(start)..][..16].split_at(8);
-            x86::of_sixteen(avx2, lanes(low), lanes(high), places, start).store_slice(bits);
-        }
+            let (low, high) = values[usize::from(starts[index])..][..16].split_at(8);
+            x86::of_sixteen(avx2, lanes(low), lanes(high), &places[index], starts[index])
+        };
+        // Written out: in a loop they take a detour through memory.
+        half(0).combine(half(1)).store_slice(bits);
     }
     // The same lanes under another name: nothing is stored.
     Some(u32x16::from_slice(simd, bits))
