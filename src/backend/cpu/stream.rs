@@ -10,8 +10,8 @@ use crate::percept::{CellsMut, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::RawValue;
 
-/// Bytes of percepts from which on they are written past the caches, or half the bytes of percepts and raw values together.
-/// What is less may soon be read from there. Tests have less.
+/// Bytes of percepts from which on they are written past the caches; of percepts and raw values together, twice as many. What
+/// is less may soon be read from there. Tests have less.
 const MUCH: usize = if cfg!(test) { 1 << 16 } else { 16 << 20 };
 /// Bytes of a block's percepts that a cache has room for beside everything else.
 const LITTLE: usize = 256 << 10;
