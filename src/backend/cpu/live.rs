@@ -366,7 +366,7 @@ impl Frame<'_> {
         for group in groups {
             let rows = first..first + group.places.len();
             if are_far {
-                // They wait for stores: their places are fetched meanwhile.
+                // What is brought side by side comes late: its places are fetched meanwhile.
                 group.places.iter().for_each(|place| {
                     soon_needed(&place.u);
                     soon_needed(&place.v);

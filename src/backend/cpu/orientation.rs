@@ -127,16 +127,15 @@ pub(super) fn point<S: Simd, P: Members<S>, const SCALED: bool>(
     (x * x + y * y, x, y)
 }
 
-/// The line through the two farthest points, where there is one. Where there is none in any lane, `apart` is not looked at.
+/// The line through the two farthest points, where there is one. Where no lane has one, what was found is not looked at.
 #[inline(always)]
-pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, apart: &Apart<S>) -> Line<S> {
+pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> Line<S> {
     let (none, one, two) = (splat(simd, 0.0), splat_u(simd, 1), splat_u(simd, 2));
     let single = bits_where(simd, touch.touched & touch.active.simd_le(one), Flags::ONE_TAXEL.bits());
     let several = touch.touched & touch.active.simd_gt(one);
     if !several.any_true() {
         return Line { angle: none, flags: single, present: splat_u(simd, 0) };
     }
-    let &Apart { r, x, y } = apart;
     // Distances are compared by their squares, as roots are dear.
     let apart = x * x + y * y;
     let (far, third) = (r[0].max(none), r[2].max(none));
