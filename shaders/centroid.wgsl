@@ -37,6 +37,6 @@ fn mean_place(sum: Place, total: Numbers, touched: Truths) -> Place {
 
 // What is present where a field is touched.
 fn present_places(field: Field, touched: Truths) -> Words {
-    let present = select(POSITION, CENTROID | POSITION | NORMAL, field.charted != 0u) << PRESENT;
+    let present = select(POSITION, CENTROID | POSITION | NORMAL, is_charted(field)) << PRESENT;
     return select(Words(), Words(present), touched);
 }

@@ -44,9 +44,9 @@ fn status_of(sums: Sums, field: Field) -> Words {
     let flags = (unpacked(sums.status) & Words(UNUSABLE - 1u)) << Words(STATUS);
     let pressed = sums.pressed > Words();
     let usable = (unpacked(sums.unusable) & Words(UNUSABLE)) == Words();
-    let present = TOTAL | PEAK | ACTIVE | select(0u, AREA, field.area_known != 0u);
+    let present = TOTAL | PEAK | ACTIVE | select(0u, AREA, (field.known & AREA_KNOWN) != 0u);
     return flags
         | select(Words(NO_CONTACT), Words(), pressed)
-        | Words(select(NO_CHART, 0u, field.charted != 0u))
+        | Words(select(NO_CHART, 0u, is_charted(field)))
         | select(Words(), Words(present << PRESENT), usable);
 }

@@ -6,7 +6,6 @@ struct Batch {
     calibrated: u32,
     changes: u32,
     fields: u32,
-    wide: u32,
     // Quads of a block: two to this power, up to 16. Divisions are dear where vectors have none.
     lanes_log2: u32,
 }
@@ -34,11 +33,25 @@ struct Knot {
     slope: f32,
 }
 
+// A field whose members lie in one table; a wide one's part is described alike.
 struct Field {
     first: u32,
     count: u32,
-    charted: u32,
-    area_known: u32,
+    // CHARTED, AREA_KNOWN.
+    known: u32,
+    // Where its results go.
+    index: u32,
+}
+
+// A part of a wide field.
+struct Part {
+    members: Field,
+    // Its own number among all parts, that of its field's first, and how many that has.
+    number: u32,
+    first: u32,
+    count: u32,
+    // Members of its field before it.
+    before: u32,
 }
 
 struct Member {
@@ -84,6 +97,9 @@ const ANISOTROPY = 1u << 9u;
 const DISPLACEMENT = 1u << 10u;
 const DIRECTION = 1u << 11u;
 
+const CHARTED = 1u << 0u;
+const AREA_KNOWN = 1u << 1u;
+
 const STRAIGHT = 0u;
 const MASKED = 1u;
 const FIRST_CURVE = 2u;
@@ -102,10 +118,6 @@ const TINY_BITS = 0x21800000u;
 
 // Invocations of a group.
 const GROUP = 64u;
-
-// A field of more members than this is taken by a whole group, each invocation a part of it. Besides being faster, it
-// must be so: lavapipe ends any shader's loops after 65,535 rounds in all, without a word.
-const WIDE = 4096u;
 
 // A dispatch counts groups along x, folded over z, as no side may be longer than 65,535; y counts blocks of frames where
 // an invocation has but one.

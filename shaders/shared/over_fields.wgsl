@@ -1,6 +1,5 @@
-// How the stages from contact to axis go over the fields, all in one: each field and quad of frames by one invocation, or
-// a wide field by a whole group. A member's pressures are read once for the sums and the centroid, and once more for what
-// needs the centroid.
+// What the stages from contact to axis have in common, as they go over members together: a member's pressures are read
+// once for the sums and the centroid, and once more for what needs the centroid.
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> fields: array<Field>;
@@ -11,7 +10,6 @@
 // 5, and 6 where there is one: what the taxels say.
 // Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
 @group(0) @binding(7) var<storage, read_write> results: array<u32>;
-@group(0) @binding(8) var<storage, read> wide_fields: array<u32>;
 
 // Which column has what; what nobody wants is nowhere, and not computed.
 const NOWHERE = 0xffffffffu;
@@ -55,6 +53,10 @@ fn add_statuses(so_far: Sums, start: u32, end: u32, step: u32, first: u32) -> Su
     return sums;
 }
 
+fn is_charted(field: Field) -> bool {
+    return (field.known & CHARTED) != 0u;
+}
+
 // What a field's later stages are told of its earlier ones.
 struct Found {
     status: Words,
@@ -75,7 +77,7 @@ fn found_of(field: Field, sums: Sums, place_sum: Place) -> Found {
         found.status |= present_places(field, touched);
     }
     if ORIENTED || AXED {
-        let charted = Truths(field.charted != 0u);
+        let charted = Truths(is_charted(field));
         found.scale = scale_of(sums.total);
         found.lined = (sums.pressed > Words(1u)) & charted;
         let alone = (sums.pressed == Words(1u)) & charted;
@@ -187,167 +189,4 @@ fn spread_of(begin: u32, end: u32, step: u32, first: u32, found: Found) -> Sprea
         moments = less_moments(moments, over);
     }
     return Spread(far, moments);
-}
-
-@compute @workgroup_size(FIELDS_GROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    // A group takes a block's quads of as many fields as it has room for; groups side by side take other fields of the
-    // same block, which so stays in the cache.
-    let index = (group_number(group, groups) * FIELDS_GROUP + local) >> batch.lanes_log2;
-    let quad = (group.y << batch.lanes_log2) + (local & (lanes() - 1u));
-    if index >= batch.fields || quad >= quads() {
-        return;
-    }
-    let field = fields[index];
-    if field.count > WIDE {
-        return;
-    }
-    let end = field.first + field.count;
-    let first = at(0u, quad);
-    let charted = field.charted != 0u;
-    let touch = touch_of(field.first, end, 1u, first, charted);
-    let found = found_of(field, touch.sums, touch.place);
-    store_sums(index, quad, touch.sums, found.place);
-    var spread = Spread(nobody_far(), no_moments());
-    if charted {
-        spread = spread_of(field.first, end, 1u, first, found);
-    }
-    finish_lines(index, quad, found, spread.far, spread.moments);
-}
-
-// What an invocation has found so far, as bits: of one kind after the other, as there is no room for all.
-const WIDEST = 9u;
-var<workgroup> parts: array<array<Words, WIDEST>, GROUP>;
-
-fn put_sums(local: u32, sums: Sums, place: Place) {
-    parts[local][0] = bitcast<Words>(sums.total);
-    parts[local][1] = bitcast<Words>(sums.peak);
-    parts[local][2] = bitcast<Words>(sums.area);
-    parts[local][3] = sums.pressed;
-    parts[local][4] = Words(sums.status);
-    parts[local][5] = bitcast<Words>(place.u);
-    parts[local][6] = bitcast<Words>(place.v);
-    parts[local][7] = bitcast<Words>(place.depth);
-    parts[local][8] = Words(sums.unusable);
-}
-
-fn number_at(local: u32, part: u32) -> Numbers {
-    return bitcast<Numbers>(parts[local][part]);
-}
-
-fn sums_at(local: u32) -> Sums {
-    return Sums(
-        number_at(local, 0u),
-        number_at(local, 1u),
-        number_at(local, 2u),
-        parts[local][3],
-        first_of(parts[local][4]),
-        first_of(parts[local][8]),
-    );
-}
-
-fn place_at(local: u32) -> Place {
-    return Place(number_at(local, 5u), number_at(local, 6u), number_at(local, 7u));
-}
-
-fn put_far(local: u32, far: Farthest) {
-    parts[local][0] = bitcast<Words>(far.r1);
-    parts[local][1] = bitcast<Words>(far.r2);
-    parts[local][2] = bitcast<Words>(far.r3);
-    parts[local][3] = far.m1;
-    parts[local][4] = far.m2;
-    parts[local][5] = bitcast<Words>(far.e1u);
-    parts[local][6] = bitcast<Words>(far.e1v);
-    parts[local][7] = bitcast<Words>(far.e2u);
-    parts[local][8] = bitcast<Words>(far.e2v);
-}
-
-fn far_at(local: u32) -> Farthest {
-    return Farthest(
-        number_at(local, 0u),
-        number_at(local, 1u),
-        number_at(local, 2u),
-        parts[local][3],
-        parts[local][4],
-        number_at(local, 5u),
-        number_at(local, 6u),
-        number_at(local, 7u),
-        number_at(local, 8u),
-    );
-}
-
-fn put_moments(local: u32, moments: Moments) {
-    parts[local][0] = bitcast<Words>(moments.a);
-    parts[local][1] = bitcast<Words>(moments.b);
-    parts[local][2] = bitcast<Words>(moments.d);
-}
-
-fn moments_at(local: u32) -> Moments {
-    return Moments(number_at(local, 0u), number_at(local, 1u), number_at(local, 2u));
-}
-
-@compute @workgroup_size(GROUP)
-fn wide(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = group_number(group, groups);
-    if number >= batch.wide {
-        return;
-    }
-    let index = wide_fields[number];
-    let quad = group.y;
-    let field = fields[index];
-    let end = field.first + field.count;
-    let first = at(0u, quad);
-    let charted = field.charted != 0u;
-    let touch = touch_of(field.first + local, end, GROUP, first, charted);
-    put_sums(local, touch.sums, touch.place);
-    for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-        workgroupBarrier();
-        if local < half {
-            let joined = join_places(place_at(local), place_at(local + half));
-            put_sums(local, join_sums(sums_at(local), sums_at(local + half)), joined);
-        }
-    }
-    workgroupBarrier();
-    // Every invocation goes on with what all have found.
-    let sums = sums_at(0u);
-    let found = found_of(field, sums, place_at(0u));
-    if local == 0u {
-        store_sums(index, quad, sums, found.place);
-    }
-    let spread = spread_of(field.first + local, end, GROUP, first, found);
-    var far = spread.far;
-    var moments = spread.moments;
-    if ORIENTED {
-        workgroupBarrier();
-        put_far(local, far);
-        for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-            workgroupBarrier();
-            if local < half {
-                put_far(local, join_far(far_at(local), far_at(local + half)));
-            }
-        }
-        far = far_at(0u);
-    }
-    if AXED {
-        workgroupBarrier();
-        put_moments(local, moments);
-        for (var half = GROUP / 2u; half > 0u; half /= 2u) {
-            workgroupBarrier();
-            if local < half {
-                put_moments(local, join_moments(moments_at(local), moments_at(local + half)));
-            }
-        }
-        moments = moments_at(0u);
-    }
-    if local == 0u {
-        finish_lines(index, quad, found, far, moments);
-    }
 }

@@ -152,7 +152,7 @@ impl Reference {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
         let pressed = self.pressed(field, pressures);
-        let how = self.plan.sums();
+        let how = self.plan.sums(field);
         let sums = contact::bound(&pressed, how);
         let mut bound =
             CellBound { total: Some(sums.total), peak: Some(sums.peak), area: Some(sums.area), ..CellBound::default() };

@@ -379,16 +379,13 @@ impl Plan {
         self.change_threshold
     }
 
-    /// How single precision adds up, and so how far it may be off.
-    pub(crate) fn sums(&self) -> Sums {
-        match self.knobs.arithmetic {
-            Some(Arithmetic::Compensated) => Sums::Compensated,
-            _ => Sums::OnePass,
-        }
+    /// How single precision adds up over `field`, and so how far it may be off.
+    pub(crate) fn sums(&self, field: &PlanField) -> Sums {
+        if self.is_compensated() { Sums::compensated(field.count) } else { Sums::OnePass }
     }
 
     pub(crate) fn is_compensated(&self) -> bool {
-        self.sums() == Sums::Compensated
+        self.knobs.arithmetic == Some(Arithmetic::Compensated)
     }
 
     pub(crate) fn stages(&self) -> Stages {

@@ -2,18 +2,13 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// A field of more members than this is taken by a whole workgroup, as `WIDE` in `shaders/shared/layout.wgsl` says.
-#[cfg(feature = "gpu")]
+/// A field of more members than this is taken in parts of as many or more, each by a whole group of the GPU's invocations.
+/// lavapipe ends an invocation's loops after 65,535 rounds in all, of which a field that is not wide makes two a member.
 pub(crate) const WIDE: usize = 4096;
 
 /// Memberships that a uniform binding holds, as `shaders/shared/few_members.wgsl` says: 64 KiB, which every device can bind.
 #[cfg(feature = "gpu")]
 pub(crate) const FEW: usize = 4096;
-
-/// Members of a field at most: lavapipe ends an invocation's loops after 65,535 rounds, and it has three passes over every
-/// 64th member at most.
-#[cfg(feature = "gpu")]
-pub(crate) const WIDEST: usize = 65_000 / 3 * 64;
 
 /// A field of as many members or more has sixteen of them abreast on the CPU: fewer do as well one after the other, with
 /// sixteen frames or fields abreast.
@@ -33,8 +28,6 @@ pub(crate) struct Batch {
     pub(crate) changes: u32,
     /// Fields.
     pub(crate) fields: u32,
-    /// Fields of more than [`WIDE`] members.
-    pub(crate) wide: u32,
     /// Quads of a block, how many of a field a group of invocations takes: two to this power.
     pub(crate) lanes_log2: u32,
 }
@@ -123,18 +116,40 @@ pub(crate) struct Step {
     pub(crate) flags: u32,
 }
 
-/// Where a field's members stand, and what it can answer.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+/// Where a field's members stand, and what it can answer. A part of a wide field is described alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Field {
-    /// Index of its first member.
+    /// Its first member in the table that has them.
     pub(crate) first: u32,
     /// Number of members.
     pub(crate) count: u32,
-    /// 1: it has a chart.
-    pub(crate) charted: u32,
-    /// 1: every member's area is known.
-    pub(crate) area_known: u32,
+    /// [`CHARTED`], [`AREA_KNOWN`].
+    pub(crate) known: u32,
+    /// Which of the plan's fields it is.
+    pub(crate) index: u32,
+}
+
+/// It has a chart.
+#[cfg(feature = "gpu")]
+pub(crate) const CHARTED: u32 = 1 << 0;
+/// Every member's area is known.
+#[cfg(feature = "gpu")]
+pub(crate) const AREA_KNOWN: u32 = 1 << 1;
+
+/// A part of a wide field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Part {
+    pub(crate) members: Field,
+    /// Among all parts.
+    pub(crate) number: u32,
+    /// The number of its field's first part.
+    pub(crate) first: u32,
+    /// How many parts its field has.
+    pub(crate) count: u32,
+    /// Members of its field before it.
+    pub(crate) before: u32,
 }
 
 /// A taxel's part in a field.

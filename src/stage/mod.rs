@@ -39,20 +39,30 @@ pub(crate) const SLACK: f64 = 1.1;
 /// **Bound.** Added up one by one, in whatever order, each of n terms goes through at most n − 1 roundings. A compensated
 /// sum (Kahan) adds y = fl(x − c) and keeps exactly what the addition lost, so that s − c = Σ y: a term carries its own
 /// rounding, and one more where it is larger than the sum so far, of x and of c, which is at most u·Σ|x|. That is
-/// (2 + 2n·u)u·Σ|x|, one rounding for s − c, and one for each of up to six levels of the tree that joins 64 sums.
+/// (2 + 2n·u)u·Σ|x|, one rounding for s − c, and one for each time that it is joined with another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sums {
     OnePass,
-    Compensated,
+    Compensated {
+        /// How often a sum is joined with another, at most.
+        joined: usize,
+    },
 }
 
 impl Sums {
+    /// Compensated ones over a field of `count` members. 64 sums are joined in a tree of six levels; of a wide field's parts
+    /// every 64th is joined with the one before, and what that makes in another tree.
+    pub(crate) fn compensated(count: usize) -> Self {
+        let parts = count.div_ceil(layout::WIDE);
+        Self::Compensated { joined: if parts > 1 { 6 + parts.div_ceil(64) + 6 } else { 6 } }
+    }
+
     /// How far the sum of `n` terms may be off, in u times the sum of their sizes.
     pub(crate) fn roundings(self, n: usize) -> f64 {
         let n = n as f64;
         match self {
             Self::OnePass => n - 1.0,
-            Self::Compensated => 9.0 + 2.0 * n * U,
+            Self::Compensated { joined } => 3.0 + joined as f64 + 2.0 * n * U,
         }
     }
 }

@@ -107,7 +107,7 @@ fn percepts_do_not_depend_on_how_a_long_call_streams() {
 /// calibrated ones, sums with care and without.
 #[test]
 fn percepts_of_a_frame_at_a_time_are_those_of_many() {
-    let shape = Shape { sensors: 6000, fields: 200, members: 40, wide: 5000, local: true, frames: 9, seed: 7 };
+    let shape = Shape { sensors: 34_000, fields: 200, members: 40, wide: 33_500, local: true, frames: 9, seed: 7 };
     let body = shape.body();
     let mut frames = shape.frames();
     for (number, value) in frames.iter_mut().flat_map(|frame| &mut frame.values).enumerate().step_by(97) {

@@ -3,6 +3,7 @@
 use super::BLOCK;
 use super::adapter::Device;
 use super::columns::Columns;
+use super::over_fields::BY_PART;
 use crate::error::{Error, Result};
 use crate::scene::Plan;
 use crate::stage::layout;
@@ -18,26 +19,19 @@ pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) 
     let limits = device.device.limits();
     let limit = limits.max_storage_buffer_binding_size as usize;
     let tables = [
-        plan.members.len() * size_of::<layout::Member>(),
         plan.taxels.len() * size_of::<layout::Taxel>(),
         plan.fields.len() * size_of::<layout::Field>(),
         plan.curves.knots.len() * size_of::<layout::Knot>(),
     ];
-    // A frame of every column, and a quad of every slot.
+    // A frame of every column, and a quad of every slot and of every part of a wide field.
     let (cells, quad) = (plan.fields.len() * 4 * columns.count(), plan.slots() * 16);
-    if tables.into_iter().chain([cells, quad]).any(|bytes| bytes > limit) {
+    let wide = plan.fields.iter().filter(|field| field.count > layout::WIDE);
+    let of_parts = wide.map(|field| field.count.div_ceil(layout::WIDE)).sum::<usize>() * BY_PART;
+    if tables.into_iter().chain([cells, quad, of_parts]).any(|bytes| bytes > limit) {
         return Err(Error::failed(format!(
-            "{} memberships and {} taxels are more than a GPU binding holds ({limit} bytes); use the cpu backend",
-            plan.members.len(),
-            plan.channels()
-        )));
-    }
-    if let Some(field) = plan.fields.iter().find(|field| field.count > layout::WIDEST) {
-        return Err(Error::failed(format!(
-            "field `{}` has {} taxels, and the GPU takes {} at most; use the cpu backend",
-            field.name,
-            field.count,
-            layout::WIDEST
+            "{} taxels and {} fields are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+            plan.channels(),
+            plan.fields.len()
         )));
     }
     let in_blocks = |frames: usize| match frames {
@@ -46,7 +40,7 @@ pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) 
         _ => 1 << frames.max(1).ilog2(),
     };
     let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(BLOCK, MOST);
-    let held = in_blocks(limit / quad * 4);
+    let held = in_blocks(limit / quad.max(of_parts) * 4);
     // What comes back, in one buffer.
     let back = cells + if plan.stages().touches { 2 * quad } else { 0 };
     let most = held.min(limit / cells).min(limits.max_buffer_size as usize / back).max(1);

@@ -11,12 +11,14 @@ mod bus;
 mod capacity;
 mod columns;
 mod members;
+mod over_fields;
 mod pack;
 #[cfg(feature = "cli")]
 pub(crate) mod raster;
 mod report;
 mod ring;
 pub(crate) mod shaders;
+mod shares;
 mod stage;
 mod unpack;
 
@@ -30,10 +32,11 @@ pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
 use self::adapter::Device;
 use self::columns::{Columns, NOTHING};
-use self::members::MemberTable;
+use self::over_fields::{Bound, OverFields};
 use self::pack::Form;
 use self::ring::{SETS, Set};
-use self::shaders::{Abreast, Values};
+use self::shaders::Values;
+use self::shares::Shares;
 use self::stage::{Over, Stage, table};
 use super::{Backend, RawBatch};
 use crate::error::Result;
@@ -73,8 +76,6 @@ pub(crate) struct Gpu {
     form: Form,
     /// Where those go, if not into `raw`.
     texture: Option<wgpu::Texture>,
-    /// Number of wide fields.
-    wide: u32,
     columns: Columns,
     results: wgpu::Buffer,
     /// Per taxel and frame, where they are read back.
@@ -97,9 +98,16 @@ impl Gpu {
         Self::on(adapter::shared()?, plan, batch)
     }
 
-    pub(crate) fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
+    fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
+        let most = over_fields::most_members(&device);
+        Self::in_shares(device, plan, batch, most)
+    }
+
+    /// With at most `most_members` in one table on the device.
+    fn in_shares(device: Device, plan: &Plan, batch: usize, most_members: usize) -> Result<Self> {
         let columns = Columns::new(plan);
         let capacity = capacity::of(&device, plan, &columns, batch)?;
+        let shares = Shares::new(plan, over_fields::of_part(&device), most_members);
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
         let frames = capacity as u64;
         let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages| {
@@ -131,23 +139,12 @@ impl Gpu {
         let raw = working("raw", up);
         let texture = (direct && is_processor(&device)).then(|| pack::texture(&device, "raw", up, form.texel()));
         let taxels = table(&device, "taxels", &plan.taxels);
-        let gpu_fields: Vec<layout::Field> = plan.fields.iter().map(gpu_field).collect();
-        let field_table = table(&device, "fields", &gpu_fields);
-        let members = MemberTable::new(&device, &plan.members);
-        let all_depths: Vec<f32> = plan.fields.iter().flat_map(|field| field.depths.iter().copied()).collect();
-        let depths = table(&device, "depths", &all_depths);
         let quads = layout::padded_quads(capacity) as u64;
         let pressures = working("pressures", quads * slots * 16);
         let statuses = working("statuses", quads * slots * 4);
         let results = working("results", frames * fields * 4 * columns.count() as u64);
         // What the frame before left; buffers begin as zeros, and zero is no contact.
         let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
-        let wide: Vec<u32> = (0..)
-            .zip(plan.fields.iter())
-            .filter(|(_, field)| field.count > layout::WIDE)
-            .map(|(index, _)| index)
-            .collect();
-        let wide_fields = table(&device, "wide fields", &wide);
 
         let wanted = plan.stages();
         let (curves, knots) =
@@ -166,7 +163,7 @@ impl Gpu {
         let before = plan.has_changes().then(|| working("raw before", row));
         if let Some(before) = &before {
             let one = buffer("one frame", HEADER, uniform);
-            device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1, wide.len() as u32)));
+            device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1)));
             let calibrated = plan.calibrated() as u64;
             let pressed = working("pressures before", calibrated * 16);
             let heard = working("statuses before", calibrated * 4);
@@ -177,35 +174,16 @@ impl Gpu {
             let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
-        let told = columns.of_fields(plan);
-        let (abreast, quads_or_one) =
-            if capacity == 1 { (Abreast::One, Over::OneFrame) } else { (Abreast::Four, Over::Quads) };
+        let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
         let over_fields = |direct: bool| {
             let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
-            let tables = [(0, &batch), (1, &field_table), (3, &depths), (4, &taxels), (7, &results)];
-            let mut bound: Vec<_> = tables.map(|(binding, table)| (binding, table.as_entire_binding())).into();
-            bound.push((2, members.binding()));
-            let values = match &texels {
-                Some(texels) => {
-                    bound.push((5, wgpu::BindingResource::TextureView(texels)));
-                    Values::RawTexture
-                }
-                None if direct => {
-                    bound.push((5, raw.as_entire_binding()));
-                    Values::Raw
-                }
-                None => {
-                    bound.extend([(5, pressures.as_entire_binding()), (6, statuses.as_entire_binding())]);
-                    Values::Pressures
-                }
+            let (values, at) = match &texels {
+                Some(texels) => (Values::RawTexture, (wgpu::BindingResource::TextureView(texels), None)),
+                None if direct => (Values::Raw, (raw.as_entire_binding(), None)),
+                None => (Values::Pressures, (pressures.as_entire_binding(), Some(statuses.as_entire_binding()))),
             };
-            let shader = shaders::fields(abreast, values, members.kind());
-            let mut stages = vec![Stage::bound(&device, &shader, "main", quads_or_one, &told, &bound)];
-            if !wide.is_empty() {
-                bound.push((8, wide_fields.as_entire_binding()));
-                stages.push(Stage::bound(&device, &shader, "wide", Over::WideFields, &told, &bound));
-            }
-            stages
+            let (batch, taxels, results) = (&batch, &taxels, &results);
+            tables.stages(&device, &Bound { batch, taxels, results, values, at })
         };
         let replaced = match direct {
             true => {
@@ -254,7 +232,6 @@ impl Gpu {
             careful,
             form,
             texture,
-            wide: wide.len() as u32,
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
@@ -267,7 +244,7 @@ impl Gpu {
 
     /// Sends `raw`, which is at most the capacity and starts at frame `first` of a call, with set `set`, which is free.
     fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
-        let header = header(&self.plan, raw.frames as u32, self.wide);
+        let header = header(&self.plan, raw.frames as u32);
         self.pack(set, raw, &header)?;
         let (upload, readback) = (&self.ring[set].upload, &self.ring[set].readback);
         upload.unmap();
@@ -388,23 +365,13 @@ fn is_plain(plan: &Plan) -> bool {
 }
 
 /// What a dispatch over `frames` frames is told of the plan.
-fn header(plan: &Plan, frames: u32, wide: u32) -> layout::Batch {
+fn header(plan: &Plan, frames: u32) -> layout::Batch {
     layout::Batch {
         frames,
         channels: plan.channels() as u32,
         calibrated: plan.calibrated() as u32,
         changes: (plan.slots() - plan.calibrated()) as u32,
         fields: plan.fields.len() as u32,
-        wide,
         lanes_log2: layout::lanes(frames as usize).ilog2(),
-    }
-}
-
-fn gpu_field(field: &crate::scene::PlanField) -> layout::Field {
-    layout::Field {
-        first: field.first as u32,
-        count: field.count as u32,
-        charted: field.charted.into(),
-        area_known: field.area_known.into(),
     }
 }

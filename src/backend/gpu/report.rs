@@ -117,7 +117,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let device = adapter::with_clock()?;
     let mut gpu = Gpu::on(device, plan, frames)?;
     let frames = frames.min(gpu.capacity);
-    let batch = header(plan, frames as u32, gpu.wide);
+    let batch = header(plan, frames as u32);
     gpu.device.queue.write_buffer(&gpu.batch, 0, bytemuck::bytes_of(&batch));
     let clock = Clock::new(&gpu.device);
     let up = gpu.raw_bytes(frames);
@@ -191,7 +191,7 @@ impl EmptyCall {
     pub fn new(plan: &Plan, frames: usize) -> Result<Self> {
         let gpu = Gpu::on(adapter::shared()?, plan, frames)?;
         let frames = frames.min(gpu.capacity);
-        let batch = header(plan, frames as u32, gpu.wide);
+        let batch = header(plan, frames as u32);
         let module = gpu.device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("empty"),
             source: wgpu::ShaderSource::Wgsl(format!("@compute @workgroup_size({GROUP}) fn main() {{}}").into()),

@@ -68,8 +68,17 @@ pub(crate) enum Members {
     Texture,
 }
 
-/// Contact, centroid, orientation and axis.
-pub(crate) fn fields(abreast: Abreast, values: Values, members: Members) -> Shader {
+/// Contact, centroid, orientation and axis, over fields that are not wide.
+pub(crate) fn narrow_fields(abreast: Abreast, values: Values, members: Members) -> Shader {
+    over_fields("fields", shared!("narrow_fields"), abreast, values, members)
+}
+
+/// The same over wide ones.
+pub(crate) fn wide_fields(abreast: Abreast, values: Values, members: Members) -> Shader {
+    over_fields("wide fields", shared!("wide_fields"), abreast, values, members)
+}
+
+fn over_fields(name: &'static str, fields: &str, abreast: Abreast, values: Values, members: Members) -> Shader {
     let abreast = match abreast {
         Abreast::Four => shared!("four_frames", "four_cells"),
         Abreast::One => shared!("one_frame", "one_cell"),
@@ -92,9 +101,9 @@ pub(crate) fn fields(abreast: Abreast, values: Values, members: Members) -> Shad
         include_str!("../../../shaders/axis.wgsl"),
     );
     Shader {
-        name: "fields",
+        name,
         stages: &["contact", "centroid", "orientation", "axis"],
-        source: [shared!("layout"), abreast, values, members, SHARED, STAGES].concat().into(),
+        source: [shared!("layout"), abreast, values, members, SHARED, fields, STAGES].concat().into(),
     }
 }
 
@@ -104,7 +113,10 @@ pub(crate) fn all() -> Vec<Shader> {
     let mut all = vec![CALIBRATE, CHANGE];
     for abreast in [Abreast::Four, Abreast::One] {
         for values in [Values::Pressures, Values::Raw, Values::RawTexture] {
-            all.extend([Members::Many, Members::Few, Members::Texture].map(|members| fields(abreast, values, members)));
+            for members in [Members::Many, Members::Few, Members::Texture] {
+                all.push(narrow_fields(abreast, values, members));
+                all.push(wide_fields(abreast, values, members));
+            }
         }
     }
     all.extend([HYSTERESIS, MOTION]);

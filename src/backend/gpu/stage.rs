@@ -33,12 +33,12 @@ pub(super) enum Over {
     CalibratedOnce,
     /// One invocation a slot that is a change and a quad.
     Changes,
-    /// One invocation a field and quad; those of wide fields return at once.
-    Quads,
+    /// One invocation each of so many fields and quad.
+    Quads(u32),
     /// The same for one frame, in larger groups.
-    OneFrame,
-    /// One group a wide field and quad.
-    WideFields,
+    OneFrame(u32),
+    /// One group each of so many wide fields, or parts of them, and quad.
+    Wide(u32),
     /// One invocation a field and frame.
     Cells,
     /// One invocation a field.
@@ -55,9 +55,9 @@ impl Over {
             Self::Calibrated => (vectors.div_ceil(GROUP), quads.div_ceil(TURNS.min(lanes))),
             Self::CalibratedOnce => (vectors.div_ceil(GROUP), 1),
             Self::Changes => (batch.changes.div_ceil(GROUP), quads),
-            Self::Quads => (batch.fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
-            Self::OneFrame => (batch.fields.div_ceil(FIELDS_GROUP), 1),
-            Self::WideFields => (batch.wide, quads),
+            Self::Quads(fields) => (fields.div_ceil(GROUP / lanes), quads.div_ceil(lanes)),
+            Self::OneFrame(fields) => (fields.div_ceil(FIELDS_GROUP), 1),
+            Self::Wide(count) => (count, quads),
             Self::Cells => ((batch.fields * batch.frames).div_ceil(GROUP), 1),
             Self::Fields => (batch.fields.div_ceil(GROUP), 1),
         };

@@ -7,7 +7,7 @@ use naga::{Module, TypeInner};
 
 use super::columns::NOTHING;
 use super::pack::Form;
-use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, fields};
+use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, narrow_fields, wide_fields};
 use super::stage::{folded, pipeline};
 use super::unpack::PRESENT;
 use super::{GROUP, Gpu, adapter};
@@ -42,12 +42,13 @@ macro_rules! same_layout {
 
 #[test]
 fn structs_lie_as_naga_lays_them() {
-    let module = parse(&fields(Abreast::Four, Values::Pressures, Members::Many));
-    same_layout!(&module, Batch { frames, channels, calibrated, changes, fields, wide, lanes_log2 });
+    let module = parse(&wide_fields(Abreast::Four, Values::Pressures, Members::Many));
+    same_layout!(&module, Batch { frames, channels, calibrated, changes, fields, lanes_log2 });
     same_layout!(&module, Taxel { baseline, gain, dead_band, p_max, raw_low, raw_high, area, response });
     same_layout!(&module, Curve { first, count });
     same_layout!(&module, Knot { raw, p, slope });
-    same_layout!(&module, Field { first, count, charted, area_known });
+    same_layout!(&module, Field { first, count, known, index });
+    same_layout!(&module, Part { members, number, first, count, before });
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
 }
@@ -85,9 +86,10 @@ fn bits_have_one_meaning() {
     assert_eq!(Flags::all().bits() - shared, (Flags::HELD | Flags::JUMPED).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
-    let one = parse(&fields(Abreast::One, Values::Raw, Members::Few));
+    let one = parse(&narrow_fields(Abreast::One, Values::Raw, Members::Few));
     assert_eq!(constant(&one, "FIELDS_GROUP"), Some(super::stage::FIELDS_GROUP));
-    assert_eq!(constant(&module, "WIDE"), Some(layout::WIDE as u32));
+    assert_eq!(constant(&module, "CHARTED"), Some(layout::CHARTED));
+    assert_eq!(constant(&module, "AREA_KNOWN"), Some(layout::AREA_KNOWN));
     assert_eq!(constant(&module, "STRAIGHT"), Some(layout::STRAIGHT));
     assert_eq!(constant(&module, "MASKED"), Some(layout::MASKED));
     assert_eq!(constant(&module, "FIRST_CURVE"), Some(layout::FIRST_CURVE));
@@ -99,7 +101,7 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "TURNS"), Some(super::stage::TURNS));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
-    let textures = parse(&fields(Abreast::One, Values::RawTexture, Members::Texture));
+    let textures = parse(&narrow_fields(Abreast::One, Values::RawTexture, Members::Texture));
     assert_eq!(constant(&textures, "ROW_LOG2"), Some(super::pack::TEXELS.ilog2()));
     let change = parse(&CHANGE);
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
@@ -112,11 +114,15 @@ fn every_shader_validates_with_no_optional_capability() {
     for shader in &all() {
         let module = parse(shader);
         let validated = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
-        assert!(validated.is_ok(), "{}: {:?}", shader.name, validated.err());
-        assert_eq!(module.entry_points[0].name, "main", "{}", shader.name);
-        let storage =
-            module.global_variables.iter().filter(|(_, v)| matches!(v.space, naga::AddressSpace::Storage { .. }));
-        assert!(storage.count() <= 8, "{} binds more than every device can", shader.name);
+        let info = validated.unwrap_or_else(|e| panic!("{}: {e:?}", shader.name));
+        for (number, entry) in module.entry_points.iter().enumerate() {
+            let storage = module.global_variables.iter().filter(|(handle, variable)| {
+                let is_used = !info.get_entry_point(number)[*handle].is_empty();
+                is_used && matches!(variable.space, naga::AddressSpace::Storage { .. })
+            });
+            let count = storage.count();
+            assert!((1..=8).contains(&count), "{} {} binds {count} buffers", shader.name, entry.name);
+        }
     }
 }
 
@@ -152,7 +158,7 @@ fn pipelines_build_without_any_driver() {
 
 #[test]
 fn a_shader_that_is_wrong_is_caught() {
-    let sound = fields(Abreast::Four, Values::Pressures, Members::Many).source;
+    let sound = narrow_fields(Abreast::Four, Values::Pressures, Members::Many).source;
     let broken = sound.replace("sums.total += pull;", "sums.total += Words(status);");
     assert!(broken != sound);
     assert!(
@@ -227,7 +233,7 @@ fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
 }
 
 /// Percepts of `frames` frames of every odd value there is, among plain ones.
-fn percepts_of_odd_values(gpu: &mut Gpu, frames: usize) -> Percepts {
+pub(super) fn percepts_of_odd_values(gpu: &mut Gpu, frames: usize) -> Percepts {
     let plan = gpu.plan.clone();
     let odd =
         [0, 1 << 31, 1, u32::MAX, f32::INFINITY.to_bits(), f32::NAN.to_bits(), 0x2180_0000, 0x217f_ffff, 0x5d80_0001];
@@ -236,12 +242,18 @@ fn percepts_of_odd_values(gpu: &mut Gpu, frames: usize) -> Percepts {
         1 => RawValue::new(-3.0),
         _ => RawValue::new((i * i % 1023 + 1) as f64),
     };
-    let values: Vec<RawValue> = (0..frames * plan.channels()).map(value).collect();
+    percepts_of(gpu, &(0..frames * plan.channels()).map(value).collect::<Vec<_>>())
+}
+
+/// Percepts of frames of `values`, one after the other.
+pub(super) fn percepts_of(gpu: &mut Gpu, values: &[RawValue]) -> Percepts {
+    let plan = gpu.plan.clone();
+    let frames = values.len() / plan.channels();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures());
     percepts.reset(frames);
-    let rows = Rows::Packed { values: &values, channels: plan.channels() };
+    let rows = Rows::Packed { values, channels: plan.channels() };
     gpu.run(&RawBatch { first: 0, frames, rows, steps: &steps }, &mut percepts).unwrap();
     percepts
 }
