@@ -45,3 +45,14 @@ fn allocations_are_counted() {
     let made = allocation_counter::measure(|| drop(Engine::new(&body, Options::default())));
     assert!(made.count_total > 100, "{made:?}");
 }
+
+/// What is shared among cores is a task for each other core, twice a frame.
+#[test]
+fn a_frame_that_is_shared_allocates_its_tasks_alone() {
+    use somatic::experiments::shape::Shape;
+    let shape = Shape { sensors: 5000, fields: 4400, members: 16, wide: 0, local: true, frames: 1, seed: 1 };
+    let made = allocations(&shape.body(), Outputs::CENTROID | Outputs::ORIENTATION, None);
+    let others = std::thread::available_parallelism().map_or(0, |threads| threads.get() as u64 - 1);
+    // Now and then a queue grows.
+    assert!(made <= 100 * 2 * others * 5 / 4, "{made} for 100 frames on {others} other threads");
+}

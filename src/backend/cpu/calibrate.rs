@@ -1,6 +1,7 @@
 //! calibrate in lanes: sixteen taxels of one frame abreast; see [`crate::stage::calibrate`].
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, i32x16, u32x16};
@@ -10,6 +11,7 @@ use super::Tables;
 use super::lines::Aligned;
 use super::pick::OneFrame;
 use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::together::{Tasks, on_threads};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -229,37 +231,73 @@ pub(super) fn frame(
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, pressures, statuses))
+    let all = 0..tables.tiles.all.len();
+    with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, all, pressures, statuses))
 }
 
+/// The same by all cores. Beside the other, where it is inlined, it makes a small skin's live call longer.
+#[inline(never)]
+pub(super) fn shared_frame(
+    level: Level,
+    plan: &Plan,
+    tables: &Tables,
+    raw: (Rows<'_>, usize),
+    pressures: &mut [Row<f32>],
+    statuses: &mut [Row<u32>],
+) -> bool {
+    let (count, threads) = (tables.tiles.all.len(), rayon::current_num_threads());
+    // A few parts a thread, as none knows what else its core does; and no more than a word has bits.
+    let part = count.div_ceil((4 * threads).min(u64::BITS as usize)).max(1).next_multiple_of(TOGETHER);
+    let faulty = AtomicU64::new(0);
+    let parts = pressures[..count].chunks_mut(part).zip(statuses[..count].chunks_mut(part));
+    let parts = Tasks::new(parts.enumerate());
+    on_threads(threads, || {
+        while let Some((index, (pressures, statuses))) = parts.take() {
+            let range = index * part..index * part + pressures.len();
+            if with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, range.clone(), pressures, statuses)) {
+                faulty.fetch_or(1 << index, Ordering::Relaxed);
+            }
+        }
+    });
+    let faulty = faulty.into_inner();
+    for (index, statuses) in statuses[..count].chunks_mut(part).enumerate() {
+        if faulty != 0 && faulty & 1 << index == 0 {
+            statuses.fill([0; LANES]);
+        }
+    }
+    faulty != 0
+}
+
+/// Those of `range`, which `pressures` and `statuses` begin with.
 #[inline(always)]
 fn tiles<S: Simd>(
     simd: S,
     plan: &Plan,
     tiles: &Tiles,
     (raw, frame): (Rows<'_>, usize),
+    range: Range<usize>,
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
     let (mut faults, values) = (false, OneFrame::new(raw, frame));
-    let count = tiles.all.len();
-    for first in (0..count).step_by(TOGETHER) {
-        let group = first..count.min(first + TOGETHER);
-        if plain_tiles(simd, plan, tiles, values, group.clone(), pressures) {
+    for first in range.clone().step_by(TOGETHER) {
+        let group = first..range.end.min(first + TOGETHER);
+        let here = first - range.start..group.end - range.start;
+        if plain_tiles(simd, plan, tiles, values, group.clone(), &mut pressures[here.clone()]) {
             if faults || plan.has_changes() {
-                statuses[group].fill([0; LANES]);
+                statuses[here].fill([0; LANES]);
             }
             continue;
         }
         let were_plain = !faults;
-        for index in group {
+        for (index, here) in group.zip(here.clone()) {
             let Aligned(bits) = &mut Aligned([0; LANES]);
             values.read(simd, index, plan.calibrated(), bits);
-            let (pressures, statuses) = (&mut pressures[index], &mut statuses[index]);
+            let (pressures, statuses) = (&mut pressures[here], &mut statuses[here]);
             faults |= tile(simd, plan, &tiles.all[index], index * LANES, bits, pressures, statuses);
         }
         if were_plain && faults {
-            statuses[..first].fill([0; LANES]);
+            statuses[..here.start].fill([0; LANES]);
         }
     }
     faults
@@ -280,7 +318,7 @@ fn plain_tiles<S: Simd>(
 ) -> bool {
     let (none, mut sizes, mut beyond) = (f32x16::splat(simd, 0.0), Sizes::new(simd), u32x16::splat(simd, 0));
     let sorts = &tiles.sorts[group.clone()];
-    for (index, (sort, pressures)) in group.clone().zip(sorts.iter().zip(&mut pressures[group])) {
+    for (index, (sort, pressures)) in group.zip(sorts.iter().zip(pressures)) {
         if *sort == Sort::Any {
             return false;
         }

@@ -2,16 +2,17 @@
 
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
-use rayon::prelude::*;
 
 use super::descent::{Descent, depth};
 use super::gate::Gate;
+use super::groups::{Narrow, OverFields, PlaceRow};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
-use super::simd::{F, LANES, Row, U, load, load_u, soon_needed, with_widest};
-use super::slots::{NEAR, Slots, inserting_pays};
-use super::touch::{Abreast, Cells, Kinds, Members, OneKind, Part};
+use super::simd::{LANES, Row, soon_needed, with_widest};
+use super::slots::{NEAR, inserting_pays};
+use super::together::{Tasks, on_threads};
+use super::touch::{Abreast, Cells, OneKind};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
 use crate::percept::CellsMut;
@@ -27,122 +28,13 @@ struct Alone {
     kind: OneKind,
 }
 
-/// Sixteen narrow fields of about as many members, a lane each.
-#[derive(Clone, Debug)]
-struct Narrow {
-    /// Per lane, which field; fewer at the end.
-    fields: Vec<usize>,
-    /// Where they are, if one stands after the other.
-    together: Option<usize>,
-    kinds: Kinds,
-    /// By member; lanes that have no more go on with an unpressed one.
-    slots: Slots,
-    places: Vec<PlaceRow>,
-    /// Rows of the groups before it.
-    first_row: usize,
-    /// None where all are 1.
-    weights: Option<Lines<f32>>,
-    depths: Lines<f32>,
-    areas: Lines<f32>,
-}
-
-/// Where a member of each field of a group is.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-struct PlaceRow {
-    u: Row<f32>,
-    v: Row<f32>,
-}
-
-impl Narrow {
-    fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
-        let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
-        let blank = Lines::new(rows, 0.0);
-        let mut slots = Lines::new(rows, unpressed as u32);
-        let mut group = Self {
-            fields: fields.to_vec(),
-            together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
-            kinds: Kinds::EMPTY,
-            slots: Slots::Far(Lines::default()),
-            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
-            first_row: 0,
-            weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
-            depths: blank.clone(),
-            areas: blank,
-        };
-        for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
-            group.kinds.set(lane, field);
-            for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
-                slots[row][lane] = member.slot;
-                if let Some(weights) = &mut group.weights {
-                    weights[row][lane] = member.weight;
-                }
-                group.places[row].u[lane] = member.u;
-                group.places[row].v[lane] = member.v;
-                group.depths[row][lane] = *depth;
-                group.areas[row][lane] = plan.taxels[member.slot as usize].area;
-            }
-        }
-        group.slots = Slots::new(slots, unpressed);
-        group
-    }
-
-    fn is_weighted(&self) -> bool {
-        self.weights.is_some()
-    }
-
-    /// Has weights from now on, of 1 if it had none.
-    fn weigh(&mut self) {
-        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
-    }
+/// Whether `threads` share a frame of `plan`.
+pub(super) fn is_shared(plan: &Plan, threads: usize) -> bool {
+    plan.memberships() >= SHARED && threads > 1
 }
 
 /// Bytes of places that stay in a core's nearest cache beside all else: in many it has 32 KiB.
 const NEAREST_CACHE: usize = 16 << 10;
-
-/// A group's values in this frame; `WEIGHTED` where weights are not all 1.
-#[derive(Clone, Copy)]
-struct OverFields<'a, const WEIGHTED: bool> {
-    group: &'a Narrow,
-    /// Empty if not `WEIGHTED`.
-    weights: &'a [Row<f32>],
-    pressures: &'a [Row<f32>],
-    statuses: &'a [Row<u32>],
-}
-
-impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFields<'_, WEIGHTED> {
-    #[inline(always)]
-    fn count(self) -> usize {
-        self.group.places.len()
-    }
-
-    #[inline(always)]
-    fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
-        let PlaceRow { u, v } = &self.group.places[member];
-        let pressure = load(simd, &self.pressures[member], at);
-        Part {
-            pressure,
-            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
-            u: load(simd, u, at),
-            v: load(simd, v, at),
-        }
-    }
-
-    #[inline(always)]
-    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.group.depths[member], at)
-    }
-
-    #[inline(always)]
-    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.group.areas[member], at)
-    }
-
-    #[inline(always)]
-    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
-        load_u(simd, &self.statuses[member], at)
-    }
-}
 
 /// About how many rows are gathered before anything is computed of them: what was stored piece by piece can be loaded as
 /// a whole only once it has reached the cache. With their weights and places they are to stay in the nearest one.
@@ -172,11 +64,12 @@ pub(super) struct Live {
     /// Those of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
     gathered: Gathered,
+    /// Of the other threads that take part, where a frame is shared.
+    others: Vec<Gathered>,
     gate: Option<Gate>,
     descent: Option<Descent>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
-    shared: bool,
     /// Whether members' pressures are brought side by side by way of registers.
     inserts: bool,
 }
@@ -211,6 +104,7 @@ impl Live {
         });
         let alone = wide.iter().map(std::slice::from_ref);
         let units: Vec<&[usize]> = alone.chain(narrow.iter().map(|group| &group.fields[..])).collect();
+        let threads = rayon::current_num_threads();
         Self {
             descent: Descent::new(plan, &units),
             gate,
@@ -227,7 +121,7 @@ impl Live {
                 (Lines::default(), Lines::default())
             },
             gathered: Gathered::default(),
-            shared: plan.memberships() >= SHARED && rayon::current_num_threads() > 1,
+            others: vec![Gathered::default(); if is_shared(plan, threads) { threads - 1 } else { 0 }],
             inserts: inserting_pays(level),
         }
     }
@@ -250,8 +144,10 @@ impl Live {
     ) {
         let Self { pressures, statuses, before: (was, said), gate, .. } = self;
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
+        let is_shared = !self.others.is_empty();
         let mut faults = match &mut gate {
             Some(gate) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
+            None if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
             None => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
         };
         if plan.has_changes() {
@@ -280,16 +176,10 @@ impl Live {
             let together = self.together;
             // What little is left behind a gate is done before others are awake.
             let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
-            if self.shared && share * plan.memberships() as f64 >= SHARED as f64 {
-                let wide = self.wide.par_iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
-                let narrow = self.narrow.par_chunks(together).zip(narrow.par_chunks_mut(together));
-                wide.for_each_init(Gathered::default, |gathered, (table, ((field, answer), _))| {
-                    frame.wide(table, field, gathered, answer);
-                });
-                let narrow = narrow.zip(stale_narrow.par_chunks(together));
-                narrow.for_each_init(Gathered::default, |gathered, ((groups, answers), stale)| {
-                    frame.stale(groups, stale, gathered, answers);
-                });
+            if is_shared && share * plan.memberships() as f64 >= SHARED as f64 {
+                let fields = (&self.wide[..], &self.narrow[..], together);
+                let gathered = (&mut self.gathered, &mut self.others[..]);
+                frame.shared(fields, (wide, narrow), (stale_wide, stale_narrow), gathered);
             } else {
                 let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
                 for (table, ((field, answer), _)) in wide {
@@ -333,6 +223,37 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
+    /// Fields alone and in groups, so many of these together, those of them that are stale, by as many threads as have
+    /// something to work in.
+    #[inline(never)]
+    fn shared(
+        &self,
+        (wide, narrow, together): (&[Alone], &[Narrow], usize),
+        (wide_answers, narrow_answers): (&mut [Cells], &mut [Cells]),
+        (stale_wide, stale_narrow): (&[bool], &[bool]),
+        (own, others): (&mut Gathered, &mut [Gathered]),
+    ) {
+        let threads = 1 + others.len();
+        let wide = wide.iter().zip(wide_answers).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+        // Several at a time, and yet enough to choose from.
+        let some = (narrow.len() / (16 * threads)).next_multiple_of(together).max(together);
+        let narrow = narrow.chunks(some).zip(narrow_answers.chunks_mut(some)).zip(stale_narrow.chunks(some));
+        let (wide, narrow) = (Tasks::new(wide), Tasks::new(narrow));
+        let gathered = Tasks::new(std::iter::once(own).chain(others));
+        on_threads(threads, || {
+            let Some(gathered) = gathered.take() else { return };
+            while let Some((table, ((field, answer), _))) = wide.take() {
+                self.wide(table, field, gathered, answer);
+            }
+            while let Some(((groups, answers), stale)) = narrow.take() {
+                let pieces = groups.chunks(together).zip(answers.chunks_mut(together));
+                for ((groups, answers), stale) in pieces.zip(stale.chunks(together)) {
+                    self.stale(groups, stale, gathered, answers);
+                }
+            }
+        });
+    }
+
     /// A field alone.
     fn wide(&self, table: usize, field: &Alone, gathered: &mut Gathered, answer: &mut Cells) {
         let (table, values): (&Table, _) = (&self.tables.wide[table], &mut gathered.values);

@@ -16,6 +16,7 @@ mod compensated;
 mod contact;
 mod descent;
 mod gate;
+mod groups;
 mod hysteresis;
 mod in_view;
 mod lines;
@@ -35,6 +36,7 @@ mod slots;
 mod stream;
 #[cfg(test)]
 mod tests;
+mod together;
 mod touch;
 mod transpose;
 mod wide;
@@ -141,12 +143,7 @@ impl Cpu {
                 self.part(raw, first, streams, part);
             }
         };
-        rayon::in_place_scope(|scope| {
-            for _ in 1..threads {
-                scope.spawn(|_| work());
-            }
-            work();
-        });
+        together::on_threads(threads, work);
     }
 
     /// Runs the frames from `first` on, sixteen after the other; `streams` says whether answers are written past the caches.

@@ -8,7 +8,7 @@ use crate::backend::{Near, Picks, Step};
 use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
-use crate::scene::{Arithmetic, Knobs, PlanField, Scene};
+use crate::scene::{Arithmetic, Coverage, Knobs, PlanField, Scene};
 use crate::signal::{Calibration, Frame, Letter, Receptor};
 
 const HAND: &[u8] = include_bytes!("../../../bodies/hand.glb");
@@ -201,6 +201,29 @@ fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
         let scene = Scene { outputs, ..Scene::default() };
         let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
         large_skins_agree(&plan, FRAMES);
+    }
+}
+
+#[test]
+fn a_frame_that_all_cores_share_has_the_same_bits() {
+    const FRAMES: usize = 37;
+    let body = sheet(36_000);
+    let calibration = Calibration::identity(body.taxels.len());
+    for letters in [Vec::new(), Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[])] {
+        // Nothing is left out, as then there is little to share.
+        let knobs = Knobs { coverage: Coverage::All, ..Knobs::default() };
+        let mut scene = Scene { outputs: Outputs::USUAL - Outputs::MOTION, knobs, ..Scene::default() };
+        if !letters.is_empty() {
+            scene.letters = letters;
+        }
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        assert!(live::is_shared(&plan, 2));
+        // Frames with faults in some parts of the skin, where those before had others, and frames without any.
+        let raw = mostly_at_rest(values(&plan, FRAMES), plan.channels());
+        for level in levels() {
+            let right = run(&plan, level, &raw, FRAMES, FRAMES);
+            assert!(right == run(&plan, level, &raw, FRAMES, 1), "{level:?}");
+        }
     }
 }
 

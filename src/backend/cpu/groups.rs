@@ -1,0 +1,123 @@
+//! Sixteen narrow fields, a lane each, as one frame's programs read them.
+
+use fearless_simd::prelude::*;
+
+use super::lines::Lines;
+use super::simd::{F, LANES, Row, U, load, load_u};
+use super::slots::Slots;
+use super::touch::{Kinds, Members, Part};
+use crate::scene::Plan;
+
+/// Sixteen narrow fields of about as many members, a lane each.
+#[derive(Clone, Debug)]
+pub(super) struct Narrow {
+    /// Per lane, which field; fewer at the end.
+    pub(super) fields: Vec<usize>,
+    /// Where they are, if one stands after the other.
+    pub(super) together: Option<usize>,
+    pub(super) kinds: Kinds,
+    /// By member; lanes that have no more go on with an unpressed one.
+    pub(super) slots: Slots,
+    pub(super) places: Vec<PlaceRow>,
+    /// Rows of the groups before it.
+    pub(super) first_row: usize,
+    /// None where all are 1.
+    pub(super) weights: Option<Lines<f32>>,
+    pub(super) depths: Lines<f32>,
+    pub(super) areas: Lines<f32>,
+}
+
+/// Where a member of each field of a group is.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct PlaceRow {
+    pub(super) u: Row<f32>,
+    pub(super) v: Row<f32>,
+}
+
+impl Narrow {
+    pub(super) fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
+        let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
+        let blank = Lines::new(rows, 0.0);
+        let mut slots = Lines::new(rows, unpressed as u32);
+        let mut group = Self {
+            fields: fields.to_vec(),
+            together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
+            kinds: Kinds::EMPTY,
+            slots: Slots::Far(Lines::default()),
+            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            first_row: 0,
+            weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
+            depths: blank.clone(),
+            areas: blank,
+        };
+        for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
+            group.kinds.set(lane, field);
+            for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
+                slots[row][lane] = member.slot;
+                if let Some(weights) = &mut group.weights {
+                    weights[row][lane] = member.weight;
+                }
+                group.places[row].u[lane] = member.u;
+                group.places[row].v[lane] = member.v;
+                group.depths[row][lane] = *depth;
+                group.areas[row][lane] = plan.taxels[member.slot as usize].area;
+            }
+        }
+        group.slots = Slots::new(slots, unpressed);
+        group
+    }
+
+    pub(super) fn is_weighted(&self) -> bool {
+        self.weights.is_some()
+    }
+
+    /// Has weights from now on, of 1 if it had none.
+    pub(super) fn weigh(&mut self) {
+        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
+    }
+}
+
+/// A group's values in this frame; `WEIGHTED` where weights are not all 1.
+#[derive(Clone, Copy)]
+pub(super) struct OverFields<'a, const WEIGHTED: bool> {
+    pub(super) group: &'a Narrow,
+    /// Empty if not `WEIGHTED`.
+    pub(super) weights: &'a [Row<f32>],
+    pub(super) pressures: &'a [Row<f32>],
+    pub(super) statuses: &'a [Row<u32>],
+}
+
+impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFields<'_, WEIGHTED> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.group.places.len()
+    }
+
+    #[inline(always)]
+    fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+        let PlaceRow { u, v } = &self.group.places[member];
+        let pressure = load(simd, &self.pressures[member], at);
+        Part {
+            pressure,
+            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
+            u: load(simd, u, at),
+            v: load(simd, v, at),
+        }
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.depths[member], at)
+    }
+
+    #[inline(always)]
+    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.areas[member], at)
+    }
+
+    #[inline(always)]
+    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
+        load_u(simd, &self.statuses[member], at)
+    }
+}
