@@ -47,6 +47,7 @@ fn allocations_are_counted() {
 }
 
 /// What is shared among cores is a task for each other core, twice a frame.
+#[cfg(feature = "cli")]
 #[test]
 fn a_frame_that_is_shared_allocates_its_tasks_alone() {
     use somatic::experiments::shape::Shape;

@@ -69,6 +69,8 @@ impl Shares {
     }
 }
 
+// Which has skins of any size.
+#[cfg(feature = "cli")]
 #[cfg(test)]
 mod tests {
     use super::super::tests::{percepts_of, percepts_of_odd_values};
