@@ -1,5 +1,5 @@
-// Wide fields: each, and a quad of frames, by a whole group, whose invocations take every 64th member; or the widest in
-// parts, each by a whole group. Then come first all parts' sums; from what these make of the field, all parts' lines; and
+// Wide fields: each, and a quad of frames, by a whole group, whose invocations take every 64th member; or in parts, each by
+// a whole group, so that each invocation has members. Then come first all parts' sums; from what these make of the field, all parts' lines; and
 // one group a field puts those together. Besides being faster, it must be so: lavapipe ends any shader's loops after 65,535
 // rounds in all, without a word.
 

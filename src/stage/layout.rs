@@ -2,8 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// A field of more members than this is taken in parts of as many or more, each by a whole group of the GPU's invocations.
-/// lavapipe ends an invocation's loops after 65,535 rounds in all, of which a field that is not wide makes two a member.
+/// A field of more members than this, or each of its parts, is taken by a whole group of the GPU's invocations. lavapipe ends
+/// an invocation's loops after 65,535 rounds in all, of which a field that is not wide makes three a member at most.
 pub(crate) const WIDE: usize = 4096;
 
 /// Memberships that a uniform binding holds, as `shaders/shared/few_members.wgsl` says: 64 KiB, which every device can bind.

@@ -80,7 +80,7 @@ impl Narrow {
 
 /// A group's values in this frame; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
-pub(super) struct OverFields<'a, const WEIGHTED: bool> {
+pub(super) struct InFrame<'a, const WEIGHTED: bool> {
     pub(super) group: &'a Narrow,
     /// Empty if not `WEIGHTED`.
     pub(super) weights: &'a [Row<f32>],
@@ -88,7 +88,7 @@ pub(super) struct OverFields<'a, const WEIGHTED: bool> {
     pub(super) statuses: &'a [Row<u32>],
 }
 
-impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFields<'_, WEIGHTED> {
+impl<S: Simd, const WEIGHTED: bool> Members<S> for InFrame<'_, WEIGHTED> {
     #[inline(always)]
     fn count(self) -> usize {
         self.group.places.len()

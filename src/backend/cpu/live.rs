@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::descent::{Descent, depth};
 use super::gate::Gate;
-use super::groups::{Narrow, OverFields, PlaceRow};
+use super::groups::{InFrame, Narrow, PlaceRow};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
@@ -333,7 +333,7 @@ impl Frame<'_> {
             |index| {
                 let group = &groups[index];
                 let rows = group.first_row - groups[0].first_row..;
-                let members = OverFields::<WEIGHTED> {
+                let members = InFrame::<WEIGHTED> {
                     group,
                     weights: group.weights.as_deref().unwrap_or_default(),
                     pressures: &pressures[rows.clone()],

@@ -1,4 +1,5 @@
-//! Work that the cores take from each other, the caller's thread among them: tasks that it would wait for start late.
+//! Work that the cores take from each other, the caller's thread among them: tasks that it would wait for start late. It
+//! still waits until each of the others has had its turn, even to find that nothing is left.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -3,7 +3,8 @@
 use super::BLOCK;
 use super::adapter::Device;
 use super::columns::Columns;
-use super::over_fields::BY_PART;
+use super::over_fields::{self, BY_PART};
+use super::shares;
 use crate::error::{Error, Result};
 use crate::scene::Plan;
 use crate::stage::layout;
@@ -25,11 +26,11 @@ pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) 
     ];
     // A frame of every column, and a quad of every slot and of every part of a wide field.
     let (cells, quad) = (plan.fields.len() * 4 * columns.count(), plan.slots() * 16);
-    let wide = plan.fields.iter().filter(|field| field.count > layout::WIDE);
-    let of_parts = wide.map(|field| field.count.div_ceil(layout::WIDE)).sum::<usize>() * BY_PART;
+    let of_part = over_fields::of_part(device);
+    let of_parts = plan.fields.iter().map(|field| shares::parts(field.count, of_part)).sum::<usize>() * BY_PART;
     if tables.into_iter().chain([cells, quad, of_parts]).any(|bytes| bytes > limit) {
         return Err(Error::failed(format!(
-            "{} taxels and {} fields are more than a GPU binding holds ({limit} bytes); use the cpu backend",
+            "{} taxels in {} fields are more than a GPU binding holds ({limit} bytes); use the cpu backend",
             plan.channels(),
             plan.fields.len()
         )));

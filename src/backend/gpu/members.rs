@@ -1,4 +1,4 @@
-//! The table of members on the device, in the form that a plan of that size and a device of that kind read best.
+//! A table of members on the device, in the form that a plan of that size and a device of that kind read best.
 
 use bytemuck::cast_slice;
 
@@ -8,7 +8,7 @@ use super::stage::{table, table_as};
 use super::{is_processor, pack};
 use crate::stage::layout;
 
-/// All members, field by field.
+/// A share's members, field by field.
 pub(super) enum MemberTable {
     Many(wgpu::Buffer),
     /// At most [`layout::FEW`].

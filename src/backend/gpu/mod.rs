@@ -99,15 +99,15 @@ impl Gpu {
     }
 
     fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
-        let most = over_fields::most_members(&device);
-        Self::in_shares(device, plan, batch, most)
+        let cut = (over_fields::of_part(&device), over_fields::most_members(&device));
+        Self::in_shares(device, plan, batch, cut)
     }
 
-    /// With at most `most_members` in one table on the device.
-    fn in_shares(device: Device, plan: &Plan, batch: usize, most_members: usize) -> Result<Self> {
+    /// With so many members in a part of a wide field, and at most so many in one table on the device.
+    fn in_shares(device: Device, plan: &Plan, batch: usize, (of_part, most): (usize, usize)) -> Result<Self> {
         let columns = Columns::new(plan);
         let capacity = capacity::of(&device, plan, &columns, batch)?;
-        let shares = Shares::new(plan, over_fields::of_part(&device), most_members);
+        let shares = Shares::new(plan, of_part, most);
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
         let frames = capacity as u64;
         let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages| {

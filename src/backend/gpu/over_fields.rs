@@ -1,4 +1,4 @@
-//! The stages from contact to axis on the device: one program over fields, and three over the parts of wide ones.
+//! The stages from contact to axis on the device: a program over fields, one over wide ones, and three over their parts.
 
 use wgpu::BindingResource;
 
@@ -58,7 +58,7 @@ pub(super) fn most_members(device: &Device) -> usize {
     bound.min(TEXELS * limits.max_texture_dimension_2d as usize)
 }
 
-/// Members of a wide field's part on `device`, however many frames a call has, as sums depend on it: many parts keep a GPU's
+/// Members of a wide field's part on `device`, at most unless it has very many, however many frames a call has, as sums depend on it: many parts keep a GPU's
 /// processors busy, few take less joining.
 pub(super) fn of_part(device: &Device) -> usize {
     if is_processor(device) { 8 * layout::WIDE } else { layout::WIDE }

@@ -173,7 +173,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
 }
 
 /// A call that computes nothing, to hold a call of an engine to: as many bytes go up and come down as in a submission of a
-/// plan, and a program without a statement is dispatched in as many groups.
+/// plan, and a program without a statement is dispatched in as many groups as the largest of its programs.
 pub struct EmptyCall {
     gpu: Gpu,
     pipeline: wgpu::ComputePipeline,
@@ -204,7 +204,8 @@ impl EmptyCall {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        let groups = gpu.stages.first().map_or([1, 1, 1], |stage| stage.over.groups(&batch));
+        let groups = gpu.stages.iter().map(|stage| stage.over.groups(&batch));
+        let groups = groups.max_by_key(|groups| groups.iter().product::<u32>()).unwrap_or([1, 1, 1]);
         let bytes_down = (frames * plan.fields.len() * 4 * gpu.columns.read().len()) as u64;
         Ok(Self { pipeline, groups, frames, values: vec![0; gpu.raw_bytes(frames)], bytes_down, gpu })
     }

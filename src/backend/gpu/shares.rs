@@ -1,5 +1,5 @@
-//! A plan's fields on the device: the widest in parts, and all of them in shares, as a device binds only so many members at
-//! once.
+//! A plan's fields on the device: those of very many members in parts, and all of them in shares, as a device binds only so
+//! many members at once.
 
 use std::ops::Range;
 
@@ -26,22 +26,34 @@ pub(super) struct Share {
     pub(super) parts: Vec<layout::Part>,
 }
 
+/// Parts of a field at most: what each has found is read once for each of the others.
+const MOST_PARTS: usize = 256;
+
+/// How many parts of at most `of_part` members a field of `count` is cut into, or as few members more as it takes.
+pub(super) fn parts(count: usize, of_part: usize) -> usize {
+    match count.div_ceil(of_part) {
+        0 | 1 => 0,
+        parts => parts.min(MOST_PARTS),
+    }
+}
+
 impl Shares {
-    /// The fields of `plan`, those of more than `of_part` members in parts of as many at most, and all in shares of at most
-    /// `most`, or a part's.
+    /// The fields of `plan`, those of more than `of_part` members in [`parts`], which have 64 members or more, and all in shares
+    /// of at most `most`, or a part's.
     pub(super) fn new(plan: &Plan, of_part: usize, most: usize) -> Self {
         let mut all = Self { shares: Vec::new(), firsts: Vec::new(), parts: 0 };
         for (index, field) in plan.fields.iter().enumerate() {
             let known = if field.charted { CHARTED } else { 0 } | if field.area_known { AREA_KNOWN } else { 0 };
-            // Parts of about one size, so that each of a group's invocations has members.
-            let (count, first) = (field.count.div_ceil(of_part).max(1), all.parts);
-            for part in 0..count {
-                let [before, end] = [part, part + 1].map(|part| field.count * part / count);
-                let share = all.with_room(field.first + before..field.first + end, most.max(of_part));
+            let (count, first) = (parts(field.count, of_part), all.parts);
+            // About of one size, so that each of a group's invocations has members.
+            let cut = |part: usize| field.count * part / count.max(1);
+            for part in 0..count.max(1) {
+                let (before, end) = (cut(part), cut(part + 1));
+                let share = all.with_room(field.first + before..field.first + end, most.max(end - before));
                 let first_member = (field.first + before - share.members.start) as u32;
                 let members =
                     layout::Field { first: first_member, count: (end - before) as u32, known, index: index as u32 };
-                if count == 1 {
+                if count == 0 {
                     let fields = if field.count > WIDE { &mut share.wide } else { &mut share.narrow };
                     fields.push(members);
                     continue;
@@ -53,7 +65,7 @@ impl Shares {
                     all.firsts.push(part);
                 }
             }
-            all.parts += if count == 1 { 0 } else { count };
+            all.parts += count;
         }
         all
     }
@@ -79,7 +91,7 @@ mod tests {
     use crate::experiments::shape::Shape;
     use crate::field::FieldSet;
     use crate::percept::{Flags, Outputs};
-    use crate::scene::Scene;
+    use crate::scene::{Arithmetic, Knobs, Scene};
     use crate::signal::{Calibration, RawValue};
 
     #[test]
@@ -131,20 +143,58 @@ mod tests {
         let shape = Shape { sensors: 34_000, fields: 300, members: 40, wide: 33_000, local: true, frames: 9, seed: 3 };
         let body = shape.body();
         let calibration = Calibration::identity(body.taxels.len());
-        let scene = Scene { outputs: Outputs::USUAL - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
-        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
-        for device_type in [wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu] {
-            for frames in [1, 9] {
-                // Whole, and cut between fields and within the wide one.
-                let [whole, cut] = [1 << 20, 5000].map(|most| {
-                    let mut device = device.clone();
-                    device.info.device_type = device_type;
-                    let mut gpu = Gpu::in_shares(device, &plan, frames, most).unwrap();
-                    percepts_of_odd_values(&mut gpu, frames)
-                });
-                assert!(whole == cut, "{frames} frames, {device_type:?}");
+        for arithmetic in [Arithmetic::OnePass, Arithmetic::Compensated] {
+            let knobs = Knobs { arithmetic: Some(arithmetic), ..Knobs::default() };
+            let scene = Scene { outputs: Outputs::USUAL | Outputs::AXIS, knobs, ..Scene::default() };
+            let mut plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+            // Some without a chart, whose third coordinate counts.
+            let mut fields = plan.fields.to_vec();
+            for field in fields.iter_mut().rev().step_by(3) {
+                field.charted = false;
+                field.depths.iter_mut().enumerate().for_each(|(index, depth)| *depth = (index % 7) as f32 / 7.0);
+            }
+            plan.fields = fields.into();
+            for device_type in [wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu] {
+                for (frames, of_part) in [(1, 256), (9, 256), (9, WIDE)] {
+                    // Whole, and cut between fields and within the wide one.
+                    let [whole, cut] = [1 << 20, 5000].map(|most| {
+                        let mut device = device.clone();
+                        device.info.device_type = device_type;
+                        let mut gpu = Gpu::in_shares(device, &plan, frames, (of_part, most)).unwrap();
+                        percepts_of_odd_values(&mut gpu, frames)
+                    });
+                    assert!(whole == cut, "{frames} frames, {of_part} a part, {device_type:?}, {arithmetic:?}");
+                }
             }
         }
+    }
+
+    #[test]
+    fn many_parts_add_up_to_what_one_has() {
+        let Ok(device) = adapter::shared() else {
+            assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
+            return;
+        };
+        let shape = Shape { sensors: 30_000, fields: 1, members: 1, wide: 30_000, local: true, frames: 5, seed: 3 };
+        let body = shape.body();
+        let calibration = Calibration::identity(body.taxels.len());
+        let scene = Scene { outputs: Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE, ..Scene::default() };
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        // Whole numbers, whose sums are exact in whatever order.
+        let value = |i: usize| RawValue::new((i * i % 509) as f64);
+        let values: Vec<RawValue> = (0..shape.frames * shape.sensors).map(value).collect();
+        assert_eq!([1 << 20, WIDE, 150].map(|of_part| parts(30_000, of_part)), [0, 8, 200]);
+        let [one, some, many] = [1 << 20, WIDE, 150].map(|of_part| {
+            percepts_of(&mut Gpu::in_shares(device.clone(), &plan, shape.frames, (of_part, 1 << 20)).unwrap(), &values)
+        });
+        assert!((0..shape.frames).all(|frame| one.touched(frame).count() > 0));
+        assert!(one == some && one == many);
+    }
+
+    #[test]
+    fn a_field_has_no_more_parts_than_read_each_other_quickly() {
+        assert_eq!([0, 1, WIDE, WIDE + 1, 1 << 20].map(|count| parts(count, WIDE)), [0, 0, 0, 2, 256]);
+        assert_eq!(parts(100_000_000, WIDE), MOST_PARTS);
     }
 
     #[test]
@@ -170,7 +220,7 @@ mod tests {
         let [whole, cut] = [1 << 20, 5000].map(|most| {
             let mut device = device.clone();
             device.info.device_type = wgpu::DeviceType::DiscreteGpu;
-            percepts_of(&mut Gpu::in_shares(device, &plan, shape.frames, most).unwrap(), &values)
+            percepts_of(&mut Gpu::in_shares(device, &plan, shape.frames, (WIDE, most)).unwrap(), &values)
         });
         let ties = (0..shape.frames).filter(|&frame| whole.frame(frame).any(|of| of.flags.contains(Flags::TIE)));
         assert_eq!(ties.count(), shape.frames);
