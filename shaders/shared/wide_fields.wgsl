@@ -132,8 +132,8 @@ fn join_eight(first: u32, apart: u32, kind: u32) {
     }
 }
 
-// What all 64 invocations of a group have found together; each is told. By eights, as halving takes lavapipe three times
-// as long: it computes for all invocations what only some need, and changes between them at each barrier.
+// What all 64 invocations of a group have found together; each is told. By eights, as lavapipe computes for all invocations
+// what only some need, and changes between them at each barrier: halving has six.
 fn of_group(local: u32, own: Bits, kind: u32) -> Bits {
     by_invocations[local] = own;
     workgroupBarrier();
