@@ -94,6 +94,13 @@ mod tests {
     use crate::scene::{Arithmetic, Knobs, Scene};
     use crate::signal::{Calibration, RawValue};
 
+    /// The device, where there is one.
+    fn device() -> Option<adapter::Device> {
+        let device = adapter::shared().ok();
+        assert!(device.is_some() || std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
+        device
+    }
+
     #[test]
     fn every_member_has_one_place_in_a_share_that_has_room() {
         let shape = Shape { sensors: 9000, fields: 150, members: 30, wide: 8500, local: true, frames: 1, seed: 1 };
@@ -136,10 +143,7 @@ mod tests {
 
     #[test]
     fn percepts_do_not_depend_on_how_members_are_shared_out() {
-        let Ok(device) = adapter::shared() else {
-            assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
-            return;
-        };
+        let Some(device) = device() else { return };
         let shape = Shape { sensors: 34_000, fields: 300, members: 40, wide: 33_000, local: true, frames: 9, seed: 3 };
         let body = shape.body();
         let calibration = Calibration::identity(body.taxels.len());
@@ -171,10 +175,7 @@ mod tests {
 
     #[test]
     fn many_parts_add_up_to_what_one_has() {
-        let Ok(device) = adapter::shared() else {
-            assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
-            return;
-        };
+        let Some(device) = device() else { return };
         let shape = Shape { sensors: 30_000, fields: 1, members: 1, wide: 30_000, local: true, frames: 5, seed: 3 };
         let body = shape.body();
         let calibration = Calibration::identity(body.taxels.len());
@@ -199,10 +200,7 @@ mod tests {
 
     #[test]
     fn of_equals_the_first_member_is_the_farther_wherever_its_table_is() {
-        let Ok(device) = adapter::shared() else {
-            assert!(std::env::var_os("SOMATIC_REQUIRE_GPU").is_none(), "no adapter");
-            return;
-        };
+        let Some(device) = device() else { return };
         const SIDE: usize = 182;
         let sensors = SIDE * SIDE;
         let shape = Shape { sensors, fields: 1, members: 1, wide: sensors, local: true, frames: SIDE / 2, seed: 3 };
