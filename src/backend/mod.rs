@@ -8,6 +8,7 @@ pub(crate) mod reference;
 
 use std::ops::Range;
 use std::str::FromStr;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
@@ -105,9 +106,13 @@ fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
+    /// No others have the same.
+    pub(crate) number: u64,
     /// Per slot that is calibrated, which are the channels once for every signal.
     pub(crate) places: Vec<u32>,
     pub(crate) channels: usize,
+    /// Values of a frame.
+    pub(crate) width: usize,
     /// Per sixteen slots.
     pub(crate) near: Vec<Near>,
     /// The lowest and the highest of their places.
@@ -222,7 +227,9 @@ impl Picks {
         });
         let spans: Vec<[u32; 2]> = spans.collect();
         let lines = few_at_a_time(places.iter().map(|place| place / 16 * 16).collect());
-        Self { near, spans, blocks, lines, shuffles, channels: channels.len(), places }
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        Self { number, near, spans, blocks, lines, shuffles, channels: channels.len(), width, places }
     }
 }
 

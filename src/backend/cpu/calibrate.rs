@@ -9,7 +9,7 @@ use fearless_simd::{Level, f32x16, i32x16, u32x16};
 use super::super::Rows;
 use super::Tables;
 use super::lines::Aligned;
-use super::pick::OneFrame;
+use super::pick::{OneFrame, Values};
 use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
 use super::together::{Tasks, on_threads};
 use crate::percept::Flags;
@@ -45,6 +45,7 @@ pub(super) enum Sort {
 }
 
 /// All of a plan's taxels, by ascending slot.
+#[derive(Clone, Debug)]
 pub(super) struct Tiles {
     pub(super) all: Vec<Tile>,
     /// Each one's sort, again: where that is all there is to know, eight lines a tile need not come from memory.
@@ -54,14 +55,18 @@ pub(super) struct Tiles {
 impl Tiles {
     /// Those of `plan`; what fills up the last tile is unpressed.
     pub(super) fn new(plan: &Plan) -> Self {
-        let all: Vec<Tile> = plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect();
+        Self::of(plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect())
+    }
+
+    pub(super) fn of(all: Vec<Tile>) -> Self {
         let sorts = all.iter().map(|tile| tile.sort).collect();
         Self { all, sorts }
     }
 }
 
 impl Tile {
-    fn new(taxels: &[Taxel]) -> Self {
+    /// Of up to sixteen `taxels`.
+    pub(super) fn new(taxels: &[Taxel]) -> Self {
         let sort = if taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure) {
             Sort::Raw
         } else if taxels.iter().all(|taxel| taxel.response == STRAIGHT) {
@@ -231,8 +236,21 @@ pub(super) fn frame(
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    let all = 0..tables.tiles.all.len();
-    with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, all, pressures, statuses))
+    let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
+    all(level, plan, &tables.tiles, values, pressures, statuses)
+}
+
+/// The same for any `values` of taxels in as many `tiles`, in whatever order these have them.
+pub(super) fn all(
+    level: Level,
+    plan: &Plan,
+    tiles: &Tiles,
+    values: impl Values,
+    pressures: &mut [Row<f32>],
+    statuses: &mut [Row<u32>],
+) -> bool {
+    let range = 0..tiles.all.len();
+    with_widest!(level, simd => some(simd, plan, tiles, values, range.clone(), pressures, statuses))
 }
 
 /// The same by all cores. Beside the other, where it is inlined, it makes a small skin's live call longer.
@@ -249,12 +267,14 @@ pub(super) fn shared_frame(
     // A few parts a thread, as none knows what else its core does; and no more than a word has bits.
     let part = count.div_ceil((4 * threads).min(u64::BITS as usize)).max(1).next_multiple_of(TOGETHER);
     let faulty = AtomicU64::new(0);
+    let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
     let parts = pressures[..count].chunks_mut(part).zip(statuses[..count].chunks_mut(part));
     let parts = Tasks::new(parts.enumerate());
     on_threads(threads, || {
         while let Some((index, (pressures, statuses))) = parts.take() {
             let range = index * part..index * part + pressures.len();
-            if with_widest!(level, simd => tiles(simd, plan, &tables.tiles, raw, range.clone(), pressures, statuses)) {
+            let tiles = &tables.tiles;
+            if with_widest!(level, simd => some(simd, plan, tiles, values, range.clone(), pressures, statuses)) {
                 faulty.fetch_or(1 << index, Ordering::Relaxed);
             }
         }
@@ -270,20 +290,20 @@ pub(super) fn shared_frame(
 
 /// Those of `range`, which `pressures` and `statuses` begin with.
 #[inline(always)]
-fn tiles<S: Simd>(
+fn some<S: Simd>(
     simd: S,
     plan: &Plan,
     tiles: &Tiles,
-    (raw, frame): (Rows<'_>, usize),
+    values: impl Values,
     range: Range<usize>,
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    let (mut faults, values) = (false, OneFrame::new(raw, frame));
+    let mut faults = false;
     for first in range.clone().step_by(TOGETHER) {
         let group = first..range.end.min(first + TOGETHER);
         let here = first - range.start..group.end - range.start;
-        if plain_tiles(simd, plan, tiles, values, group.clone(), &mut pressures[here.clone()]) {
+        if plain_tiles(simd, tiles, values, group.clone(), &mut pressures[here.clone()]) {
             if faults || plan.has_changes() {
                 statuses[here].fill([0; LANES]);
             }
@@ -292,7 +312,7 @@ fn tiles<S: Simd>(
         let were_plain = !faults;
         for (index, here) in group.zip(here.clone()) {
             let Aligned(bits) = &mut Aligned([0; LANES]);
-            values.read(simd, index, plan.calibrated(), bits);
+            values.read(simd, index, bits);
             let (pressures, statuses) = (&mut pressures[here], &mut statuses[here]);
             faults |= tile(simd, plan, &tiles.all[index], index * LANES, bits, pressures, statuses);
         }
@@ -310,9 +330,8 @@ fn tiles<S: Simd>(
 #[inline(always)]
 fn plain_tiles<S: Simd>(
     simd: S,
-    plan: &Plan,
     tiles: &Tiles,
-    values: OneFrame<'_>,
+    values: impl Values,
     group: Range<usize>,
     pressures: &mut [Row<f32>],
 ) -> bool {
@@ -322,7 +341,7 @@ fn plain_tiles<S: Simd>(
         if *sort == Sort::Any {
             return false;
         }
-        let bits = values.row(simd, index, plan.calibrated());
+        let bits = values.row(simd, index);
         sizes.see(simd, bits);
         if *sort == Sort::Raw {
             unsigned(simd, bits).store_slice(pressures);

@@ -11,7 +11,7 @@ use super::super::{BLOCK, Rows};
 use super::Tables;
 use super::calibrate::{self, Tile};
 use super::lines::{Aligned, Lines};
-use super::pick::OneFrame;
+use super::pick::{OneFrame, Values};
 use super::simd::{LANES, Row, load, load_u, width, with_widest};
 use crate::scene::{Cadence, Coverage, Knobs, Plan};
 
@@ -172,7 +172,7 @@ impl Gate {
         if self.known && raw.straight(frame, index).is_some_and(|values| same(simd, values, last)) {
             return;
         }
-        OneFrame::new(raw, frame).read(simd, index, plan.calibrated(), bits);
+        OneFrame::new(raw, frame, plan.calibrated()).read(simd, index, bits);
         if self.known && same(simd, bits, last) {
             return;
         }

@@ -16,8 +16,8 @@ pub(super) struct Narrow {
     /// Where they are, if one stands after the other.
     pub(super) together: Option<usize>,
     pub(super) kinds: Kinds,
-    /// By member; lanes that have no more go on with an unpressed one.
-    pub(super) slots: Slots,
+    /// Its number.
+    pub(super) index: usize,
     pub(super) places: Vec<PlaceRow>,
     /// Rows of the groups before it.
     pub(super) first_row: usize,
@@ -36,7 +36,9 @@ pub(super) struct PlaceRow {
 }
 
 impl Narrow {
-    pub(super) fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
+    /// The group number `index`, of `fields`; and by member, where these have their values: lanes that have no more go on with
+    /// slot `unpressed`.
+    pub(super) fn new(plan: &Plan, index: usize, fields: &[usize], unpressed: usize) -> (Self, Slots) {
         let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
         let blank = Lines::new(rows, 0.0);
         let mut slots = Lines::new(rows, unpressed as u32);
@@ -44,7 +46,7 @@ impl Narrow {
             fields: fields.to_vec(),
             together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
             kinds: Kinds::EMPTY,
-            slots: Slots::Far(Lines::default()),
+            index,
             places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
             first_row: 0,
             weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
@@ -64,8 +66,7 @@ impl Narrow {
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
         }
-        group.slots = Slots::new(slots, unpressed);
-        group
+        (group, Slots::new(slots, unpressed))
     }
 
     pub(super) fn is_weighted(&self) -> bool {

@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use super::super::Rows;
 use super::ahead::Ahead;
 use super::lines::{Aligned, Lines};
-use super::pick::{OneFrame, SomeFrames};
+use super::pick::{OneFrame, SomeFrames, Values};
 use super::simd::{LANES, Row, reads_rows_abreast, with_widest};
 use super::transpose::transpose;
 use super::window::Window;
@@ -85,10 +85,10 @@ impl InView {
         let mut faults = false;
         for group in groups_of(GROUP) {
             for (row, frame) in frames.clone().enumerate() {
-                let values = OneFrame::new(raw, frame);
+                let values = OneFrame::new(raw, frame, plan.calibrated());
                 with_widest!(level, simd => {
                     for (tile, bits) in group.clone().zip(self.bits.chunks_mut(LANES)) {
-                        values.read(simd, tile, plan.calibrated(), &mut bits[row]);
+                        values.read(simd, tile, &mut bits[row]);
                     }
                 });
             }

@@ -3,6 +3,8 @@
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
+use super::super::Rows;
+use super::as_delivered::AsDelivered;
 use super::descent::{Descent, depth};
 use super::gate::Gate;
 use super::groups::{InFrame, Narrow, PlaceRow};
@@ -10,7 +12,7 @@ use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
 use super::simd::{LANES, Row, soon_needed, with_widest};
-use super::slots::{NEAR, inserting_pays};
+use super::slots::{NEAR, Slots, inserting_pays};
 use super::together::{Tasks, on_threads};
 use super::touch::{Abreast, Cells, OneKind};
 use super::wide::{self, Table, Values, Wide};
@@ -54,6 +56,8 @@ struct Gathered {
 pub(super) struct Live {
     wide: Vec<Alone>,
     narrow: Vec<Narrow>,
+    /// By group of narrow ones, where their members have their values.
+    slots: Vec<Slots>,
     /// How many of the narrow are computed together.
     together: usize,
     /// Per wide field, then per group of narrow ones.
@@ -63,6 +67,8 @@ pub(super) struct Live {
     statuses: Lines<u32>,
     /// Those of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
+    /// What is read where it lies, for frames of the picks of that number.
+    as_delivered: Option<(u64, Option<AsDelivered>)>,
     gathered: Gathered,
     /// Of the other threads that take part, where a frame is shared.
     others: Vec<Gathered>,
@@ -84,9 +90,11 @@ impl Live {
         if plan.knobs().coverage == Coverage::CoarseToFine {
             narrow.sort_by_key(|&field| (depth(plan, field), plan.fields[field].above));
         }
-        let unpressed = tiles * LANES;
-        let room = if unpressed < NEAR { NEAR / LANES } else { tiles + 1 };
-        let mut narrow: Vec<Narrow> = narrow.chunks(LANES).map(|fields| Narrow::new(plan, fields, unpressed)).collect();
+        let room = if tiles * LANES < NEAR { NEAR / LANES } else { tiles + 1 };
+        let unpressed = (room - 1) * LANES;
+        let groups = narrow.chunks(LANES).enumerate();
+        let (mut narrow, slots): (Vec<Narrow>, Vec<Slots>) =
+            groups.map(|(index, fields)| Narrow::new(plan, index, fields, unpressed)).unzip();
         let mut first_row = 0;
         for group in &mut narrow {
             group.first_row = first_row;
@@ -97,10 +105,10 @@ impl Live {
         for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
             groups.iter_mut().for_each(Narrow::weigh);
         }
-        let slots = |field: usize| plan.members_of(&plan.fields[field]).iter().map(|member| member.slot);
+        let slots_of = |field: usize| plan.members_of(&plan.fields[field]).iter().map(|member| member.slot);
         let gate = Gate::new(plan, wide.len() + narrow.len(), |unit| match unit.checked_sub(wide.len()) {
-            None => slots(wide[unit]).collect(),
-            Some(group) => narrow[group].fields.iter().flat_map(|&field| slots(field)).collect(),
+            None => slots_of(wide[unit]).collect(),
+            Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
         });
         let alone = wide.iter().map(std::slice::from_ref);
         let units: Vec<&[usize]> = alone.chain(narrow.iter().map(|group| &group.fields[..])).collect();
@@ -112,7 +120,9 @@ impl Live {
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
             wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
             narrow,
+            slots,
             together,
+            as_delivered: None,
             pressures: Lines::new(room, 0.0),
             statuses: Lines::new(room, 0),
             before: if plan.has_changes() {
@@ -126,11 +136,17 @@ impl Live {
         }
     }
 
+    #[cfg(test)]
+    pub(super) fn slots(&self) -> &[Slots] {
+        &self.slots
+    }
+
     /// Computes everything anew in the next frame.
     pub(super) fn forget(&mut self) {
         if let Some(gate) = &mut self.gate {
             gate.forget();
         }
+        self.as_delivered = None;
     }
 
     /// All stages for one frame, into `cells`, which is one frame.
@@ -145,10 +161,25 @@ impl Live {
         let Self { pressures, statuses, before: (was, said), gate, .. } = self;
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
         let is_shared = !self.others.is_empty();
-        let mut faults = match &mut gate {
-            Some(gate) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
-            None if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
-            None => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
+        let as_delivered = match moment.now.0 {
+            Rows::Picked { picks, .. } if gate.is_none() && !is_shared => {
+                if self.as_delivered.as_ref().is_none_or(|(of, _)| *of != picks.number) {
+                    self.as_delivered =
+                        Some((picks.number, AsDelivered::new(plan, &self.slots, picks, pressures.len() * LANES)));
+                }
+                self.as_delivered.as_ref().and_then(|(_, as_delivered)| as_delivered.as_ref())
+            }
+            _ => None,
+        };
+        let mut slots = &self.slots[..];
+        let mut faults = match (&mut gate, as_delivered) {
+            (Some(gate), _) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
+            (None, Some(as_delivered)) => {
+                slots = &as_delivered.slots;
+                as_delivered.frame(level, plan, moment.now, pressures, statuses)
+            }
+            (None, None) if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
+            (None, None) => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
         };
         if plan.has_changes() {
             calibrate::frame(level, plan, tables, moment.before, was, said);
@@ -163,6 +194,7 @@ impl Live {
             tables,
             pressures: self.pressures.as_flattened(),
             statuses: self.statuses.as_flattened(),
+            slots,
             faults,
             inserts: self.inserts,
         };
@@ -218,6 +250,8 @@ struct Frame<'a> {
     tables: &'a Tables,
     pressures: &'a [f32],
     statuses: &'a [u32],
+    /// By group, where its members have their values.
+    slots: &'a [Slots],
     faults: bool,
     inserts: bool,
 }
@@ -293,14 +327,10 @@ impl Frame<'_> {
                     soon_needed(&place.v);
                 });
             }
-            group.slots.gather_pressures(
-                self.level,
-                self.inserts,
-                self.pressures,
-                &mut gathered.pressures[rows.clone()],
-            );
+            let slots = &self.slots[group.index];
+            slots.gather_pressures(self.level, self.inserts, self.pressures, &mut gathered.pressures[rows.clone()]);
             if self.faults {
-                group.slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
+                slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
                 self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
             }
             first = rows.end;

@@ -6,6 +6,7 @@
 
 mod ahead;
 mod angle;
+mod as_delivered;
 mod axis;
 mod batch;
 mod calibrate;

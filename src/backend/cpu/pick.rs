@@ -10,29 +10,44 @@ use super::super::{ELSEWHERE, Near, Picks, Rows, Shuffle};
 use super::lines::Aligned;
 use super::simd::{LANES, Row};
 
-/// A frame's raw values, for reading several tiles.
+/// A frame's raw values, tile by tile.
+pub(super) trait Values: Copy {
+    /// The bits of tile `tile`.
+    fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S>;
+
+    /// Reads them.
+    #[inline(always)]
+    fn read<S: Simd>(self, simd: S, tile: usize, bits: &mut Row<u32>) {
+        self.row(simd, tile).store_slice(bits);
+    }
+}
+
+/// Those of a frame in the plan's order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OneFrame<'a> {
     raw: Rows<'a>,
     frame: usize,
+    calibrated: usize,
     /// As the source delivered them, if it did.
     picked: Option<(&'a [u32], &'a Picks)>,
 }
 
 impl<'a> OneFrame<'a> {
-    /// Frame `frame` of `raw`.
+    /// Frame `frame` of `raw`, of which so many slots are calibrated.
     #[inline(always)]
-    pub(super) fn new(raw: Rows<'a>, frame: usize) -> Self {
+    pub(super) fn new(raw: Rows<'a>, frame: usize, calibrated: usize) -> Self {
         let picked = match raw {
             Rows::Packed { .. } => None,
             Rows::Picked { frames, picks } => Some((bytemuck::cast_slice(&frames[frame].values), picks)),
         };
-        Self { raw, frame, picked }
+        Self { raw, frame, calibrated, picked }
     }
+}
 
-    /// The bits from slot 16 · `tile` on.
+impl Values for OneFrame<'_> {
+    /// From slot 16 · `tile` on.
     #[inline(always)]
-    pub(super) fn row<S: Simd>(self, simd: S, tile: usize, calibrated: usize) -> u32x16<S> {
+    fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S> {
         if let Some((values, picks)) = self.picked {
             match picks.near[tile] {
                 Near::Straight(from) => return u32x16::from_slice(simd, &values[from as usize..][..LANES]),
@@ -44,13 +59,7 @@ impl<'a> OneFrame<'a> {
                 Near::Scattered => {}
             }
         }
-        u32x16::from_slice(simd, &one_by_one(self.raw, self.frame, tile, calibrated))
-    }
-
-    /// Reads them.
-    #[inline(always)]
-    pub(super) fn read<S: Simd>(self, simd: S, tile: usize, calibrated: usize, bits: &mut Row<u32>) {
-        self.row(simd, tile, calibrated).store_slice(bits);
+        u32x16::from_slice(simd, &one_by_one(self.raw, self.frame, tile, self.calibrated))
     }
 }
 

@@ -30,6 +30,15 @@ impl Slots {
         }
     }
 
+    /// Where `to` says each of them is, which is none beyond `most`.
+    pub(super) fn moved(&self, to: impl Fn(u32) -> u32, most: usize) -> Self {
+        let rows = match self {
+            Self::Near(slots) => slots.iter().map(|row| row.map(|slot| to(slot.into()))).collect(),
+            Self::Far(slots) => slots.iter().map(|row| row.map(&to)).collect(),
+        };
+        Self::new(rows, most)
+    }
+
     /// Brings the values of all of them side by side.
     pub(super) fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
         match self {
@@ -163,8 +172,11 @@ mod x86 {
     fearless_simd::kernel!(
         #[inline(always)]
         pub(super) fn eight(token: Avx2, values: &[f32; NEAR], slots: &[u16; 8]) -> f32x8<Avx2> {
-            let low = _mm256_castps128_ps256(four!(values, slots, 0));
-            _mm256_insertf128_ps::<1>(low, four!(values, slots, 4)).simd_into(token)
+            // Four numbers at a time: loads are what there are most of.
+            let [low, high]: [[u16; 4]; 2] = bytemuck::cast::<_, [u64; 2]>(*slots)
+                .map(|four| [four as u16, (four >> 16) as u16, (four >> 32) as u16, (four >> 48) as u16]);
+            let low = _mm256_castps128_ps256(four!(values, low, 0));
+            _mm256_insertf128_ps::<1>(low, four!(values, high, 0)).simd_into(token)
         }
     );
 }

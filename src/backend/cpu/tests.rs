@@ -25,7 +25,7 @@ pub(super) fn levels() -> Vec<Level> {
 }
 
 /// `frames` frames for `plan`: pressed here and there, with everything in between that a value can be.
-fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
+pub(super) fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
     let mut state = 7_u64;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -59,7 +59,7 @@ fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
     raw
 }
 
-fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
+pub(super) fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
     let mut cpu = Cpu::with_level(plan, level);
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures())
@@ -140,7 +140,7 @@ fn much_of_a_skin_rests_and_has_the_same_bits() {
 const FOLD: u32 = 20_000;
 
 /// Rows of taxels on a sheet, and fields of sixteen that follow each other, each over half of the one before.
-fn sheet(taxels: u32) -> Body {
+pub(super) fn sheet(taxels: u32) -> Body {
     const COLUMNS: u32 = 100;
     let taxel = |id| Taxel {
         id,
@@ -172,7 +172,7 @@ fn sheet(taxels: u32) -> Body {
 }
 
 /// `raw` in frames of `width` values as a source would deliver them, each channel's at the place in `channels`.
-fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
+pub(super) fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
     raw.chunks(channels.len())
         .map(|values| {
             let mut frame = Frame::missing(0.0, width);

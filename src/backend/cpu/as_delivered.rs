@@ -1,0 +1,216 @@
+//! One frame's values, read where the source has put them.
+//!
+//! Fields of one frame bring their members' values side by side wherever these are. So nothing has to be brought into the plan's
+//! order before: sixteen values that lie side by side are calibrated together, and those of nobody among them are read as 0.
+
+use fearless_simd::Level;
+use fearless_simd::prelude::*;
+use fearless_simd::u32x16;
+
+use super::super::{Near, Picks, Rows};
+use super::calibrate::{self, Sort, Tile, Tiles};
+use super::lines::Lines;
+use super::pick::Values;
+use super::simd::{LANES, Row};
+use super::slots::Slots;
+use crate::scene::Plan;
+use crate::stage::layout::{STRAIGHT, Taxel};
+
+/// One that every value is 0 of.
+const NOBODYS: Taxel = Taxel {
+    baseline: 0.0,
+    gain: 1.0,
+    dead_band: 0.0,
+    p_max: f32::MAX,
+    raw_low: f32::MIN,
+    raw_high: f32::MAX,
+    area: 0.0,
+    response: STRAIGHT,
+};
+
+/// A plan's taxels as some picks find them in a frame.
+#[derive(Clone, Debug)]
+pub(super) struct AsDelivered {
+    /// By tile, where in a frame it begins.
+    starts: Vec<u32>,
+    /// By tile, all bits of those that are somebody's.
+    wanted: Lines<u32>,
+    tiles: Tiles,
+    /// By group of fields, where their members have their values.
+    pub(super) slots: Vec<Slots>,
+}
+
+impl AsDelivered {
+    /// For frames that `picks` are of, where it pays; `slots` has the groups' slots in the plan's order, and `room` says how many
+    /// there are, of which the last ones are nobody's.
+    pub(super) fn new(plan: &Plan, slots: &[Slots], picks: &Picks, room: usize) -> Option<Self> {
+        // Every value is one taxel's then, and fields read nothing else.
+        let is_simple = plan.calibrated() == plan.channels() && !plan.has_changes() && plan.kept_pressures() == 0;
+        if !is_simple || plan.fields.iter().any(|field| field.is_wide()) || picks.width < LANES {
+            return None;
+        }
+        let start_of = |place: u32| (place as usize / LANES * LANES).min(picks.width - LANES) as u32;
+        let mut starts: Vec<u32> = picks.places.iter().map(|&place| start_of(place)).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        let in_order = picks.near.iter().filter(|near| matches!(near, Near::Straight(_))).count();
+        let others = picks.near.len() - in_order;
+        // Three tiles are read and calibrated while two are put together.
+        if others == 0 || starts.len() > in_order + 3 * others / 2 || (starts.len() + 1) * LANES > room {
+            return None;
+        }
+        let slot_at = |place: u32| {
+            let start = start_of(place);
+            let tile = starts.partition_point(|&other| other < start);
+            (tile * LANES) as u32 + place - start
+        };
+        let (mut taxels, mut wanted) = (vec![NOBODYS; starts.len() * LANES], Lines::new(starts.len(), 0));
+        for (taxel, &place) in plan.taxels.iter().zip(&picks.places) {
+            let slot = slot_at(place) as usize;
+            taxels[slot] = *taxel;
+            wanted[slot / LANES][slot % LANES] = u32::MAX;
+        }
+        let tiles = Tiles::of(taxels.chunks(LANES).map(Tile::new).collect());
+        if tiles.sorts.contains(&Sort::Any) {
+            return None;
+        }
+        let to = |slot: u32| picks.places.get(slot as usize).map_or(slot, |&place| slot_at(place));
+        let slots = slots.iter().map(|slots| slots.moved(to, room - 1)).collect();
+        Some(Self { starts, wanted, tiles, slots })
+    }
+
+    /// A frame's pressures, by slot here, and whether any status says anything; see [`calibrate::frame`].
+    pub(super) fn frame(
+        &self,
+        level: Level,
+        plan: &Plan,
+        (raw, frame): (Rows<'_>, usize),
+        pressures: &mut [Row<f32>],
+        statuses: &mut [Row<u32>],
+    ) -> bool {
+        let Rows::Picked { frames, .. } = raw else { unreachable!("only such rows have picks") };
+        let values: &[u32] = bytemuck::cast_slice(&frames[frame].values);
+        let values = Wanted { values, starts: &self.starts, wanted: &self.wanted };
+        calibrate::all(level, plan, &self.tiles, values, pressures, statuses)
+    }
+}
+
+/// A frame's values, those of nobody as 0.
+#[derive(Clone, Copy)]
+struct Wanted<'a> {
+    values: &'a [u32],
+    starts: &'a [u32],
+    wanted: &'a [Row<u32>],
+}
+
+impl Values for Wanted<'_> {
+    #[inline(always)]
+    fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S> {
+        let values = &self.values[self.starts[tile] as usize..][..LANES];
+        u32x16::from_slice(simd, values) & u32x16::from_slice(simd, &self.wanted[tile])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Backend, RawBatch, Step};
+    use super::super::Cpu;
+    use super::super::live::Live;
+    use super::super::tests::{delivered, levels, run, sheet, values};
+    use super::*;
+    use crate::field::FieldSet;
+    use crate::percept::{Flags, Outputs, Percepts, Precision};
+    use crate::scene::Scene;
+    use crate::signal::{Calibration, Frame, RawValue};
+
+    const TAXELS: u32 = 1000;
+    const WIDTH: usize = 1257;
+
+    /// The sheet's plan, calibrated as `text` says.
+    fn plan(text: &str) -> Plan {
+        let body = sheet(TAXELS);
+        let ids: Vec<u32> = (0..TAXELS).collect();
+        let scene = Scene { outputs: Outputs::USUAL - Outputs::MOTION, ..Scene::default() };
+        let calibration = Calibration::parse(text, &ids).unwrap();
+        Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap()
+    }
+
+    /// Every fifth of a frame's values is nobody's, the last ones are not; and the same the other way round.
+    fn two_picks(plan: &Plan) -> [(Vec<u32>, Picks); 2] {
+        let forth = (0..TAXELS).map(|channel| channel * 5 / 4 + 8);
+        let back = forth.clone().map(|place| WIDTH as u32 - 1 - place);
+        [forth.collect(), back.collect()].map(|channels: Vec<u32>| {
+            let picks = Picks::new(&channels, plan.calibrated(), WIDTH);
+            (channels, picks)
+        })
+    }
+
+    fn of(plan: &Plan, picks: &Picks) -> Option<AsDelivered> {
+        let live = Live::new(Level::new(), plan);
+        AsDelivered::new(plan, live.slots(), picks, 1 << 16)
+    }
+
+    #[test]
+    fn bits_do_not_depend_on_where_values_lie() {
+        const FRAMES: usize = 48;
+        for text in ["[all]", "[all]\nbaseline = 1\ngain = 0.7\np_max = 300"] {
+            let plan = plan(text);
+            let raw = values(&plan, FRAMES);
+            let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+            let [forth, back] = two_picks(&plan);
+            assert!([&forth, &back].iter().all(|(_, picks)| of(&plan, picks).is_some()));
+            let [forth_rows, back_rows] =
+                [&forth, &back].map(|(channels, picks)| (delivered(&raw, channels, WIDTH), picks));
+            let step = [Step { dt_s: 0.01, flags: Flags::empty() }];
+            for level in levels() {
+                let mut cpu = Cpu::with_level(&plan, level);
+                let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
+                    .with_columns(plan.columns, 0)
+                    .with_letters(plan.letters().len());
+                percepts.reset(FRAMES);
+                for first in 0..FRAMES {
+                    let frame = first..first + 1;
+                    // One after the other and in turn.
+                    let rows = match first / 8 + first % 2 {
+                        0 | 3 | 4 => Rows::Picked { frames: &forth_rows.0[frame], picks: forth_rows.1 },
+                        1 | 5 => Rows::Picked { frames: &back_rows.0[frame], picks: back_rows.1 },
+                        _ => Rows::Packed { values: &raw, channels: plan.channels() }.part(frame),
+                    };
+                    cpu.run(&RawBatch { first, frames: 1, rows, steps: &step }, &mut percepts).unwrap();
+                }
+                assert!(right == percepts, "{level:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_nobodys_is_not_looked_at() {
+        for text in ["[all]", "[all]\nbaseline = 1\ngain = 0.7\np_max = 300"] {
+            let plan = plan(text);
+            let [(channels, picks), _] = two_picks(&plan);
+            let here = of(&plan, &picks).unwrap();
+            let mut frames = vec![Frame::missing(0.0, WIDTH)];
+            channels.iter().for_each(|&place| frames[0].values[place as usize] = RawValue::new(2.0));
+            let (mut pressures, mut statuses) = (Lines::new(100, 0.0), Lines::new(100, 0));
+            let mut frame = |frames: &[Frame]| {
+                let rows = Rows::Picked { frames, picks: &picks };
+                here.frame(Level::new(), &plan, (rows, 0), &mut pressures, &mut statuses)
+            };
+            assert!(!frame(&frames));
+            frames[0].values[channels[77] as usize] = RawValue::MISSING;
+            assert!(frame(&frames));
+            let pressed = pressures.as_flattened().iter().filter(|&&pressure| pressure > 0.0);
+            assert_eq!(pressed.count(), TAXELS as usize - 1);
+        }
+    }
+
+    #[test]
+    fn a_frame_of_which_little_is_wanted_is_not_read_through() {
+        let plan = plan("[all]");
+        let apart: Vec<u32> = (0..TAXELS).map(|channel| channel * 20).collect();
+        assert!(of(&plan, &Picks::new(&apart, plan.calibrated(), 20_000)).is_none());
+        // Where all lies one after the other there is nothing to gain.
+        let straight: Vec<u32> = (0..TAXELS).collect();
+        assert!(of(&plan, &Picks::new(&straight, plan.calibrated(), 1008)).is_none());
+    }
+}
