@@ -13,7 +13,7 @@ use super::lines::Lines;
 use super::pick::Values;
 use super::simd::{LANES, Row};
 use super::slots::Slots;
-use crate::scene::Plan;
+use crate::scene::{Plan, PlanField};
 use crate::stage::layout::{STRAIGHT, Taxel};
 
 /// One that every value is 0 of.
@@ -46,7 +46,7 @@ impl AsDelivered {
     pub(super) fn new(plan: &Plan, slots: &[Slots], picks: &Picks, room: usize) -> Option<Self> {
         // Every value is one taxel's then, and fields read nothing else.
         let is_simple = plan.calibrated() == plan.channels() && !plan.has_changes() && plan.kept_pressures() == 0;
-        if !is_simple || plan.fields.iter().any(|field| field.is_wide()) || picks.width < LANES {
+        if !is_simple || plan.fields.iter().any(PlanField::is_wide) || picks.width < LANES {
             return None;
         }
         let start_of = |place: u32| (place as usize / LANES * LANES).min(picks.width - LANES) as u32;
