@@ -107,18 +107,22 @@ impl<'a> SomeFrames<'a> {
     /// Reads the bits from slot 16 · `tile` on, a row a frame.
     #[inline(always)]
     pub(super) fn read<S: Simd>(&self, simd: S, tile: usize, calibrated: usize, bits: &mut [Row<u32>; LANES]) {
-        let rows = self.values[..self.frames].iter().zip(bits);
+        let rows = self.values[..self.frames].iter().zip(&mut *bits);
         match (self.near(tile), self.raw) {
             (Near::Straight(from), _) => {
                 rows.for_each(|(values, bits)| bits.copy_from_slice(&values[from as usize..][..LANES]));
             }
             (Near::Shuffled { first, count }, Rows::Picked { picks, .. }) => {
                 let shuffles = &picks.shuffles[first as usize..][..count as usize];
+                // Mostly one is enough.
+                if let [one] = shuffles
+                    && pick_from_each(simd, &self.values[..self.frames], one, bits)
+                {
+                    return;
+                }
+                let rows = self.values[..self.frames].iter().zip(bits);
                 for (frame, (values, bits)) in (self.first..).zip(rows) {
-                    // Mostly one is enough, and knows it beforehand.
-                    let row =
-                        if let [one] = shuffles { pick(simd, values, one) } else { pick_all(simd, values, shuffles) };
-                    match row {
+                    match pick_all(simd, values, shuffles) {
                         Some(row) => row.store_slice(bits),
                         None => *bits = one_by_one(self.raw, frame, tile, calibrated),
                     }
@@ -157,7 +161,7 @@ fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>
     if let Some(avx512) = simd.level().as_avx512() {
         let both = values.first_chunk::<32>()?;
         let lanes = |lanes: &[u32]| u32x16::from_slice(avx512, lanes);
-        let places = u8x16::from_slice(avx512, &shuffle.places);
+        let places = x86::in_32(avx512, u8x16::from_slice(avx512, &shuffle.places));
         x86::of_32(avx512, lanes(&both[..16]), lanes(&both[16..]), places).store_slice(bits);
     } else {
         let (avx2, starts) = (simd.level().as_avx2()?, shuffle.halves?);
@@ -165,7 +169,7 @@ fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>
         let half = |index: usize| {
             let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
             let (low, high) = values[usize::from(starts[index])..][..16].split_at(8);
-            x86::of_sixteen(avx2, lanes(low), lanes(high), &places[index], starts[index])
+            x86::of_sixteen(avx2, lanes(low), lanes(high), x86::in_sixteen(avx2, &places[index], starts[index]))
         };
         // Written out: in a loop they take a detour through memory.
         half(0).combine(half(1)).store_slice(bits);
@@ -174,10 +178,50 @@ fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>
     Some(u32x16::from_slice(simd, bits))
 }
 
+/// The same of each of `values`, with what is the same for all made once; whether the machine has the instructions.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[inline(always)]
+fn pick_from_each<S: Simd>(simd: S, values: &[&[u32]], shuffle: &Shuffle, rows: &mut [Row<u32>]) -> bool {
+    use fearless_simd::{u8x16, u32x8};
+
+    let from = shuffle.from as usize;
+    if let Some(avx512) = simd.level().as_avx512() {
+        let places = x86::in_32(avx512, u8x16::from_slice(avx512, &shuffle.places));
+        for (values, row) in values.iter().zip(rows) {
+            let (low, high) = values[from..][..32].split_at(16);
+            let [low, high] = [low, high].map(|lanes| u32x16::from_slice(avx512, lanes));
+            x86::of_32(avx512, low, high, places).store_slice(row);
+        }
+    } else if let Some((avx2, starts)) = simd.level().as_avx2().zip(shuffle.halves) {
+        let (places, _) = shuffle.places.as_chunks();
+        let first = x86::in_sixteen(avx2, &places[0], starts[0]);
+        let last = x86::in_sixteen(avx2, &places[1], starts[1]);
+        for (values, row) in values.iter().zip(rows) {
+            let values = &values[from..];
+            let half = |start: u8, places| {
+                let (low, high) = values[usize::from(start)..][..16].split_at(8);
+                x86::of_sixteen(avx2, u32x8::from_slice(avx2, low), u32x8::from_slice(avx2, high), places)
+            };
+            let (low, high) = row.split_at_mut(8);
+            half(starts[0], first).store_slice(low);
+            half(starts[1], last).store_slice(high);
+        }
+    } else {
+        return false;
+    }
+    true
+}
+
 #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
 #[inline(always)]
 fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle) -> Option<u32x16<S>> {
     None
+}
+
+#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+#[inline(always)]
+fn pick_from_each<S: Simd>(_: S, _: &[&[u32]], _: &Shuffle, _: &mut [Row<u32>]) -> bool {
+    false
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -192,30 +236,40 @@ mod x86 {
     use fearless_simd::{u8x16, u32x8, u32x16};
 
     fearless_simd::kernel!(
+        /// `places` as lanes.
+        #[inline(always)]
+        pub(super) fn in_32(token: Avx512, places: u8x16<Avx512>) -> u32x16<Avx512> {
+            _mm512_cvtepu8_epi32(places.into()).simd_into(token)
+        }
+    );
+
+    fearless_simd::kernel!(
         /// Those of 32 lanes that `places` says.
         #[inline(always)]
         pub(super) fn of_32(
             token: Avx512,
             low: u32x16<Avx512>,
             high: u32x16<Avx512>,
-            places: u8x16<Avx512>,
+            places: u32x16<Avx512>,
         ) -> u32x16<Avx512> {
-            _mm512_permutex2var_epi32(low.into(), _mm512_cvtepu8_epi32(places.into()), high.into()).simd_into(token)
+            _mm512_permutex2var_epi32(low.into(), places.into(), high.into()).simd_into(token)
         }
     );
 
     fearless_simd::kernel!(
-        /// Those of sixteen lanes that `places` says, which count from `start` places before them.
+        /// `places`, which count from `start` places before sixteen lanes, as lanes that count from the first of these.
         #[inline(always)]
-        pub(super) fn of_sixteen(
-            token: Avx2,
-            low: u32x8<Avx2>,
-            high: u32x8<Avx2>,
-            places: &[u8; 8],
-            start: u8,
-        ) -> u32x8<Avx2> {
+        pub(super) fn in_sixteen(token: Avx2, places: &[u8; 8], start: u8) -> u32x8<Avx2> {
             let places = _mm256_cvtepu8_epi32(_mm_set_epi64x(0, i64::from_ne_bytes(*places)));
-            let places = _mm256_sub_epi32(places, _mm256_set1_epi32(start.into()));
+            _mm256_sub_epi32(places, _mm256_set1_epi32(start.into())).simd_into(token)
+        }
+    );
+
+    fearless_simd::kernel!(
+        /// Those of sixteen lanes that `places` says.
+        #[inline(always)]
+        pub(super) fn of_sixteen(token: Avx2, low: u32x8<Avx2>, high: u32x8<Avx2>, places: u32x8<Avx2>) -> u32x8<Avx2> {
+            let places = places.into();
             let [low, high] =
                 [low, high].map(|lanes| _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(lanes.into(), places)));
             // Eight and more is the bit that becomes the sign.
