@@ -25,12 +25,25 @@ const MEMBERS_A_LINE: usize = LINE / size_of::<Member>();
 /// Members from which on they are fetched: all of a plan's are more than a cache holds. Tests have fewer.
 const MANY_MEMBERS: usize = if cfg!(test) { 1 << 10 } else { 1 << 18 };
 
+/// Whether raw values are so little that a cache may still have them.
+pub(super) fn are_near(raw: Rows<'_>) -> bool {
+    let bytes_of_all = match raw {
+        Rows::Packed { values, .. } => size_of_val(values),
+        Rows::Picked { frames, picks } => frames.len() * bytes(&picks.lines),
+    };
+    bytes_of_all < MUCH
+}
+
+/// Bytes of `lines` of a frame.
+fn bytes(lines: &[FewLines]) -> usize {
+    lines.as_flattened().len() * LINE
+}
+
 /// Where in each of the frames lie the lines of `tiles`, where they are fetched: frames lie as a source delivered them, are
 /// many, and the lines of sixteen are few.
 pub(super) fn worth(raw: Rows<'_>, tiles: Range<usize>) -> Option<(&[Frame], &[FewLines])> {
     let Rows::Picked { frames, picks } = raw else { return None };
-    let bytes = |lines: &[FewLines]| lines.as_flattened().len() * LINE;
-    if frames.len() * bytes(&picks.lines) < MUCH || tiles.is_empty() {
+    if are_near(raw) || tiles.is_empty() {
         return None;
     }
     let lines = if tiles.len() == picks.near.len() {

@@ -73,7 +73,11 @@ impl InView {
         };
         let is_fetched = ahead::worth(raw, tiles.clone()).is_some();
         let count = if is_fetched { tiles.len() } else { UNFETCHED };
-        if is_fetched || reads_rows_abreast(level) || groups_of(count).any(|group| ahead::worth(raw, group).is_some()) {
+        if is_fetched
+            || ahead::are_near(raw)
+            || reads_rows_abreast(level)
+            || groups_of(count).any(|group| ahead::worth(raw, group).is_some())
+        {
             let (some, mut faults) = (SomeFrames::new(raw, frames.start, frames.len()), false);
             for group in groups_of(count) {
                 let next = group.end..tiles.end.min(group.end + count);
