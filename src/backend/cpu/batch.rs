@@ -89,24 +89,32 @@ impl<'a> OverFrames<'a, true> {
 pub(super) struct Brief {
     first: usize,
     count: usize,
-    is_wide: bool,
-    unweighted: bool,
+    way: Way,
     pub(super) kind: OneKind,
-    /// Its place among those that are gone over in sections.
-    in_sections: Option<usize>,
+}
+
+/// How a field's members are gone over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// One after the other.
+    Narrow {
+        weighted: bool,
+    },
+    Wide,
+    /// Wide, and with this place among those that are gone over in sections.
+    InSections(usize),
 }
 
 impl Brief {
     /// Of all fields of `plan`.
     pub(super) fn all(plan: &Plan, window: &Window) -> Vec<Self> {
         let of = |field: &PlanField| {
-            let (is_wide, kind) = (field.is_wide(), OneKind::new(field));
-            let (first, count, unweighted) = (field.first, field.count, field.unweighted);
-            Self { first, count, is_wide, unweighted, kind, in_sections: None }
+            let way = if field.is_wide() { Way::Wide } else { Way::Narrow { weighted: !field.unweighted } };
+            Self { first: field.first, count: field.count, way, kind: OneKind::new(field) }
         };
         let mut all: Vec<Self> = plan.fields.iter().map(of).collect();
         for (place, far) in window.in_sections().iter().enumerate() {
-            all[far.field].in_sections = Some(place);
+            all[far.field].way = Way::InSections(place);
         }
         all
     }
@@ -116,7 +124,7 @@ impl Brief {
     }
 
     pub(super) fn is_wide(&self) -> bool {
-        self.is_wide
+        !matches!(self.way, Way::Narrow { .. })
     }
 }
 
@@ -252,9 +260,9 @@ pub(super) fn stretch(
         }
         let mut rests = [true; LANES];
         for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
-            *rests = match tables.briefs[field].in_sections {
-                Some(place) => found[place].rests,
-                None => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
+            *rests = match tables.briefs[field].way {
+                Way::InSections(place) => found[place].rests,
+                _ => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
             };
         }
         let rests = &rests[..place.count];
@@ -313,31 +321,28 @@ fn answer<S: Simd>(
 ) {
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let briefs = &tables.briefs[first..first + rests.len()];
-    let sort = |index: usize| {
-        let Brief { is_wide, unweighted, in_sections, .. } = briefs[index];
-        (rests[index], in_sections, is_wide, unweighted)
-    };
     let mut start = 0;
     while start < briefs.len() {
-        let alike = (start..briefs.len()).take_while(|&index| sort(index) == sort(start)).count();
+        let (rest, way) = (rests[start], briefs[start].way);
+        let others = rests[start..].iter().zip(&briefs[start..]);
+        let alike = others.take_while(|(rests, brief)| **rests == rest && brief.way == way).count();
         let run = start..start + alike;
         let (between, answers) = (&mut between[run.clone()], &mut answers[run.clone()]);
         let briefs = &briefs[run];
         // Once for all stages.
         macro_rules! answer {
             ($abreast:ident, $weighted:literal) => {{
-                let lot = |index: usize| {
-                    let (seen, field) = (&tables.seen[briefs[index].members()], first + start + index);
-                    ($abreast(OverFrames::<$weighted> { skin, seen, field }), briefs[index].kind)
-                };
-                let mut lots = [lot(0); LANES];
-                for (index, one) in lots.iter_mut().enumerate().take(alike).skip(1) {
-                    *one = lot(index);
+                let mut lots = [(&tables.seen[..0], &briefs[0].kind); LANES];
+                for (lot, brief) in lots.iter_mut().zip(briefs) {
+                    *lot = (&tables.seen[brief.members()], &brief.kind);
                 }
                 touch(
                     simd,
                     #[inline(always)]
-                    |index| lots[index],
+                    |index| {
+                        let ((seen, kind), field) = (lots[index], first + start + index);
+                        ($abreast(OverFrames::<$weighted> { skin, seen, field }), kind)
+                    },
                     LANES,
                     wanted,
                     #[inline(always)]
@@ -347,16 +352,16 @@ fn answer<S: Simd>(
                 );
             }};
         }
-        match sort(start) {
-            (true, ..) => {
+        match way {
+            _ if rest => {
                 for (cells, brief) in answers.iter_mut().zip(briefs) {
                     *cells = Cells::at_rest(&brief.kind);
                 }
             }
-            (_, Some(place), ..) => answers.fill(found[place].cells),
-            (_, _, true, _) => answer!(ManyAbreast, true),
-            (.., true) => answer!(Abreast, false),
-            _ => answer!(Abreast, true),
+            Way::InSections(place) => answers.fill(found[place].cells),
+            Way::Wide => answer!(ManyAbreast, true),
+            Way::Narrow { weighted: false } => answer!(Abreast, false),
+            Way::Narrow { weighted: true } => answer!(Abreast, true),
         }
         start += alike;
     }

@@ -63,7 +63,8 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
         meanwhile();
-        for at in (0..lanes).step_by(2 * width::<S>()) {
+        let mut at = 0;
+        while at < lanes {
             let next = at + width::<S>();
             if care || next >= lanes {
                 for at in [at, next].into_iter().filter(|&at| at < lanes) {
@@ -78,6 +79,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
                 contact(simd, members, &kind, wanted, at, &sums, between, cells);
                 contact(simd, members, &kind, wanted, next, &next_sums, between, cells);
             }
+            at = next + width::<S>();
         }
     }
     if !stages.centroid {
@@ -85,31 +87,37 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     }
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
-        for at in (0..lanes).step_by(width::<S>()) {
+        let mut at = 0;
+        while at < lanes {
             find_centroid(simd, members, &kind, care, at, between, cells);
+            at += width::<S>();
         }
     }
     if stages.orientation {
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
             meanwhile();
-            for at in (0..lanes).step_by(width::<S>()) {
+            let mut at = 0;
+            while at < lanes {
                 if let Some(touch) = so_far::<S, 2>(simd, &kind, at, between, cells) {
                     let Apart { r: [r1, r2, r3], x, y } = members.farthest(simd, at, &touch);
                     keep(simd, [r1, r2, r3, x, y], at, between);
                 }
+                at += width::<S>();
             }
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
             meanwhile();
-            for at in (0..lanes).step_by(width::<S>()) {
+            let mut at = 0;
+            while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let [r1, r2, r3, x, y] = kept(simd, at, between);
                     let line = orientation::line(simd, &touch, &Apart { r: [r1, r2, r3], x, y });
                     store(simd, line.angle, &mut cells.orientation, at);
                     say(simd, &line, at, cells);
                 }
+                at += width::<S>();
             }
         }
     }
@@ -117,7 +125,8 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
             meanwhile();
-            for at in (0..lanes).step_by(width::<S>()) {
+            let mut at = 0;
+            while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let axis::Moments { a, b, d } = if care {
                         members.moments_with_care(simd, at, &touch)
@@ -126,12 +135,14 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
                     };
                     keep(simd, [a, b, d], at, between);
                 }
+                at += width::<S>();
             }
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
             meanwhile();
-            for at in (0..lanes).step_by(width::<S>()) {
+            let mut at = 0;
+            while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let [a, b, d] = kept(simd, at, between);
                     let (line, anisotropy) = axis::line(simd, &touch, &axis::Moments { a, b, d });
@@ -139,6 +150,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
                     store(simd, anisotropy, &mut cells.anisotropy, at);
                     say(simd, &line, at, cells);
                 }
+                at += width::<S>();
             }
         }
     }

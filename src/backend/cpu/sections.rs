@@ -230,7 +230,7 @@ fn sum_up<S: Simd>(
                 || {},
             );
         }
-        if stages.centroid && Kind::<S>::any_uncharted(kind) {
+        if stages.centroid && Kind::<S>::any_uncharted(&kind) {
             go_on(
                 simd,
                 members.clone(),
@@ -270,7 +270,7 @@ fn look_from_centroid<S: Simd>(
 ) {
     let Found { cells, between, sums, .. } = found;
     for at in (0..LANES).step_by(width::<S>()) {
-        let Some(touch) = so_far::<S, 1>(simd, kind, at, between, cells) else { continue };
+        let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) else { continue };
         if stages.orientation {
             let mut search = Search::of_numbers(loaded(simd, &sums.search, at));
             for start in members.clone().step_by(LANES) {
@@ -338,7 +338,7 @@ fn loaded<S: Simd, const K: usize>(simd: S, rows: &[Row<f32>; K], at: usize) -> 
 fn answer<S: Simd>(simd: S, wanted: Wanted, kind: &OneKind, found: &mut Found) {
     let Found { cells, between, sums, .. } = found;
     let (between, cells) = (std::slice::from_mut(between), std::slice::from_mut(cells));
-    touch(simd, |_| (&*sums, *kind), LANES, wanted, || {}, between, cells);
+    touch(simd, |_| (&*sums, kind), LANES, wanted, || {}, between, cells);
 }
 
 impl<S: Simd> Sweep<S> for &Sixteen {

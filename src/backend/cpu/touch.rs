@@ -144,7 +144,7 @@ impl OneKind {
     }
 }
 
-impl<S: Simd> Kind<S> for OneKind {
+impl<S: Simd> Kind<S> for &OneKind {
     #[inline(always)]
     fn any_charted(&self) -> bool {
         self.charted
