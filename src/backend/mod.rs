@@ -106,7 +106,7 @@ fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
-    /// No others have the same.
+    /// No others but copies have the same.
     pub(crate) number: u64,
     /// Per slot that is calibrated, which are the channels once for every signal.
     pub(crate) places: Vec<u32>,

@@ -16,7 +16,7 @@ use super::slots::Slots;
 use crate::scene::{Plan, PlanField};
 use crate::stage::layout::{STRAIGHT, Taxel};
 
-/// One that every value is 0 of.
+/// Of what is nobody's, which is read as 0.
 const NOBODYS: Taxel = Taxel {
     baseline: 0.0,
     gain: 1.0,
@@ -55,8 +55,8 @@ impl AsDelivered {
         starts.dedup();
         let in_order = picks.near.iter().filter(|near| matches!(near, Near::Straight(_))).count();
         let others = picks.near.len() - in_order;
-        // Three tiles are read and calibrated while two are put together.
-        if others == 0 || starts.len() > in_order + 3 * others / 2 || (starts.len() + 1) * LANES > room {
+        // Three tiles are read and calibrated while two are put together; of these there have to be some.
+        if 8 * others <= in_order || starts.len() > in_order + 3 * others / 2 || (starts.len() + 1) * LANES > room {
             return None;
         }
         let slot_at = |place: u32| {
@@ -71,6 +71,7 @@ impl AsDelivered {
             wanted[slot / LANES][slot % LANES] = u32::MAX;
         }
         let tiles = Tiles::of(taxels.chunks(LANES).map(Tile::new).collect());
+        // Curves are looked up by the plan's slot.
         if tiles.sorts.contains(&Sort::Any) {
             return None;
         }
@@ -116,31 +117,41 @@ mod tests {
     use super::super::super::{Backend, RawBatch, Step};
     use super::super::Cpu;
     use super::super::live::Live;
-    use super::super::tests::{delivered, levels, run, sheet, values};
+    use super::super::tests::{delivered, levels, mostly_at_rest, sheet, values};
     use super::*;
     use crate::field::FieldSet;
     use crate::percept::{Flags, Outputs, Percepts, Precision};
     use crate::scene::Scene;
     use crate::signal::{Calibration, Frame, RawValue};
 
-    const TAXELS: u32 = 1000;
-    const WIDTH: usize = 1257;
+    /// Some, and as many as a gate stands before.
+    const TAXELS: [u32; 2] = [1000, 5000];
 
-    /// The sheet's plan, calibrated as `text` says.
-    fn plan(text: &str) -> Plan {
-        let body = sheet(TAXELS);
-        let ids: Vec<u32> = (0..TAXELS).collect();
+    /// The sheet's plan, some fields of fewer taxels and with weights, calibrated as `text` says.
+    fn plan(taxels: u32, text: &str) -> Plan {
+        let mut body = sheet(taxels);
+        for (index, field) in body.fields.iter_mut().enumerate() {
+            field.members = std::mem::take(&mut field.members).into_iter().take(16 - index % 7).collect();
+            let weight = if index > 60 { 1.0 + f64::from(index as u32 % 3) } else { 1.0 };
+            field.members.values_mut().for_each(|member| member.weight = weight);
+        }
+        let ids: Vec<u32> = (0..taxels).collect();
         let scene = Scene { outputs: Outputs::USUAL - Outputs::MOTION, ..Scene::default() };
         let calibration = Calibration::parse(text, &ids).unwrap();
         Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap()
     }
 
-    /// Every fifth of a frame's values is nobody's, the last ones are not; and the same the other way round.
+    /// Values of a frame, of which every fifth is nobody's, and the last ones are not.
+    fn width(plan: &Plan) -> usize {
+        plan.channels() * 5 / 4 + 7
+    }
+
+    /// Such frames' picks, and those of the same the other way round.
     fn two_picks(plan: &Plan) -> [(Vec<u32>, Picks); 2] {
-        let forth = (0..TAXELS).map(|channel| channel * 5 / 4 + 8);
-        let back = forth.clone().map(|place| WIDTH as u32 - 1 - place);
+        let forth = (0..plan.channels() as u32).map(|channel| channel * 5 / 4 + 8);
+        let back = forth.clone().map(|place| width(plan) as u32 - 1 - place);
         [forth.collect(), back.collect()].map(|channels: Vec<u32>| {
-            let picks = Picks::new(&channels, plan.calibrated(), WIDTH);
+            let picks = Picks::new(&channels, plan.calibrated(), width(plan));
             (channels, picks)
         })
     }
@@ -150,35 +161,59 @@ mod tests {
         AsDelivered::new(plan, live.slots(), picks, 1 << 16)
     }
 
+    /// All of `frames` with calls of 1, 2 and 3 frames, in the rows that `rows` has them in; the other plan's calibration from
+    /// the middle on.
+    fn live<'a>(plans: [&Plan; 2], level: Level, frames: usize, rows: impl Fn(usize) -> Rows<'a>) -> Percepts {
+        let mut cpu = Cpu::with_level(plans[0], level);
+        let mut percepts = Percepts::new(plans[0].outputs, plans[0].fields.len(), Precision::F32)
+            .with_columns(plans[0].columns, 0)
+            .with_letters(plans[0].letters().len());
+        percepts.reset(frames);
+        let steps = [Step { dt_s: 0.01, flags: Flags::empty() }; 3];
+        let (mut first, mut is_recalibrated) = (0, false);
+        for call in 0.. {
+            let count = (call % 3 + 1).min(frames - first);
+            if count == 0 {
+                break;
+            }
+            if first >= frames / 2 && !is_recalibrated {
+                cpu.recalibrate(plans[1]);
+                is_recalibrated = true;
+            }
+            let rows = rows(call).part(first..first + count);
+            cpu.run(&RawBatch { first, frames: count, rows, steps: &steps[..count] }, &mut percepts).unwrap();
+            first += count;
+        }
+        percepts
+    }
+
     #[test]
     fn bits_do_not_depend_on_where_values_lie() {
-        const FRAMES: usize = 48;
-        for text in ["[all]", "[all]\nbaseline = 1\ngain = 0.7\np_max = 300"] {
-            let plan = plan(text);
-            let raw = values(&plan, FRAMES);
-            let right = run(&plan, Level::new(), &raw, FRAMES, 1);
-            let [forth, back] = two_picks(&plan);
-            assert!([&forth, &back].iter().all(|(_, picks)| of(&plan, picks).is_some()));
-            let [forth_rows, back_rows] =
-                [&forth, &back].map(|(channels, picks)| (delivered(&raw, channels, WIDTH), picks));
-            let step = [Step { dt_s: 0.01, flags: Flags::empty() }];
-            for level in levels() {
-                let mut cpu = Cpu::with_level(&plan, level);
-                let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
-                    .with_columns(plan.columns, 0)
-                    .with_letters(plan.letters().len());
-                percepts.reset(FRAMES);
-                for first in 0..FRAMES {
-                    let frame = first..first + 1;
+        const FRAMES: usize = 170;
+        for taxels in TAXELS {
+            let texts = ["[all]", "[all]\nbaseline = 1\ngain = 0.7\np_max = 300"];
+            let plans = texts.map(|text| plan(taxels, text));
+            let [plain, other] = &plans;
+            let all_over = values(plain, FRAMES);
+            // A gate stands before the first frames, steps aside for those that are touched all over, and comes back.
+            let mut raw = mostly_at_rest(all_over.clone(), plain.channels());
+            let touched = 20 * plain.channels()..90 * plain.channels();
+            raw[touched.clone()].copy_from_slice(&all_over[touched]);
+            let [forth, back] = two_picks(plain);
+            assert!(plans.iter().all(|plan| [&forth, &back].iter().all(|(_, picks)| of(plan, picks).is_some())));
+            let frames = [&forth, &back].map(|(channels, _)| delivered(&raw, channels, width(plain)));
+            let packed = Rows::Packed { values: &raw, channels: plain.channels() };
+            for plans in [[plain, other], [other, plain]] {
+                let right = live(plans, Level::new(), FRAMES, |_| packed);
+                for level in levels() {
                     // One after the other and in turn.
-                    let rows = match first / 8 + first % 2 {
-                        0 | 3 | 4 => Rows::Picked { frames: &forth_rows.0[frame], picks: forth_rows.1 },
-                        1 | 5 => Rows::Picked { frames: &back_rows.0[frame], picks: back_rows.1 },
-                        _ => Rows::Packed { values: &raw, channels: plan.channels() }.part(frame),
-                    };
-                    cpu.run(&RawBatch { first, frames: 1, rows, steps: &step }, &mut percepts).unwrap();
+                    let also = live(plans, level, FRAMES, |call| match call / 4 % 4 + call % 2 {
+                        0 | 3 | 4 => Rows::Picked { frames: &frames[0], picks: &forth.1 },
+                        1 => Rows::Picked { frames: &frames[1], picks: &back.1 },
+                        _ => packed,
+                    });
+                    assert!(right == also, "{level:?}, {taxels} taxels");
                 }
-                assert!(right == percepts, "{level:?}");
             }
         }
     }
@@ -186,10 +221,10 @@ mod tests {
     #[test]
     fn what_is_nobodys_is_not_looked_at() {
         for text in ["[all]", "[all]\nbaseline = 1\ngain = 0.7\np_max = 300"] {
-            let plan = plan(text);
+            let plan = plan(TAXELS[0], text);
             let [(channels, picks), _] = two_picks(&plan);
             let here = of(&plan, &picks).unwrap();
-            let mut frames = vec![Frame::missing(0.0, WIDTH)];
+            let mut frames = vec![Frame::missing(0.0, width(&plan))];
             channels.iter().for_each(|&place| frames[0].values[place as usize] = RawValue::new(2.0));
             let (mut pressures, mut statuses) = (Lines::new(100, 0.0), Lines::new(100, 0));
             let mut frame = |frames: &[Frame]| {
@@ -200,17 +235,19 @@ mod tests {
             frames[0].values[channels[77] as usize] = RawValue::MISSING;
             assert!(frame(&frames));
             let pressed = pressures.as_flattened().iter().filter(|&&pressure| pressure > 0.0);
-            assert_eq!(pressed.count(), TAXELS as usize - 1);
+            assert_eq!(pressed.count(), plan.channels() - 1);
         }
     }
 
     #[test]
     fn a_frame_of_which_little_is_wanted_is_not_read_through() {
-        let plan = plan("[all]");
-        let apart: Vec<u32> = (0..TAXELS).map(|channel| channel * 20).collect();
+        let plan = plan(TAXELS[0], "[all]");
+        let apart: Vec<u32> = (0..TAXELS[0]).map(|channel| channel * 20).collect();
         assert!(of(&plan, &Picks::new(&apart, plan.calibrated(), 20_000)).is_none());
-        // Where all lies one after the other there is nothing to gain.
-        let straight: Vec<u32> = (0..TAXELS).collect();
-        assert!(of(&plan, &Picks::new(&straight, plan.calibrated(), 1008)).is_none());
+        // Where all lies one after the other there is nothing to gain, nor where it is but for the last ones.
+        let straight: Vec<u32> = (0..TAXELS[0]).collect();
+        for width in [1000, 1008] {
+            assert!(of(&plan, &Picks::new(&straight, plan.calibrated(), width)).is_none());
+        }
     }
 }

@@ -44,7 +44,7 @@ pub(super) enum Sort {
     Any,
 }
 
-/// All of a plan's taxels, by ascending slot.
+/// All of a plan's taxels, by ascending slot or as a source delivers them.
 #[derive(Clone, Debug)]
 pub(super) struct Tiles {
     pub(super) all: Vec<Tile>,
@@ -97,7 +97,8 @@ impl Tile {
     }
 }
 
-/// Raw bits to pressures and statuses; whether any status says anything. `first` is the tile's first slot.
+/// Raw bits to pressures and statuses; whether any status says anything. `first` is the tile's first slot, which only curves
+/// look at.
 #[inline(always)]
 pub(super) fn tile<S: Simd>(
     simd: S,

@@ -62,7 +62,7 @@ pub(super) struct Live {
     together: usize,
     /// Per wide field, then per group of narrow ones.
     answers: Vec<Cells>,
-    /// By slot, and a last row of taxels that nothing presses.
+    /// By slot, of the plan or of a frame as it came, and a last row of taxels that nothing presses, which none of them has.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
     /// Those of the frame before, where there are changes.
@@ -162,7 +162,8 @@ impl Live {
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
         let is_shared = !self.others.is_empty();
         let as_delivered = match moment.now.0 {
-            Rows::Picked { picks, .. } if gate.is_none() && !is_shared => {
+            Rows::Picked { picks, .. } if !is_shared => {
+                // At once, though a gate may stand before it: when that steps aside, nothing is made any more.
                 if self.as_delivered.as_ref().is_none_or(|(of, _)| *of != picks.number) {
                     self.as_delivered =
                         Some((picks.number, AsDelivered::new(plan, &self.slots, picks, pressures.len() * LANES)));

@@ -30,7 +30,7 @@ impl Slots {
         }
     }
 
-    /// Where `to` says each of them is, which is none beyond `most`.
+    /// The same members where `to` puts them, which is nowhere beyond `most`.
     pub(super) fn moved(&self, to: impl Fn(u32) -> u32, most: usize) -> Self {
         let rows = match self {
             Self::Near(slots) => slots.iter().map(|row| row.map(|slot| to(slot.into()))).collect(),

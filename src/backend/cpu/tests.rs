@@ -46,7 +46,7 @@ pub(super) fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
 
 /// The same where most of the skin rests: every twenty frames another ninth of it is touched, and elsewhere a value is
 /// missing now and then.
-fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
+pub(super) fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
     for (index, value) in raw.iter_mut().enumerate() {
         let (frame, channel) = (index / channels, index % channels);
         let is_touched = channel * 9 / channels == frame / 20 % 9;
@@ -59,7 +59,7 @@ fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
     raw
 }
 
-pub(super) fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
+fn run(plan: &Plan, level: Level, raw: &[RawValue], frames: usize, at_once: usize) -> Percepts {
     let mut cpu = Cpu::with_level(plan, level);
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures())
