@@ -49,13 +49,14 @@ impl AsDelivered {
         if !is_simple || plan.fields.iter().any(PlanField::is_wide) || picks.width < LANES {
             return None;
         }
+        // The last one ends with the frame, and so may begin early.
         let start_of = |place: u32| (place as usize / LANES * LANES).min(picks.width - LANES) as u32;
         let mut starts: Vec<u32> = picks.places.iter().map(|&place| start_of(place)).collect();
         starts.sort_unstable();
         starts.dedup();
         let in_order = picks.near.iter().filter(|near| matches!(near, Near::Straight(_))).count();
         let others = picks.near.len() - in_order;
-        // Three tiles are read and calibrated while two are put together; of these there have to be some.
+        // To read and calibrate three tiles as they are takes as long as to put two together: there have to be enough of these.
         if 8 * others <= in_order || starts.len() > in_order + 3 * others / 2 || (starts.len() + 1) * LANES > room {
             return None;
         }
@@ -124,7 +125,7 @@ mod tests {
     use crate::scene::Scene;
     use crate::signal::{Calibration, Frame, RawValue};
 
-    /// Some, and as many as a gate stands before.
+    /// Without a gate, and with one.
     const TAXELS: [u32; 2] = [1000, 5000];
 
     /// The sheet's plan, some fields of fewer taxels and with weights, calibrated as `text` says.
@@ -141,7 +142,7 @@ mod tests {
         Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap()
     }
 
-    /// Values of a frame, of which every fifth is nobody's, and the last ones are not.
+    /// Values of a frame: the first eight and every fifth are nobody's, the last one is a taxel's.
     fn width(plan: &Plan) -> usize {
         plan.channels() * 5 / 4 + 7
     }
@@ -206,7 +207,7 @@ mod tests {
             for plans in [[plain, other], [other, plain]] {
                 let right = live(plans, Level::new(), FRAMES, |_| packed);
                 for level in levels() {
-                    // One after the other and in turn.
+                    // Four calls each: both picks in turn, the second and none, none and the first, the first alone.
                     let also = live(plans, level, FRAMES, |call| match call / 4 % 4 + call % 2 {
                         0 | 3 | 4 => Rows::Picked { frames: &frames[0], picks: &forth.1 },
                         1 => Rows::Picked { frames: &frames[1], picks: &back.1 },
