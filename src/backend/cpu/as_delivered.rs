@@ -93,7 +93,7 @@ impl AsDelivered {
         let Rows::Picked { frames, .. } = raw else { unreachable!("only such rows have picks") };
         let values: &[u32] = bytemuck::cast_slice(&frames[frame].values);
         let values = Wanted { values, starts: &self.starts, wanted: &self.wanted };
-        calibrate::all(level, plan, &self.tiles, values, pressures, statuses)
+        calibrate::all_tiles(level, plan, &self.tiles, values, pressures, statuses)
     }
 }
 

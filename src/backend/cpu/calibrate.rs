@@ -238,11 +238,11 @@ pub(super) fn frame(
     statuses: &mut [Row<u32>],
 ) -> bool {
     let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
-    all(level, plan, &tables.tiles, values, pressures, statuses)
+    all_tiles(level, plan, &tables.tiles, values, pressures, statuses)
 }
 
 /// The same for any `values` of taxels in as many `tiles`, in whatever order these have them.
-pub(super) fn all(
+pub(super) fn all_tiles(
     level: Level,
     plan: &Plan,
     tiles: &Tiles,
@@ -251,7 +251,7 @@ pub(super) fn all(
     statuses: &mut [Row<u32>],
 ) -> bool {
     let range = 0..tiles.all.len();
-    with_widest!(level, simd => some(simd, plan, tiles, values, range.clone(), pressures, statuses))
+    with_widest!(level, simd => some_tiles(simd, plan, tiles, values, range.clone(), pressures, statuses))
 }
 
 /// The same by all cores. Beside the other, where it is inlined, it makes a small skin's live call longer.
@@ -275,7 +275,7 @@ pub(super) fn shared_frame(
         while let Some((index, (pressures, statuses))) = parts.take() {
             let range = index * part..index * part + pressures.len();
             let tiles = &tables.tiles;
-            if with_widest!(level, simd => some(simd, plan, tiles, values, range.clone(), pressures, statuses)) {
+            if with_widest!(level, simd => some_tiles(simd, plan, tiles, values, range.clone(), pressures, statuses)) {
                 faulty.fetch_or(1 << index, Ordering::Relaxed);
             }
         }
@@ -291,7 +291,7 @@ pub(super) fn shared_frame(
 
 /// Those of `range`, which `pressures` and `statuses` begin with.
 #[inline(always)]
-fn some<S: Simd>(
+fn some_tiles<S: Simd>(
     simd: S,
     plan: &Plan,
     tiles: &Tiles,
