@@ -106,25 +106,30 @@ pub(super) struct Coming<'a> {
 }
 
 impl<'a> Coming<'a> {
-    /// For the first sixteen of `fields`, in so many `steps`.
-    pub(super) fn new(tables: &'a Tables, fields: Range<usize>, pressures: &'a [Row<f32>], steps: usize) -> Self {
-        let pressures = tables.window.is_far().then_some(pressures);
-        if pressures.is_none() && tables.seen.len() < MANY_MEMBERS {
-            return Self::default();
+    /// Nothing yet, of fields that have `pressures`.
+    pub(super) fn of(tables: &Tables, pressures: &'a [Row<f32>]) -> Self {
+        Self { members: &[], pressures: tables.window.is_far().then_some(pressures), at_a_time: 0 }
+    }
+
+    /// Now for the first sixteen of `fields`, in so many `steps`. In place, as a copy would wait for all stores before it.
+    pub(super) fn turn_to(&mut self, tables: &'a Tables, fields: Range<usize>, steps: usize) {
+        self.members = &[];
+        if self.pressures.is_none() && tables.seen.len() < MANY_MEMBERS {
+            return;
         }
         let (briefs, later) = tables.briefs[fields].split_at_checked(LANES).unwrap_or_default();
         later.iter().take(LANES).for_each(|brief| soon_needed(brief));
-        let (Some(first), Some(last)) = (briefs.first(), briefs.last()) else { return Self::default() };
+        let (Some(first), Some(last)) = (briefs.first(), briefs.last()) else { return };
         // A wide field's taxels mostly follow each other, and are many.
         if briefs.iter().any(Brief::is_wide) {
-            return Self::default();
+            return;
         }
-        let members = &tables.seen[first.members().start..last.members().end];
-        let at_a_time = members.len().div_ceil(steps.max(1));
-        match pressures {
-            Some(_) => Self { members, pressures, at_a_time },
-            None => Self::members(members, at_a_time.next_multiple_of(MEMBERS_A_LINE)),
-        }
+        self.members = &tables.seen[first.members().start..last.members().end];
+        let at_a_time = self.members.len().div_ceil(steps.max(1));
+        self.at_a_time = match self.pressures {
+            Some(_) => at_a_time,
+            None => at_a_time.next_multiple_of(MEMBERS_A_LINE),
+        };
     }
 
     /// `members` themselves, so many at a time: a whole number of lines.

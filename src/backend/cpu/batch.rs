@@ -240,7 +240,7 @@ pub(super) fn stretch(
     );
     let Scratch { in_view, cells: of_fields, between, found, faults, .. } = scratch;
     let skin = Skin::new(plan, in_view);
-    let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::default() };
+    let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::of(tables, &in_view.pressures) };
     for chunk in std::iter::once(last).chain(0..last) {
         let fields = &all[chunk * LANES..all.len().min((chunk + 1) * LANES)];
         let steps = fields.len() * calls(plan.stages());
@@ -254,7 +254,7 @@ pub(super) fn stretch(
             whole_rows: is_first,
         };
         let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
-        meanwhile.coming = Coming::new(tables, next..stretch.fields.start + last * LANES, &in_view.pressures, steps);
+        meanwhile.coming.turn_to(tables, next..stretch.fields.start + last * LANES, steps);
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
             announced.turn_to(next, frames, steps);
         }

@@ -34,7 +34,7 @@ impl Place {
         // A whole row, though it may reach into the next frame: what belongs there is written later.
         match column.get_mut(start..start + LANES) {
             Some(cells) if self.fields >= LANES && (self.whole_rows || self.count == LANES) => row.store_slice(cells),
-            _ => column[start..start + self.count].copy_from_slice(&row.as_slice()[..self.count]),
+            _ => store_first(row, &mut column[start..start + self.count]),
         }
     }
 
@@ -43,6 +43,31 @@ impl Place {
     fn of_frame<T>(self, column: &mut [T], frame: usize) -> &mut [T] {
         let start = frame * self.fields + self.first;
         &mut column[start..start + self.count]
+    }
+}
+
+/// As many of the first lanes as `cells` has. In halves, as what goes by way of memory in pieces of another size waits until all
+/// answers that were stored before it have left the core: a fifteenth of a recording's time.
+#[inline(always)]
+fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
+    let (mut eight, later) = lanes.split();
+    let (eights, cells) = cells.as_chunks_mut::<8>();
+    for to in eights {
+        eight.store_slice(to);
+        eight = later;
+    }
+    let (mut four, later) = eight.split();
+    let (fours, cells) = cells.as_chunks_mut::<4>();
+    for to in fours {
+        four.store_slice(to);
+        four = later;
+    }
+    let [a, b, c, _] = four.into();
+    match cells {
+        [] => {}
+        [to] => *to = a,
+        [to, more] => (*to, *more) = (a, b),
+        [to, more, last, ..] => (*to, *more, *last) = (a, b, c),
     }
 }
 
