@@ -173,6 +173,10 @@ pub(super) struct Job<'a, 'b> {
     pub(super) before: (Rows<'b>, usize),
     /// What is fetched for the next one.
     pub(super) ahead: Ahead<'a>,
+    /// Whether none was before.
+    pub(super) is_first: bool,
+    /// Among the cells from `first` on, the first one that the next one writes.
+    pub(super) next_cell: usize,
 }
 
 /// All stages for the fields of `stretch`, in as many frames as `cells` has, which is at most sixteen. Those before have their
@@ -188,11 +192,11 @@ pub(super) fn stretch(
     cells: &mut CellsMut<'_>,
     outgoing: Option<&mut Outgoing<'_>>,
 ) {
-    let Job { raw, first, before, ahead } = job;
+    let Job { raw, first, before, ahead, .. } = job;
     let frames = cells.frames();
     let is_first = stretch.fields.start == 0;
     if is_first {
-        scratch.faults = false;
+        (scratch.faults, scratch.in_view.any_rests) = (false, false);
     }
     for tiles in stretch.reads.iter().filter(|tiles| !tiles.is_empty()) {
         let frames = first..first + frames;
@@ -227,13 +231,14 @@ pub(super) fn stretch(
     }
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
-    let all = &plan.fields[stretch.fields.clone()];
-    let last = all.len().div_ceil(LANES).saturating_sub(1);
+    let last = stretch.last_sixteen();
     let answers = outgoing.map_or_else(
         || {
             let mut announced = Announcement::of(cells);
-            announced.turn_to(stretch.fields.start + last * LANES, frames, 1);
-            announced.step();
+            if job.is_first {
+                announced.turn_to(last, frames, 1);
+                announced.step();
+            }
             Answers::ToBeWritten(announced)
         },
         Answers::OnTheirWay,
@@ -241,10 +246,10 @@ pub(super) fn stretch(
     let Scratch { in_view, cells: of_fields, between, found, faults, .. } = scratch;
     let skin = Skin::new(plan, in_view);
     let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::of(tables, &in_view.pressures) };
-    for chunk in std::iter::once(last).chain(0..last) {
-        let fields = &all[chunk * LANES..all.len().min((chunk + 1) * LANES)];
+    let may_rest = in_view.any_rests || found.iter().any(|found| found.rests);
+    for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
+        let fields = &plan.fields[first_field..stretch.fields.end.min(first_field + LANES)];
         let steps = fields.len() * calls(plan.stages());
-        let first_field = stretch.fields.start + chunk * LANES;
         let place = Place {
             fields: cells.fields(),
             first: first_field,
@@ -253,13 +258,14 @@ pub(super) fn stretch(
             // Of later stretches the next frame's first fields have their answers.
             whole_rows: is_first,
         };
-        let next = if chunk == last { stretch.fields.start } else { first_field + LANES };
-        meanwhile.coming.turn_to(tables, next..stretch.fields.start + last * LANES, steps);
+        let next = if first_field == last { stretch.fields.start } else { first_field + LANES };
+        meanwhile.coming.turn_to(tables, next..last, steps);
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
-            announced.turn_to(next, frames, steps);
+            announced.turn_to(if next == last { job.next_cell } else { next }, frames, steps);
         }
-        let mut rests = [true; LANES];
-        for (field, rests) in (first_field..).zip(&mut rests[..place.count]) {
+        let mut rests = [false; LANES];
+        let ask = if may_rest { &mut rests[..place.count] } else { &mut [] };
+        for (field, rests) in (first_field..).zip(ask) {
             *rests = match tables.briefs[field].way {
                 Way::InSections(place) => found[place].rests,
                 _ => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),

@@ -30,6 +30,8 @@ pub(super) struct InView {
     pub(super) pressures: Lines<f32>,
     pub(super) statuses: Lines<u32>,
     pub(super) tiles: Vec<TileInView>,
+    /// Whether any tile rested of those that were read since somebody unset this.
+    pub(super) any_rests: bool,
 }
 
 /// What is known of sixteen taxels in sixteen frames.
@@ -49,6 +51,7 @@ impl InView {
             pressures: Lines::new(slots, 0.0),
             statuses: Lines::new(slots, 0),
             tiles: vec![TileInView { rests: true, faulty: false }; slots / LANES],
+            any_rests: false,
         }
     }
 
@@ -118,7 +121,8 @@ fn calibrate<S: Simd>(
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
-    let InView { bits: there, pressures: kept_pressures, statuses: kept_statuses, tiles: kept_tiles } = in_view;
+    let InView { bits: there, pressures: kept_pressures, statuses: kept_statuses, tiles: kept_tiles, any_rests } =
+        in_view;
     for (index, &sort) in tiles.clone().zip(&tables.tiles.sorts[tiles.clone()]) {
         let tile = &tables.tiles.all[index];
         let slot = index * LANES;
@@ -142,6 +146,7 @@ fn calibrate<S: Simd>(
             },
         );
         let rests = !is_pressed;
+        *any_rests |= rests;
         let (abreast, kept) = (&mut kept_pressures[place..place + LANES], &mut kept_tiles[place / LANES]);
         if !rests {
             transpose(simd, |frame| cast_ref(&pressures[frame]), cast_slice_mut::<Row<f32>, Row<u32>>(abreast));

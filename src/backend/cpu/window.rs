@@ -51,6 +51,11 @@ impl Stretch {
         let [below, above] = &self.reads;
         if below.len() > above.len() { below.clone() } else { above.clone() }
     }
+
+    /// The first of the last sixteen fields, or of as many as there are.
+    pub(super) fn last_sixteen(&self) -> usize {
+        self.fields.start + self.fields.len().saturating_sub(1) / LANES * LANES
+    }
 }
 
 impl Window {
