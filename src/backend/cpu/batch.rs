@@ -250,28 +250,22 @@ pub(super) fn stretch(
     for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
         let fields = &plan.fields[first_field..stretch.fields.end.min(first_field + LANES)];
         let steps = fields.len() * calls(plan.stages());
-        let place = Place {
-            fields: cells.fields(),
-            first: first_field,
-            count: fields.len(),
-            frames,
-            // Of later stretches the next frame's first fields have their answers.
-            whole_rows: is_first,
-        };
+        // Of later stretches the next frame's first fields have their answers.
+        let place = Place::new(cells, first_field, fields.len(), is_first);
         let next = if first_field == last { stretch.fields.start } else { first_field + LANES };
         meanwhile.coming.turn_to(tables, next..last, steps);
         if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
             announced.turn_to(if next == last { job.next_cell } else { next }, frames, steps);
         }
         let mut rests = [false; LANES];
-        let ask = if may_rest { &mut rests[..place.count] } else { &mut [] };
+        let ask = if may_rest { &mut rests[..fields.len()] } else { &mut [] };
         for (field, rests) in (first_field..).zip(ask) {
             *rests = match tables.briefs[field].way {
                 Way::InSections(place) => found[place].rests,
                 _ => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
             };
         }
-        let rests = &rests[..place.count];
+        let rests = &rests[..fields.len()];
         if rests.iter().all(|&rests| rests) {
             (0..steps).for_each(|_| meanwhile.step());
             columns::write_at_rest(fields, place, plan.outputs, cells);

@@ -14,27 +14,33 @@ use crate::scene::PlanField;
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     /// A frame's cells.
-    pub(super) fields: usize,
+    fields: usize,
     /// The first of them that is written, and how many.
-    pub(super) first: usize,
-    pub(super) count: usize,
-    pub(super) frames: usize,
-    /// Whether a row may reach beyond its frame's last field.
-    pub(super) whole_rows: bool,
+    first: usize,
+    count: usize,
+    frames: usize,
+    /// Of how many frames a whole row is written, though it may reach into the next frame: what belongs there is written later.
+    whole: usize,
 }
 
 impl Place {
+    /// That of `count` fields from `first` on in all frames of `cells`; `beyond` says whether a row may reach beyond its frame's
+    /// last field.
+    pub(super) fn new(cells: &CellsMut<'_>, first: usize, count: usize, beyond: bool) -> Self {
+        let (fields, frames) = (cells.fields(), cells.frames());
+        let is_whole = fields >= LANES && (beyond || count == LANES);
+        let end = first + LANES;
+        let whole = if is_whole && fields * frames >= end { (fields * frames - end) / fields + 1 } else { 0 };
+        Self { fields, first, count, frames, whole: whole.min(frames) }
+    }
+
     /// Writes the row of `frame`, if there is such a frame.
     #[inline(always)]
     fn put<S: Simd>(self, frame: usize, row: u32x16<S>, column: &mut [u32]) {
-        if frame >= self.frames {
-            return;
-        }
-        let start = frame * self.fields + self.first;
-        // A whole row, though it may reach into the next frame: what belongs there is written later.
-        match column.get_mut(start..start + LANES) {
-            Some(cells) if self.fields >= LANES && (self.whole_rows || self.count == LANES) => row.store_slice(cells),
-            _ => store_first(row, &mut column[start..start + self.count]),
+        if frame < self.whole {
+            row.store_slice(&mut column[frame * self.fields + self.first..][..LANES]);
+        } else if frame < self.frames {
+            store_first(row, self.of_frame(column, frame));
         }
     }
 
@@ -46,29 +52,20 @@ impl Place {
     }
 }
 
-/// As many of the first lanes as `cells` has. In halves, as what goes by way of memory in pieces of another size waits until all
-/// answers that were stored before it have left the core: a fifteenth of a recording's time.
+/// As many of the first lanes as `cells` has. In halves: what goes by way of memory, and is read in pieces across those that were
+/// stored, waits until all answers before it have left the core, which was a fifteenth of a recording's time.
 #[inline(always)]
 fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
-    let (mut eight, later) = lanes.split();
-    let (eights, cells) = cells.as_chunks_mut::<8>();
-    for to in eights {
-        eight.store_slice(to);
-        eight = later;
-    }
-    let (mut four, later) = eight.split();
-    let (fours, cells) = cells.as_chunks_mut::<4>();
-    for to in fours {
-        four.store_slice(to);
-        four = later;
-    }
-    let [a, b, c, _] = four.into();
-    match cells {
-        [] => {}
-        [to] => *to = a,
-        [to, more] => (*to, *more) = (a, b),
-        [to, more, last, ..] => (*to, *more, *last) = (a, b, c),
-    }
+    let (first, second) = lanes.split();
+    let (half, cells) = match cells.split_first_chunk_mut::<8>() {
+        Some((cells, rest)) => {
+            first.store_slice(cells);
+            (second, rest)
+        }
+        None => (first, cells),
+    };
+    let half: [u32; 8] = half.into();
+    cells.copy_from_slice(&half[..cells.len()]);
 }
 
 /// All columns that stages here fill, as bits: flags and what is present, then what is 0 where nothing presses. Those that
