@@ -148,35 +148,35 @@ mod x86 {
 
     use super::{LANES, NEAR};
 
-    /// Four of `values`, at the slots from a lane on.
+    /// Four of `values`, at the four `slots`, which are one word: loads are what there are most of.
     macro_rules! four {
-        ($values:ident, $slots:ident, $lane:literal) => {
+        ($values:ident, $slots:expr) => {{
+            let slots = u64::from_le_bytes(bytemuck::cast($slots));
             _mm_set_ps(
-                $values[usize::from($slots[$lane + 3])],
-                $values[usize::from($slots[$lane + 2])],
-                $values[usize::from($slots[$lane + 1])],
-                $values[usize::from($slots[$lane])],
+                $values[usize::from((slots >> 48) as u16)],
+                $values[usize::from((slots >> 32) as u16)],
+                $values[usize::from((slots >> 16) as u16)],
+                $values[usize::from(slots as u16)],
             )
-        };
+        }};
     }
 
     fearless_simd::kernel!(
         #[inline(always)]
         pub(super) fn sixteen(token: Avx512, values: &[f32; NEAR], slots: &[u16; LANES]) -> f32x16<Avx512> {
-            let two = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(four!(values, slots, 0)), four!(values, slots, 4));
-            let three = _mm512_insertf32x4::<2>(two, four!(values, slots, 8));
-            _mm512_insertf32x4::<3>(three, four!(values, slots, 12)).simd_into(token)
+            let [first, second, third, last]: [[u16; 4]; 4] = bytemuck::cast(*slots);
+            let one = _mm512_castps128_ps512(four!(values, first));
+            let two = _mm512_insertf32x4::<1>(one, four!(values, second));
+            let three = _mm512_insertf32x4::<2>(two, four!(values, third));
+            _mm512_insertf32x4::<3>(three, four!(values, last)).simd_into(token)
         }
     );
 
     fearless_simd::kernel!(
         #[inline(always)]
         pub(super) fn eight(token: Avx2, values: &[f32; NEAR], slots: &[u16; 8]) -> f32x8<Avx2> {
-            // Four numbers at a time: loads are what there are most of.
-            let [low, high]: [[u16; 4]; 2] = bytemuck::cast::<_, [u64; 2]>(*slots)
-                .map(|four| [four as u16, (four >> 16) as u16, (four >> 32) as u16, (four >> 48) as u16]);
-            let low = _mm256_castps128_ps256(four!(values, low, 0));
-            _mm256_insertf128_ps::<1>(low, four!(values, high, 0)).simd_into(token)
+            let [low, high]: [[u16; 4]; 2] = bytemuck::cast(*slots);
+            _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(four!(values, low)), four!(values, high)).simd_into(token)
         }
     );
 }
