@@ -317,3 +317,43 @@ fn bits_do_not_depend_on_what_is_fetched_and_where_answers_go() {
         }
     }
 }
+
+#[test]
+fn fields_of_few_taxels_have_the_same_bits() {
+    const FRAMES: usize = 53;
+    let mut body = sheet(FOLD + 1000);
+    let mut next = 0;
+    // Each size in runs that neither begin nor end with sixteen fields, some weighted, one over the fold.
+    body.fields = (0..)
+        .map_while(|index: u32| {
+            let taxels = [1, 2, 1, 4, 16, 3, 2, 1, 5][index as usize / 75 % 9];
+            let weight = |id: u32| if index % 450 < 150 { 1.0 } else { f64::from(1 + id % 3) };
+            let members = (next..next + taxels).map(|id| (id, MemberSpec { weight: weight(id), uv: None })).collect();
+            next += taxels;
+            (next <= FOLD + 1000).then(|| FieldSpec { name: format!("field {index}"), members, ..FieldSpec::default() })
+        })
+        .collect();
+    let calibration = Calibration::identity(body.taxels.len());
+    let sums = Outputs::TOTAL | Outputs::ACTIVE | Outputs::CENTROID;
+    for outputs in [Outputs::USUAL - Outputs::MOTION, sums | Outputs::ORIENTATION, sums] {
+        let scene = Scene { outputs, ..Scene::default() };
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let window = window::Window::new(&plan);
+        assert!(window.slots() < plan.slots() && plan.fields.iter().any(|field| !field.charted));
+        let mut raw = values(&plan, FRAMES);
+        // Faults in the second and in the last sixteen frames alone.
+        for (index, value) in raw.iter_mut().enumerate() {
+            if index / plan.channels() / LANES % 2 == 0 && !value.number().is_some_and(f64::is_finite) {
+                *value = RawValue::new(0.0);
+            }
+        }
+        for raw in [mostly_at_rest(raw.clone(), plan.channels()), raw] {
+            let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+            for level in levels() {
+                for at_once in [16, 40, FRAMES] {
+                    assert!(right == run(&plan, level, &raw, FRAMES, at_once), "{level:?}, {at_once} at once");
+                }
+            }
+        }
+    }
+}
