@@ -55,7 +55,7 @@ impl Place {
 /// As many of the first lanes as `cells` has. In halves: what goes by way of memory, and is read in pieces across those that were
 /// stored, waits until all answers before it have left the core, which was a fifteenth of a recording's time.
 #[inline(always)]
-fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
+pub(super) fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
     let (first, second) = lanes.split();
     let (half, cells) = match cells.split_first_chunk_mut::<8>() {
         Some((cells, rest)) => {

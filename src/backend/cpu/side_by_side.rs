@@ -7,6 +7,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
 use super::super::Rows;
+use super::columns::store_first;
 use super::lines::Aligned;
 use super::pick::SomeFrames;
 use super::simd::{LANES, with_widest};
@@ -33,10 +34,7 @@ impl Columns for Target<'_> {
         match words.get_mut(self.at..self.at + LANES) {
             Some(words) => lanes.store_slice(words),
             // There are not as many frames.
-            None => {
-                let words = &mut words[self.at..];
-                words.copy_from_slice(&lanes.as_slice()[..words.len()]);
-            }
+            None => store_first(lanes, &mut words[self.at..]),
         }
     }
 }

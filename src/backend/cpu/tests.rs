@@ -343,7 +343,7 @@ fn fields_of_few_taxels_have_the_same_bits() {
         let mut raw = values(&plan, FRAMES);
         // Faults in the second and in the last sixteen frames alone.
         for (index, value) in raw.iter_mut().enumerate() {
-            if index / plan.channels() / LANES % 2 == 0 && !value.number().is_some_and(f64::is_finite) {
+            if (index / plan.channels() / LANES).is_multiple_of(2) && !value.number().is_some_and(f64::is_finite) {
                 *value = RawValue::new(0.0);
             }
         }
