@@ -97,7 +97,7 @@ impl<'a> Ahead<'a> {
 
 /// What the next fields are made of, fetched where it is more than a cache holds: pressures that may lie anywhere among many,
 /// or else the members themselves.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Coming<'a> {
     members: &'a [Member],
     /// Where it is they that are fetched.

@@ -173,8 +173,8 @@ pub(super) struct Job<'a, 'b> {
     pub(super) before: (Rows<'b>, usize),
     /// What is fetched for the next one.
     pub(super) ahead: Ahead<'a>,
-    /// Whether none was before.
-    pub(super) is_first: bool,
+    /// Whether nobody has had the rows fetched that are written first, as it is a task's first.
+    pub(super) is_unannounced: bool,
     /// Among the cells from `first` on, the first one that the next one writes.
     pub(super) next_cell: usize,
 }
@@ -214,6 +214,7 @@ pub(super) fn stretch(
             &mut in_view.statuses,
         );
         in_view.tiles.iter_mut().for_each(|tile| tile.rests = false);
+        in_view.any_rests = false;
     }
     if is_first && !cells.pressures.is_empty() {
         let slots = plan.slots();
@@ -231,11 +232,11 @@ pub(super) fn stretch(
     }
     // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
     // written finds its way to memory while the next ones are computed.
-    let last = stretch.last_sixteen();
+    let last = stretch.start_of_last_sixteen();
     let answers = outgoing.map_or_else(
         || {
             let mut announced = Announcement::of(cells);
-            if job.is_first {
+            if job.is_unannounced {
                 announced.turn_to(last, frames, 1);
                 announced.step();
             }
@@ -305,7 +306,7 @@ impl Meanwhile<'_, '_, '_, '_> {
 
 /// All stages for the fields from `first` on, of which `rests` says whether any pressure is to be seen, over sixteen frames.
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "as `block`")]
+#[expect(clippy::too_many_arguments, reason = "as `stretch`")]
 fn answer<S: Simd>(
     simd: S,
     plan: &Plan,

@@ -52,8 +52,9 @@ impl Place {
     }
 }
 
-/// As many of the first lanes as `cells` has. In halves: what goes by way of memory, and is read in pieces across those that were
-/// stored, waits until all answers before it have left the core, which was a fifteenth of a recording's time.
+/// As many of the first lanes as `cells` has. In halves, as what goes by way of memory, and is read in pieces across those that
+/// were stored, waits until all answers before it have left the core: a fifteenth of a recording's time. With vectors of eight
+/// lanes and more a half is one piece.
 #[inline(always)]
 pub(super) fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
     let (first, second) = lanes.split();
@@ -112,7 +113,7 @@ impl Announcement {
         Self { columns, count, at: 0, column: 0, stride: cells.fields(), rows: 0, at_a_time: 0 }
     }
 
-    /// Now the rows of the sixteen fields from `first` on, in so many `steps`. Of a row where it ends: it begins in the line
+    /// Now the rows of sixteen cells from cell `first` on, and of the same fields in all `frames`, in so many `steps`. Of a row where it ends: it begins in the line
     /// where the one that was written before ended.
     pub(super) fn turn_to(&mut self, first: usize, frames: usize, steps: usize) {
         let (rows, last) = (self.count * frames, first + LANES - 1);

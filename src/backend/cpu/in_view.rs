@@ -30,7 +30,7 @@ pub(super) struct InView {
     pub(super) pressures: Lines<f32>,
     pub(super) statuses: Lines<u32>,
     pub(super) tiles: Vec<TileInView>,
-    /// Whether any tile rested of those that were read since somebody unset this.
+    /// Whether any tile rests that was read for this block; each block unsets it.
     pub(super) any_rests: bool,
 }
 

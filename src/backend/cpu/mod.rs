@@ -164,10 +164,10 @@ impl Cpu {
                     Some(next) => (next, at..at + LANES),
                     None => (&stretches[0], at + LANES..at + 2 * LANES),
                 };
-                let next_cell = (frames.start - at) * plan.fields.len() + next.last_sixteen();
+                let next_cell = (frames.start - at) * plan.fields.len() + next.start_of_last_sixteen();
                 let ahead = Ahead::new(raw.rows, frames, next.most_read(), steps(stretch.fields.len()));
-                let is_first = at == first && index == 0;
-                let job = batch::Job { raw, first: at, before, ahead, is_first, next_cell };
+                let is_unannounced = at == first && index == 0;
+                let job = batch::Job { raw, first: at, before, ahead, is_unannounced, next_cell };
                 batch::stretch(self.level, plan, tables, job, stretch, &mut scratch, cells, outgoing.as_deref_mut());
             }
         };

@@ -323,7 +323,7 @@ fn fields_of_few_taxels_have_the_same_bits() {
     const FRAMES: usize = 53;
     let mut body = sheet(FOLD + 1000);
     let mut next = 0;
-    // Each size in runs that neither begin nor end with sixteen fields, some weighted, one over the fold.
+    // Each size in runs that mostly end within sixteen fields, two of three weighted, one field over the fold.
     body.fields = (0..)
         .map_while(|index: u32| {
             let taxels = [1, 2, 1, 4, 16, 3, 2, 1, 5][index as usize / 75 % 9];
@@ -335,23 +335,35 @@ fn fields_of_few_taxels_have_the_same_bits() {
         .collect();
     let calibration = Calibration::identity(body.taxels.len());
     let sums = Outputs::TOTAL | Outputs::ACTIVE | Outputs::CENTROID;
-    for outputs in [Outputs::USUAL - Outputs::MOTION, sums | Outputs::ORIENTATION, sums] {
-        let scene = Scene { outputs, ..Scene::default() };
-        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
-        let window = window::Window::new(&plan);
-        assert!(window.slots() < plan.slots() && plan.fields.iter().any(|field| !field.charted));
-        let mut raw = values(&plan, FRAMES);
-        // Faults in the second and in the last sixteen frames alone.
-        for (index, value) in raw.iter_mut().enumerate() {
-            if (index / plan.channels() / LANES).is_multiple_of(2) && !value.number().is_some_and(f64::is_finite) {
-                *value = RawValue::new(0.0);
-            }
-        }
-        for raw in [mostly_at_rest(raw.clone(), plan.channels()), raw] {
-            let right = run(&plan, Level::new(), &raw, FRAMES, 1);
-            for level in levels() {
-                for at_once in [16, 40, FRAMES] {
-                    assert!(right == run(&plan, level, &raw, FRAMES, at_once), "{level:?}, {at_once} at once");
+    // In a window that slides, without one and past the caches, and fewer than stand abreast.
+    for fields in [body.fields.len(), 107, 7] {
+        body.fields.truncate(fields);
+        for outputs in [Outputs::USUAL - Outputs::MOTION, sums | Outputs::ORIENTATION, sums] {
+            let scene = Scene { outputs, ..Scene::default() };
+            let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+            let is_large = fields > 1000;
+            assert_eq!(window::Window::new(&plan).slots() < plan.slots(), is_large);
+            assert_eq!(plan.fields.iter().filter(|field| !field.charted).count(), usize::from(is_large));
+            let all_over = values(&plan, FRAMES);
+            for mut raw in [mostly_at_rest(all_over.clone(), plan.channels()), all_over] {
+                // Faults in the second sixteen frames and in the few after the third.
+                for (index, value) in raw.iter_mut().enumerate() {
+                    let is_plain = value.number().is_some_and(|number| number == 0.0 || (1.0..1e6).contains(&number));
+                    if (index / plan.channels() / LANES).is_multiple_of(2) && !is_plain {
+                        *value = RawValue::new(0.0);
+                    }
+                }
+                let right = run(&plan, Level::new(), &raw, FRAMES, 1);
+                let is_faulty = |frame: usize| {
+                    let flags = |field| right.get(frame, field).flags;
+                    (0..fields).any(|field| flags(field).intersects(Flags::FAULTY_INPUT | Flags::INCOMPLETE))
+                };
+                assert!(!(0..16).chain(32..48).any(is_faulty) && (!is_large || (16..32).any(is_faulty)));
+                assert!((0..FRAMES).any(|frame| right.touched(frame).next().is_some()));
+                for level in levels() {
+                    for at_once in [16, 40, FRAMES] {
+                        assert!(right == run(&plan, level, &raw, FRAMES, at_once), "{level:?}, {at_once} at once");
+                    }
                 }
             }
         }

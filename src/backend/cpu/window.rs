@@ -53,7 +53,7 @@ impl Stretch {
     }
 
     /// The first of the last sixteen fields, or of as many as there are.
-    pub(super) fn last_sixteen(&self) -> usize {
+    pub(super) fn start_of_last_sixteen(&self) -> usize {
         self.fields.start + self.fields.len().saturating_sub(1) / LANES * LANES
     }
 }
