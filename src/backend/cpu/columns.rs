@@ -113,8 +113,8 @@ impl Announcement {
         Self { columns, count, at: 0, column: 0, stride: cells.fields(), rows: 0, at_a_time: 0 }
     }
 
-    /// Now the rows of sixteen cells from cell `first` on, and of the same fields in all `frames`, in so many `steps`. Of a row where it ends: it begins in the line
-    /// where the one that was written before ended.
+    /// Now the rows of sixteen cells from cell `first` on, and of the same fields in all `frames`, in so many `steps`. Of a row
+    /// where it ends: it begins in the line where the one that was written before ended.
     pub(super) fn turn_to(&mut self, first: usize, frames: usize, steps: usize) {
         let (rows, last) = (self.count * frames, first + LANES - 1);
         (self.at, self.column, self.rows, self.at_a_time) = (last, 0, rows, rows.div_ceil(steps.max(1)));
