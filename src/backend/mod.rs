@@ -25,7 +25,7 @@ pub fn processor() -> String {
 /// Which backend is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BackendKind {
-    /// The fastest of `cpu` and `gpu` on this plan and machine, by a measurement.
+    /// The fastest of `cpu` and `gpu` on this plan and machine, by a measurement; `cpu` where the GPU is software on it.
     #[default]
     Auto,
     /// Double precision, as the equations read.
@@ -368,12 +368,12 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
         }
         BackendKind::Auto => {
             let mut cpu: Box<dyn Backend> = Box::new(cpu::Cpu::new(plan));
-            let mut gpu = match choose(BackendKind::Gpu, plan, batch) {
-                Ok(gpu) => gpu.backend,
+            let mut gpu = match hardware(plan, batch) {
+                Ok(gpu) => gpu,
                 Err(e) if e.is_no_adapter() => return chosen(cpu, format!("no GPU to compare with: {e}")),
                 Err(e) => return chosen(cpu, format!("the GPU cannot run this plan: {e}")),
             };
-            let (on_cpu, on_gpu) = (time(&mut *cpu, plan, batch)?, time(&mut *gpu, plan, batch)?);
+            let [on_cpu, on_gpu] = least_times([&mut *cpu, &mut *gpu], plan, batch)?;
             let why = format!(
                 "measured on this plan, {batch} frame{} a call: cpu {:.0} µs, gpu {:.0} µs",
                 if batch == 1 { "" } else { "s" },
@@ -385,10 +385,28 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
     }
 }
 
-/// The median time of a call with every taxel pressed, over as many calls as fit into some milliseconds.
-fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration> {
-    const CALLS: usize = 15;
-    const ENOUGH: Duration = Duration::from_millis(60);
+/// The backend on a GPU that is not the CPU itself: one that is would be slower than the `cpu` backend on the same cores,
+/// and takes long to start.
+fn hardware(plan: &Plan, batch: usize) -> Result<Box<dyn Backend>> {
+    #[cfg(feature = "gpu")]
+    return Ok(Box::new(gpu::Gpu::on_hardware(plan, batch)?));
+    #[cfg(not(feature = "gpu"))]
+    return choose(BackendKind::Gpu, plan, batch).map(|chosen| chosen.backend);
+}
+
+/// The least time that each of `backends` takes for a call with every taxel pressed. They take turns, so that what else
+/// the machine does meanwhile slows neither alone.
+fn least_times<const N: usize>(
+    mut backends: [&mut dyn Backend; N],
+    plan: &Plan,
+    batch: usize,
+) -> Result<[Duration; N]> {
+    /// Rounds at least, and at most, and how long is enough in between.
+    const ROUNDS: Range<usize> = 3..12;
+    const ENOUGH: Duration = Duration::from_millis(120);
+    /// Calls of a turn, if they are short: the first one after another's finds the caches cold.
+    const CALLS: usize = 3;
+    const SHORT: Duration = Duration::from_millis(5);
     let values: Vec<RawValue> = (0..batch * plan.channels()).map(|i| RawValue::new((i % 977 + 1) as f64)).collect();
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; batch];
     let raw = RawBatch {
@@ -399,17 +417,73 @@ fn time(backend: &mut dyn Backend, plan: &Plan, batch: usize) -> Result<Duration
     };
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures());
-    let mut times = Vec::with_capacity(CALLS);
-    percepts.reset(batch);
-    backend.run(&raw, &mut percepts)?;
+    let mut least = [Duration::MAX; N];
     let start = Instant::now();
-    while times.is_empty() || (times.len() < CALLS && start.elapsed() < ENOUGH) {
-        percepts.reset(batch);
-        let call = Instant::now();
-        backend.run(&raw, &mut percepts)?;
-        times.push(call.elapsed());
+    for round in 0..ROUNDS.end {
+        if round >= ROUNDS.start && start.elapsed() >= ENOUGH {
+            break;
+        }
+        for (backend, least) in backends.iter_mut().zip(&mut least) {
+            let turn = Instant::now();
+            for call in 0..CALLS {
+                if call > 0 && turn.elapsed() >= SHORT {
+                    break;
+                }
+                percepts.reset(batch);
+                let start = Instant::now();
+                backend.run(&raw, &mut percepts)?;
+                *least = start.elapsed().min(*least);
+            }
+        }
     }
-    backend.restart();
-    times.sort();
-    Ok(times[times.len() / 2])
+    backends.iter_mut().for_each(|backend| backend.restart());
+    Ok(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::Body;
+    use crate::field::FieldSet;
+    use crate::scene::Scene;
+    use crate::signal::Calibration;
+
+    /// Takes so long a call, but for the first ones of all, while the machine is busy with something else.
+    struct Timed {
+        takes: Duration,
+        busy_calls: &'static AtomicU64,
+    }
+
+    impl Backend for Timed {
+        fn name(&self) -> &'static str {
+            "timed"
+        }
+
+        fn describe(&self) -> String {
+            String::new()
+        }
+
+        fn restart(&mut self) {}
+
+        fn recalibrate(&mut self, _: &Plan) {}
+
+        fn run(&mut self, _: &RawBatch<'_>, _: &mut Percepts) -> Result<()> {
+            let left = self.busy_calls.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
+            std::thread::sleep(self.takes + if left.is_ok() { Duration::from_millis(20) } else { Duration::ZERO });
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_busy_moment_does_not_make_the_faster_backend_the_slower() {
+        static BUSY_CALLS: AtomicU64 = AtomicU64::new(4);
+        let body = Body::from_bytes("hand", crate::bundled::body("hand").unwrap()).unwrap();
+        let (fields, calibration) = (FieldSet::new(&body).unwrap(), Calibration::identity(body.taxels.len()));
+        let plan = Plan::new(&body, &fields, &Scene::default(), &calibration).unwrap();
+        let timed = |millis| Timed { takes: Duration::from_millis(millis), busy_calls: &BUSY_CALLS };
+        let (mut fast, mut slow) = (timed(1), timed(8));
+        let [on_fast, on_slow] = least_times([&mut fast, &mut slow], &plan, 1).unwrap();
+        assert_eq!(BUSY_CALLS.load(Ordering::Relaxed), 0);
+        assert!(on_fast < on_slow && on_slow >= Duration::from_millis(8), "{on_fast:?} {on_slow:?}");
+    }
 }

@@ -111,7 +111,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         !stop.load(Ordering::Relaxed)
     });
     drop(bar);
-    let report = report?;
+    let mut report = report?;
+    report.left_out.extend(software().filter(|_| options.backend == BackendKind::Auto));
     // A run that was cut short, or with knobs that are held, is not what others would measure.
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
@@ -150,9 +151,24 @@ fn missed(wish: &Wish, pick: &Pick<'_>) -> Result<String> {
     Ok(format!("no knobs reach {}; nearest is {combination}: {}", wish.words(), pick.missed.join("; ")))
 }
 
+/// Why a GPU is not chosen unless it is asked for, where all there are compute on the CPU.
+fn software() -> Option<String> {
+    #[cfg(feature = "gpu")]
+    {
+        let adapters = somatic::backend::gpu::adapters();
+        let names: Vec<&str> = adapters.iter().map(|adapter| &adapter.name[..]).collect();
+        let is_software = !adapters.is_empty() && adapters.iter().all(|adapter| adapter.kind == "software");
+        is_software
+            .then(|| format!("gpu: {} computes on the same CPU; ask for it with --backend gpu", names.join(", ")))
+    }
+    #[cfg(not(feature = "gpu"))]
+    None
+}
+
 /// What is measured for `asked`.
 fn manner(asked: &Asked, options: &Options, seconds: f64) -> Result<Manner> {
     let backends = match options.backend {
+        BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
         BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
         BackendKind::Reference => {
             return Err(Error::usage("the reference has no knobs to compare; take another backend, or auto"));

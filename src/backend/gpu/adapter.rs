@@ -62,17 +62,35 @@ static SHARED: Mutex<Option<Device>> = Mutex::new(None);
 
 /// The process's device; opened on the first call.
 pub(crate) fn shared() -> Result<Device> {
+    shared_if(|_| Ok(()))
+}
+
+/// The process's device, if it is not the CPU itself; opened on the first call.
+pub(crate) fn hardware() -> Result<Device> {
+    shared_if(|info| match info.device_type {
+        wgpu::DeviceType::Cpu => {
+            Err(Error::no_adapter(format!("the only adapter, {}, computes on the same CPU", info.name)))
+        }
+        _ => Ok(()),
+    })
+}
+
+/// The process's device, if `accept` has nothing against its adapter; else it is not even opened.
+fn shared_if(accept: impl Fn(&wgpu::AdapterInfo) -> Result<()>) -> Result<Device> {
     let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
     // One that was lost does not come back; another may be had.
     if let Some(device) = shared.as_ref().filter(|device| device.check().is_ok()) {
-        return Ok(device.clone());
+        return accept(&device.info).map(|()| device.clone());
     }
-    let device = open(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12)?;
+    let adapter = best(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12)?;
+    accept(&adapter.get_info())?;
+    let device = device_of(&adapter, wgpu::Features::empty())?;
     *shared = Some(device.clone());
     Ok(device)
 }
 
 /// Opens the best adapter of `backends` with the limits that every WebGPU device has.
+#[cfg(test)]
 pub(crate) fn open(backends: wgpu::Backends) -> Result<Device> {
     open_with(backends, wgpu::Features::empty())
 }
@@ -85,7 +103,12 @@ pub(super) fn with_clock() -> Result<Device> {
 
 /// Opens the best adapter with those of `features` that it has.
 fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Device> {
-    let adapter = pollster::block_on(async {
+    device_of(&best(backends)?, features)
+}
+
+/// The best adapter of `backends`: one that is no hardware only where there is no other.
+fn best(backends: wgpu::Backends) -> Result<wgpu::Adapter> {
+    pollster::block_on(async {
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..wgpu::RequestAdapterOptions::default()
@@ -96,7 +119,11 @@ fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Devic
         // What wgpu says of it names every API it was not built for.
         let remedy = "install one (on Debian, mesa-vulkan-drivers runs shaders on the CPU)";
         Error::no_adapter(format!("no GPU driver answers; {remedy}"))
-    })?;
+    })
+}
+
+/// Opens `adapter` with those of `features` that it has.
+fn device_of(adapter: &wgpu::Adapter, features: wgpu::Features) -> Result<Device> {
     let info = adapter.get_info();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("somatic"),

@@ -98,6 +98,14 @@ impl Gpu {
         Self::on(adapter::shared()?, plan, batch)
     }
 
+    /// The same on a device that is not the CPU itself.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`]; the only adapter is software.
+    pub(crate) fn on_hardware(plan: &Plan, batch: usize) -> Result<Self> {
+        Self::on(adapter::hardware()?, plan, batch)
+    }
+
     fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
         let cut = (over_fields::of_part(&device), over_fields::most_members(&device));
         Self::in_shares(device, plan, batch, cut)

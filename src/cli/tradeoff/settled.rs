@@ -4,7 +4,7 @@ use somatic::scene::{Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Combination, Found, Pick, Report, Row, Store, Way, day, measure};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::{in_words, made_up, manner, missed, played};
+use super::{in_words, made_up, manner, missed, played, software};
 use crate::cli::input::Input;
 use crate::cli::say;
 use crate::cli::scene::Asked;
@@ -53,6 +53,15 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
         }
         Found::Nothing => (None, String::new()),
     };
+    // Another run may have been asked to measure it.
+    let report = report.map(|mut report| {
+        let is_gpu = |row: &Row| row.backend == "gpu";
+        let is_left_open = options.backend == BackendKind::Auto;
+        if is_left_open && report.rows.iter().any(is_gpu) && software().is_some() {
+            report.rows.retain(|row| !is_gpu(row));
+        }
+        report
+    });
     if wish.is_empty() {
         return Ok(match report {
             Some(report) => without_wish(options, &report, way, &when),
