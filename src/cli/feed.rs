@@ -26,6 +26,10 @@ pub(super) struct Told {
     pub(super) read_at: Vec<Instant>,
     /// Whether anything so far is stale.
     pub(super) has_stale: bool,
+    /// What is to be said of them.
+    pub(super) notices: Vec<String>,
+    /// What has been lost so far, where that is asked for.
+    pub(super) losses: Vec<String>,
 }
 
 /// How frames are to come.
@@ -50,20 +54,20 @@ pub(super) struct Feed {
 impl Feed {
     /// Starts to read `source`.
     pub(super) fn start(source: Box<dyn Source + Send>, manner: Manner) -> Self {
-        Self::holding(source, manner, if manner.gather { 4 } else { 1024 })
+        Self::holding(source, manner, if manner.gather { 4 } else { 1024 }, true)
     }
 
-    /// Starts to read `source`, which itself drops what is not taken in time, at most so many frames at once.
+    /// Starts to read `source`, which itself drops and tells what is not taken in time, at most so many frames at once.
     pub(super) fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
-        Self::holding(source, Manner { most, gather: false, speed: None }, 1)
+        Self::holding(source, Manner { most, gather: false, speed: None }, 1, false)
     }
 
-    /// Starts to read `source`, of which so many arrivals may wait.
-    fn holding(mut source: Box<dyn Source + Send>, manner: Manner, waiting: usize) -> Self {
+    /// Starts to read `source`, of which so many arrivals may wait, with what it lost up to each if that is asked for.
+    fn holding(mut source: Box<dyn Source + Send>, manner: Manner, waiting: usize, with_losses: bool) -> Self {
         let (sender, arrivals) = sync_channel(waiting);
         let (spare, used) = channel();
         thread::spawn(move || {
-            let end = read(&mut *source, manner, &sender, &used);
+            let end = read(&mut *source, manner, with_losses, &sender, &used);
             // Nobody hears it when the command has ended already.
             let _ = sender.send(end);
         });
@@ -88,6 +92,8 @@ impl Feed {
                     told.progress = further.progress;
                     told.read_at.extend(further.read_at);
                     told.has_stale |= further.has_stale;
+                    told.notices.extend(further.notices);
+                    told.losses = further.losses;
                 }
                 Ok(other) => {
                     self.next = Some(other);
@@ -106,7 +112,13 @@ impl Feed {
 }
 
 /// Reads all of `source`; what it returns is how that ended.
-fn read(source: &mut dyn Source, manner: Manner, to: &SyncSender<Arrival>, used: &Receiver<Vec<Frame>>) -> Arrival {
+fn read(
+    source: &mut dyn Source,
+    manner: Manner,
+    with_losses: bool,
+    to: &SyncSender<Arrival>,
+    used: &Receiver<Vec<Frame>>,
+) -> Arrival {
     let together = if manner.gather { manner.most } else { 1 };
     let width = source.taxels().len();
     let mut pool: Vec<Frame> = Vec::new();
@@ -131,6 +143,10 @@ fn read(source: &mut dyn Source, manner: Manner, to: &SyncSender<Arrival>, used:
             thread::sleep(clock.until(frame.t_s));
         }
         (told.progress, told.has_stale) = (source.progress(), source.has_stale());
+        told.notices = source.notices();
+        if with_losses {
+            told.losses = source.losses();
+        }
         if !frames.is_empty() && to.send(Arrival::Frames(frames, told)).is_err() {
             return Arrival::End(Vec::new());
         }

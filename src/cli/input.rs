@@ -1,6 +1,6 @@
 //! What frames are read from.
 
-use somatic::source::{CsvSource, Cut, Replay, SerialSource, Source, SourceSpec};
+use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, Source, SourceSpec};
 use somatic::{Error, Result, bundled};
 
 use super::scene::Asked;
@@ -34,12 +34,18 @@ impl Input {
         let spec: SourceSpec = text.parse()?;
         let name = match &spec {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
-            SourceSpec::Stdin => "stdin".to_owned(),
+            SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
         };
         let lines = asked.line_flags().lines(&asked.sources)?;
         let input = Self { name, spec: Some(spec), lines };
+        if input.spec == Some(SourceSpec::CsvStdin) {
+            return match asked.repeat {
+                Some(_) => Err(Error::usage("--loop is for recordings in files; standard input cannot be read twice")),
+                None => Ok(input),
+            };
+        }
         if asked.speed.is_some() && !input.is_recording() {
             return Err(Error::usage("--speed is for recordings; live frames come when they come"));
         }
@@ -53,8 +59,13 @@ impl Input {
         self.spec.is_none()
     }
 
+    /// Whether its frames may hold any of the body's taxels: no header says which.
+    pub(super) fn holds_any(&self) -> bool {
+        self.spec == Some(SourceSpec::Stdin)
+    }
+
     pub(super) fn is_recording(&self) -> bool {
-        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Serial { .. }))
+        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::CsvStdin | SourceSpec::Serial { .. }))
     }
 
     /// Opens the serial lines.
@@ -73,8 +84,12 @@ impl Input {
             times: asked.repeat.unwrap_or(Cut::WHOLE.times),
         };
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
+        let strict = asked.strict;
         let open = move || -> Result<Box<dyn Source + Send>> {
             match &spec {
+                Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {
+                    Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict()))
+                }
                 Some(spec) => spec.open(&ids, rate_hz),
                 None => {
                     let length = Some(bundled::TOUCH.len() as u64);

@@ -10,6 +10,7 @@ mod calibrate;
 mod completions;
 mod convert;
 mod devices;
+mod doubts;
 mod feed;
 mod info;
 mod input;

@@ -13,6 +13,7 @@ use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
 use super::attached;
+use super::doubts::Doubts;
 use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
 use super::lines::Live;
@@ -32,11 +33,15 @@ Examples:
   somatic run robot.scene.toml                           all of it from a file
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
+  zcat touch.csv.gz | somatic run --body robot.glb --source csv:-
   somatic run --source mcap:touch.mcap --from 60 --to 90   that minute's half, with the body it was made on
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
 
-A frame on standard input is a line such as {\"t\":0.5,\"values\":{\"7\":12.0}}.
+A frame on standard input is a line such as
+  {\"t\":0.5,\"values\":{\"4\":12.0},\"pose\":{\"hand\":[0.1,0,0.3,0,0,0,1]}}
+t in seconds, raw values by taxel id, and, if links move, where each is in the world: x,y,z in
+metres and a quaternion qx,qy,qz,qw. With --source csv:- it is a row under t,<taxel id>,...
 At a terminal the touched fields are shown; into a pipe goes a line of JSON a frame.";
 
 /// Frames a call for recordings, unless told otherwise.
@@ -99,6 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
+    let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
     asked.line_flags().check_taps(settled.options.calibration.as_ref(), &ids)?;
     let mut engine = Engine::new(&body, settled.options)?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
@@ -119,8 +125,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         let (name, what, why) = engine.backend();
         say(&format!("backend {name} ({what}): {}", settled.why.as_deref().unwrap_or(why)));
     }
+    let mut doubts = None;
     if !asked.quiet {
         say_kept(&engine);
+        let from = Doubts::new(&input.name, &body, source.taxels(), input.holds_any(), is_raw);
+        from.of_taxels(engine.plan()).iter().for_each(|doubt| say(doubt));
+        doubts = Some(from);
     }
 
     // From here on there is something to bring to a clean end.
@@ -146,8 +156,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     };
     let agreement = asked.verify.then(Agreement::default);
     let heeds_stale = live.is_some();
-    let mut pump =
-        Pump { engine, sinks, view, flush: !gather, agreement, unfit: Vec::new(), failed: false, live, heeds_stale };
+    let mut pump = Pump {
+        engine,
+        sinks,
+        view,
+        flush: !gather,
+        agreement,
+        unfit: Vec::new(),
+        failed: false,
+        live,
+        heeds_stale,
+        doubts,
+    };
     let until = lasts.map(|span| Instant::now() + span);
     match pump.run(feed, &stop, until) {
         Ok(losses) => pump.finish(losses),
@@ -177,15 +197,20 @@ struct Pump {
     live: Option<Live>,
     /// Whether the engine heeds what is stale.
     heeds_stale: bool,
+    /// What is looked for in the first frames.
+    doubts: Option<Doubts>,
 }
 
 impl Pump {
     /// Runs until the source ends, the last reader has gone, or `stop` is set; gives what the source lost.
     fn run(&mut self, mut feed: Feed, stop: &AtomicBool, until: Option<Instant>) -> Result<Vec<String>> {
         let watched = self.view.is_table() || self.sinks.is_empty();
+        let mut losses = Vec::new();
         while !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
                 Some(Arrival::Frames(frames, told)) => {
+                    told.notices.iter().filter(|_| !self.view.is_table()).for_each(|notice| say(notice));
+                    losses = told.losses;
                     if told.has_stale && !std::mem::replace(&mut self.heeds_stale, true) {
                         self.engine.heed_stale();
                     }
@@ -193,6 +218,10 @@ impl Pump {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);
                     } else {
                         self.engine.process(&frames)?;
+                    }
+                    let has_seen_enough = self.doubts.as_mut().is_some_and(|doubts| doubts.see(&frames));
+                    if has_seen_enough && !self.view.is_table() {
+                        tell_doubts(&self.engine, &mut self.doubts);
                     }
                     self.view.see(self.engine.percepts(), told.progress);
                     self.pass_on(&frames)?;
@@ -219,7 +248,7 @@ impl Pump {
             }
             self.view.draw();
         }
-        Ok(Vec::new())
+        Ok(losses)
     }
 
     /// Gives `frames`, and what the engine made of them, to every sink.
@@ -243,6 +272,7 @@ impl Pump {
             losses = live.finish()?;
         }
         tell_unfit(&self.engine, &mut self.unfit);
+        tell_doubts(&self.engine, &mut self.doubts);
         for loss in &losses {
             say(&format!("never processed: {loss}"));
         }
@@ -303,6 +333,12 @@ fn tell_unfit(engine: &Engine, told: &mut Vec<(u32, Unfit)>) {
         say(&format!("taxel {id} is used again"));
     }
     *told = now;
+}
+
+/// Says, the first time, what is doubtful in the frames so far.
+fn tell_doubts(engine: &Engine, doubts: &mut Option<Doubts>) {
+    let doubts = doubts.take();
+    doubts.iter().flat_map(|doubts| doubts.of_frames(engine.plan())).for_each(|doubt| say(&doubt));
 }
 
 /// A flag that the first Ctrl-C or termination signal sets; the second ends the process at once.

@@ -35,8 +35,8 @@ pub(super) struct Asked {
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, serial:PORT[@BAUD], which may be several, or - for NDJSON
-    /// on standard input [default: the bundled touch].
+    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, serial:PORT[@BAUD], which may be several, or on standard
+    /// input - for NDJSON and csv:- for CSV [default: the bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -96,6 +96,11 @@ pub(super) struct Asked {
     /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
     #[arg(long)]
     pub(super) tare: bool,
+
+    /// End with an error at the first taxel on standard input that the body does not have [default: its values are left
+    /// out, and the exit code is 3].
+    #[arg(long)]
+    pub(super) strict: bool,
 
     /// Frames per second of a CSV recording that has no column t, in Hz.
     #[arg(long, value_name = "HZ")]
@@ -291,6 +296,7 @@ impl Asked {
             letters: list(&self.letters, file.letters),
             signal: list(&self.signal, file.signal),
             tare: self.tare || file.tare,
+            strict: self.strict || file.strict,
             rate: self.rate.or(file.rate),
             wiring: self.wiring.clone().or(file.wiring),
             live_rate: self.live_rate.or(file.live_rate),

@@ -7,6 +7,12 @@ use crate::signal::{Calibration, FsrSignal, Receptor, TaxelCalibration};
 use crate::stage::layout;
 
 impl Plan {
+    /// The taxels of field `field` of the percepts, as indices into the body's.
+    pub fn taxels_of(&self, field: usize) -> impl Iterator<Item = usize> + '_ {
+        let members = self.fields.get(field).map_or(&[][..], |field| self.members_of(field));
+        members.iter().map(|member| self.body_taxels[self.channel_of(member.slot as usize)])
+    }
+
     /// Makes the taxels, slot by slot, and gives each
     /// letter's first slot.
     pub(super) fn lay_out_slots(&mut self, calibration: &Calibration) -> Result<Vec<u32>> {

@@ -1,7 +1,8 @@
 //! Recordings as CSV: a header `t,<taxel id>,<taxel id>,...`, then a row a frame.
 //!
-//! A blank cell is a missing value; `nan` and `inf` are values that a sensor got wrong. Rows are read one at a time, so
-//! memory does not grow with the length of a recording.
+//! A blank cell is a missing value; `nan` and `inf` are values that a sensor got wrong. All cells are numbers, so a quote
+//! means nothing: a pair around one cell is ignored, and any other is an error in its own row. Rows are read one at a time,
+//! so memory does not grow with the length of a recording.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -14,7 +15,7 @@ use super::Source;
 use crate::error::{Error, Result};
 use crate::signal::{Frame, RawValue};
 
-/// Bytes a row may have. A stray quote would otherwise pull the rest of the file into one row.
+/// Bytes a row may have, so that what is no CSV does not fill the memory.
 const MAX_ROW: usize = 64 << 20;
 
 /// A recording read from CSV.
@@ -74,6 +75,7 @@ impl CsvSource {
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
+            .quoting(false)
             // Of `\r\n` the `\r` is trimmed with other blanks: only so is it known on which line a row stands.
             .terminator(csv::Terminator::Any(b'\n'))
             .buffer_capacity(1 << 16)
@@ -152,25 +154,44 @@ impl CsvSource {
         self.reader.position().line() - u64::from(!(read.ended && read.last != b'\n'))
     }
 
+    /// What is wrong with the first cell of the row just read that holds a quote and is not in a pair of them.
+    fn stray_quote(&self) -> Option<Error> {
+        // Hardly any row has one.
+        if !self.row.as_slice().contains(&b'"') {
+            return None;
+        }
+        let (index, cell) = self.row.iter().enumerate().find(|(_, cell)| trimmed(cell).contains(&b'"'))?;
+        let taxel = index.checked_sub(self.time.columns()).and_then(|index| self.taxels.get(index));
+        let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
+        let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
+        Some(Error::failed(format!("`{word}` has a quote; numbers stand without quotes: remove it")).at(place))
+    }
+
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         if !self.read_row()? {
             return Ok(false);
         }
         let (found, wanted) = (self.row.len(), self.time.columns() + self.taxels.len());
         let line = self.line();
+        let at_line = |e: Error| e.at(format!("line {line}"));
+        let quote = self.stray_quote();
         if found != wanted {
             // Only a last row may be ragged: the recorder was stopped in the middle of it.
             if self.read_row()? {
-                return Err(Error::failed(format!(
-                    "{found} values where the header has {wanted} columns; complete or delete the row"
-                ))
-                .at(format!("line {line}")));
+                let ragged = || {
+                    Error::failed(format!(
+                        "{found} values where the header has {wanted} columns; complete or delete the row"
+                    ))
+                };
+                return Err(at_line(quote.unwrap_or_else(ragged)));
             }
             let how = if found < wanted { "truncated" } else { "too long" };
             self.losses.push(format!("{}: line {line}: last row {how}: {found} of {wanted} values", self.name));
             return Ok(false);
         }
-        let at_line = |e: Error| e.at(format!("line {line}"));
+        if let Some(quote) = quote {
+            return Err(at_line(quote));
+        }
         frame.clear();
         frame.values.resize(self.taxels.len(), RawValue::MISSING);
         let mut cells = self.row.iter();
@@ -213,6 +234,8 @@ fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
     }
     let remedy = if cell.starts_with(b"\xFF\xFE") || cell.starts_with(b"\xFE\xFF") {
         "the file is UTF-16; save it as UTF-8"
+    } else if word.contains('"') {
+        "ids stand without quotes: remove the quote"
     } else if word.contains([';', '\t']) {
         "columns are separated by commas"
     } else if word.contains('\r') {
@@ -225,6 +248,12 @@ fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
         "the header is `t,<taxel id>,<taxel id>,...`, and ids are whole numbers"
     };
     Err(Error::failed(format!("column {column} is headed `{}`, which is no taxel id; {remedy}", shortened(&word))))
+}
+
+/// Whether `line` could be a header or a row of a recording: `t`, numbers and blanks, with commas between them.
+pub(super) fn is_row(line: &[u8]) -> bool {
+    let is_cell = |cell: &[u8]| matches!(trimmed(cell), b"" | b"t") || number(trimmed(cell)).is_some();
+    line.contains(&b',') && line.split(|&byte| byte == b',').all(is_cell)
 }
 
 fn parse_time(cell: &[u8]) -> Result<f64> {
@@ -268,13 +297,18 @@ fn number(word: &[u8]) -> Option<f64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
+/// What is in `cell`, without blanks around it, or a pair of quotes.
 fn trimmed(cell: &[u8]) -> &[u8] {
-    cell.trim_ascii()
+    match cell.trim_ascii() {
+        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
+        bare => bare,
+    }
 }
 
 /// As much of `word` as fits in a message.
 fn shortened(word: &str) -> String {
-    let mut short: String = word.chars().take(40).flat_map(char::escape_debug).collect();
+    let short: String = word.chars().take(40).flat_map(char::escape_debug).collect();
+    let mut short = short.replace("\\\"", "\"");
     if word.chars().nth(40).is_some() {
         short.push('…');
     }
@@ -293,7 +327,7 @@ impl Read for Metered {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.since_row > MAX_ROW {
             return Err(io::Error::other(format!(
-                "a row of over {} MiB: a quote without its partner, or no CSV at all",
+                "a row of over {} MiB: no CSV, or its lines have no end",
                 MAX_ROW >> 20
             )));
         }
@@ -427,11 +461,34 @@ mod tests {
     }
 
     #[test]
-    fn a_quote_without_its_partner_does_not_fill_the_memory() {
-        let text = &b"t,4\n0,\"1\n"[..];
+    fn a_stray_quote_is_an_error_in_its_own_row() {
+        let mut text = "t,4,7\n".to_owned();
+        for row in 0..2000 {
+            text += &format!("{row},1,{}2\n", if row == 9 { "\"" } else { "" });
+        }
+        let mut source = open(&text, None).unwrap();
+        let mut frame = Frame::missing(0.0, 2);
+        for _ in 0..9 {
+            assert!(source.next_frame(&mut frame).unwrap());
+        }
+        assert_eq!(
+            source.next_frame(&mut frame).unwrap_err().to_string(),
+            "a.csv: line 11: column 3 (taxel 7): `\"2` has a quote; numbers stand without quotes: remove it"
+        );
+        assert!(why("t,4\n\"0,1\n1,2\n", None).starts_with("a.csv: line 2: column 1: `\"0` has a quote"));
+        assert!(why("t,4\n0,1\"\"2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `1\"\"2` has a quote"));
+        // A comma for the decimal point, as some spreadsheets write it.
+        assert!(why("t,4\n0,\"1,5\"\n1,2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `\"1` has"));
+        assert!(why("t,\"4\n0,1\n", None).contains("column 2 is headed `\"4`, which is no taxel id; ids stand"));
+    }
+
+    #[test]
+    fn a_row_without_end_does_not_fill_the_memory() {
+        let text = &b"t,4\n0,1\n"[..];
         let mut source = CsvSource::from_reader("a.csv", text.chain(io::repeat(b'1')), None, None).unwrap();
+        assert!(source.next_frame(&mut Frame::missing(0.0, 1)).unwrap());
         let error = source.next_frame(&mut Frame::missing(0.0, 1)).unwrap_err();
-        assert!(error.to_string().contains("quote"), "{error}");
+        assert!(error.to_string().contains("over 64 MiB"), "{error}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod replay;
 mod serial;
 mod simulated;
 mod spec;
+mod unknown;
 
 pub use self::csv::CsvSource;
 pub use csv_file::CsvFile;
@@ -61,6 +62,11 @@ pub trait Source {
     /// When the last byte of the last frame was read, where that is known; asked for once a frame.
     fn read_at(&mut self) -> Option<Instant> {
         None
+    }
+
+    /// What is to be said of the frames since the last call, a line each.
+    fn notices(&mut self) -> Vec<String> {
+        Vec::new()
     }
 
     /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.

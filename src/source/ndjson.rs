@@ -2,16 +2,19 @@
 //! `{"t":s,"values":{"<taxel id>":raw},"pose":{"<link>":[x,y,z,qx,qy,qz,qw]}}`.
 //!
 //! A taxel that a line leaves out, or gives as `null`, is missing; `"nan"` and `"inf"` are values that a sensor got
-//! wrong. A line goes straight into the frame, without a tree of JSON values in between.
+//! wrong. A taxel that the body does not have is named once, and its values are left out and counted. A line goes
+//! straight into the frame, without a tree of JSON values in between.
 
 use std::collections::HashMap;
 use std::fmt;
-use std::io::{BufRead, Read as _};
+use std::io::{BufRead, BufReader, Read as _};
 
 use glam::{DQuat, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::Source;
+use super::csv::is_row;
+use super::unknown::Unknown;
 use crate::error::{Error, Result};
 use crate::signal::{Frame, Pose, RawValue};
 
@@ -36,10 +39,11 @@ struct Taxels {
     ids: Vec<u32>,
     index: HashMap<u32, usize>,
     last_line: Vec<u64>,
+    unknown: Unknown,
 }
 
 impl NdjsonSource {
-    /// Reads frames from `reader`, which messages call `name`. Frames may give the taxels `ids`, and no others.
+    /// Reads frames from `reader`, which messages call `name`, for a body that has the taxels `ids`.
     #[must_use]
     pub fn new(name: impl Into<String>, reader: impl BufRead + Send + 'static, ids: Vec<u32>) -> Self {
         let index = ids.iter().enumerate().map(|(index, &id)| (id, index)).collect();
@@ -49,9 +53,22 @@ impl NdjsonSource {
             reader: Box::new(reader),
             line: Vec::new(),
             line_number: 0,
-            taxels: Taxels { ids, index, last_line },
+            taxels: Taxels { ids, index, last_line, unknown: Unknown::default() },
             losses: Vec::new(),
         }
+    }
+
+    /// Reads frames from standard input, for a body that has the taxels `ids`.
+    #[must_use]
+    pub fn stdin(ids: Vec<u32>) -> Self {
+        Self::new("stdin", BufReader::with_capacity(1 << 16, std::io::stdin()), ids)
+    }
+
+    /// The same, for which a taxel that the body does not have is an error.
+    #[must_use]
+    pub fn strict(mut self) -> Self {
+        self.taxels.unknown.refused = true;
+        self
     }
 
     /// Reads the next line that is not blank into `self.line`. `None` at the end, else whether it has its newline.
@@ -102,6 +119,10 @@ impl NdjsonSource {
                 ));
                 Ok(false)
             }
+            Err(_) if is_row(line) => {
+                Err(Error::failed("this is CSV, and `-` reads a line of JSON a frame; say --source csv:-")
+                    .at(format!("line {}", self.line_number)))
+            }
             Err(e) => Err(explained(&e, self.line_number)),
         }
     }
@@ -116,8 +137,14 @@ impl Source for NdjsonSource {
         self.read_frame(frame).map_err(|e| e.at(&self.name))
     }
 
+    fn notices(&mut self) -> Vec<String> {
+        let place = |what: String| format!("{}: line {}: {what}", self.name, self.line_number);
+        self.taxels.unknown.notice().map(place).into_iter().collect()
+    }
+
     fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        let unknown = self.taxels.unknown.loss().map(|what| format!("{}: {what}", self.name));
+        self.losses.iter().cloned().chain(unknown).collect()
     }
 }
 
@@ -252,9 +279,12 @@ impl<'de> Visitor<'de> for ValuesSeed<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         while let Some(id) = map.next_key_seed(IdSeed)? {
             let Some(&index) = self.taxels.index.get(&id) else {
-                return Err(A::Error::custom(format!(
-                    "the body has no taxel {id}; leave it out, or give the body that has it"
-                )));
+                self.taxels.unknown.check(id).map_err(A::Error::custom)?;
+                // One that is null is missing, as it would be without the key.
+                if map.next_value::<Option<IgnoredAny>>()?.is_some() {
+                    self.taxels.unknown.leave_out(id);
+                }
+                continue;
             };
             if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
                 return Err(A::Error::custom(format!("taxel {id} is there twice; give each taxel once")));
@@ -469,8 +499,7 @@ mod tests {
     #[test]
     fn errors_name_line_and_what_is_wrong() {
         let second = |line: &str| why(&format!("{{\"t\":0}}\n{line}\n"));
-        assert!(second("{\"t\":1,\"values\":{\"5\":1}}").starts_with("stdin: line 2, column"));
-        assert!(second("{\"t\":1,\"values\":{\"5\":1}}").contains("no taxel 5; leave it out"));
+        assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").starts_with("stdin: line 2, column"));
         assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").contains("taxel 4 is there twice"));
         assert!(second("{\"t\":1,\"values\":{\"palm\":1}}").contains("`palm` is no taxel id"));
         assert!(second("{\"t\":1,\"values\":{\"4\":\"1\"}}").contains("without quotes"));
@@ -489,6 +518,42 @@ mod tests {
     }
 
     #[test]
+    fn values_of_taxels_that_the_body_does_not_have_are_left_out_named_once_and_counted() {
+        let mut source = source(
+            "{\"t\":0,\"values\":{\"5\":1,\"4\":2,\"6\":null}}\n{\"t\":1,\"values\":{\"5\":1,\"8\":\"nan\",\"9\":3}}\n",
+        );
+        let mut frame = Frame::missing(0.0, 3);
+        assert!(source.next_frame(&mut frame).unwrap());
+        assert_eq!(format!("{:?}", frame.values), "[2, missing, missing]");
+        let start = "stdin: line 1: the body has no taxel 5; its values are left out";
+        assert!(source.notices()[0].starts_with(start) && source.notices().is_empty());
+        assert!(source.next_frame(&mut frame).unwrap());
+        assert_eq!(format!("{:?}", frame.values), "[missing, missing, 3]");
+        assert!(source.notices()[0].contains("no taxel 8;"));
+        assert_eq!(source.losses(), ["stdin: 3 values of taxels that the body does not have (5, 8)"]);
+        assert!(!source.next_frame(&mut frame).unwrap());
+    }
+
+    #[test]
+    fn strictly_a_taxel_that_the_body_does_not_have_is_an_error() {
+        let mut source = source("{\"t\":0}\n{\"t\":1,\"values\":{\"5\":1}}\n").strict();
+        let mut frame = Frame::missing(0.0, 3);
+        assert!(source.next_frame(&mut frame).unwrap());
+        let error = source.next_frame(&mut frame).unwrap_err().to_string();
+        assert!(error.starts_with("stdin: line 2, column") && error.contains("no taxel 5; leave it out"), "{error}");
+    }
+
+    #[test]
+    fn csv_is_told_from_json() {
+        for line in ["t,4,7", "0.5, 1,-2e3,", "\u{feff}t,4", "4,7\r"] {
+            assert!(why(&format!("{line}\n0,1,2\n")).ends_with("say --source csv:-"), "{}", why(line));
+        }
+        for line in ["hello, world", "7", "{\"t\":0,}", "[0,1,2]"] {
+            assert!(!why(&format!("{line}\n")).contains("csv:-"), "{line}");
+        }
+    }
+
+    #[test]
     fn a_last_line_cut_short_anywhere_is_a_loss() {
         let last =
             "{\"t\":1.25,\"values\":{\"4\":null,\"7\":\"nan\",\"9\":-1.5e-3},\"pose\":{\"hand\":[0,0,0,0,0,0,1]}}";
@@ -502,7 +567,7 @@ mod tests {
 
     #[test]
     fn a_line_without_end_does_not_fill_the_memory() {
-        let endless = std::io::BufReader::new(std::io::repeat(b' '));
+        let endless = BufReader::new(std::io::repeat(b' '));
         let error = NdjsonSource::new("stdin", endless, vec![]).next_frame(&mut Frame::default()).unwrap_err();
         assert!(error.to_string().contains("line 1: a line of over 64 MiB"), "{error}");
     }

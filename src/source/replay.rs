@@ -167,6 +167,10 @@ impl Source for Replay {
         self.had_stale || self.source.has_stale()
     }
 
+    fn notices(&mut self) -> Vec<String> {
+        self.source.notices()
+    }
+
     fn losses(&self) -> Vec<String> {
         self.losses.clone()
     }

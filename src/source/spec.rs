@@ -1,13 +1,13 @@
 //! What a person writes to name a source.
 
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source};
 use crate::error::{Error, Result, nearest};
 
-const FORMS: &str = "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, or - for NDJSON on standard input";
+const FORMS: &str =
+    "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, or - for NDJSON and csv:- for CSV on standard input";
 
 /// A source as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,6 +28,8 @@ pub enum SourceSpec {
     Sim(PathBuf),
     /// `-`: NDJSON frames on standard input.
     Stdin,
+    /// `csv:-`: CSV on standard input.
+    CsvStdin,
 }
 
 impl FromStr for SourceSpec {
@@ -38,9 +40,13 @@ impl FromStr for SourceSpec {
             return Ok(Self::Stdin);
         }
         let bad = |what: String| Err(Error::usage(what).at(format!("source `{text}`")));
+        if is_port(text) {
+            return bad(format!("a serial port is written serial:{text}"));
+        }
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
             "csv" | "serial" | "mcap" | "sim" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
+            "csv" if rest == "-" => Ok(Self::CsvStdin),
             "csv" => Ok(Self::Csv(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
             "sim" => Ok(Self::Sim(rest.into())),
@@ -67,21 +73,32 @@ impl FromStr for SourceSpec {
     }
 }
 
+/// Whether `text` is the bare name of a serial port, as Linux, macOS or Windows have them.
+fn is_port(text: &str) -> bool {
+    let is_com = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit()) && !rest.contains('.');
+    ["/dev/tty", "/dev/serial/", "/dev/cu.", "/dev/pts/"].iter().any(|start| text.starts_with(start))
+        || text.strip_prefix("COM").is_some_and(is_com)
+}
+
 impl SourceSpec {
+    /// Whether it is read from standard input.
+    #[must_use]
+    pub fn is_stdin(&self) -> bool {
+        matches!(self, Self::Stdin | Self::CsvStdin)
+    }
+
     /// Opens the source. `taxels` are the ids that the body has, `rate_hz` the rate of a CSV without a column `t`.
     ///
     /// # Errors
     /// It cannot be opened, or this build does not read it; a usage error where a rate makes no sense.
     pub fn open(&self, taxels: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
-        if rate_hz.is_some() && !matches!(self, Self::Csv(_)) {
+        if rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin) {
             return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
         }
         match self {
             Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
-            Self::Stdin => {
-                let reader = BufReader::with_capacity(1 << 16, std::io::stdin());
-                Ok(Box::new(NdjsonSource::new("stdin", reader, taxels.to_vec())))
-            }
+            Self::CsvStdin => Ok(Box::new(CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?)),
+            Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()))),
             #[cfg(feature = "mcap")]
             Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
             #[cfg(not(feature = "mcap"))]
@@ -113,6 +130,7 @@ mod tests {
         assert_eq!(parsed("a/b.CSV"), SourceSpec::Csv("a/b.CSV".into()));
         assert_eq!(parsed("C:\\b.csv"), SourceSpec::Csv("C:\\b.csv".into()));
         assert_eq!(parsed("-"), SourceSpec::Stdin);
+        assert_eq!(parsed("csv:-"), SourceSpec::CsvStdin);
         assert_eq!(parsed("sim:touch.toml"), SourceSpec::Sim("touch.toml".into()));
         assert_eq!(parsed("serial:COM3"), SourceSpec::Serial { port: "COM3".into(), baud: None });
         let port = "/dev/ttyUSB0".to_owned();
@@ -131,6 +149,12 @@ mod tests {
         assert!(why("a.txt").contains("csv:FILE"));
         assert!(why("").contains("csv:FILE"));
         assert!(why("serial:a@fast").contains("baud"));
+        for port in ["/dev/ttyUSB0", "/dev/ttyACM0@9600", "/dev/serial/by-path/pci-0:1.0-port0", "/dev/cu.usb1", "COM3"]
+        {
+            let written = format!("source `{port}`: a serial port is written serial:{port}");
+            assert_eq!(why(port), written);
+        }
+        assert!(why("COM3.txt").contains("csv:FILE"));
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod bench;
 mod board;
 mod calibrate;
 mod devices;
+mod doubts;
 mod fields;
 mod inspect;
 mod live;
@@ -21,6 +22,7 @@ mod run;
 #[cfg(unix)]
 mod serial;
 mod simulate;
+mod sources;
 mod tradeoff;
 #[cfg(unix)]
 mod tune;

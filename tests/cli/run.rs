@@ -24,6 +24,26 @@ fn has_adapters() -> bool {
     there
 }
 
+/// What kind of adapters there are.
+#[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+enum Gpus {
+    Hardware,
+    Software,
+    None,
+}
+
+fn gpus() -> Gpus {
+    #[cfg(feature = "gpu")]
+    let kinds: Vec<&str> = somatic::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
+    #[cfg(not(feature = "gpu"))]
+    let kinds: Vec<&str> = Vec::new();
+    match kinds.iter().filter(|kind| **kind != "software").count() {
+        0 if kinds.is_empty() => Gpus::None,
+        0 => Gpus::Software,
+        _ => Gpus::Hardware,
+    }
+}
+
 fn fields(frame: &Value) -> &Vec<Value> {
     frame["fields"].as_array().unwrap()
 }
@@ -432,7 +452,7 @@ fn a_signal_brings_a_run_that_waits_for_input_to_a_clean_end() {
         let out = folder.path().join("out.ndjson");
         let mut run = Piped::start(&["--sink", "-", "--sink", text_of(&out)]);
         for t in 0..2 {
-            run.send(&format!(r#"{{"t":{t},"values":{{"4":1}}}}"#));
+            run.send(&format!(r#"{{"t":0.{t},"values":{{"4":1}}}}"#));
             run.line();
         }
         assert_eq!(files_in(folder.path()), ["out.ndjson.part"]);
@@ -451,7 +471,11 @@ fn auto_says_once_what_it_chose_and_quiet_says_nothing() {
     let said: Vec<String> =
         stderr(&output).lines().filter(|line| line.starts_with("somatic:")).map(str::to_owned).collect();
     assert_eq!(said.len(), 1, "{said:?}");
-    let why = if has_adapters() { "measured on this plan, 256 frames a call: cpu " } else { "no GPU" };
+    let why = match gpus() {
+        Gpus::Hardware => "measured on this plan, 256 frames a call: cpu ",
+        Gpus::Software => "computes on the same CPU",
+        Gpus::None => "no GPU driver answers",
+    };
     assert!(said[0].starts_with("somatic: backend ") && said[0].contains(why), "{said:?}");
     let quiet = super::output(&["run", "--quiet"]);
     assert!(!stderr(&quiet).contains("somatic:"));

@@ -9,6 +9,11 @@ impl Asked {
     pub(super) fn check(&self) -> Result<()> {
         self.check_accuracy().map_err(|(_, e)| e)?;
         self.line_flags().lines(&self.sources)?;
+        if self.strict && self.sources != ["-"] {
+            return Err(Error::usage(
+                "--strict is for --source -; in other sources a taxel that the body does not have is always an error",
+            ));
+        }
         if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
             return Err(Error::usage(format!(
                 "--speed {speed} is no speed; give a positive number, 1 for as recorded"
