@@ -69,6 +69,10 @@ pub(super) struct Arguments {
     #[arg(long)]
     equalise: bool,
 
+    /// Mask the sensors that moved during the rest, instead of writing nothing: for broken ones.
+    #[arg(long)]
+    mask_moved: bool,
+
     /// Frames per second of a CSV recording that has no column t, in Hz.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -110,7 +114,11 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         tell(lines);
     }
     let lost = gathered?;
-    let findings = survey.finish(Wishes { bits: arguments.bits, equalise: arguments.equalise })?;
+    let findings = survey.finish(Wishes {
+        bits: arguments.bits,
+        equalise: arguments.equalise,
+        mask_moved: arguments.mask_moved,
+    })?;
 
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
@@ -163,7 +171,7 @@ fn gather(
     arguments: &Arguments,
     lines: Option<&Lines>,
 ) -> Result<Vec<String>> {
-    let is_live = lines.is_some() || first_of(&arguments.sources)? == SourceSpec::Stdin;
+    let is_live = lines.is_some() || first_of(&arguments.sources)?.is_stdin();
     let stop = stop_on_signal()?;
     let mut feed = match lines {
         Some(_) => Feed::start_live(source, 64),
@@ -175,12 +183,14 @@ fn gather(
         }
     };
     guide(&format!("leave the robot alone for {} s", arguments.rest));
-    let mut begin = None;
+    let (mut begin, mut lost) = (None, Vec::new());
     let mut is_pressing = false;
     while !stop.load(Ordering::Relaxed) {
         lines.into_iter().for_each(tell);
         match feed.next(Duration::from_millis(40)) {
-            Some(Arrival::Frames(frames, _)) => {
+            Some(Arrival::Frames(frames, told)) => {
+                told.notices.iter().for_each(|notice| say(notice));
+                lost = told.losses;
                 for frame in &frames {
                     let since_s = frame.t_s - *begin.get_or_insert(frame.t_s);
                     if since_s < arguments.rest {
@@ -195,7 +205,7 @@ fn gather(
                         });
                     }
                     if arguments.press.is_some_and(|press| since_s >= arguments.rest + press) {
-                        return Ok(Vec::new());
+                        return Ok(lost);
                     }
                     survey.press(&frame.values);
                 }
@@ -206,7 +216,7 @@ fn gather(
             None => {}
         }
     }
-    Ok(Vec::new())
+    Ok(lost)
 }
 
 fn table_of(findings: &Findings) -> String {
@@ -223,7 +233,7 @@ fn table_of(findings: &Findings) -> String {
         |value: f64| format!("{value:.3e}").parse().map_or_else(|_| value.to_string(), |short: f64| short.to_string());
     let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), number);
     let row = |found: &Found| {
-        let Found { id, baseline, noise, dead_band, travel, full, gain } = *found;
+        let Found { id, baseline, noise, dead_band, travel, full, gain, .. } = *found;
         [
             id.to_string(),
             or_dash(baseline),

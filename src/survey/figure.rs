@@ -112,6 +112,7 @@ mod tests {
             travel,
             full: None,
             gain: 1.0,
+            moved: false,
         };
         let findings =
             Findings { sensors: vec![sensor(0, Some(200.0)), sensor(1, None)], invert: true, raw_range: None };

@@ -87,7 +87,7 @@ mod tests {
 
     fn found(id: u32, baseline: Option<f64>) -> Found {
         let full = baseline.map(|baseline| baseline - 0.5);
-        Found { id, baseline, noise: 1.0, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0 }
+        Found { id, baseline, noise: 1.0, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0, moved: false }
     }
 
     #[test]

@@ -4,6 +4,10 @@
 //! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
 //! as far as it is the middle one of three in succession, so that a single wrong value is no press. Which side is the
 //! pressed one is told by most of the sensors.
+//!
+//! A sensor has **moved** during the rest where it strays far, again by the middle ones of three values, and farther than
+//! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over
+//! its way.
 
 mod figure;
 mod file;
@@ -20,6 +24,12 @@ const EXCEEDED: f64 = 1e-3;
 const MARGIN: f64 = 1.5;
 /// A travel under this many dead bands is no press.
 const CLEAR: f64 = 3.0;
+/// Chance takes a value this many standard deviations from the baseline at most.
+const CHANCE: f64 = 12.0;
+/// The share of the raw range over which a dead band is too wide where chance does not explain it,
+const WIDE: f64 = 1.0 / 16.0;
+/// and where it does, or a single wrong value makes it.
+const TOO_WIDE: f64 = 1.0 / 4.0;
 /// Noise over this many times that of most sensors is worth a word.
 const LOUD: f64 = 5.0;
 
@@ -52,8 +62,7 @@ impl Default for Pressed {
 impl Pressed {
     fn see(&mut self, value: f32) {
         if self.seen >= 2 {
-            let [a, b] = self.last;
-            let middle = a.max(b).min(a.min(b).max(value));
+            let middle = middle(self.last[0], self.last[1], value);
             (self.low, self.high) = (self.low.min(middle), self.high.max(middle));
         }
         self.last = [self.last[1], value];
@@ -68,6 +77,8 @@ pub struct Wishes {
     pub bits: Option<u8>,
     /// Give every pressed sensor the gain that makes its travel the median one: for sensors that were all pressed alike.
     pub equalise: bool,
+    /// Mask the sensors that moved at rest, where they are an error otherwise: for broken ones.
+    pub mask_moved: bool,
 }
 
 /// One sensor, as it was found.
@@ -87,6 +98,8 @@ pub struct Found {
     pub full: Option<f64>,
     /// P a raw unit.
     pub gain: f64,
+    /// Whether it moved at rest, so that the above says nothing.
+    pub moved: bool,
 }
 
 /// What a survey has come to.
@@ -160,7 +173,7 @@ impl Survey {
     /// What follows from what was seen.
     ///
     /// # Errors
-    /// There was no rest, or nothing was pressed; a usage error for bits that no converter has.
+    /// There was no rest, or sensors moved during it, or nothing was pressed; a usage error for bits that no converter has.
     pub fn finish(&self, wishes: Wishes) -> Result<Findings> {
         if wishes.bits.is_some_and(|bits| !(1..=24).contains(&bits)) {
             return Err(Error::usage("a converter has 1 to 24 bits"));
@@ -187,12 +200,36 @@ impl Survey {
             (0..self.ids.len()).filter(|&i| clear(i, side) && travels[i][side] > travels[i][1 - side]).count()
         };
         let (falling, rising) = (votes(0), votes(1));
+        let raw_range = wishes.bits.map(|bits| [0.0, (1_u32 << bits) as f64 - 1.0]);
+        // Where nothing was pressed, what was seen of the range is no measure.
+        let is_range_known = raw_range.is_some() || falling + rising > 0;
+        let range = raw_range.map_or_else(|| self.seen_range(), |[low, high]| high - low);
+        let moved: Vec<bool> = (0..self.ids.len())
+            .map(|sensor| {
+                let Some((baseline, noise)) = at_rest[sensor] else { return false };
+                let movement = movement_of(&self.rest[sensor], baseline);
+                let by_chance = CHANCE * chance_of(&self.rest[sensor], step);
+                (dead_band(movement) > WIDE * range && movement > by_chance)
+                    || (is_range_known && dead_band(noise) > TOO_WIDE * range)
+            })
+            .collect();
+        if moved.contains(&true) && !wishes.mask_moved {
+            let widest = (0..self.ids.len()).filter(|&sensor| moved[sensor]).filter_map(|sensor| at_rest[sensor]);
+            let widest = widest.map(|(_, noise)| dead_band(noise)).fold(0.0, f64::max);
+            let ids: Vec<u32> = self.ids.iter().zip(&moved).filter(|(_, moved)| **moved).map(|(id, _)| *id).collect();
+            return Err(Error::failed(format!(
+                "{} of {} sensors moved during the rest: {}; their dead bands would be up to {widest} of a raw range of \
+                 {range}. Keep everything off the robot until the rest is over; --mask-moved leaves broken sensors out",
+                ids.len(),
+                self.ids.len(),
+                several(&ids)
+            )));
+        }
         if falling + rising == 0 {
             return Err(Error::failed("no sensor left its rest; press every sensor firmly once the rest is over"));
         }
         let invert = falling > rising;
         let side = usize::from(!invert);
-        let raw_range = wishes.bits.map(|bits| [0.0, (1_u32 << bits) as f64 - 1.0]);
         let end = match raw_range {
             Some([low, high]) => Some(if invert { low } else { high }),
             None => self.stop_of_many(invert, |sensor| clear(sensor, side)),
@@ -217,9 +254,19 @@ impl Survey {
                     (Some(travel), Some(usual)) if wishes.equalise => rounded(usual / travel),
                     _ => 1.0,
                 },
+                moved: moved[sensor],
             }
         });
         Ok(Findings { sensors: sensors.collect(), invert, raw_range })
+    }
+
+    /// How far apart the raw values of all sensors were, at rest and pressed.
+    fn seen_range(&self) -> f64 {
+        let at_rest = self.rest.iter().flatten().copied();
+        let pressed = self.pressed.iter().filter(|pressed| pressed.seen > 2);
+        let all = at_rest.chain(pressed.flat_map(|pressed| [pressed.low, pressed.high]));
+        let (low, high) = all.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        (f64::from(high) - f64::from(low)).max(0.0)
     }
 
     /// The raw value that at least three pressed sensors, and a tenth of them, went to and never beyond.
@@ -238,10 +285,34 @@ impl Survey {
 fn rest_of(kept: &[f32]) -> Option<(f64, f64)> {
     let mut values: Vec<f64> = kept.iter().map(|&value| value.into()).collect();
     let baseline = median(&mut values)?;
-    let mut strays: Vec<f64> = values.iter().map(|value| (value - baseline).abs()).collect();
+    Some((baseline, noise_of(values.into_iter(), baseline)))
+}
+
+/// How far from `baseline` all `values` stay but for the share that noise may exceed; 0 where there are none.
+fn noise_of(values: impl Iterator<Item = f64>, baseline: f64) -> f64 {
+    let mut strays: Vec<f64> = values.map(|value| (value - baseline).abs()).collect();
     strays.sort_by(f64::total_cmp);
     let rank = ((1.0 - EXCEEDED) * strays.len() as f64).ceil() as usize;
-    Some((baseline, strays[rank.clamp(1, strays.len()) - 1]))
+    strays.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+}
+
+/// How far a sensor moved at rest: its noise without single wrong values.
+fn movement_of(kept: &[f32], baseline: f64) -> f64 {
+    noise_of(kept.windows(3).map(|three| middle(three[0], three[1], three[2]).into()), baseline)
+}
+
+/// The middle one of three values.
+fn middle(a: f32, b: f32, c: f32) -> f32 {
+    a.max(b).min(a.min(b).max(c))
+}
+
+/// The standard deviation of a sensor's values at rest as the steps between them tell it, and at least that of rounding to
+/// whole multiples of `unit`.
+fn chance_of(kept: &[f32], unit: f64) -> f64 {
+    /// The median of the size of the difference of two normal values, in their standard deviation: √2 · 0.6745.
+    const MEDIAN_STEP: f64 = 0.953_87;
+    let mut steps: Vec<f64> = kept.windows(2).map(|pair| (f64::from(pair[1]) - f64::from(pair[0])).abs()).collect();
+    (median(&mut steps).unwrap_or(0.0) / MEDIAN_STEP).max(unit / 12.0_f64.sqrt())
 }
 
 /// How far a sensor went down and up from its baseline.
@@ -258,6 +329,14 @@ fn travels(rest: &Option<(f64, f64)>, pressed: &Pressed) -> [f64; 2] {
 fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len().checked_sub(1)? / 2).copied()
+}
+
+/// The first few of `ids`, and how many more there are.
+fn several(ids: &[u32]) -> String {
+    const SHOWN: usize = 12;
+    let names: Vec<String> = ids.iter().take(SHOWN).map(ToString::to_string).collect();
+    let rest = if ids.len() > SHOWN { format!(" and {} more", ids.len() - SHOWN) } else { String::new() };
+    format!("{}{rest}", names.join(", "))
 }
 
 /// `value` with four significant digits.
@@ -278,21 +357,19 @@ impl Findings {
             (Some([low, high]), Some(baseline)) => baseline == if self.invert { low } else { high },
             _ => false,
         };
-        let kinds: [(&str, Vec<u32>); 4] = [
+        let kinds: [(&str, Vec<u32>); 5] = [
             ("delivered nothing at rest, and are masked", ids(&|found| found.baseline.is_none())),
             ("stand at the end of their range untouched, and are masked", ids(&at_its_end)),
             (
                 "were not pressed, and so have no travel",
-                ids(&|f| f.baseline.is_some() && f.travel.is_none() && !at_its_end(f)),
+                ids(&|f| f.baseline.is_some() && f.travel.is_none() && !at_its_end(f) && !f.moved),
             ),
-            ("are far noisier than the others at rest", ids(&|found| usual > 0.0 && found.noise > LOUD * usual)),
+            ("moved at rest, and are masked", ids(&|found| found.moved && !at_its_end(found))),
+            (
+                "are far noisier than the others at rest",
+                ids(&|found| usual > 0.0 && found.noise > LOUD * usual && !found.moved),
+            ),
         ];
-        let several = |ids: &[u32]| {
-            const SHOWN: usize = 12;
-            let names: Vec<String> = ids.iter().take(SHOWN).map(ToString::to_string).collect();
-            let rest = if ids.len() > SHOWN { format!(" and {} more", ids.len() - SHOWN) } else { String::new() };
-            format!("{}{rest}", names.join(", "))
-        };
         kinds
             .into_iter()
             .filter(|(_, ids)| !ids.is_empty())
@@ -303,7 +380,7 @@ impl Findings {
     /// Whether nothing can be felt through `found`.
     fn is_lost(&self, found: &Found) -> bool {
         let end = self.raw_range.map(|[low, high]| if self.invert { low } else { high });
-        found.baseline.is_none() || found.baseline == end
+        found.baseline.is_none() || found.moved || found.baseline == end
     }
 }
 
@@ -334,7 +411,7 @@ mod tests {
 
     #[test]
     fn sensors_that_fall_are_found_to_do_so() {
-        let found = hand().finish(Wishes { bits: Some(8), equalise: false }).unwrap();
+        let found = hand().finish(Wishes { bits: Some(8), ..Wishes::default() }).unwrap();
         assert!(found.invert);
         assert_eq!(found.raw_range, Some([0.0, 255.0]));
         let [a, b, c, d] = found.sensors[..] else { panic!("four went in") };
@@ -347,7 +424,7 @@ mod tests {
 
     #[test]
     fn equal_presses_get_equal_pressures() {
-        let found = hand().finish(Wishes { bits: None, equalise: true }).unwrap();
+        let found = hand().finish(Wishes { equalise: true, ..Wishes::default() }).unwrap();
         let gains: Vec<f64> = found.sensors.iter().map(|found| found.gain).collect();
         assert_eq!(gains, [0.96, 1.0, 2.0, 1.0]);
         // Two at one end are not enough to tell it.
@@ -365,7 +442,70 @@ mod tests {
         }
         let still = still.finish(Wishes::default()).unwrap_err().to_string();
         assert!(still.contains("no sensor left its rest"), "{still}");
-        assert!(hand().finish(Wishes { bits: Some(60), equalise: false }).unwrap_err().is_usage());
+        assert!(hand().finish(Wishes { bits: Some(60), ..Wishes::default() }).unwrap_err().is_usage());
+    }
+
+    /// Sensors 3 and 5 of ten bits in a rest of 150 frames: `value` gives the first's, noise the second's; then both are
+    /// pressed.
+    fn rested(value: impl Fn(usize) -> f64) -> Survey {
+        let mut survey = Survey::new(&[3, 5]);
+        for n in 0..150 {
+            survey.rest(&values(&[value(n).round(), 700.0 + [0.0, 2.0, -1.0][n % 3]]));
+        }
+        (0..30).for_each(|_| survey.press(&values(&[40.0, 30.0])));
+        survey
+    }
+
+    #[test]
+    fn a_rest_in_which_something_moved_is_refused_by_its_sensors() {
+        let press_of = |depth: f64, from: usize| {
+            move |n: usize| 900.0 - depth * if n < from { 0.0 } else { ((n - from) as f64 / 10.0).min(1.0) }
+        };
+        // Whether it is pressed for a while at the end, nearly all the time, or wiggled at.
+        let wiggled = |n: usize| 500.0 + 400.0 * (n as f64 * 0.9).sin();
+        let glitch = |n: usize| if n == 70 { 20.0 } else { 900.0 };
+        let kinds: [&dyn Fn(usize) -> f64; 5] =
+            [&press_of(880.0, 120), &press_of(880.0, 5), &press_of(80.0, 100), &wiggled, &glitch];
+        for (kind, value) in kinds.into_iter().enumerate() {
+            for bits in [Some(10), None] {
+                let error = rested(value).finish(Wishes { bits, ..Wishes::default() }).unwrap_err().to_string();
+                assert!(error.starts_with("1 of 2 sensors moved during the rest: 3; their dead"), "{kind}: {error}");
+            }
+        }
+        let refused = rested(press_of(880.0, 120)).finish(Wishes { bits: Some(10), ..Wishes::default() });
+        assert!(refused.unwrap_err().to_string().contains("up to 1320 of a raw range of 1023. Keep everything off"));
+        // A rest that was pressed all over, in which nothing is pressed any more, is told by its reason too.
+        let mut all = Survey::new(&[3]);
+        (0..150).for_each(|n| all.rest(&values(&[press_of(600.0, 90)(n).round()])));
+        (0..30).for_each(|_| all.press(&values(&[900.0])));
+        assert!(all.finish(Wishes::default()).unwrap_err().to_string().contains("moved during the rest"));
+    }
+
+    #[test]
+    fn what_noise_and_slow_drift_explain_is_no_movement() {
+        let pseudo =
+            |n: usize| ((n * 7919 + 13) % 1009) as f64 / 1009.0 + ((n * 104_729 + 7) % 997) as f64 / 997.0 - 1.0;
+        let noisy = move |n: usize| 800.0 + 60.0 * pseudo(n);
+        let drifting = move |n: usize| 800.0 + 3.0 * pseudo(n) + 0.2 * n as f64;
+        let flickering = |n: usize| 800.0 + if n.is_multiple_of(9) { 1.0 } else { 0.0 };
+        let glitch = |n: usize| if n == 70 { 690.0 } else { 800.0 };
+        let kinds: [&dyn Fn(usize) -> f64; 4] = [&noisy, &drifting, &flickering, &glitch];
+        for (kind, value) in kinds.into_iter().enumerate() {
+            for bits in [Some(10), None] {
+                let found = rested(value).finish(Wishes { bits, ..Wishes::default() });
+                assert!(found.is_ok_and(|found| !found.sensors[0].moved), "{kind}");
+            }
+        }
+    }
+
+    #[test]
+    fn sensors_that_moved_are_masked_if_that_is_wished() {
+        let survey = rested(|n| if n.is_multiple_of(50) { 20.0 } else { 900.0 });
+        let found = survey.finish(Wishes { bits: Some(10), mask_moved: true, ..Wishes::default() }).unwrap();
+        assert_eq!(found.sensors.iter().map(|found| found.moved).collect::<Vec<_>>(), [true, false]);
+        assert_eq!(found.remarks(), ["1 of 2 sensors moved at rest, and are masked: 3"]);
+        let text = found.calibration("hand");
+        assert!(text.contains("[taxel.3]\nmask = true") && text.contains("dead_band = 3\n"), "{text}");
     }
 
     #[test]

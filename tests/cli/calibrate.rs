@@ -77,3 +77,24 @@ fn a_survey_that_says_nothing_leaves_nothing_behind() {
     refused(&["--rest=-1"], "times over 0", 2);
     refused(&["--plot", "a.gif"], "ends in .svg or .png", 2);
 }
+
+#[test]
+fn a_rest_in_which_something_moved_leaves_nothing_behind_but_the_names_of_its_sensors() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (csv, toml) = (at("survey.csv"), at("hand.toml"));
+    done(&["simulate", SURVEY, "-o", &csv]);
+    // The back of the hand is pressed from 4.5 s on.
+    let rest =
+        |seconds| ["calibrate", "--body", "hand", "--source", &csv, "--bits", "10", "-o", &toml, "--rest", seconds];
+    let error = fails(1, &rest("5"));
+    assert!(error.lines().count() == 1 && error.contains(" of 40 sensors moved during the rest: 16, 18, "), "{error}");
+    assert!(error.contains("of a raw range of 1023. Keep everything off the robot"), "{error}");
+    assert!(!std::path::Path::new(&toml).exists());
+
+    let masked = done(&[&rest("5")[..], &["--mask-moved"]].concat());
+    assert!(masked.contains("sensors moved at rest, and are masked: 16, 18, "), "{masked}");
+    assert!(std::fs::read_to_string(&toml).unwrap().contains("[taxel.16]\nmask = true\n"));
+    done(&[&rest("4.4")[..], &["--force"]].concat());
+    assert!(!std::fs::read_to_string(&toml).unwrap().contains("[taxel.16]\nmask = true\n"));
+}
