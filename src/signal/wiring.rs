@@ -106,6 +106,12 @@ impl Wiring {
         Ok(Self { boards })
     }
 
+    /// How many boards so many taxels need.
+    #[must_use]
+    pub fn least_boards(taxels: usize) -> usize {
+        taxels.div_ceil(MOST_CHANNELS as usize)
+    }
+
     /// The wiring that holds where none is given: `boards` boards, numbered from `first_id`, that share the `taxels` in
     /// ascending order of their ids, each as many as the next or one more.
     ///
@@ -118,9 +124,12 @@ impl Wiring {
             let what = format!("{} taxels cannot be shared by {boards} boards", sorted.len());
             return Err(Error::usage(what));
         }
-        if sorted.len().div_ceil(boards) > MOST_CHANNELS as usize {
-            let least = sorted.len().div_ceil(MOST_CHANNELS as usize);
-            let what = format!("{} taxels need at least {least} boards of 256 channels", sorted.len());
+        let least = Self::least_boards(sorted.len());
+        if boards < least {
+            let what = format!(
+                "{} taxels need at least {least} boards of 256 channels; give as many ports, or a wiring",
+                sorted.len()
+            );
             return Err(Error::usage(what));
         }
         if usize::from(first_id) + boards > usize::from(u16::MAX) {

@@ -247,3 +247,32 @@ fn what_makes_no_sense_is_said_in_a_line() {
     assert_eq!(text.lines().count(), 4, "{text}");
     assert!(text.contains("board 2 at /dev/") && text.contains("board 2: 3 frames, "), "{text}");
 }
+
+#[test]
+fn boards_have_the_taxels_of_the_body_that_is_named() {
+    let error = fails(2, &["board", "--body", "mat", "--source", "-"]);
+    assert!(error.contains("2048 taxels need at least 8 boards of 256 channels; add --boards 8"), "{error}");
+    let error = fails(2, &["board", "--body", "mat"]);
+    assert!(error.contains("somatic board --body mat --boards 8 --source sim:FILE.toml"), "{error}");
+    // As it says, and each board with its share.
+    let mat = concat!("sim:", env!("CARGO_MANIFEST_DIR"), "/examples/simulations/mat.toml");
+    let text = done(&["board", "--body", "mat", "--boards", "8", "--source", mat, "--for", "0.2s"]);
+    assert_eq!(text.matches(": 256 channels").count(), 8, "{text}");
+    // A recording of some of the taxels is played by boards that have all.
+    let (_folder, path) = crate::file("few.csv", "t,4,7\n0,1,2\n0.1,2,3\n");
+    let channels = |more: &[&str]| {
+        done(&[&["board", "--frames", "3", "--source", path.to_str().unwrap()][..], more].concat())
+            .lines()
+            .next()
+            .unwrap()
+            .to_owned()
+    };
+    assert!(channels(&[]).contains(": 2 channels"));
+    assert!(channels(&["--body", "hand"]).contains(": 40 channels"));
+    let (_folder, path) = crate::file("other.csv", "t,4,777\n0,1,2\n");
+    assert!(
+        fails(1, &["board", "--body", "hand", "--source", path.to_str().unwrap()])
+            .contains("hand: the source has taxel 777")
+    );
+    assert!(fails(2, &["board", "--source", "csv:-"]).contains("CSV from files"));
+}

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use somatic::signal::Wiring;
-use somatic::source::{CsvSource, Source, SourceSpec};
+use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec};
 use somatic::wire::board::{Faults, Make, Potentiometers, VirtualBoard};
 use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
@@ -58,9 +58,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SOURCE")]
     source: Option<String>,
 
-    /// The body whose taxels NDJSON speaks of.
-    #[arg(long, value_name = "BODY", default_value = "hand")]
-    body: String,
+    /// The body whose taxels the boards have [default: those that the source has; of NDJSON, the bundled hand's].
+    #[arg(long, value_name = "BODY")]
+    body: Option<String>,
 
     /// Begin again at the end.
     #[arg(long = "loop", conflicts_with = "frames")]
@@ -210,6 +210,8 @@ struct Play {
 impl Play {
     fn open(spec: Option<&SourceSpec>, ids: &[u32]) -> Result<Box<dyn Source + Send>> {
         match spec {
+            // Nobody listens to a board for what is left out.
+            Some(SourceSpec::Stdin) => Ok(Box::new(NdjsonSource::stdin(ids.to_vec()).strict())),
             Some(spec) => spec.open(ids, None),
             None => Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?)),
         }
@@ -236,13 +238,36 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
     if live && arguments.again {
         return Err(Error::usage("standard input cannot be read twice; leave out --loop"));
     }
+    if spec == Some(SourceSpec::CsvStdin) {
+        return Err(Error::usage("boards play CSV from files; name one as --source csv:FILE"));
+    }
     let wiring = arguments.wiring.as_ref().map(Wiring::load).transpose()?;
-    let ids: Vec<u32> =
-        if live { load_body(&arguments.body)?.taxels.iter().map(|taxel| taxel.id).collect() } else { Vec::new() };
+    let body = arguments.body.as_deref().or(live.then_some("hand")).map(load_body).transpose()?;
+    let ids: Vec<u32> = body.iter().flat_map(|body| &body.taxels).map(|taxel| taxel.id).collect();
+    if let (Some(body), None) = (&body, &spec)
+        && arguments.body.as_deref() != Some("hand")
+    {
+        let boards = match Wiring::least_boards(ids.len()) {
+            0 | 1 => String::new(),
+            least if wiring.is_some() || arguments.boards >= least => String::new(),
+            least => format!(" --boards {least}"),
+        };
+        return Err(Error::usage(format!(
+            "the bundled touch is for the bundled hand; name what boards on body `{}` play: somatic board --body {}{boards} \
+             --source sim:FILE.toml",
+            body.name, body.name
+        )));
+    }
     let taxels = Play::open(spec.as_ref(), &ids)?.taxels().to_vec();
+    if let Some(body) = &body
+        && let Some(id) = taxels.iter().find(|id| !ids.contains(id))
+    {
+        let what = format!("the source has taxel {id}, and the body has none of that number; is it for another body?");
+        return Err(Error::failed(what).at(&body.name));
+    }
     let wiring = match wiring {
         Some(wiring) => wiring,
-        None => Wiring::in_order(&taxels, arguments.board, arguments.boards)?,
+        None => in_order(if body.is_some() { &ids } else { &taxels }, arguments)?,
     };
     let rate_mhz = match arguments.rate {
         None => 0,
@@ -282,6 +307,18 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
     }
     let common = Common { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
     Ok((stations, common, Play { spec, ids, taxels, most: most.into(), again: again && !live }))
+}
+
+/// The wiring of `taxels` to as many boards as `arguments` say.
+fn in_order(taxels: &[u32], arguments: &Arguments) -> Result<Wiring> {
+    let least = Wiring::least_boards(taxels.len());
+    if arguments.boards > 0 && arguments.boards < least {
+        return Err(Error::usage(format!(
+            "{} taxels need at least {least} boards of 256 channels; add --boards {least}",
+            taxels.len()
+        )));
+    }
+    Wiring::in_order(taxels, arguments.board, arguments.boards)
 }
 
 fn tell_where(arguments: &Arguments, stations: &[Station]) -> Result<()> {
