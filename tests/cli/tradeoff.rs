@@ -115,3 +115,20 @@ fn contradictions_are_found_where_they_stand() {
     assert!(fails(2, &["tradeoff", "--plot", "a.gif"]).contains("neither .svg nor .png"));
     assert!(fails(2, &["tradeoff", "--source", "-"]).contains("again and again"));
 }
+
+#[cfg(feature = "gpu")]
+#[test]
+fn a_software_gpu_is_measured_only_if_it_is_asked_for() {
+    let adapters = somatic::backend::gpu::adapters();
+    if adapters.is_empty() || adapters.iter().any(|adapter| adapter.kind != "software") {
+        eprintln!("SKIPPED: a trade without software GPUs, as there is none, or a real one beside it");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (text, _) = done(folder.path(), &["tradeoff", "--seconds", "0.05", "--frames", "30", "--json"]);
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let rows = report["rows"].as_array().unwrap();
+    assert!(!rows.is_empty() && rows.iter().all(|row| row["backend"] != "gpu"), "{text}");
+    let left_out = report["left_out"].to_string();
+    assert!(left_out.contains("computes on the same CPU; ask for it with --backend gpu"), "{left_out}");
+}
