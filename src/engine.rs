@@ -18,9 +18,9 @@ use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
-use crate::percept::{Flags, Percepts};
+use crate::percept::Percepts;
 use crate::scene::{Cadence, Coordinates, Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit};
+use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::calibrate;
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
@@ -114,7 +114,7 @@ impl Engine {
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         // Of a large skin these take as much memory as the plan.
         drop(recharted.fields);
-        let upkeep = KeptUp::new(&plan, calibration.upkeep);
+        let upkeep = KeptUp::new(&plan, calibration.upkeep, body);
         if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(
                 "the calibration's [upkeep] must know what is touched; ask for letter `sustained` too",
@@ -201,6 +201,15 @@ impl Engine {
     pub fn heed_stale(&mut self) {
         self.intake.heed_stale();
         self.pick();
+    }
+
+    /// Tells which board each taxel hangs on: from now on, the drift of one that is touched is that of its board's
+    /// untouched taxels, where there are three. Without, it is that of its link's, else of the body's. For before the first
+    /// frame.
+    pub fn wire(&mut self, wiring: &Wiring) {
+        if let Some(kept) = &mut self.upkeep {
+            kept.wire(&self.plan, wiring, |channel| self.ids[self.plan.body_taxels[channel]]);
+        }
     }
 
     /// Finds out whether values can be read where they are. Upkeep looks at all of them, gathered.
@@ -323,7 +332,7 @@ impl Engine {
             }
         }
         if let Some(kept) = &mut self.upkeep {
-            *kept = KeptUp::new(&self.plan, kept.upkeep.keys()).unwrap_or_else(|| unreachable!("it was on before"));
+            kept.restart(&self.plan);
         }
         self.backend.recalibrate(&self.plan);
         if let Some(cadence) = &mut self.cadence {
@@ -351,6 +360,7 @@ impl Engine {
         }
         let host = Host { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref() };
         host.run(&mut *self.backend, &frames[range.clone()], &raw, &mut self.percepts, &mut self.side)?;
+        let mut right = None;
         if let Some(check) = check {
             let mut bounds = check.reference.bounds(&raw);
             if let Some(cadence) = &self.cadence {
@@ -358,15 +368,13 @@ impl Engine {
             }
             check.bounds.extend(bounds);
             host.run(&mut check.reference, &frames[range.clone()], &raw, &mut check.right, &mut check.side)?;
+            right = Some(&mut check.right);
         }
         if let Some(kept) = &mut self.upkeep {
-            let fields = self.plan.fields.len();
-            let cells = &self.percepts.flags[range.start * fields..range.end * fields];
-            for frame in cells.chunks_exact(fields) {
-                for (touched, flags) in kept.touched.iter_mut().zip(frame) {
-                    *touched |= !flags.contains(Flags::NO_CONTACT);
-                }
-            }
+            let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();
+            kept.note(&self.percepts.flags[cells.clone()]);
+            kept.flag(&mut self.percepts.flags[cells.clone()]);
+            right.into_iter().for_each(|right| kept.flag(&mut right.flags[cells.clone()]));
         }
         Ok(())
     }
@@ -374,12 +382,7 @@ impl Engine {
     /// Lets upkeep judge the epoch, and calibrates from now on as it says.
     fn close_epoch(&mut self, check: Option<&mut Check>) {
         let Some(kept) = &mut self.upkeep else { return };
-        let changed = kept.upkeep.close(&self.plan.touched_channels(&kept.touched));
-        kept.touched.fill(false);
-        if changed {
-            for (channel, (baseline, unfit)) in kept.upkeep.taxels().enumerate() {
-                self.plan.keep_up(channel, baseline, unfit.is_some(), &kept.made);
-            }
+        if kept.close(&mut self.plan) {
             self.backend.recalibrate(&self.plan);
             if let Some(cadence) = &mut self.cadence {
                 cadence.forget();

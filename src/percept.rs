@@ -57,6 +57,9 @@ bitflags! {
         /// The centroid went farther at once than the filter's window: it is taken for another touch, and filtered motion
         /// starts anew.
         const JUMPED = 1 << 17;
+        /// A taxel has been touched for long while too few others were untouched to tell its drift: its baseline is that of
+        /// the onset.
+        const DRIFT_UNKNOWN = 1 << 18;
     }
 }
 

@@ -1,25 +1,123 @@
 //! What an engine keeps for the upkeep of its calibration.
 
+use std::collections::HashMap;
+
+use crate::body::Body;
+use crate::percept::Flags;
 use crate::scene::Plan;
-use crate::signal::{Kept, Upkeep, UpkeepKeys};
-use crate::stage::layout;
+use crate::signal::{Kept, RawValue, Receptor, Upkeep, UpkeepKeys, Wiring};
+use crate::stage::{calibrate, layout};
 
 /// Upkeep, and what it needs of the engine.
 pub(super) struct KeptUp {
     pub(super) upkeep: Upkeep,
     /// The taxels as the calibration has them, slot by slot.
-    pub(super) made: Vec<layout::Taxel>,
+    made: Vec<layout::Taxel>,
+    /// Per channel, the groups that are warmed together, the nearest first: a board where that is known, a link, the body.
+    groups: Vec<Vec<Option<usize>>>,
     /// Per field, whether it was in contact in this epoch.
-    pub(super) touched: Vec<bool>,
+    touched: Vec<bool>,
+    /// Per field, whether the drift of a taxel of its is unknown.
+    unknown: Vec<bool>,
 }
 
 impl KeptUp {
-    pub(super) fn new(plan: &Plan, keys: UpkeepKeys) -> Option<Self> {
-        let taxels = plan.calibrations.iter().map(|c| Kept { baseline: c.baseline, raw_range: c.raw_range });
+    pub(super) fn new(plan: &Plan, keys: UpkeepKeys, body: &Body) -> Option<Self> {
+        let links = plan.body_taxels.iter().map(|&taxel| Some(body.taxels[taxel].link)).collect();
+        Self::in_groups(plan, keys, vec![links, vec![Some(0); plan.channels()]])
+    }
+
+    fn in_groups(plan: &Plan, keys: UpkeepKeys, groups: Vec<Vec<Option<usize>>>) -> Option<Self> {
         Some(Self {
-            upkeep: Upkeep::new(keys, taxels)?,
+            upkeep: Upkeep::new(keys, (0..plan.channels()).map(|channel| kept(plan, channel)), groups.clone())?,
             made: plan.taxels.clone(),
+            groups,
             touched: vec![false; plan.fields.len()],
+            unknown: vec![false; plan.fields.len()],
         })
     }
+
+    /// Begins anew with the calibration that `plan` has now.
+    pub(super) fn restart(&mut self, plan: &Plan) {
+        let anew = Self::in_groups(plan, self.upkeep.keys(), self.groups.clone());
+        *self = anew.unwrap_or_else(|| unreachable!("it was on before"));
+    }
+
+    /// Taxels of one board are warmed together more than those of a link; `id_of` gives each channel's taxel.
+    pub(super) fn wire(&mut self, plan: &Plan, wiring: &Wiring, id_of: impl Fn(usize) -> u32) {
+        let numbered = wiring.boards().iter().enumerate();
+        let board_of: HashMap<u32, usize> =
+            numbered.flat_map(|(number, board)| board.taxels.iter().flatten().map(move |&id| (id, number))).collect();
+        let boards = (0..plan.channels()).map(|channel| board_of.get(&id_of(channel)).copied()).collect();
+        self.groups.insert(0, boards);
+        self.restart(plan);
+    }
+
+    /// Takes note of which fields are in contact, by the flags of frames, cell by cell.
+    pub(super) fn note(&mut self, seen: &[Flags]) {
+        let fields = self.touched.len();
+        for frame in seen.chunks_exact(fields) {
+            for (touched, flags) in self.touched.iter_mut().zip(frame) {
+                *touched |= !flags.contains(Flags::NO_CONTACT);
+            }
+        }
+    }
+
+    /// Flags the fields whose taxels drift by nobody knows how much, cell by cell.
+    pub(super) fn flag(&self, cells: &mut [Flags]) {
+        for frame in cells.chunks_exact_mut(self.unknown.len()) {
+            for (flags, &unknown) in frame.iter_mut().zip(&self.unknown) {
+                // A percept that is kept from the frame before has that one's.
+                flags.set(Flags::DRIFT_UNKNOWN, unknown);
+            }
+        }
+    }
+
+    /// Judges the epoch that ends, and puts the outcome into `plan`. Returns whether anything changed in it.
+    pub(super) fn close(&mut self, plan: &mut Plan) -> bool {
+        let contact = plan.touched_channels(&self.touched);
+        self.touched.fill(false);
+        let changed = self.upkeep.close(&contact, |pressed| {
+            let holds = |field| plan.members_of(field).iter().any(|m| pressed[plan.channel_of(m.slot as usize)]);
+            plan.touched_channels(&plan.fields.iter().map(holds).collect::<Vec<_>>())
+        });
+        let unknown: Vec<bool> = self.upkeep.unknown().collect();
+        for (flagged, field) in self.unknown.iter_mut().zip(plan.fields.iter()) {
+            let lasting = plan.letters()[field.letter].receptor == Receptor::Sustained;
+            *flagged = lasting && plan.members_of(field).iter().any(|m| unknown[plan.channel_of(m.slot as usize)]);
+        }
+        if changed {
+            for (channel, (baseline, unfit)) in self.upkeep.taxels().enumerate() {
+                plan.keep_up(channel, baseline, unfit.is_some(), &self.made);
+            }
+        }
+        changed
+    }
+}
+
+/// What upkeep is to know of the taxel at `channel`.
+fn kept(plan: &Plan, channel: usize) -> Kept {
+    let taxel = &plan.calibrations[channel];
+    let knots = plan.knots_of(channel);
+    let (falls, felt) = match knots {
+        [] => (taxel.gain < 0.0, f64::from(taxel.dead_band) / f64::from(taxel.gain.abs())),
+        [first, .., last] => (last.p < first.p, felt(plan, channel, [first.raw, last.raw].map(f64::from))),
+        [_] => (false, 0.0),
+    };
+    Kept { baseline: taxel.baseline, raw_range: taxel.raw_range, felt, falls, mask: taxel.mask }
+}
+
+/// How far the raw value of a taxel with a curve must go from its baseline for it to be felt, between `ends` of the curve.
+/// 0 where it is felt at the baseline already.
+fn felt(plan: &Plan, channel: usize, ends: [f64; 2]) -> f64 {
+    let (taxel, knots) = (&plan.calibrations[channel], plan.knots_of(channel));
+    let is_felt =
+        |step: f64| calibrate::reference(RawValue::new(f64::from(taxel.baseline) + step), taxel, knots).value > 0.0;
+    let Some(end) = ends.into_iter().find(|&end| is_felt(end)).filter(|_| !is_felt(0.0)) else { return 0.0 };
+    let (mut still, mut felt) = (0.0, end);
+    for _ in 0..32 {
+        let middle: f64 = 0.5 * (still + felt);
+        *(if is_felt(middle) { &mut felt } else { &mut still }) = middle;
+    }
+    felt.abs()
 }
