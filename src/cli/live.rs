@@ -200,6 +200,7 @@ impl Pace {
 struct Row {
     name: String,
     latest: Option<Percept>,
+    touches: usize,
     touched_at: Option<Instant>,
     frames_touched: u64,
     largest: Option<(f64, f64)>,
@@ -224,6 +225,7 @@ impl Table {
         let row = |field: usize| Row {
             name: plan.label(field),
             latest: None,
+            touches: 0,
             touched_at: None,
             frames_touched: 0,
             largest: None,
@@ -248,6 +250,7 @@ impl Table {
                 row.frames_touched += 1;
                 row.touched_at = Some(now);
                 row.latest = Some(percept);
+                row.touches = percepts.touches(frame, percept.field).len();
                 self.in_world |= percept.in_world;
                 if let Some(total) = percept.total {
                     self.largest_total = self.largest_total.max(total);
@@ -288,10 +291,10 @@ impl Table {
 
         let room = rows.saturating_sub(lines.len());
         let fits = if visible.len() > room { room.saturating_sub(1) } else { visible.len() };
-        let scale = Scale { largest_total: self.largest_total };
-        lines.extend(
-            visible.iter().take(fits).map(|row| format!("  {}", layout.row(&row.name, row.latest.as_ref(), scale))),
-        );
+        for row in visible.iter().take(fits) {
+            let scale = Scale { largest_total: self.largest_total, touches: row.touches };
+            lines.push(format!("  {}", layout.row(&row.name, row.latest.as_ref(), scale)));
+        }
         if fits < visible.len() {
             lines.push(format!("  {}", style(format!("… and {} more", visible.len() - fits)).dim()));
         }

@@ -14,10 +14,13 @@ const LEAST_NAME: usize = 14;
 const LEAST_FLAGS: usize = 9;
 const BAR: usize = 8;
 
-/// What totals and peaks are measured by: the largest total seen.
+/// What a percept is shown beside.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
+    /// The largest total seen, which totals and peaks are measured by.
     pub(super) largest_total: f64,
+    /// How many separate touches the field has.
+    pub(super) touches: usize,
 }
 
 impl Scale {
@@ -41,7 +44,7 @@ struct Column {
     text: fn(&Percept, Scale) -> Option<String>,
 }
 
-const COLUMNS: [Column; 9] = [
+const COLUMNS: [Column; 11] = [
     Column {
         heading: "total",
         width: 8,
@@ -63,6 +66,20 @@ const COLUMNS: [Column; 9] = [
         outputs: Outputs::ACTIVE,
         gives_way: 4,
         text: |p, _| p.active.map(|active| active.to_string()),
+    },
+    Column {
+        heading: "area mm²",
+        width: 8,
+        outputs: Outputs::AREA,
+        gives_way: 8,
+        text: |p, _| p.area.map(|area| format!("{:.1}", area * 1e6)),
+    },
+    Column {
+        heading: "touches",
+        width: 7,
+        outputs: Outputs::TOUCHES,
+        gives_way: 3,
+        text: |_, beside| Some(beside.touches.to_string()),
     },
     Column {
         heading: "u    v mm",
