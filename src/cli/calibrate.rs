@@ -145,7 +145,7 @@ fn first_of(sources: &[String]) -> Result<SourceSpec> {
 
 /// Says what is to be said of serial lines.
 fn tell(lines: &Lines) {
-    lines.notices().iter().for_each(|notice| say(notice));
+    lines.notices().iter().for_each(|notice| say(&notice.to_string()));
 }
 
 /// The ids that `source` delivers, each of which `body` must have.

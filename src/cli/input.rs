@@ -68,6 +68,10 @@ impl Input {
         !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::CsvStdin | SourceSpec::Serial { .. }))
     }
 
+    pub(super) fn is_stdin(&self) -> bool {
+        self.spec == Some(SourceSpec::Stdin)
+    }
+
     /// Opens the serial lines.
     pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<SerialSource> {
         asked.line_flags().open(&self.lines, ids, asked.max_age)

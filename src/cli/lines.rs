@@ -10,6 +10,7 @@ use somatic::source::{BoardAccount, BoardState, Lines};
 use somatic::{Error, Result};
 
 use super::latency::Latency;
+use super::repeats::Repeats;
 use super::say;
 use super::words::count;
 
@@ -18,20 +19,36 @@ const REMEMBERED: usize = 3;
 /// More boards than this have one row together.
 const MOST_ROWS: usize = 6;
 
+/// Something that was said, to stand below the table.
+struct Latest {
+    text: String,
+    /// With when it came, and how often.
+    told: String,
+}
+
 /// Serial lines while they are read.
 pub(super) struct Live {
     lines: Lines,
     latency: Latency,
+    repeats: Repeats,
     /// Said while a table stood there.
     kept: Vec<String>,
-    latest: VecDeque<String>,
+    latest: VecDeque<Latest>,
     summary: Option<PathBuf>,
     quiet: bool,
 }
 
 impl Live {
     pub(super) fn new(lines: Lines, summary: Option<PathBuf>, quiet: bool) -> Self {
-        Self { lines, latency: Latency::default(), kept: Vec::new(), latest: VecDeque::new(), summary, quiet }
+        Self {
+            lines,
+            latency: Latency::default(),
+            repeats: Repeats::default(),
+            kept: Vec::new(),
+            latest: VecDeque::new(),
+            summary,
+            quiet,
+        }
     }
 
     /// The percepts of frames whose last bytes were read then have been written.
@@ -42,17 +59,18 @@ impl Live {
     /// Says what is to be said of the lines; below the table and after it, where one stands there.
     pub(super) fn tell(&mut self, at_table: bool) {
         for notice in self.lines.notices() {
+            let Some(told) = self.repeats.tell(notice.at_s, &notice.text) else { continue };
             if !at_table {
-                say(&notice);
+                say(&told);
                 continue;
             }
             if self.latest.len() == REMEMBERED {
                 self.latest.pop_front();
             }
-            self.latest.push_back(notice.clone());
-            // A line that breaks again and again fills no memory.
+            self.latest.push_back(Latest { text: notice.text, told: told.clone() });
+            // A line that breaks in ever other ways fills no memory.
             if self.kept.len() < 1000 {
-                self.kept.push(notice);
+                self.kept.push(told);
             }
         }
     }
@@ -72,7 +90,8 @@ impl Live {
         if !self.latency.is_empty() {
             rows.push(format!("  latency {}", self.latency.words()));
         }
-        rows.extend(self.latest.iter().map(|notice| style(format!("  {notice}")).yellow().to_string()));
+        let latest = self.latest.iter().filter(|latest| !latest.is_over(&accounts));
+        rows.extend(latest.map(|latest| style(format!("  {}", latest.told)).yellow().to_string()));
         rows
     }
 
@@ -81,7 +100,9 @@ impl Live {
         self.lines.close();
         self.kept.drain(..).for_each(|notice| say(&notice));
         self.tell(false);
+        self.repeats.rest().for_each(|told| say(&told));
         let accounts = self.lines.accounts();
+        let answered = accounts.iter().any(|account| account.port.is_some());
         if !self.quiet {
             for account in accounts.iter().filter(|account| account.state != BoardState::Awaited) {
                 let port = account.port.as_deref().unwrap_or("?");
@@ -89,7 +110,7 @@ impl Live {
             }
             let awaited = accounts.iter().filter(|account| account.state == BoardState::Awaited);
             let awaited: Vec<String> = awaited.map(|account| account.board.to_string()).collect();
-            if !awaited.is_empty() {
+            if !awaited.is_empty() && answered {
                 say(&format!("never heard of: board {}", awaited.join(", ")));
             }
             if !self.latency.is_empty() {
@@ -101,7 +122,21 @@ impl Live {
             let text = format!("{:#}\n", json!({"boards": boards, "latency": self.latency.json()}));
             std::fs::write(path, text).map_err(|e| Error::io(path, &e))?;
         }
+        if !answered {
+            let what =
+                "no board has answered; are they powered, and the ports right? `somatic devices` shows the ports";
+            return Err(Error::failed(what));
+        }
         Ok(self.lines.losses())
+    }
+}
+
+impl Latest {
+    /// Whether it tells of a plug that is in again.
+    fn is_over(&self, accounts: &[BoardAccount]) -> bool {
+        let is_of = |port: &str| self.text.strip_prefix(port).is_some_and(|rest| rest.starts_with(": unplugged"));
+        let is_back = |account: &BoardAccount| account.state != BoardState::Unplugged;
+        accounts.iter().any(|account| is_back(account) && account.port.as_deref().is_some_and(is_of))
     }
 }
 
@@ -164,4 +199,22 @@ fn as_json(account: &BoardAccount) -> Value {
         "drift_ppm": account.drift.map(|drift| drift * 1e6),
         "rate_hz": account.rate_hz,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plug_that_is_in_again_is_no_longer_said_to_be_out() {
+        let mut account = BoardAccount::default();
+        (account.port, account.state) = (Some("tty1".into()), BoardState::Unplugged);
+        let latest = |text: &str| Latest { text: text.into(), told: String::new() };
+        let gone = latest("tty1: unplugged; waiting for it to come back");
+        assert!(!gone.is_over(&[account.clone()]));
+        account.state = BoardState::Silent;
+        assert!(gone.is_over(&[account.clone()]));
+        assert!(!latest("tty1: board 1 is back").is_over(&[account.clone()]));
+        assert!(!latest("tty12: unplugged").is_over(&[account]));
+    }
 }

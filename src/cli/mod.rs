@@ -15,6 +15,8 @@ mod feed;
 mod info;
 mod input;
 mod inspect;
+#[cfg(unix)]
+mod keys;
 mod latency;
 mod lines;
 mod live;
@@ -24,6 +26,7 @@ mod plot;
 mod ports;
 #[cfg(feature = "gpu")]
 mod render;
+mod repeats;
 mod run;
 mod scene;
 mod screen;

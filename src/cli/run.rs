@@ -16,8 +16,11 @@ use super::attached;
 use super::doubts::Doubts;
 use super::feed::{Arrival, Feed, Manner};
 use super::input::Input;
+#[cfg(unix)]
+use super::keys::{self, Keys};
 use super::lines::Live;
 use super::live::{About, View};
+use super::repeats::Repeats;
 use super::scene::Asked;
 use super::tradeoff::{say_kept, settled};
 use super::{DONE, FAILED, LOST, say, words};
@@ -42,7 +45,7 @@ A frame on standard input is a line such as
   {\"t\":0.5,\"values\":{\"4\":12.0},\"pose\":{\"hand\":[0.1,0,0.3,0,0,0,1]}}
 t in seconds, raw values by taxel id, and, if links move, where each is in the world: x,y,z in
 metres and a quaternion qx,qy,qz,qw. With --source csv:- it is a row under t,<taxel id>,...
-At a terminal the touched fields are shown; into a pipe goes a line of JSON a frame.";
+At a terminal the touched fields are shown until q or Ctrl-C; into a pipe goes a line of JSON a frame.";
 
 /// Frames a call for recordings, unless told otherwise.
 pub(super) const RECORDED_BATCH: usize = 256;
@@ -116,6 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         None => {
             let source = input.open_lines(&ids, &asked)?;
             engine.heed_stale();
+            engine.wire(source.wiring());
             let live = Live::new(source.lines(), arguments.summary.clone(), asked.quiet);
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
@@ -139,6 +143,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let names = field_names(engine.plan());
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
+    // Where standard input is the source, what is typed there are frames.
+    #[cfg(unix)]
+    let keys = if at_terminal && !input.is_stdin() { Keys::listen() } else { None };
     let records = sinks.iter().any(|sink| matches!(sink, SinkSpec::Mcap(_)));
     let session = Session {
         names,
@@ -162,14 +169,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         view,
         flush: !gather,
         agreement,
-        unfit: Vec::new(),
+        unfit: Told::default(),
         failed: false,
         live,
         heeds_stale,
         doubts,
     };
+    #[cfg(unix)]
+    let is_ended = || stop.load(Ordering::Relaxed) || keys.as_ref().is_some_and(Keys::ends);
+    #[cfg(not(unix))]
+    let is_ended = || stop.load(Ordering::Relaxed);
     let until = lasts.map(|span| Instant::now() + span);
-    match pump.run(feed, &stop, until) {
+    match pump.run(feed, is_ended, until) {
         Ok(losses) => pump.finish(losses),
         Err(error) => {
             let Pump { view, live, .. } = pump;
@@ -189,8 +200,7 @@ struct Pump {
     /// Whether somebody waits for every frame.
     flush: bool,
     agreement: Option<Agreement>,
-    /// Taxels that have been told to be left out.
-    unfit: Vec<(u32, Unfit)>,
+    unfit: Told,
     /// Whether a sink could not go on.
     failed: bool,
     /// The serial lines, if they are read.
@@ -202,11 +212,11 @@ struct Pump {
 }
 
 impl Pump {
-    /// Runs until the source ends, the last reader has gone, or `stop` is set; gives what the source lost.
-    fn run(&mut self, mut feed: Feed, stop: &AtomicBool, until: Option<Instant>) -> Result<Vec<String>> {
+    /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source lost.
+    fn run(&mut self, mut feed: Feed, is_ended: impl Fn() -> bool, until: Option<Instant>) -> Result<Vec<String>> {
         let watched = self.view.is_table() || self.sinks.is_empty();
         let mut losses = Vec::new();
-        while !stop.load(Ordering::Relaxed) && until.is_none_or(|until| Instant::now() < until) {
+        while !is_ended() && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
                 Some(Arrival::Frames(frames, told)) => {
                     told.notices.iter().filter(|_| !self.view.is_table()).for_each(|notice| say(notice));
@@ -231,9 +241,10 @@ impl Pump {
                     if let Some(live) = &mut self.live {
                         live.see(&told.read_at);
                     }
+                    self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
                     feed.give_back(frames);
                     if !self.view.is_table() {
-                        tell_unfit(&self.engine, &mut self.unfit);
+                        self.unfit.tell(&self.engine);
                     }
                 }
                 Some(Arrival::End(losses)) => return Ok(losses),
@@ -271,7 +282,8 @@ impl Pump {
         if let Some(live) = self.live {
             losses = live.finish()?;
         }
-        tell_unfit(&self.engine, &mut self.unfit);
+        self.unfit.tell(&self.engine);
+        self.unfit.repeats.rest().for_each(|told| say(&told));
         tell_doubts(&self.engine, &mut self.doubts);
         for loss in &losses {
             say(&format!("never processed: {loss}"));
@@ -323,16 +335,30 @@ fn give(sink: &mut dyn Sink, heard: &Heard<'_>, percepts: &Percepts, flush: bool
     if flush { sink.flush() } else { Ok(Flow::Open) }
 }
 
-/// Says which taxels are left out from now on and which are used again, where that differs from what was `told`.
-fn tell_unfit(engine: &Engine, told: &mut Vec<(u32, Unfit)>) {
-    let now: Vec<(u32, Unfit)> = engine.unfit().collect();
-    for (id, why) in now.iter().filter(|taxel| !told.contains(taxel)) {
-        say(&format!("taxel {id} is {why} and left out"));
+/// What was told of taxels that are left out.
+#[derive(Default)]
+struct Told {
+    unfit: Vec<(u32, Unfit)>,
+    repeats: Repeats,
+    /// The time of the last frame, s.
+    at_s: f64,
+}
+
+impl Told {
+    /// Says which taxels are left out from now on and which are used again, where that differs from what was told.
+    fn tell(&mut self, engine: &Engine) {
+        let now: Vec<(u32, Unfit)> = engine.unfit().collect();
+        let left_out = now.iter().filter(|taxel| !self.unfit.contains(taxel));
+        let left_out = left_out.map(|(id, why)| format!("taxel {id} is {why} and left out"));
+        let again = self.unfit.iter().filter(|(id, _)| !now.iter().any(|(other, _)| other == id));
+        let again = again.map(|(id, _)| format!("taxel {id} is used again"));
+        for text in left_out.chain(again) {
+            if let Some(told) = self.repeats.tell(self.at_s, &text) {
+                say(&told);
+            }
+        }
+        self.unfit = now;
     }
-    for (id, _) in told.iter().filter(|(id, _)| !now.iter().any(|(other, _)| other == id)) {
-        say(&format!("taxel {id} is used again"));
-    }
-    *told = now;
 }
 
 /// Says, the first time, what is doubtful in the frames so far.
@@ -350,6 +376,8 @@ pub(super) fn stop_on_signal() -> Result<Arc<AtomicBool>> {
             for term in [Term::stdout(), Term::stderr()].into_iter().filter(Term::is_term) {
                 let _ = term.show_cursor();
             }
+            #[cfg(unix)]
+            keys::restore();
             std::process::exit(130);
         }
     })

@@ -23,7 +23,7 @@ pub use ndjson::NdjsonSource;
 pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
 #[cfg(feature = "cli")]
-pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, SerialOptions, SerialSource, TapTrouble};
+pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, Notice, SerialOptions, SerialSource, TapTrouble};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 

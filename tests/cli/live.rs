@@ -83,3 +83,47 @@ fn with_its_output_elsewhere_a_recording_shows_a_bar_unless_quiet() {
     let Some((text, _)) = seen(&command("--quiet"), "") else { return };
     assert_eq!(text, "");
 }
+
+#[test]
+fn q_ends_a_table_as_ctrl_c_does_and_both_leave_the_terminal_as_it_was() {
+    let (folder, _) = file("x", "");
+    for key in ["q", "\x03"] {
+        let out = folder.path().join("out.ndjson");
+        let run = format!("{BINARY} run --backend cpu --speed 0.2 --sink ndjson:{}", text_of(&out));
+        // The shell lives on after Ctrl-C.
+        let command = format!("sh -c 'trap : INT; stty -a; {run}; echo code $?; stty -a'");
+        let Some((text, _)) = seen(&command, key) else { return };
+        let (before, after) = text.split_once("code 0").unwrap_or_else(|| panic!("{key:?}: {text}"));
+        assert!(before.contains("frames over") && !before.contains("280 frames"), "{before}");
+        let modes = |text: &str| text.lines().find(|line| line.contains("icanon")).map(str::to_owned);
+        assert!(modes(before).is_some() && modes(before) == modes(after), "{text}");
+        assert!(after.contains(" icanon") && after.contains(" echo "), "{after}");
+        // What was made of the frames until then is whole.
+        let lines = std::fs::read_to_string(&out).unwrap();
+        assert!(lines.ends_with('\n') && super::frames(&lines).len() < 280, "{key:?}");
+        std::fs::remove_file(&out).unwrap();
+    }
+}
+
+#[test]
+fn what_is_typed_where_frames_are_read_is_no_key() {
+    let Some((text, code)) = seen(&format!("{BINARY} run --backend cpu --source -"), "q\n") else { return };
+    assert!(code == Some(1) && text.contains("line 1"), "{text}");
+}
+
+#[test]
+fn area_and_touches_have_columns_where_they_are_asked_for() {
+    let command = format!("{BINARY} run --backend cpu --speed 8 --outputs total,area,touches");
+    let Some((text, _)) = seen(&command, "") else { return };
+    for part in ["touches", "area mm²"] {
+        assert!(text.contains(part), "{part:?}: {text}");
+    }
+    let row = text.lines().find(|line| line.contains("hand/back") && line.contains('█')).expect("it is touched");
+    // One touch, of sensors whose areas are known.
+    // Without what colours it.
+    let row: String = row.split("\x1b[").map(|part| part.split_once('m').map_or(part, |(_, text)| text)).collect();
+    let words: Vec<&str> = row.split_whitespace().collect();
+    assert!(words.contains(&"1") && words.iter().any(|word| word.parse().is_ok_and(|mm2: f64| mm2 > 10.0)), "{row}");
+    let Some((text, _)) = seen(&format!("{BINARY} run --backend cpu --speed 20 --outputs total"), "") else { return };
+    assert!(!text.contains("touches") && !text.contains("area"), "{text}");
+}

@@ -156,7 +156,8 @@ fn sixteen_boards_on_bad_lines_balance_and_nothing_is_another_than_was_sent() {
     let mut boards = Boards::start(&arguments);
     let (mut source, lines) = open(&boards);
     let seen = listen(&mut source, &mut boards, |_| ());
-    let (accounts, notices) = (lines.accounts(), lines.notices());
+    let accounts = lines.accounts();
+    let notices: Vec<String> = lines.notices().into_iter().map(|notice| notice.text).collect();
     balances(&accounts, &boards.end());
     assert!(seen.whole > 16 * 150 && seen.stale > 16, "{} {}", seen.whole, seen.stale);
     // Half a second of 50 frames a second is gone with the plug, and more with the noise.
@@ -211,6 +212,26 @@ fn a_run_says_what_became_of_a_board_that_starts_again() {
     assert!(number(latency, "frames") > 100 && number(latency, "p50_us") <= number(latency, "worst_us"));
     let lines = std::fs::read_to_string(sink).unwrap();
     assert!(lines.lines().count() as u64 >= number(latency, "frames"));
+}
+
+#[test]
+fn what_happens_again_and_again_is_told_once_and_counted() {
+    let boards = Boards::start(&["--wait", "--for", "6s", "--faults", "reset/0.1s,unplug=0.3s@2s"]);
+    let folder = tempfile::tempdir().unwrap();
+    let summary = folder.path().join("s.json");
+    let source = format!("serial:{}", boards.ports[0]);
+    let arguments = ["run", "--backend", "cpu", "--sink", "-", "--for", "4s", "--summary", text_of(&summary)];
+    let output = somatic(&[&arguments[..], &["--source", &source]].concat()).output().unwrap();
+    let told = stderr(&output);
+    let again: Vec<&str> = told.lines().filter(|line| line.contains("board 1 has started again")).collect();
+    let [first, last] = again[..] else { panic!("{told}") };
+    let times: u64 = last.split(": ").last().unwrap().trim_end_matches(" times in all").parse().unwrap();
+    let at_s: f64 = first.split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!(times > 10 && (0.0..4.5).contains(&at_s), "{told}");
+    // It was unplugged, and is not any more.
+    let summary: Value = serde_json::from_str(&std::fs::read_to_string(summary).unwrap()).unwrap();
+    let (state, unplugs) = (&summary["boards"][0]["state"], &summary["boards"][0]["unplugs"]);
+    assert!(unplugs.as_u64() >= Some(1) && state != "unplugged", "{summary}");
 }
 
 /// Times of the frames that `somatic run` makes of two boards that play at 50 Hz and send as `board` says, in two seconds.
@@ -361,7 +382,11 @@ fn another_device_and_nobody_are_told_apart() {
     let name = serialport::SerialPort::name(&end).unwrap();
     drop(end);
     let (line, code) = named(&[&format!("serial:{name}")], &[]);
-    assert!(line.contains("nothing answers") && line.contains("powered") && code == Some(0), "{line}");
+    // A run in which no board has ever answered has failed.
+    assert!(line.contains("nothing answers") && line.contains("powered") && code == Some(1), "{line}");
+    let told = stderr(&somatic(&["run", "--source", &format!("serial:{name}"), "--for", "1s"]).output().unwrap());
+    let last = told.lines().last().unwrap_or_default();
+    assert!(last.contains("no board has answered") && !told.contains("never heard of"), "{told}");
 }
 
 /// Resident memory of this process, kB.

@@ -112,7 +112,7 @@ fn each_heavy_dependency_has_one_door() {
         ("fearless_simd", "backend/cpu"),
         ("plotters", "ink|picture/words.rs|tradeoff/plot.rs"),
         ("png", "ink"),
-        ("rustix", "cli/board/pty.rs|source/ports.rs"),
+        ("rustix", "cli/board/pty.rs|cli/keys.rs|source/ports.rs"),
         ("mcap", "recording"),
         ("crc32fast", "recording"),
         ("lz4_flex", "recording"),

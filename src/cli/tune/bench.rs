@@ -145,7 +145,7 @@ impl Bench {
 
     fn tell(&mut self) {
         for notice in self.lines.notices() {
-            self.guide.say(&notice);
+            self.guide.say(&notice.to_string());
         }
     }
 

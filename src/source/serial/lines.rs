@@ -1,6 +1,7 @@
 //! What reading threads and the reader of frames share, and what anyone may know of the lines.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -76,14 +77,30 @@ pub struct BoardAccount {
     pub rate_hz: Option<f64>,
 }
 
+/// Something that is to be said of a line.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Notice {
+    /// When it happened, s since the lines were opened: the clock of the frames.
+    pub at_s: f64,
+    /// What happened, one line that begins with the port.
+    pub text: String,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2} s: {}", self.at_s, self.text)
+    }
+}
+
 /// What is to be known of serial lines while they are read, from any thread.
 #[derive(Clone)]
 pub struct Lines(pub(super) Arc<Shared>);
 
 impl Lines {
-    /// What was said since the last call, a line each.
+    /// What was said since the last call.
     #[must_use]
-    pub fn notices(&self) -> Vec<String> {
+    pub fn notices(&self) -> Vec<Notice> {
         self.0.lock().notices.drain(..).collect()
     }
 
@@ -139,7 +156,8 @@ pub(super) struct State {
     pub(super) accounts: Vec<BoardAccount>,
     /// One a channel, board by board.
     pub(super) taps: Vec<Vec<ChannelTap>>,
-    notices: VecDeque<String>,
+    start: Instant,
+    notices: VecDeque<Notice>,
     verdicts: Vec<Verdict>,
     /// Per board, the line that it was heard on.
     owners: Vec<Option<usize>>,
@@ -156,11 +174,12 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(wiring: &Wiring, lines: usize) -> Self {
+    pub(super) fn new(wiring: &Wiring, lines: usize, start: Instant) -> Self {
         let account = |board: u16| BoardAccount { board, ..BoardAccount::default() };
         let accounts: Vec<_> = wiring.boards().iter().map(|board| account(board.id)).collect();
         let state = State {
             queue: VecDeque::new(),
+            start,
             notices: VecDeque::new(),
             verdicts: vec![Verdict::Pending; lines],
             owners: vec![None; accounts.len()],
@@ -212,9 +231,9 @@ impl State {
         Some((frame, read_at))
     }
 
-    pub(super) fn say(&mut self, notice: String) {
+    pub(super) fn say(&mut self, text: String) {
         if self.notices.len() < MOST_NOTICES {
-            self.notices.push_back(notice);
+            self.notices.push_back(Notice { at_s: self.start.elapsed().as_secs_f64(), text });
         }
     }
 

@@ -17,7 +17,7 @@ use std::sync::{Arc, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use lines::{BoardAccount, BoardState, Lines};
+pub use lines::{BoardAccount, BoardState, Lines, Notice};
 pub use taps::{ChannelTap, TapTrouble};
 
 use self::lines::Shared;
@@ -54,6 +54,7 @@ pub struct SerialSource {
     lines: Lines,
     merge: Merge,
     taxels: Vec<u32>,
+    wiring: Arc<Wiring>,
     start: Instant,
     read_at: Option<Instant>,
 }
@@ -81,8 +82,8 @@ impl SerialSource {
         let places = wiring.boards().iter().map(|board| board.taxels.iter().map(&mut place).collect()).collect();
 
         let wiring = Arc::new(wiring);
-        let shared = Arc::new(Shared::new(&wiring, ports.len()));
         let start = Instant::now();
+        let shared = Arc::new(Shared::new(&wiring, ports.len(), start));
         for (line, (port, baud)) in ports.iter().enumerate() {
             let usual = || wired_baud(&wiring, port).unwrap_or(USUAL_BAUD);
             let session = Session::new(Task {
@@ -100,7 +101,13 @@ impl SerialSource {
                 .map_err(|e| Error::failed(format!("cannot start a thread: {e}")).at(port))?;
         }
         let merge = Merge::new(places, pace, options.max_age_s);
-        Ok(Self { lines: Lines(shared), merge, taxels, start, read_at: None })
+        Ok(Self { lines: Lines(shared), merge, taxels, wiring, start, read_at: None })
+    }
+
+    /// Which taxel hangs on which channel of which board.
+    #[must_use]
+    pub fn wiring(&self) -> &Wiring {
+        &self.wiring
     }
 
     /// What is to be known of the lines, for whoever shows it.

@@ -101,6 +101,10 @@ impl Talk {
         let account = &mut state.accounts[board];
         account.port = Some(port.clone());
         let (was_away, was_bad) = (self.unplugged.take().is_some(), self.said.take().is_some());
+        if was_away {
+            // Its line is there again; it speaks once a frame comes.
+            account.state = BoardState::Silent;
+        }
         if was_away && self.joined == Some((board, id)) {
             // Its clock went on, or it says that it has started again.
             state.say(format!("{port}: board {id} is back"));
