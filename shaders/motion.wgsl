@@ -2,17 +2,18 @@
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> steps: array<Step>;
-// Per field the distance within which its centroid counts as still.
-@group(0) @binding(2) var<storage, read> still: array<f32>;
+@group(0) @binding(2) var<storage, read> still: array<Still>;
 // As shaders/shared/over_fields.wgsl has them.
 @group(0) @binding(3) var<storage, read_write> results: array<u32>;
-// Per field the centroid of the last batch's last frame, and 1 where that was in contact.
-@group(0) @binding(4) var<storage, read_write> last: array<vec4<f32>>;
+// Per field the centroid of the last batch's last frame as bits, how many taxels were pressed there, and 1 where that was
+// in contact.
+@group(0) @binding(4) var<storage, read_write> last: array<vec4<u32>>;
 
 const NOWHERE = 0xffffffffu;
-override CENTROID_AT: u32 = 1u;
+override ACTIVE_AT: u32 = 1u;
+override CENTROID_AT: u32 = 2u;
 // Flags below and quantities present above, for the host to add to the cell's: its neighbours read that meanwhile.
-override MOTION_AT: u32 = 3u;
+override MOTION_AT: u32 = 4u;
 override DISPLACEMENT_AT: u32 = NOWHERE;
 override DIRECTION_AT: u32 = NOWHERE;
 override DISTANCE_AT: u32 = NOWHERE;
@@ -24,10 +25,12 @@ fn at_column(column: u32, cell: u32) -> u32 {
     return column * batch.frames * batch.fields + cell;
 }
 
-fn centroid(cell: u32) -> vec2<f32> {
+// A cell's centroid as bits, how many taxels are pressed, and 1 where it is in contact.
+fn touch_at(cell: u32) -> vec4<u32> {
     let u = results[at_column(CENTROID_AT, cell)];
     let v = results[at_column(CENTROID_AT + 1u, cell)];
-    return vec2<f32>(bitcast<f32>(u), bitcast<f32>(v));
+    let pressed = results[at_column(ACTIVE_AT, cell)];
+    return vec4<u32>(u, v, pressed, select(1u, 0u, (results[cell] & (NO_CONTACT | NO_CHART)) != 0u));
 }
 
 fn store(column: u32, cell: u32, value: f32) {
@@ -51,22 +54,24 @@ fn motion_of(field: u32, frame: u32, cell: u32) -> Motion {
     if (results[cell] & (NO_CONTACT | NO_CHART)) != 0u {
         return motion;
     }
-    var before = last[field].xy;
-    var touched = last[field].w == 1.0;
+    var touch_before = last[field];
     if frame > 0u {
-        before = centroid(cell - batch.fields);
-        touched = (results[cell - batch.fields] & NO_CONTACT) == 0u;
+        touch_before = touch_at(cell - batch.fields);
     }
+    let touched = touch_before.w == 1u;
     let step = steps[frame];
     if !touched || step.flags != 0u {
         motion.status = select(NO_PREVIOUS, step.flags, touched);
         return motion;
     }
-    let now = centroid(cell);
+    let touch = touch_at(cell);
+    let now = bitcast<vec2<f32>>(touch.xy);
+    let before = bitcast<vec2<f32>>(touch_before.xy);
     let moved = now - before;
     let distance = sqrt(moved.x * moved.x + moved.y * moved.y);
     let radial = sqrt(now.x * now.x + now.y * now.y) - sqrt(before.x * before.x + before.y * before.y);
-    let is_still = distance <= still[field];
+    let rounding = still[field].rounding + still[field].per_taxel * f32(touch.z + touch_before.z);
+    let is_still = distance <= max(rounding, still[field].least);
     var direction = 0.0;
     if !is_still {
         direction = full_angle(moved.x, moved.y);
@@ -111,6 +116,5 @@ fn keep(
         return;
     }
     let cell = (batch.frames - 1u) * batch.fields + field;
-    let touched = (results[cell] & (NO_CONTACT | NO_CHART)) == 0u;
-    last[field] = vec4<f32>(centroid(cell), 0.0, select(0.0, 1.0, touched));
+    last[field] = touch_at(cell);
 }

@@ -67,6 +67,14 @@ struct Step {
     flags: u32,
 }
 
+// Up to which distance a field's centroid counts as still, in its unit: at least so far, or what rounding of two frames'
+// centroids may feign, which grows with each pressed taxel.
+struct Still {
+    least: f32,
+    rounding: f32,
+    per_taxel: f32,
+}
+
 const NO_CONTACT = 1u << 0u;
 const ONE_TAXEL = 1u << 1u;
 const TIE = 1u << 2u;

@@ -1,7 +1,5 @@
 //! Backend `reference`: the stages' own f64, one cell after the other, and the bounds that the others are held to.
 
-use glam::DVec2;
-
 use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
@@ -65,7 +63,7 @@ pub(crate) struct Reference {
 struct Before {
     contact: bool,
     /// The centroid in the field's unit, if it was in contact and has a chart.
-    centroid: Option<DVec2>,
+    centroid: Option<motion::Centroid>,
 }
 
 /// What a field's next bound hangs on.
@@ -73,7 +71,7 @@ struct Before {
 struct BoundBefore {
     state: ContactState,
     /// The centroid, and its bound as a distance.
-    centroid: Option<(DVec2, f64)>,
+    centroid: Option<(motion::Centroid, f64)>,
     touches: touches::Doubt,
     filter: filter::Doubt,
 }
@@ -152,7 +150,7 @@ impl Reference {
             return (CellBound { in_doubt: Flags::all(), ..CellBound::default() }, unknown);
         }
         let pressed = self.pressed(field, pressures);
-        let how = self.plan.sums(field);
+        let how = self.plan.sums(field.count);
         let sums = contact::bound(&pressed, how);
         let mut bound =
             CellBound { total: Some(sums.total), peak: Some(sums.peak), area: Some(sums.area), ..CellBound::default() };
@@ -190,7 +188,8 @@ impl Reference {
                 bound.in_doubt |= axis.line.in_doubt;
             }
         }
-        let kept = (field.charted && self.plan.stages().motion).then(|| (c.truncate(), c_bound.truncate().length()));
+        let touched = motion::Centroid { place: c.truncate(), pressed: pressed.len() as u32 };
+        let kept = (field.charted && self.plan.stages().motion).then(|| (touched, c_bound.truncate().length()));
         if let Some(now) = kept {
             moved(&mut bound, field, now, before, step);
         }
@@ -206,8 +205,8 @@ impl Reference {
         let mut filter = before.filter;
         if field.charted && self.plan.stages().filter {
             let clock = filter::Clock::new(step.dt_s, step.flags);
-            let (place, place_bound) = (c.truncate() * unit, c_bound.truncate().length() * unit);
-            let limit = filter.follow(&field.filter, clock, place, place_bound);
+            let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
+            let limit = filter.follow(&field.filter, clock, in_metres, c_bound.truncate().length() * unit);
             bound.in_doubt |= limit.in_doubt;
             bound.filtered_displacement = limit.displacement;
             bound.filtered_direction = limit.direction;
@@ -289,14 +288,13 @@ impl Reference {
             }
         }
         if field.charted && stages.motion {
-            let now = c.truncate();
+            let now = motion::Centroid { place: c.truncate(), pressed: sums.active };
             after.centroid = Some(now);
             match before.centroid {
                 None => flags |= Flags::NO_PREVIOUS,
                 Some(_) if !step.flags.is_empty() => flags |= step.flags,
                 Some(then) => {
-                    let still_within = f64::from(field.still_within);
-                    let moved = motion::reference(now, then, still_within);
+                    let moved = motion::reference(now, then, &field.still);
                     present |= Outputs::MOTION;
                     let unit = f64::from(field.unit_m);
                     write(Outputs::DISTANCE, &mut columns.distance, moved.distance * unit);
@@ -328,7 +326,7 @@ const INPUT: Flags = Flags::SATURATED
     .union(Flags::NO_CHART);
 
 /// Adds the bounds of motion from `before` to `now`, a centroid with its bound.
-fn moved(bound: &mut CellBound, field: &PlanField, now: (DVec2, f64), before: BoundBefore, step: &Step) {
+fn moved(bound: &mut CellBound, field: &PlanField, now: (motion::Centroid, f64), before: BoundBefore, step: &Step) {
     let Some(then) = before.centroid else {
         if before.state.in_doubt {
             bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT | Flags::STILL;
@@ -339,9 +337,8 @@ fn moved(bound: &mut CellBound, field: &PlanField, now: (DVec2, f64), before: Bo
         return;
     }
     let unit = f64::from(field.unit_m);
-    let still_within = f64::from(field.still_within);
-    let right = motion::reference(now.0, then.0, still_within);
-    let limit = motion::bound(now.0, then.0, still_within, now.1, then.1);
+    let right = motion::reference(now.0, then.0, &field.still);
+    let limit = motion::bound(now.0, then.0, &field.still, now.1, then.1);
     bound.displacement = Some(limit.displacement * unit);
     bound.direction = limit.direction;
     bound.distance = Some(limit.distance * unit);

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
-use crate::stage::{filter, position, touches};
+use crate::stage::{filter, motion, position, touches};
 
 /// What poses are applied to: the body's links and how they hang together at rest.
 pub(super) struct Links {
@@ -182,7 +182,8 @@ impl Host<'_> {
             return;
         }
         let clock = filter::Clock::new(step.dt_s, step.flags);
-        let found = memory.follow(&field.filter, clock, centroid(percepts, cell).truncate());
+        let touched = motion::Centroid { place: centroid(percepts, cell).truncate(), pressed: percepts.active[cell] };
+        let found = memory.follow(&field.filter, clock, touched);
         percepts.flags[cell] |= found.flags;
         percepts.present[cell] |= found.present & self.plan.outputs;
         if let Some(displacement) = percepts.filtered_displacement.get_mut(cell) {

@@ -148,7 +148,7 @@ impl Percepts {
         refill(&mut self.in_world, cells, false);
         self.flags.resize(cells, Flags::empty());
         self.present.resize(cells, Outputs::empty());
-        self.active.resize(when(Outputs::ACTIVE, cells), 0);
+        self.active.resize(if self.columns.contains(Outputs::ACTIVE) { cells } else { 0 }, 0);
         refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
         refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
         refill(&mut self.filtered_displacement, when(Outputs::FILTERED_DISPLACEMENT, cells), [0.0; 2]);

@@ -129,7 +129,7 @@ const PLACE: Outputs = Outputs::POSITION.union(Outputs::NORMAL);
 const NUMBERS: [(&str, Outputs, usize); 16] = [
     ("contact", Outputs::TOTAL, 1),
     ("contact", Outputs::PEAK, 1),
-    ("contact", Outputs::ACTIVE, 1),
+    ("contact", Outputs::ACTIVE.union(Outputs::FILTERED), 1),
     ("contact", Outputs::AREA, 1),
     ("centroid", PLACE.union(Outputs::CENTROID).union(Outputs::FILTERED), 2),
     ("position", PLACE, 1),

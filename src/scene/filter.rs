@@ -5,6 +5,7 @@ use std::str::FromStr;
 use crate::error::{Error, Result};
 use crate::length::Length;
 use crate::stage::filter::{FilterBy, Settings};
+use crate::stage::layout::Still;
 
 /// Which motion counts, for [`crate::Outputs::FILTERED`].
 ///
@@ -101,12 +102,12 @@ impl MotionFilter {
         Ok(())
     }
 
-    /// What that is for a field whose taxels lie about `spacing_m` apart.
-    pub(crate) fn settings(&self, spacing_m: f64, still_within_m: f64) -> Result<Settings> {
+    /// What that is for a field whose taxels lie about `spacing_m` apart, and which counts as `still` in units of `unit_m`.
+    pub(crate) fn settings(&self, spacing_m: f64, still: Still, unit_m: f64) -> Result<Settings> {
         self.check()?;
         let high = self.high_m.unwrap_or_else(|| (HIGH * spacing_m).max(APART * self.low_m.unwrap_or(0.0)));
         let low = self.low_m.unwrap_or_else(|| (LOW * spacing_m).min(high / APART));
-        Ok(Settings { window_m: [low, high], by: self.by, time_constant_s: self.time_constant_s, still_within_m })
+        Ok(Settings { window_m: [low, high], by: self.by, time_constant_s: self.time_constant_s, still, unit_m })
     }
 }
 
@@ -139,7 +140,7 @@ mod tests {
             ("0..inf", [0.0, f64::INFINITY]),
         ] {
             let filter = MotionFilter::default().with_window(text).unwrap_or_else(|e| panic!("{text}: {e}"));
-            let window_m = filter.settings(16e-3, 0.0).unwrap().window_m;
+            let window_m = filter.settings(16e-3, Still::default(), 1.0).unwrap().window_m;
             let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-15;
             assert!(near(window_m[0], low) && near(window_m[1], high), "{text}: {window_m:?}");
         }
@@ -172,7 +173,12 @@ mod tests {
     #[test]
     fn an_end_that_is_not_given_makes_room_for_the_one_that_is() {
         let window = |text: &str, spacing_m: f64| {
-            MotionFilter::default().with_window(text).unwrap().settings(spacing_m, 0.0).unwrap().window_m
+            MotionFilter::default()
+                .with_window(text)
+                .unwrap()
+                .settings(spacing_m, Still::default(), 1.0)
+                .unwrap()
+                .window_m
         };
         assert_eq!(window("1m..", 0.01), [1.0, 3.0]);
         assert_eq!(window("..3m", 1000.0), [1.0, 3.0]);
@@ -185,7 +191,7 @@ mod tests {
     fn a_time_that_is_none_is_refused() {
         for time_constant_s in [-1.0, f64::NAN, f64::INFINITY] {
             let filter = MotionFilter { time_constant_s, ..MotionFilter::default() };
-            assert!(filter.settings(1.0, 0.0).unwrap_err().to_string().contains("filter time"));
+            assert!(filter.settings(1.0, Still::default(), 1.0).unwrap_err().to_string().contains("filter time"));
         }
     }
 }

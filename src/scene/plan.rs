@@ -14,7 +14,7 @@ use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
-use crate::stage::{Sums, filter, layout, motion, touches};
+use crate::stage::{Sums, filter, layout, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ pub(crate) struct PlanField {
     /// When it counts as touched.
     pub(crate) thresholds: Thresholds,
     /// The distance in the unit up to which its centroid counts as still.
-    pub(crate) still_within: f32,
+    pub(crate) still: layout::Still,
     /// How its motion is filtered.
     pub(crate) filter: filter::Settings,
     /// Per member, the members beside it, where separate touches are wanted.
@@ -194,18 +194,18 @@ impl Plan {
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
             let above = std::iter::successors(field.parent, |&above| fields.fields[above].parent);
             let above: Option<usize> = above.into_iter().find_map(|above| first_of.get(&above).copied());
-            let unit_m = unit_of(field.radius_m());
+            let (count, unit_m) = (field.members.len(), unit_of(field.radius_m()));
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             let first = plan_fields.len();
             first_of.insert(index, first);
-            let still_within = motion::still_within(field.members.len(), field.radius_m() / f64::from(unit_m)) as f32;
+            let still = layout::Still::new(plan.sums(count), count, field.radius_m() / f64::from(unit_m));
             plan_fields.push(PlanField {
                 name: field.name.clone(),
                 letter: 0,
                 link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
                 anchor: field.anchor,
                 first: members.len(),
-                count: field.members.len(),
+                count,
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
                 above: None,
@@ -213,8 +213,8 @@ impl Plan {
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
                 unit_m,
                 thresholds: Thresholds::default(),
-                still_within,
-                filter: scene.filter.settings(field.spacing_m(), f64::from(still_within * unit_m))?,
+                still,
+                filter: scene.filter.settings(field.spacing_m(), still, f64::from(unit_m))?,
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
@@ -249,6 +249,9 @@ impl Plan {
         }
         if plan.stages().position || plan.stages().filter {
             plan.columns |= Outputs::CENTROID;
+        }
+        if plan.stages().motion || plan.stages().filter {
+            plan.columns |= Outputs::ACTIVE;
         }
         Ok(plan)
     }
@@ -379,9 +382,9 @@ impl Plan {
         self.change_threshold
     }
 
-    /// How single precision adds up over `field`, and so how far it may be off.
-    pub(crate) fn sums(&self, field: &PlanField) -> Sums {
-        if self.is_compensated() { Sums::compensated(field.count) } else { Sums::OnePass }
+    /// How single precision adds up over a field of `members`, and so how far it may be off.
+    pub(crate) fn sums(&self, members: usize) -> Sums {
+        if self.is_compensated() { Sums::compensated(members) } else { Sums::OnePass }
     }
 
     pub(crate) fn is_compensated(&self) -> bool {

@@ -29,7 +29,8 @@
 
 use glam::DVec2;
 
-use super::motion::SHORTEST_STEP_S;
+use super::layout::Still;
+use super::motion::{Centroid, SHORTEST_STEP_S};
 use super::{SLACK, U};
 use crate::percept::{Flags, Outputs};
 
@@ -54,8 +55,10 @@ pub(crate) struct Settings {
     pub(crate) by: FilterBy,
     /// τ, s.
     pub(crate) time_constant_s: f64,
-    /// The step up to which the centroid counts as still, m.
-    pub(crate) still_within_m: f64,
+    /// The step up to which the centroid counts as still, in the field's unit.
+    pub(crate) still: Still,
+    /// That unit, m.
+    pub(crate) unit_m: f64,
 }
 
 /// What becomes of a step.
@@ -68,23 +71,24 @@ enum Choice {
 
 impl Settings {
     /// What becomes of a step, and whether one that is off by `bound` (m) might fare otherwise.
-    fn judge(&self, from: DVec2, to: DVec2, bound: f64) -> (Choice, bool) {
+    fn judge(&self, from: Centroid, to: Centroid, bound: f64) -> (Choice, bool) {
         let [low, high] = self.window_m;
-        let length = (to - from).length();
+        let still_within = self.still.within(from.pressed + to.pressed) * self.unit_m;
+        let length = (to.place - from.place).length();
         let measure = match self.by {
             FilterBy::Distance => length,
-            FilterBy::Radial => (to.length() - from.length()).abs(),
+            FilterBy::Radial => (to.place.length() - from.place.length()).abs(),
         };
         let near = |value: f64, end: f64| (value - end).abs() <= bound;
         let choice = match measure {
-            _ if length <= self.still_within_m => Choice::Held,
+            _ if length <= still_within => Choice::Held,
             beyond if beyond > high => Choice::Jumped,
             short if short < low => Choice::Held,
             _ => Choice::Counts,
         };
-        let moved = length > self.still_within_m;
+        let moved = length > still_within;
         let at_an_end = moved && ((low > 0.0 && near(measure, low)) || near(measure, high));
-        (choice, at_an_end || near(length, self.still_within_m))
+        (choice, at_an_end || near(length, still_within))
     }
 }
 
@@ -116,7 +120,7 @@ impl Clock {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Memory {
     /// The last centroid that counted, m.
-    anchor: Option<DVec2>,
+    anchor: Option<Centroid>,
     /// The time since then, s.
     since_s: f64,
     /// Average of the steps' unit vectors.
@@ -143,9 +147,9 @@ impl Memory {
     }
 
     /// Takes the next centroid of a contact, m.
-    pub(crate) fn follow(&mut self, settings: &Settings, clock: Clock, place: DVec2) -> Filtered {
+    pub(crate) fn follow(&mut self, settings: &Settings, clock: Clock, centroid: Centroid) -> Filtered {
         let mut filtered = Filtered::default();
-        let fresh = Self { anchor: Some(place), ..Self::default() };
+        let fresh = Self { anchor: Some(centroid), ..Self::default() };
         match (self.anchor, clock) {
             (None, _) => {
                 *self = fresh;
@@ -158,14 +162,14 @@ impl Memory {
             (Some(_), Clock::Stands) => filtered.flags |= Flags::BAD_DT,
             (Some(from), Clock::Runs(dt_s)) => {
                 self.since_s += dt_s;
-                match settings.judge(from, place, 0.0).0 {
+                match settings.judge(from, centroid, 0.0).0 {
                     Choice::Held => filtered.flags |= Flags::HELD,
                     Choice::Jumped => {
                         *self = fresh;
                         filtered.flags |= Flags::JUMPED;
                     }
                     Choice::Counts => {
-                        filtered.displacement = place - from;
+                        filtered.displacement = centroid.place - from.place;
                         filtered.speed = filtered.displacement.length() / self.since_s;
                         filtered.present |= Outputs::FILTERED_DISPLACEMENT | Outputs::FILTERED_SPEED;
                         let unit = filtered.displacement / filtered.displacement.length();
@@ -227,9 +231,15 @@ impl Doubt {
     }
 
     /// The bounds of the next frame of a contact, whose centroid is off by up to `place_bound` (m).
-    pub(crate) fn follow(&mut self, settings: &Settings, clock: Clock, place: DVec2, place_bound: f64) -> FilterBound {
+    pub(crate) fn follow(
+        &mut self,
+        settings: &Settings,
+        clock: Clock,
+        centroid: Centroid,
+        place_bound: f64,
+    ) -> FilterBound {
         let before = *self;
-        self.right.follow(settings, clock, place);
+        self.right.follow(settings, clock, centroid);
         let fresh = Self { right: self.right, anchor: place_bound, heading: 0.0, lost: false };
         let mut bound = FilterBound::default();
         if before.lost {
@@ -254,10 +264,10 @@ impl Doubt {
             (Some(_), Clock::Stands) => return self.directed(bound),
             (Some(from), Clock::Runs(_)) => from,
         };
-        let step = place - from;
+        let step = centroid.place - from.place;
         // Beside f32's error, a few roundings of f64 on both sides.
-        let moved = SLACK * (before.anchor + place_bound + U * U * (place.length() + from.length()));
-        let (choice, in_doubt) = settings.judge(from, place, moved);
+        let moved = SLACK * (before.anchor + place_bound + U * U * (centroid.place.length() + from.place.length()));
+        let (choice, in_doubt) = settings.judge(from, centroid, moved);
         if in_doubt {
             *self = Self { lost: true, ..fresh };
             bound.in_doubt |= Flags::HELD | Flags::JUMPED | Flags::STILL;
@@ -299,7 +309,12 @@ mod tests {
     use super::*;
 
     fn settings(window_m: [f64; 2], time_constant_s: f64) -> Settings {
-        Settings { window_m, by: FilterBy::Distance, time_constant_s, still_within_m: 1e-9 }
+        let still = Still { least: 1e-9, ..Still::default() };
+        Settings { window_m, by: FilterBy::Distance, time_constant_s, still, unit_m: 1.0 }
+    }
+
+    fn at(place: DVec2) -> Centroid {
+        Centroid { place, pressed: 1 }
     }
 
     /// A filter being fed.
@@ -314,7 +329,7 @@ mod tests {
         }
 
         fn push(&mut self, dt_s: f64, u: f64, v: f64) -> Filtered {
-            self.memory.follow(&self.settings, Clock::Runs(dt_s), DVec2::new(u, v))
+            self.memory.follow(&self.settings, Clock::Runs(dt_s), at(DVec2::new(u, v)))
         }
     }
 
@@ -408,7 +423,7 @@ mod tests {
         assert_eq!([0.0, 1e-13].map(|dt_s| step(dt_s, Flags::BAD_DT)), [Clock::Stands; 2]);
         assert_eq!([-0.1, 3600.0].map(|dt_s| step(dt_s, Flags::BAD_DT)), [Clock::Broken; 2]);
         let mut fed = Fed::new(settings([1e-3, 1.0], 0.1));
-        let at = |fed: &mut Fed, clock, u| fed.memory.follow(&fed.settings.clone(), clock, DVec2::new(u, 0.0));
+        let at = |fed: &mut Fed, clock, u| fed.memory.follow(&fed.settings.clone(), clock, at(DVec2::new(u, 0.0)));
         fed.push(0.1, 0.0, 0.0);
         fed.push(0.1, 0.01, 0.0);
         // The same time again: what was known stays, and the next frame goes on from there.
@@ -445,8 +460,8 @@ mod tests {
             if random() > 0.98 {
                 (right, other, doubt) = Default::default();
             }
-            let (a, b) = (right.follow(&settings, clock, place), other.follow(&settings, clock, near));
-            let bound = doubt.follow(&settings, clock, place, claimed);
+            let (a, b) = (right.follow(&settings, clock, at(place)), other.follow(&settings, clock, at(near)));
+            let bound = doubt.follow(&settings, clock, at(place), claimed);
             if !((a.flags ^ b.flags) - bound.in_doubt).is_empty() {
                 return Err(format!("{:?} {:?}", a.flags, b.flags));
             }

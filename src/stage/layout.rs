@@ -116,6 +116,18 @@ pub(crate) struct Step {
     pub(crate) flags: u32,
 }
 
+/// Up to which distance a field's centroid counts as still, in the field's unit; see [`crate::stage::motion`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Still {
+    /// At least that far: 10⁻⁶ of the field's radius.
+    pub(crate) least: f32,
+    /// What rounding may feign of two centroids, beside `per_taxel`.
+    pub(crate) rounding: f32,
+    /// What each taxel that is pressed in either frame adds to that.
+    pub(crate) per_taxel: f32,
+}
+
 /// Where a field's members stand, and what it can answer. A part of a wide field is described alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]

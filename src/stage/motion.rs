@@ -5,20 +5,34 @@
 //!   to motion around the origin and signed; both are kept.
 //! * Absent, `no_previous`: the field was not in contact in the frame before, or there was none.
 //! * Absent, `bad_dt`: Δt ≤ 0, or longer than the scene allows.
-//! * Direction absent, `still`: ‖Δ‖ ≤ max(10⁻⁶ of the field's radius, (4n + 22)u of its unit), what rounding of two
-//!   centroids of n taxels may feign.
+//! * Direction absent, `still`: ‖Δ‖ ≤ max(10⁻⁶ of the field's radius, what rounding of the two centroids may feign). A
+//!   centroid of n pressed taxels lies within the unit of its chart's origin, and so is off by (2r + 13)u of the unit
+//!   ([`super::centroid`]). In one pass, r = n − 1, that is (2(n + n′) + 22)u for two. Compensated, r hardly hangs on n, and
+//!   that of all members stands for both. How many members a field has beside is no matter in one pass: one that is not
+//!   pressed adds 0 to each sum, which no order of adding rounds.
 //!
 //! **Bound.** With b the sum of both centroids' bounds, Δ is off by δ = b + u‖Δ‖, the distance by δ + 9u‖Δ‖ (its root),
 //! the direction by asin(δ/‖Δ‖), a radius by its centroid's bound and 9u of itself, a speed by its distance's bound over
-//! Δt and 6u of itself (Δt rounded, the quotient).
+//! Δt and 6u of itself (Δt rounded, the quotient). The distance that counts as still
+//! is a whole number of u, exact up to 2²⁴ of them; beyond, the number of taxels, the sum and a device's conversion are
+//! off by 3u of it.
 
 use glam::DVec2;
 
 use super::angle::ATAN2_ERROR;
-use super::{SLACK, U};
+use super::layout::Still;
+use super::{SLACK, Sums, U};
 
 /// Speeds over shorter steps could pass what single precision holds, s.
 pub(crate) const SHORTEST_STEP_S: f64 = 1e-12;
+
+/// Where a field is touched in a frame, in the unit of its motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Centroid {
+    pub(crate) place: DVec2,
+    /// How many taxels are pressed.
+    pub(crate) pressed: u32,
+}
 
 /// How a centroid moved; lengths in the unit of the centroids.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,34 +55,52 @@ pub(crate) struct MotionBound {
     pub(crate) still_in_doubt: bool,
 }
 
-/// The distance up to which a centroid of `members` taxels counts as still, in its unit; `radius` is the field's.
-pub(crate) fn still_within(members: usize, radius: f64) -> f64 {
-    (1e-6 * radius).max((4.0 * members as f64 + 22.0) * U)
+impl Still {
+    /// Of a field of `members` that are added up as `sums` says; `radius` is the field's, in its unit.
+    pub(crate) fn new(sums: Sums, members: usize, radius: f64) -> Self {
+        let (roundings, per_taxel) = match sums {
+            Sums::OnePass => (22.0, 2.0),
+            Sums::Compensated { .. } => ((4.0 * sums.roundings(members) + 26.0).ceil(), 0.0),
+        };
+        Self { least: (1e-6 * radius) as f32, rounding: (roundings * U) as f32, per_taxel: (per_taxel * U) as f32 }
+    }
+
+    /// The distance, where the two frames have so many pressed taxels together.
+    pub(crate) fn within(&self, pressed: u32) -> f64 {
+        let rounding = f64::from(self.rounding) + f64::from(self.per_taxel) * f64::from(pressed);
+        rounding.max(f64::from(self.least))
+    }
+
+    /// The same in single precision.
+    pub(crate) fn within_f32(&self, pressed: u32) -> f32 {
+        (self.rounding + self.per_taxel * pressed as f32).max(self.least)
+    }
 }
 
 /// What is right, in f64.
-pub(crate) fn reference(now: DVec2, before: DVec2, still_within: f64) -> Motion {
-    let displacement = now - before;
+pub(crate) fn reference(now: Centroid, before: Centroid, still: &Still) -> Motion {
+    let displacement = now.place - before.place;
     let distance = displacement.length();
     // +0 + (−0) is +0, so that moving along −u is π and not −π.
     let direction = (displacement.y + 0.0).atan2(displacement.x + 0.0);
     Motion {
         displacement,
-        direction: (distance > still_within).then_some(direction),
+        direction: (distance > still.within(now.pressed + before.pressed)).then_some(direction),
         distance,
-        radial_distance: now.length() - before.length(),
+        radial_distance: now.place.length() - before.place.length(),
     }
 }
 
 /// How far a single-precision answer may be off, given the bounds of the two centroids as distances.
-pub(crate) fn bound(now: DVec2, before: DVec2, still_within: f64, now_bound: f64, before_bound: f64) -> MotionBound {
-    let right = reference(now, before, still_within);
+pub(crate) fn bound(now: Centroid, before: Centroid, still: &Still, now_bound: f64, before_bound: f64) -> MotionBound {
+    let right = reference(now, before, still);
+    let still_within = still.within(now.pressed + before.pressed);
     let moved = SLACK * (now_bound + before_bound + U * right.distance);
     let distance = moved + 9.0 * U * right.distance;
-    let still_in_doubt = (right.distance - still_within).abs() <= distance + U * still_within;
+    let still_in_doubt = (right.distance - still_within).abs() <= distance + 3.0 * U * still_within;
     let direction = (!still_in_doubt && right.direction.is_some() && moved < 0.5 * right.distance)
         .then(|| (moved / right.distance).asin() + ATAN2_ERROR);
-    let radii = now.length() + before.length();
+    let radii = now.place.length() + before.place.length();
     MotionBound {
         displacement: moved,
         direction,
@@ -88,25 +120,62 @@ mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, PI};
 
+    fn at(u: f64, v: f64) -> Centroid {
+        Centroid { place: DVec2::new(u, v), pressed: 1 }
+    }
+
     #[test]
     fn eq_3_to_7_as_they_stand() {
-        let moved = reference(DVec2::new(3.0, 4.0), DVec2::new(3.0, -4.0), 1e-6);
+        let still = Still::new(Sums::OnePass, 1, 1.0);
+        let moved = reference(at(3.0, 4.0), at(3.0, -4.0), &still);
         assert_eq!(moved.displacement, DVec2::new(0.0, 8.0));
         assert_eq!((moved.direction, moved.distance), (Some(FRAC_PI_2), 8.0));
         // Around the origin: the paper's distance sees nothing.
         assert_eq!(moved.radial_distance, 0.0);
-        let inward = reference(DVec2::new(1.0, 0.0), DVec2::new(3.0, 0.0), 1e-6);
+        let inward = reference(at(1.0, 0.0), at(3.0, 0.0), &still);
         assert_eq!((inward.direction, inward.distance, inward.radial_distance), (Some(PI), 2.0, -2.0));
-        let back = reference(DVec2::new(1.0, -0.0), DVec2::new(3.0, 0.0), 1e-6);
+        let back = reference(at(1.0, -0.0), at(3.0, 0.0), &still);
         assert_eq!(back.direction, Some(PI));
     }
 
     #[test]
-    fn what_hardly_moves_is_still() {
-        let within = still_within(9, 1.0);
-        assert!(within > 1e-6 && within < 1e-5);
-        assert_eq!(reference(DVec2::X, DVec2::X, within).direction, None);
-        assert_eq!(reference(DVec2::X * (1.0 + 0.5 * within), DVec2::X, within).direction, None);
-        assert!(reference(DVec2::X * (1.0 + 2.0 * within), DVec2::X, within).direction.is_some());
+    fn what_hardly_moves_is_still_and_only_pressed_taxels_feign_motion() {
+        for (members, pressed) in [(9, 9), (100_000, 9), (100_000, 1), (100_000, 3000)] {
+            let still = Still::new(Sums::OnePass, members, 1.0);
+            let within = still.within(pressed + 1);
+            assert_eq!(within, (2.0 * f64::from(pressed + 1) + 22.0) * U);
+            let before = at(1.0, 0.0);
+            let direction =
+                |by: f64| reference(Centroid { pressed, ..at(1.0 + by, 0.0) }, before, &still).direction.is_some();
+            assert_eq!([0.0, 0.5, 2.0].map(|times| direction(times * within)), [false, false, true]);
+        }
+        // Of a field that is large in its unit, and hardly pressed, a millionth counts.
+        assert_eq!(Still { least: 5e-6, ..Still::new(Sums::OnePass, 9, 1.0) }.within(2), f64::from(5e-6_f32));
+    }
+
+    #[test]
+    fn the_distance_covers_the_bounds_of_two_centroids_and_is_the_same_in_single_precision() {
+        for members in [1, 9, 5000, 1_000_000] {
+            for sums in [Sums::OnePass, Sums::compensated(members)] {
+                let still = Still::new(sums, members, 0.5);
+                for pressed in [1, 2, 9, 506, 4999, 1_000_000].into_iter().filter(|&pressed| pressed <= members) {
+                    for pressed_before in [1, pressed] {
+                        let rounding = [pressed, pressed_before].map(|n| (2.0 * sums.roundings(n) + 13.0) * U);
+                        let within = still.within((pressed + pressed_before) as u32);
+                        let feigned = rounding.iter().sum::<f64>();
+                        assert!(within >= feigned, "{members} {sums:?} {pressed}: {within} {feigned}");
+                        assert!(within <= (feigned + 3.0 * U).max(0.5e-6 + U), "{members} {sums:?} {pressed}");
+                        let single = still.within_f32((pressed + pressed_before) as u32);
+                        assert_eq!(f64::from(single), within);
+                    }
+                }
+            }
+        }
+        // More than single precision counts.
+        let still = Still::new(Sums::OnePass, 1 << 30, 1.0);
+        for pressed in [(1 << 23) - 11, (1 << 23) - 10, (1 << 24) + 1, (1 << 25) - 3, (1 << 30) + 77] {
+            let (single, within) = (f64::from(still.within_f32(pressed)), still.within(pressed));
+            assert!((single - within).abs() <= 2.0 * U * within, "{pressed}");
+        }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use somatic::scene::{Arithmetic, MotionFilter};
 use somatic::{Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Scene, Touch};
 
-use crate::common::{Flat, backends, frame};
+use crate::common::{Flat, backends, frame, ways};
 
 /// Nine taxels a metre apart in a line along u, and three along v above the middle one.
 fn cross() -> Body {
@@ -180,5 +181,125 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
         let mut usual = Engine::new(&cross(), Options { backend, ..Options::default() }).unwrap();
         let percepts = usual.process(&frames).unwrap();
         assert!(percepts.touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
+    }
+}
+
+/// What tells of motion, and of filtered motion.
+const MOVED: Outputs = Outputs::DIRECTION.union(Outputs::DISTANCE).union(Outputs::FILTERED);
+
+#[test]
+fn a_ball_that_rolls_on_a_large_plate_has_a_direction() {
+    const SIDE: usize = 317;
+    let along = |i: usize| i as f64 / (SIDE - 1) as f64 - 0.5;
+    let uv: Vec<[f64; 2]> = (0..SIDE * SIDE).map(|i| [along(i % SIDE), along(i / SIDE)]).collect();
+    let body = Flat::new(&uv).field("plate", None, 0..uv.len() as u32).body();
+    // It touches some 500 taxels of 100,489, and goes 15 mm a frame.
+    let heading = 0.5_f64;
+    let frames: Vec<Frame> = (0..18)
+        .map(|turn| {
+            let way = 0.015 * f64::from(turn);
+            let middle = [way * heading.cos() - 0.15, way * heading.sin() - 0.1];
+            let pressure = |&[u, v]: &[f64; 2]| {
+                let off = (u - middle[0]).hypot(v - middle[1]) / 0.0402;
+                1000.0 * (1.0 - off * off).max(0.0).powi(2)
+            };
+            frame(0.1 * f64::from(turn), &uv.iter().map(pressure).collect::<Vec<_>>())
+        })
+        .collect();
+    let pressed = frames[3].values.iter().filter(|value| value.number().is_some_and(|value| value > 0.0)).count();
+    assert!((480..530).contains(&pressed), "{pressed}");
+    let filter = MotionFilter::default().with_window("1mm..50mm").unwrap();
+    for backend in backends() {
+        let mut seen = Vec::new();
+        for (outputs, cut) in [(MOVED, 1), (MOVED | Outputs::ACTIVE, 18), (MOVED, 7)] {
+            let scene = Scene { outputs, filter, ..Scene::default() };
+            let mut engine = Engine::new(&body, Options { backend, scene, batch: cut, ..Options::default() }).unwrap();
+            let mut run = Vec::new();
+            for part in frames.chunks(cut) {
+                let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+                assert!(agreement.holds(), "{backend:?}: {agreement}");
+                assert_eq!(percepts.get(0, 0).active.is_some(), outputs.contains(Outputs::ACTIVE));
+                run.extend((0..part.len()).map(|frame| Percept { active: None, ..percepts.get(frame, 0) }));
+            }
+            for percept in &run[1..] {
+                assert!(percept.flags.is_empty(), "{backend:?}: {percept:?}");
+                assert!((percept.distance.unwrap() - 0.015).abs() < 1e-5, "{backend:?}: {percept:?}");
+                for direction in [percept.direction, percept.filtered_direction] {
+                    let off = (direction.unwrap() - heading).to_degrees();
+                    assert!(off.abs() < 0.1, "{backend:?}: {off} degrees off");
+                }
+                assert!(percept.filtered_speed.is_some());
+            }
+            seen.push(run);
+        }
+        assert!(seen.iter().all(|run| *run == seen[0]), "{backend:?}");
+    }
+}
+
+#[test]
+fn what_counts_as_still_grows_with_the_pressed_taxels_of_both_frames() {
+    // A thousand and one taxels in a line from −1 to 1, and one more 1006 u from its middle, where u is the rounding of single
+    // precision.
+    let u = f64::from(f32::EPSILON) / 2.0;
+    let mut uv: Vec<[f64; 2]> = (0..1001).map(|i| [f64::from(i) / 500.0 - 1.0, 0.0]).collect();
+    uv.push([1006.0 * u, 0.0]);
+    let body = Flat::new(&uv).field("line", None, 0..1002).body();
+    let pressed = |taxels: &[(usize, f64)]| {
+        let mut values = vec![0.0; 1002];
+        taxels.iter().for_each(|&(taxel, value)| values[taxel] = value);
+        values
+    };
+    let mut all = vec![1.0; 1002];
+    all[1001] = 0.0;
+    let round = [
+        pressed(&[(0, 1.0), (1000, 1.0)]),
+        // 1024 u further, where four pressed taxels of two frames feign 30 u.
+        pressed(&[(0, 1.0), (1000, 1.0 + 2048.0 * u)]),
+        // 8 u further.
+        pressed(&[(0, 1.0), (1000, 1.0 + 2064.0 * u)]),
+        // Back in the middle, and 1006 u off it; each time a thousand pressed taxels feign twice as much.
+        all,
+        pressed(&[(1001, 1.0)]),
+        // Back again by one taxel.
+        pressed(&[(500, 1.0)]),
+        pressed(&[(500, 1.0)]),
+        pressed(&[(1001, 1.0)]),
+        pressed(&[]),
+        pressed(&[(500, 1.0)]),
+    ];
+    let frames: Vec<Frame> =
+        (0..20).map(|turn| frame(0.1 * f64::from(turn), &round[turn as usize % round.len()])).collect();
+    let filter = MotionFilter { low_m: Some(0.0), high_m: Some(1.0), time_constant_s: 0.0, ..MotionFilter::default() };
+    for (backend, knobs) in ways() {
+        let mut seen = Vec::new();
+        for (outputs, cut) in [(MOVED, 1), (MOVED, 20), (MOVED | Outputs::ACTIVE, 7)] {
+            let scene = Scene { outputs, filter, knobs, ..Scene::default() };
+            let mut engine = Engine::new(&body, Options { backend, scene, batch: cut, ..Options::default() }).unwrap();
+            let mut run = Vec::new();
+            for part in frames.chunks(cut) {
+                let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+                assert!(agreement.holds(), "{backend:?} {knobs:?}: {agreement}");
+                run.extend((0..part.len()).map(|frame| Percept { active: None, ..percepts.get(frame, 0) }));
+            }
+            seen.push(run);
+        }
+        assert!(seen.iter().all(|run| *run == seen[0]), "{backend:?} {knobs:?}");
+        // Compensated sums lose little, however many taxels are pressed.
+        let careful = knobs.arithmetic == Some(Arithmetic::Compensated);
+        for (turn, percept) in seen[0].iter().enumerate() {
+            let turns = [(1, true), (2, false), (3, careful), (4, careful), (5, true), (7, true)];
+            for (_, moves) in turns.into_iter().filter(|(of_round, _)| turn % round.len() == *of_round) {
+                let what = format!("{backend:?} {knobs:?} frame {turn}: {percept:?}");
+                assert_eq!(
+                    (percept.direction.is_some(), percept.flags.contains(Flags::STILL)),
+                    (moves, !moves),
+                    "{what}"
+                );
+                // What the filter holds back stays where it was, which is near enough to the fifth.
+                assert_eq!(percept.filtered_speed.is_some(), moves, "{what}");
+                assert_eq!(percept.flags.contains(Flags::HELD), !moves, "{what}");
+            }
+        }
+        assert!(seen[0][9].flags.contains(Flags::NO_PREVIOUS) && seen[0][19].flags.contains(Flags::NO_PREVIOUS));
     }
 }

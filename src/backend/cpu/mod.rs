@@ -71,8 +71,8 @@ pub(crate) struct Cpu {
     before: Vec<RawValue>,
     /// Per field, whether the frame before was in contact.
     touched: Vec<bool>,
-    /// Per field, its centroid in the frame before, in its unit, if that was in contact.
-    last: Vec<Option<[f32; 2]>>,
+    /// Per field, its centroid in the frame before, if that was in contact.
+    last: Vec<Option<motion::Centroid>>,
 }
 
 /// The plan as lanes read it.

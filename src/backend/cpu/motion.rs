@@ -2,12 +2,21 @@
 
 use super::super::Step;
 use crate::percept::{CellsMut, Flags, Outputs};
-use crate::scene::Plan;
+use crate::scene::{Plan, PlanField};
 use crate::stage::angle::full_f32;
 
-/// Goes through all frames in order; `last` is each field's centroid in the frame before, in its unit, if it was in
-/// contact then, and becomes the last frame's.
-pub(super) fn scan(plan: &Plan, steps: &[Step], cells: &mut CellsMut<'_>, last: &mut [Option<[f32; 2]>]) {
+/// What the next frame asks of a field's centroid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Centroid {
+    /// In the field's unit.
+    place: [f32; 2],
+    /// How many taxels are pressed.
+    pressed: u32,
+}
+
+/// Goes through all frames in order; `last` is each field's centroid in the frame before, if it was in contact then, and
+/// becomes the last frame's.
+pub(super) fn scan(plan: &Plan, steps: &[Step], cells: &mut CellsMut<'_>, last: &mut [Option<Centroid>]) {
     let fields = plan.fields.len();
     for (frame, step) in steps.iter().enumerate() {
         for (index, (field, last)) in plan.fields.iter().zip(last.iter_mut()).enumerate() {
@@ -16,33 +25,34 @@ pub(super) fn scan(plan: &Plan, steps: &[Step], cells: &mut CellsMut<'_>, last: 
                 *last = None;
                 continue;
             }
-            let [u, v] = [cells.centroid_u[cell], cells.centroid_v[cell]].map(|metres| metres / field.unit_m);
-            match last.replace([u, v]) {
+            let place = [cells.centroid_u[cell], cells.centroid_v[cell]].map(|metres| metres / field.unit_m);
+            let now = Centroid { place, pressed: cells.active[cell] };
+            match last.replace(now) {
                 None => cells.flags[cell] |= Flags::NO_PREVIOUS,
                 Some(_) if !step.flags.is_empty() => cells.flags[cell] |= step.flags,
-                Some(before) => one(plan.outputs, cells, cell, [u, v], before, field.still_within, step, field.unit_m),
+                Some(before) => one(plan.outputs, field, cells, cell, now, before, step),
             }
         }
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "one cell's inputs, each a number")]
+/// A cell's motion from `before` to `now`.
 fn one(
     outputs: Outputs,
+    field: &PlanField,
     cells: &mut CellsMut<'_>,
     cell: usize,
-    [u, v]: [f32; 2],
-    [u0, v0]: [f32; 2],
-    still_within: f32,
+    now: Centroid,
+    before: Centroid,
     step: &Step,
-    unit_m: f32,
 ) {
+    let ([u, v], [u0, v0], unit_m) = (now.place, before.place, field.unit_m);
     let dt_s = step.dt_s as f32;
     let (du, dv) = (u - u0, v - v0);
     let distance = (du * du + dv * dv).sqrt();
     let radial = (u * u + v * v).sqrt() - (u0 * u0 + v0 * v0).sqrt();
     let mut found = Outputs::MOTION;
-    if distance <= still_within {
+    if distance <= field.still.within_f32(now.pressed + before.pressed) {
         cells.flags[cell] |= Flags::STILL;
         found -= Outputs::DIRECTION;
     } else if let Some(direction) = cells.direction.get_mut(cell) {

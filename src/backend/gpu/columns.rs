@@ -44,7 +44,7 @@ impl Columns {
         let wanted = [
             (Column::Total, Outputs::TOTAL),
             (Column::Peak, Outputs::PEAK),
-            (Column::Active, Outputs::ACTIVE),
+            (Column::Active, Outputs::ACTIVE | Outputs::FILTERED),
             (Column::Area, Outputs::AREA),
             (Column::U, centroid),
             (Column::V, centroid),
@@ -65,7 +65,12 @@ impl Columns {
         all.extend(wanted.iter().filter(|(_, some)| outputs.intersects(*some)).map(|(column, _)| *column));
         let read = all.len();
         // What only later stages read.
-        let needed = [(Column::Total, stages.hysteresis), (Column::U, stages.motion), (Column::V, stages.motion)];
+        let needed = [
+            (Column::Total, stages.hysteresis),
+            (Column::Active, stages.motion),
+            (Column::U, stages.motion),
+            (Column::V, stages.motion),
+        ];
         for (column, _) in needed.iter().filter(|(_, needed)| *needed) {
             if !all.contains(column) {
                 all.push(*column);
@@ -127,6 +132,7 @@ impl Columns {
     /// What motion is told.
     pub(super) fn of_motion(&self) -> Vec<(&'static str, f64)> {
         self.overrides(&[
+            ("ACTIVE_AT", Column::Active),
             ("CENTROID_AT", Column::U),
             ("MOTION_AT", Column::Motion),
             ("DISPLACEMENT_AT", Column::DisplacementU),

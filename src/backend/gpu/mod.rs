@@ -209,7 +209,7 @@ impl Gpu {
             stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));
         }
         if wanted.motion {
-            let still: Vec<f32> = plan.fields.iter().map(|field| field.still_within).collect();
+            let still: Vec<layout::Still> = plan.fields.iter().map(|field| field.still).collect();
             let still = table(&device, "still", &still);
             let told = columns.of_motion();
             let main = [&batch, &steps, &still, &results, &last];

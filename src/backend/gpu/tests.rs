@@ -51,6 +51,7 @@ fn structs_lie_as_naga_lays_them() {
     same_layout!(&module, Part { members, number, first, count, before });
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
+    same_layout!(&module, Still { least, rounding, per_taxel });
 }
 
 /// The value of the integer constant `name`.
