@@ -5,17 +5,18 @@
 //!   to motion around the origin and signed; both are kept.
 //! * Absent, `no_previous`: the field was not in contact in the frame before, or there was none.
 //! * Absent, `bad_dt`: Δt ≤ 0, or longer than the scene allows.
-//! * Direction absent, `still`: ‖Δ‖ ≤ max(10⁻⁶ of the field's radius, what rounding of the two centroids may feign). A
-//!   centroid of n pressed taxels lies within the unit of its chart's origin, and so is off by (2r + 13)u of the unit
-//!   ([`super::centroid`]). In one pass, r = n − 1, that is (2(n + n′) + 22)u for two. Compensated, r hardly hangs on n, and
-//!   that of all members stands for both. How many members a field has beside is no matter in one pass: one that is not
-//!   pressed adds 0 to each sum, which no order of adding rounds.
+//! * Direction absent, `still`: ‖Δ‖ is at most 10⁻⁶ of the field's radius, or at most what rounding may feign.
+//!
+//! **Still.** A centroid of n pressed taxels is off by (2r + 13)u of the field's unit at most ([`super::centroid`]), as its
+//! taxels lie within a unit of the chart's origin. What two centroids may feign is the sum of both. In one pass r is n − 1,
+//! and the sum (2(n + n′) + 22)u. A taxel that is not pressed does not count: it adds 0 to every sum, and that rounds nothing
+//! in whatever order. With compensated sums r hardly depends on n, and r of all members stands for both.
 //!
 //! **Bound.** With b the sum of both centroids' bounds, Δ is off by δ = b + u‖Δ‖, the distance by δ + 9u‖Δ‖ (its root),
 //! the direction by asin(δ/‖Δ‖), a radius by its centroid's bound and 9u of itself, a speed by its distance's bound over
-//! Δt and 6u of itself (Δt rounded, the quotient). The distance that counts as still
-//! is a whole number of u, exact up to 2²⁴ of them; beyond, the number of taxels, the sum and a device's conversion are
-//! off by 3u of it.
+//! Δt and 6u of itself (Δt rounded, the quotient). What rounding may feign is a whole number of u. Single precision computes
+//! it exactly up to 2²⁴ u. Beyond, it is off by 3u of itself: 2u for the number of taxels, which a device need not round to
+//! the nearest, and u for the sum.
 
 use glam::DVec2;
 
