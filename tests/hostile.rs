@@ -5,6 +5,7 @@
 mod common;
 #[path = "it/draft.rs"]
 mod draft;
+mod skips;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};

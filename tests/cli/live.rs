@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use super::skips::skip;
 use super::{file, text_of};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_somatic");
@@ -13,7 +14,7 @@ const BINARY: &str = env!("CARGO_BIN_EXE_somatic");
 fn seen(command: &str, typed: &str) -> Option<(String, Option<i32>)> {
     let there = Command::new("script").arg("--version").output().is_ok_and(|o| o.stdout.starts_with(b"script"));
     if !there {
-        eprintln!("SKIPPED: there is no `script` of util-linux to make a terminal");
+        skip("TERMINAL", "there is no `script` of util-linux to make a terminal");
         return None;
     }
     let mut child = Command::new("script")

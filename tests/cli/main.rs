@@ -22,6 +22,8 @@ mod run;
 #[cfg(unix)]
 mod serial;
 mod simulate;
+#[path = "../skips/mod.rs"]
+mod skips;
 mod sources;
 mod tradeoff;
 #[cfg(unix)]

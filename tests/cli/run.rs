@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::skips::skip;
 use super::{code_of, done, fails, file, files_in, frames, output, somatic, stderr, text_of};
 
 /// One taxel of the bundled hand's palm, pressed in two of three frames.
@@ -19,7 +20,7 @@ fn has_adapters() -> bool {
     #[cfg(not(feature = "gpu"))]
     let there = false;
     if !there {
-        eprintln!("SKIPPED: the gpu backend, as no driver answers");
+        skip("GPU", "no adapter answers");
     }
     there
 }

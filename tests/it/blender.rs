@@ -1,5 +1,5 @@
 //! Bodies taken through a real Blender and back, untouched and edited. `tests/blender/run` sets it up; without it, in
-//! `SOMATIC_BLENDER`, this is skipped, loudly.
+//! `SOMATIC_BLENDER`, this is a skip.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,6 +12,7 @@ use somatic::field::FieldSet;
 use tempfile::TempDir;
 
 use crate::lint::{Plate, kinds};
+use crate::skips::skip;
 
 /// Positions are current within this, m, and directions within this, rad; `docs/layout.md` has them.
 const NEAR_M: f64 = 1e-6;
@@ -20,7 +21,7 @@ const NEAR_RAD: f64 = 1e-5;
 /// The Pythons that have a `bpy`, each with another Blender.
 fn blenders() -> Vec<PathBuf> {
     let Some(list) = std::env::var_os("SOMATIC_BLENDER") else {
-        eprintln!("SKIPPED: no Blender; tests/blender/run installs one and runs this");
+        skip("BLENDER", "no Blender; tests/blender/run installs one and runs this");
         return Vec::new();
     };
     std::env::split_paths(&list).collect()
@@ -80,7 +81,7 @@ fn assert_same_taxels(before: &Body, after: &Body, except: &[u32]) {
 /// What `somatic run` says of `recording` on `body`.
 fn percepts(body: &Path, recording: &Path) -> Option<String> {
     let Some(command) = option_env!("CARGO_BIN_EXE_somatic") else {
-        eprintln!("SKIPPED: percepts are compared where the command is built");
+        skip("COMMAND", "percepts are compared where the command is built");
         return None;
     };
     let mut command = Command::new(command);

@@ -9,7 +9,9 @@ use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, 
 use somatic::scene::{Arithmetic, Cadence, Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue};
 
-/// Every backend that can run here. Without an adapter the GPU is left out, loudly, unless it is required.
+use crate::skips::skip;
+
+/// Every backend that can run here. Without an adapter the GPU is skipped.
 pub fn backends() -> Vec<BackendKind> {
     let mut backends = vec![BackendKind::Reference, BackendKind::Cpu];
     if has_gpu() {
@@ -42,7 +44,7 @@ pub fn ways() -> Vec<(BackendKind, Knobs)> {
     ways
 }
 
-/// Whether there is an adapter. With `SOMATIC_REQUIRE_GPU=1` its absence fails the test.
+/// Whether there is an adapter; where there is none, that is a skip.
 pub fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     #[cfg(feature = "gpu")]
@@ -50,27 +52,23 @@ pub fn has_gpu() -> bool {
     #[cfg(not(feature = "gpu"))]
     let found = *FOUND.get_or_init(|| false);
     if !found {
-        assert!(
-            std::env::var("SOMATIC_REQUIRE_GPU").as_deref() != Ok("1"),
-            "SOMATIC_REQUIRE_GPU=1, and no adapter answers"
-        );
-        eprintln!("SKIPPED on the gpu backend: no adapter answers");
+        skip("GPU", "no adapter answers");
     }
     found
 }
 
-/// `part` of the folder of real recordings and meshes, or `None`, said aloud, where it is not there.
+/// `part` of the folder of real recordings and meshes, or `None`, and a skip, where it is not there.
 pub fn data(part: &str) -> Option<PathBuf> {
     let root = std::env::var_os("SOMATIC_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
     let path = root.join(part);
     if path.exists() {
         return Some(path);
     }
-    eprintln!("SKIPPED: {} is not there; set SOMATIC_DATA to the folder that has it", path.display());
+    skip("DATA", format!("{} is not there; set SOMATIC_DATA to the folder that has it", path.display()));
     None
 }
 
-/// Every glTF in the folder of meshes, real and hostile, or `None`, said aloud, where that is not there.
+/// Every glTF in the folder of meshes, real and hostile, or `None`, and a skip, where that is not there.
 pub fn meshes() -> Option<Vec<PathBuf>> {
     let (mut open, mut files) = (vec![data("meshes")?], Vec::new());
     while let Some(folder) = open.pop() {

@@ -7,6 +7,7 @@ use std::process::{Command as Process, Stdio};
 use proptest::prelude::*;
 use somatic::wire::{Answer, Command, Status};
 
+use crate::skips::skip;
 use crate::wire::{Packet, decoded, examples, hex, root, unhex, vectors};
 
 const FLAGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-std=c99"];
@@ -16,7 +17,7 @@ fn compiler() -> Option<&'static str> {
     let runs = |name: &&str| Process::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
     let found = ["gcc", "cc", "clang"].into_iter().find(runs);
     if found.is_none() {
-        eprintln!("SKIPPED: no C compiler: examples/firmware is not checked");
+        skip("COMPILER", "no C compiler: examples/firmware is not checked");
     }
     found
 }

@@ -30,6 +30,9 @@ mod random;
 mod real;
 mod recordings;
 mod simulated;
+mod skipped;
+#[path = "../skips/mod.rs"]
+mod skips;
 mod touch;
 mod upkeep;
 mod validator;

@@ -1,4 +1,4 @@
-//! Real recordings, dirt and all, on every backend. They are not part of the project; without them this skips, loudly.
+//! Real recordings, dirt and all, on every backend. They are not part of the project; without them this is a skip.
 
 use std::collections::BTreeSet;
 

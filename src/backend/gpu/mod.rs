@@ -23,6 +23,9 @@ mod stage;
 mod unpack;
 
 #[cfg(test)]
+#[path = "../../../tests/skips/mod.rs"]
+mod skips;
+#[cfg(test)]
 mod tests;
 
 pub use adapter::{AdapterSummary, adapters};
