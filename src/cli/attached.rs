@@ -46,10 +46,9 @@ pub(super) fn files(asked: &Asked, body: &Body, scene: Option<&Path>) -> Result<
         None => (file_name(&body.name), body_bytes(&body.name)?),
     };
     let mut files = vec![(name, BODY.to_owned(), bytes)];
-    let calibration = match (&asked.calibration, &recording) {
-        (Some(path), _) => Some(text(path)?),
-        (None, Some(recording)) => calibration(recording)?.map(String::into_bytes),
-        (None, None) => None,
+    let calibration = match &asked.calibration {
+        Some(path) => Some(text(path)?),
+        None => asked.own_calibration()?.map(|(_, text)| text.into_bytes()),
     };
     let toml = "application/toml".to_owned();
     files.extend(calibration.map(|bytes| (CALIBRATION.to_owned(), toml.clone(), bytes)));

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
-use somatic::source::{CsvFile, Source, SourceSpec};
+use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec};
 use somatic::{Error, Frame, Result};
 
 use super::attached::{body_bytes, file_name};
@@ -133,7 +133,8 @@ fn copy(source: &mut dyn Source, target: &mut Target) -> Result<(u64, u64)> {
     Ok((frames, posed))
 }
 
-/// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording has.
+/// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the
+/// simulation has.
 fn files(arguments: &Arguments, from: &SourceSpec) -> Result<Vec<(String, String, Vec<u8>)>> {
     let mut files = Vec::new();
     if let Some(body) = &arguments.body {
@@ -142,6 +143,17 @@ fn files(arguments: &Arguments, from: &SourceSpec) -> Result<Vec<(String, String
     if let Some(path) = &arguments.calibration {
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
         files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
+    }
+    if let SourceSpec::Sim(path) = from {
+        let simulation = SimulatedSource::open(path)?;
+        if arguments.body.is_none() {
+            let name = &simulation.body().name;
+            files.push((file_name(name), BODY.to_owned(), body_bytes(name)?));
+        }
+        if arguments.calibration.is_none() {
+            let bytes = simulation.calibration().into_bytes();
+            files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
+        }
     }
     if let SourceSpec::Mcap(path) = from {
         let mut reader = Reader::open(path)?;

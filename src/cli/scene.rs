@@ -72,8 +72,8 @@ pub(super) struct Asked {
     #[arg(long)]
     pub(super) all_fields: bool,
 
-    /// The robot's calibration, a TOML file; without one, pressures are the raw values [default: what lies in the recording
-    /// beside the body, if that is used].
+    /// The robot's calibration, a TOML file; without one, pressures are the raw values [default: a simulation's own, or what
+    /// lies in the recording beside the body, if that is used].
     #[arg(long, value_name = "FILE")]
     pub(super) calibration: Option<PathBuf>,
 
@@ -370,6 +370,21 @@ impl Asked {
         Ok(if let Some(SourceSpec::Mcap(path)) = spec { Some(path) } else { None })
     }
 
+    /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation has one,
+    /// and a recording may, which is used with its body.
+    ///
+    /// # Errors
+    /// What is to be read cannot be read.
+    pub(super) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
+        let spec = self.sources.first().map(|text| text.parse()).transpose()?;
+        if let Some(SourceSpec::Sim(path)) = spec {
+            let text = SimulatedSource::open(&path)?.calibration();
+            return Ok(Some((path, text)));
+        }
+        let Some(recording) = self.recording()? else { return Ok(None) };
+        Ok(attached::calibration(&recording)?.map(|text| (recording, text)))
+    }
+
     /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
     ///
     /// # Errors
@@ -396,12 +411,12 @@ impl Asked {
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
             Ok(calibration)
         };
-        let calibration = match (&self.calibration, self.recording()?) {
-            (Some(path), _) => Some(load(path)?),
-            (None, Some(recording)) => attached::calibration(&recording)?
-                .map(|text| Calibration::parse(&text, ids).map_err(|e| e.at(recording.display())))
-                .transpose()?,
-            (None, None) => None,
+        let parse = |(path, text): (PathBuf, String)| {
+            Calibration::parse(&text, ids).map_err(|e| e.at("its own calibration").at(path.display()))
+        };
+        let calibration = match &self.calibration {
+            Some(path) => Some(load(path)?),
+            None => self.own_calibration()?.map(parse).transpose()?,
         };
         Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
     }

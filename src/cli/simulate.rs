@@ -1,22 +1,22 @@
-//! `somatic simulate`: a simulation written down as a recording, with the truth beside it.
+//! `somatic simulate`: a simulation written down as a recording, with the truth and a calibration beside it.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::Result;
 use somatic::source::{SimulatedSource, write_recording};
+use somatic::{Result, whole};
 
 use super::{DONE, say};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic simulate examples/simulations/rod.toml -o rod.csv     rod.csv, and the truth in rod.truth.csv
-  somatic run --source rod.csv --sink percepts.ndjson
+  somatic simulate examples/simulations/rod.toml -o rod.csv     also rod.truth.csv and rod.calibration.toml
+  somatic run --source rod.csv --calibration rod.calibration.toml --sink ndjson:percepts.ndjson
   somatic run --source sim:examples/simulations/rod.toml        without a file in between
 
 docs/simulation.md describes the file, the model and the truth.";
 
-/// Write a simulated touch down as a recording, with what is true in it beside it.
+/// Write a simulated touch down as a recording, with what is true in it and its sensors' calibration beside it.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
@@ -37,7 +37,9 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
     let mut simulation = SimulatedSource::open(&arguments.simulation)?;
     let truth = arguments.truth.clone().unwrap_or_else(|| arguments.output.with_extension("truth.csv"));
     let frames = write_recording(&mut simulation, &arguments.output, &truth)?;
-    let (output, truth) = (arguments.output.display(), truth.display());
-    say(&format!("{frames} frames in {output}, the truth in {truth}"));
+    let calibration = arguments.output.with_extension("calibration.toml");
+    whole::write(&calibration, simulation.calibration().as_bytes())?;
+    let (output, truth, calibration) = (arguments.output.display(), truth.display(), calibration.display());
+    say(&format!("{frames} frames in {output}, the truth in {truth}, the calibration in {calibration}"));
     Ok(DONE)
 }

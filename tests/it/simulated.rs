@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use somatic::signal::FsrCircuit;
 use somatic::source::{CsvSource, SimulatedSource, Source as _, SourceSpec, write_recording};
-use somatic::{BackendKind, Body, Frame, Percept};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Percept};
 
 use crate::common::{Flat, engine};
 
@@ -257,6 +257,69 @@ fn dead_stuck_and_noisy_taxels_behave() {
     assert!(simulation.forces_newton()[middle as usize] > 0.3, "the force is there all the same");
     // Pressed, the healthy neighbour reads lower than open: the divider turns the signal round.
     assert!(columns[3].iter().all(|&v| v < open - 100.0));
+}
+
+/// What a simulation's sensors feel under `calibration`: the total of each frame, 0 where there is no contact.
+fn totals(simulation: &mut SimulatedSource, calibration: &str) -> Vec<f64> {
+    let calibration = Some(Calibration::parse(calibration, simulation.taxels()).unwrap());
+    let options = Options { calibration, backend: BackendKind::Reference, ..Options::default() };
+    let mut engine = Engine::new(simulation.body(), options).unwrap();
+    engine.listen(simulation.taxels()).unwrap();
+    let mut frame = Frame::missing(0.0, simulation.taxels().len());
+    let mut totals = Vec::new();
+    while simulation.next_frame(&mut frame).unwrap() {
+        let percept = engine.process(std::slice::from_ref(&frame)).unwrap().get(0, 0);
+        totals.push(percept.total.filter(|_| percept.contact).unwrap_or(0.0));
+    }
+    totals
+}
+
+const PRESS_AFTER_HALF: &str = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0, 0]]\n\
+                                press = { from_s = 0.5, to_s = 1.5, newton = 40, ramp_s = 0.1 }";
+
+#[test]
+fn by_its_own_calibration_a_simulation_feels_its_force_and_nothing_at_rest() {
+    let fsr = |counts: u16| FsrCircuit { tap: 50 }.linearised(counts, FsrCircuit::SATURATION_NEWTON);
+    let as_it_is: fn(f64) -> f64 = |newton| newton;
+    let signals: [(&str, &dyn Fn(f64) -> f64); 6] = [
+        ("kind = \"ideal\"", &as_it_is),
+        ("kind = \"linear\"\noffset = 30.5\ngain = 20", &as_it_is),
+        ("kind = \"linear\"\noffset = 240\ngain = 25\ninvert = true", &as_it_is),
+        ("kind = \"fsr\"\ntap = 50", &|newton| fsr(FsrCircuit { tap: 50 }.counts(newton))),
+        ("kind = \"fsr\"\ntap = 50\noutput = \"linearised\"", &|newton| fsr(FsrCircuit { tap: 50 }.counts(newton))),
+        ("kind = \"fsr\"\ntap = 50\noutput = \"logarithmic\"", &|newton| {
+            let circuit = FsrCircuit { tap: 50 };
+            circuit.logarithmic(circuit.counts(newton))
+        }),
+    ];
+    for (sensor, signal) in signals {
+        let mut simulation = on_dense(sensor, PRESS_AFTER_HALF);
+        let calibration = simulation.calibration();
+        let felt = totals(&mut simulation, &calibration);
+        assert!(felt[..5].iter().all(|&total| total == 0.0), "{sensor}: {felt:?}");
+        // The frame read last, in which all of the force is there. Raw values are in single precision, off by half a unit
+        // in the last place of 240 + 25 · newton each.
+        let right: f64 = simulation.forces_newton().iter().map(|&newton| signal(newton)).sum();
+        assert!(
+            right > 39.0 && (felt[9] - right).abs() <= 1225.0 * 4096.0 * U / 25.0 + right * 4.0 * U,
+            "{sensor}: {felt:?}"
+        );
+    }
+    // Noise, rounding and what is broken are no touch; without the calibration they are.
+    for sensor in [
+        "kind = \"ideal\"\nnoise_sigma = 0.05",
+        "kind = \"linear\"\noffset = 30.4\ngain = 20\nbits = 12\nnoise_sigma = 2",
+        "kind = \"linear\"\noffset = 240\ngain = 20\nbits = 8\ninvert = true\nnoise_sigma = 0.5",
+        "kind = \"fsr\"\nnoise_sigma = 1.5\nstuck = [{ taxel = 3, at = 700 }]\nnoisy = [{ taxel = 25, sigma = 80 }]",
+        "kind = \"fsr\"\nnoise_sigma = 40",
+        "kind = \"fsr\"\nnoise_sigma = 1.5\noutput = \"logarithmic\"",
+    ] {
+        let calibration = on_dense(sensor, PRESS_AFTER_HALF).calibration();
+        let felt = totals(&mut on_dense(sensor, PRESS_AFTER_HALF), &calibration);
+        assert!(felt[..5].iter().all(|&total| total == 0.0) && felt[9] > 0.0, "{sensor}: {felt:?}");
+        let raw = totals(&mut on_dense(sensor, PRESS_AFTER_HALF), "");
+        assert!(raw[..5].iter().all(|&total| total > 0.0), "{sensor}: {raw:?}");
+    }
 }
 
 #[test]

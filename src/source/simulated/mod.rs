@@ -3,6 +3,7 @@
 //! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine: nothing
 //! depends on the clock, on the order in which frames are asked for, or on a machine's own arithmetic.
 
+mod calibration;
 mod contact;
 mod file;
 mod noise;
@@ -176,6 +177,20 @@ impl SimulatedSource {
     #[must_use]
     pub fn forces_newton(&self) -> &[f64] {
         &self.forces_newton
+    }
+
+    /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
+    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked.
+    #[must_use]
+    pub fn calibration(&self) -> String {
+        let body = Path::new(&self.body.name).file_name().unwrap_or_default();
+        self.sensor.calibration(&body.to_string_lossy(), &self.ids)
+    }
+
+    /// Goes back to the first frame, with the noise of another seed.
+    pub fn reseed(&mut self, seed: u64) {
+        self.sensor.seed = seed;
+        self.next = 0;
     }
 
     /// Makes `frame` (counted from 0) the one that is read next.

@@ -1,0 +1,60 @@
+//! The calibration of simulated sensors: what stands between force and raw value is known, and so is what is broken.
+
+use std::fmt::Write as _;
+
+use super::sensor::{FsrOutput, Kind, Sensor};
+use crate::signal::FsrCircuit;
+
+/// A dead band is this many standard deviations of the noise: one value in a thousand million is beyond it.
+const DEAD_BAND_SIGMAS: f64 = 6.0;
+
+impl Sensor {
+    /// The calibration file for sensors of the taxels `ids` on the body called `body`.
+    pub(super) fn calibration(&self, body: &str, ids: &[u32]) -> String {
+        let mut text = String::from("# The sensors of a simulation as they are; docs/simulation.md says more.\n\n");
+        let _ = writeln!(text, "body = {}\n\n[all]", toml::Value::from(body));
+        for (key, value) in self.keys() {
+            let _ = writeln!(text, "{key} = {value}");
+        }
+        for (id, _) in ids.iter().zip(&self.faults).filter(|(_, fault)| fault.is_some()) {
+            let _ = write!(text, "\n[taxel.{id}]\nmask = true\n");
+        }
+        text
+    }
+
+    /// What holds for every sensor.
+    fn keys(&self) -> Vec<(&'static str, String)> {
+        let noise = DEAD_BAND_SIGMAS * self.noise_sigma;
+        match self.kind {
+            Kind::Ideal => vec![("dead_band", noise.to_string())],
+            Kind::Linear { offset, gain, bits } => {
+                let rounding = if bits.is_some() { 0.5 } else { 0.0 };
+                vec![
+                    ("baseline", offset.to_string()),
+                    ("gain", (1.0 / gain.abs()).to_string()),
+                    ("invert", (gain < 0.0).to_string()),
+                    ("dead_band", ((noise + rounding) / gain.abs()).to_string()),
+                ]
+            }
+            Kind::Fsr { circuit, output } => {
+                // The lowest reading that noise makes of an open sensor.
+                let open = FsrCircuit::convert(FsrCircuit::STEPS - noise);
+                let dead_band = match output {
+                    FsrOutput::Counts => return counts_keys(circuit, open),
+                    FsrOutput::Logarithmic => circuit.logarithmic(open),
+                    FsrOutput::Linearised { full_scale_newton } => circuit.linearised(open, full_scale_newton),
+                };
+                vec![("dead_band", dead_band.to_string())]
+            }
+        }
+    }
+}
+
+/// For readings of the paper's circuit, of which `open` is the lowest of an open sensor.
+fn counts_keys(circuit: FsrCircuit, open: u16) -> Vec<(&'static str, String)> {
+    let linear = |counts| circuit.linearised(counts, FsrCircuit::SATURATION_NEWTON);
+    // The linear signal needs hardly any; the raw one's costs it nothing below the least press that there is.
+    let raw = circuit.logarithmic(open);
+    let dead_band = if raw < linear(circuit.counts(FsrCircuit::BREAK_NEWTON)) { raw } else { linear(open) };
+    vec![("sensor", "\"fsr\"".to_owned()), ("tap", circuit.tap.to_string()), ("dead_band", dead_band.to_string())]
+}
