@@ -72,6 +72,15 @@ impl Input {
         self.spec == Some(SourceSpec::Stdin)
     }
 
+    /// Which recording it is: the file's place, length and last change. `None` for what is live, and never twice the same.
+    pub(super) fn recording(&self) -> Option<String> {
+        let Some(spec) = &self.spec else { return Some(self.name.clone()) };
+        let (SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path)) = spec else { return None };
+        let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+        let file = std::fs::metadata(path).ok();
+        Some(format!("{place:?} {:?} {:?}", file.as_ref().map(|f| f.len()), file.as_ref().map(|f| f.modified().ok())))
+    }
+
     /// Opens the serial lines.
     pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<SerialSource> {
         asked.line_flags().open(&self.lines, ids, asked.max_age)

@@ -33,8 +33,8 @@ Examples:
 
 Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is
 what no other combination beats: none is as true in both and faster. What is measured is kept, and
-`somatic run` and `somatic plan` choose by it where a scene leaves the backend or the knobs to be
-chosen. docs/tradeoff.md says what to conclude.";
+`somatic run` and `somatic plan` choose by it, on the same recording or live, where a scene leaves
+the backend or the knobs to be chosen. docs/tradeoff.md says what to conclude.";
 
 /// Frames that are measured on, unless told otherwise.
 const FRAMES: usize = 512;
@@ -117,7 +117,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
         && let Some(store) = Store::of_user()
-        && let Err(e) = store.keep(&body, &options, &driver(), &report)
+        && let Some(recording) = input.recording()
+        && let Err(e) = store.keep(&body, &options, &driver(), &recording, &report)
     {
         say(&format!("what was measured is not kept: {e}"));
     }

@@ -1,4 +1,4 @@
-//! Measurements that are kept, one file for each body and scene, and whether they still hold.
+//! Measurements that are kept, one file for each body and scene, and whether they still hold, and for what.
 
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -13,7 +13,7 @@ use crate::scene::Knobs;
 use crate::whole;
 
 /// What files are like; another is not read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A folder of measurements.
 #[derive(Clone, Debug)]
@@ -37,6 +37,8 @@ struct Key {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stored {
     key: Key,
+    /// The recording that it was made on, as told to [`Store::keep`].
+    recording: String,
     /// When it was made, s since 1970.
     pub taken_at_s: u64,
     /// What was measured.
@@ -87,8 +89,11 @@ impl Store {
     }
 
     /// The measurement of `options` on `body`, if there is one that holds on this machine with this `driver`.
+    ///
+    /// One that was made on another recording says nothing of `recording`. `None` is for frames that cannot be measured
+    /// on beforehand: any recording stands for them.
     #[must_use]
-    pub fn find(&self, body: &Body, options: &Options, driver: &str) -> Found {
+    pub fn find(&self, body: &Body, options: &Options, driver: &str, recording: Option<&str>) -> Found {
         let path = self.file(body, options);
         let Ok(text) = std::fs::read_to_string(&path) else { return Found::Nothing };
         let useless = |why: &str| Found::Useless(format!("{}: kept measurements {why}", path.display()));
@@ -104,16 +109,18 @@ impl Store {
         ];
         match differs.iter().find(|(differs, _)| *differs) {
             Some((_, why)) => useless(why),
+            None if recording.is_some_and(|recording| recording != stored.recording) => Found::Nothing,
             None => Found::Fresh(Box::new(stored)),
         }
     }
 
-    /// Keeps `report`, in place of any before.
+    /// Keeps `report`, which was made on `recording`, in place of any before.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn keep(&self, body: &Body, options: &Options, driver: &str, report: &Report) -> Result<()> {
-        let stored = Stored { key: Key::new(body, options, driver), taken_at_s: now_s(), report: report.clone() };
+    pub fn keep(&self, body: &Body, options: &Options, driver: &str, recording: &str, report: &Report) -> Result<()> {
+        let (key, recording) = (Key::new(body, options, driver), recording.to_owned());
+        let stored = Stored { key, recording, taken_at_s: now_s(), report: report.clone() };
         self.write(&self.file(body, options), &stored)
     }
 
@@ -234,29 +241,33 @@ mod tests {
             Found::Useless(why) => why,
             other => panic!("{other:?}"),
         };
-        assert!(matches!(store.find(&body, &options, "a"), Found::Nothing));
+        let find = |body: &Body, options: &Options, driver: &str| store.find(body, options, driver, Some("touch"));
+        assert!(matches!(find(&body, &options, "a"), Found::Nothing));
         let report = report(vec![row("cpu", 1.0, 2.0, 3.0)]);
-        store.keep(&body, &options, "a", &report).unwrap();
-        match store.find(&body, &options, "a") {
-            Found::Fresh(stored) => assert_eq!(stored.report, report),
-            other => panic!("{other:?}"),
+        store.keep(&body, &options, "a", "touch", &report).unwrap();
+        for recording in [Some("touch"), None] {
+            match store.find(&body, &options, "a", recording) {
+                Found::Fresh(stored) => assert_eq!(stored.report, report),
+                other => panic!("{other:?}"),
+            }
         }
-        assert!(why(store.find(&body, &options, "b")).contains("other GPU drivers"));
+        assert!(matches!(store.find(&body, &options, "a", Some("another")), Found::Nothing));
+        assert!(why(find(&body, &options, "b")).contains("other GPU drivers"));
         let mut moved = body.clone();
         moved.taxels[0].position_in_link.x += 1e-3;
-        assert!(why(store.find(&moved, &options, "a")).contains("the body before it changed"));
+        assert!(why(find(&moved, &options, "a")).contains("the body before it changed"));
         // Another scene has another file; knobs are no part of it.
         let other = |scene: Scene| Options { scene, ..options.clone() };
         let total = other(Scene { outputs: Outputs::TOTAL, ..Scene::default() });
-        assert!(matches!(store.find(&body, &total, "a"), Found::Nothing));
+        assert!(matches!(find(&body, &total, "a"), Found::Nothing));
         let knobs = Knobs { coverage: crate::scene::Coverage::All, ..Knobs::default() };
-        assert!(matches!(store.find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
+        assert!(matches!(find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
         let path = store.file(&body, &options);
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("\"version\": 1", "\"version\": 0")).unwrap();
-        assert!(why(store.find(&body, &options, "a")).contains("another version"));
+        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 0")).unwrap();
+        assert!(why(find(&body, &options, "a")).contains("another version"));
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();
-        assert!(why(store.find(&body, &options, "a")).contains("damaged"));
+        assert!(why(find(&body, &options, "a")).contains("damaged"));
     }
 
     #[test]
@@ -271,7 +282,7 @@ mod tests {
         assert!(store.rates("cpu, 256", "a").is_none(), "of something else");
         let path = store.rates_file("cpu, 1");
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("\"version\": 1", "\"version\": 0")).unwrap();
+        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 0")).unwrap();
         assert!(store.rates("cpu, 1", "a").is_none());
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();
         assert!(store.rates("cpu, 1", "a").is_none());

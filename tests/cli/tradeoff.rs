@@ -121,8 +121,7 @@ fn contradictions_are_found_where_they_stand() {
 fn a_software_gpu_is_measured_only_if_it_is_asked_for() {
     let adapters = somatic::backend::gpu::adapters();
     if adapters.is_empty() || adapters.iter().any(|adapter| adapter.kind != "software") {
-        eprintln!("SKIPPED: a trade without software GPUs, as there is none, or a real one beside it");
-        return;
+        return crate::skips::skip("SOFTWARE_GPU", "there is no software GPU, or a real one beside it");
     }
     let folder = tempfile::tempdir().unwrap();
     let (text, _) = done(folder.path(), &["tradeoff", "--seconds", "0.05", "--frames", "30", "--json"]);
@@ -131,4 +130,32 @@ fn a_software_gpu_is_measured_only_if_it_is_asked_for() {
     assert!(!rows.is_empty() && rows.iter().all(|row| row["backend"] != "gpu"), "{text}");
     let left_out = report["left_out"].to_string();
     assert!(left_out.contains("computes on the same CPU; ask for it with --backend gpu"), "{left_out}");
+}
+
+#[test]
+fn what_was_measured_counts_for_its_recording_and_for_what_is_live() {
+    let folder = tempfile::tempdir().unwrap();
+    let touch = folder.path().join("touch.csv");
+    std::fs::write(&touch, somatic::bundled::TOUCH).unwrap();
+    let named = ["--source", touch.to_str().unwrap()];
+    let outputs = ["--outputs", "centroid"];
+    done(folder.path(), &[&["tradeoff"][..], &BRIEF, &named, &outputs].concat());
+    let said = |source: &[&str]| done(folder.path(), &[&["run"][..], source, &outputs].concat()).1;
+    let by_measurement = "the fastest of these knobs, as measured on 20";
+    for source in [&named[..], &["--source", "-"]] {
+        let said = said(source);
+        assert!(said.contains(by_measurement) && said.contains("touch.csv"), "{source:?}: {said}");
+    }
+    // The bundled touch is the same frames, but who knows that.
+    let other = said(&[]);
+    assert!(other.contains("somatic: backend ") && !other.contains("touch.csv"), "{other}");
+    // So with a tolerance: it is measured again, and on what is run.
+    let plan = ["plan", "--json", "--within", "0.5 mm", "--outputs", "centroid"];
+    let (bill, _) = done(folder.path(), &plan);
+    assert!(bill.contains("briefly, just now, on bundled touch"), "{bill}");
+    let (bill, _) = done(folder.path(), &[&plan[..], &named].concat());
+    assert!(bill.contains("picked for 0.5 mm, as measured on 20") && bill.contains("touch.csv"), "{bill}");
+    // A recording that has changed is another.
+    std::fs::write(&touch, "t,4\n0,1\n0.1,2\n").unwrap();
+    assert!(!said(&named).contains(by_measurement));
 }

@@ -41,7 +41,8 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
     let way = if batch > 1 { Way::Batch } else { Way::Live };
     let store = Store::of_user();
     let kept = store.as_ref().filter(|store| store.file(body, &options).exists());
-    let found = kept.map_or(Found::Nothing, |store| store.find(body, &options, &driver()));
+    let recording = input.and_then(Input::recording);
+    let found = kept.map_or(Found::Nothing, |store| store.find(body, &options, &driver(), recording.as_deref()));
     let (report, when) = match found {
         Found::Fresh(stored) => {
             let when = format!("on {}, on {}", day(stored.taken_at_s), stored.report.source);
