@@ -143,6 +143,7 @@ impl Cell<'_> {
             let bound = bound.centroid.map(|c| c[axis]);
             self.quantity(Outputs::CENTROID, part(right.centroid), part(got.centroid), bound, distance);
         }
+        self.centroid_is_apart(right, bound, got);
         let apart = |a: &[f64; 3], b: &[f64; 3]| glam::DVec3::from_array(*a).distance(glam::DVec3::from_array(*b));
         // Poses and far origins add the rounding of f64, on both sides.
         let far = right.position.map_or(0.0, |p| 4e-15 * glam::DVec3::from_array(p).length());
@@ -167,6 +168,15 @@ impl Cell<'_> {
         self.quantity(Outputs::FILTERED_DIRECTION, right_way, got_way, bound.filtered_direction, between);
         let (right_speed, got_speed) = (right.filtered_speed, got.filtered_speed);
         self.quantity(Outputs::FILTERED_SPEED, right_speed, got_speed, bound.filtered_speed, distance);
+    }
+
+    /// Coordinates are held to a bound each; what a centroid is off by is the distance, up to √2 times as much.
+    fn centroid_is_apart(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
+        if let (Some(right), Some(got), Some(_)) = (right.centroid, got.centroid, bound.centroid) {
+            let distance_m = DVec2::from_array(right).distance(DVec2::from_array(got));
+            let comparison = self.agreement.quantities.entry("centroid".to_owned()).or_default();
+            comparison.worst_error = comparison.worst_error.max(distance_m);
+        }
     }
 
     fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
@@ -291,6 +301,16 @@ mod tests {
         // Either side of the seam is near.
         assert!(against(bound(), |_, c| c.orientation[0] = std::f64::consts::PI - 0.001).holds());
         assert!(against(bound(), |_, c| c.direction[0] = -3.139).holds());
+    }
+
+    #[test]
+    fn a_centroid_is_off_by_the_distance() {
+        let agreement = against(bound(), |_, c| (c.centroid_u[0], c.centroid_v[0]) = (0.103, 0.196));
+        let centroid = agreement.quantities["centroid"];
+        assert!(
+            (centroid.worst_error - 0.005).abs() < 1e-9 && (centroid.worst_share - 0.4).abs() < 1e-6,
+            "{centroid:?}"
+        );
     }
 
     #[test]

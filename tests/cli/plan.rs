@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{done, fails, frames, somatic, stderr};
+use crate::{done, fails, frames, somatic, stderr, text_of};
 
 const PALM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/scenes/palm.toml");
 
@@ -150,4 +150,34 @@ fn the_schema_that_is_shipped_is_the_one_that_is_printed() {
     let told = documented.lines().filter(|line| line.contains("` | `--")).count();
     assert_eq!(told, keys.len() + accuracy.len() - 1);
     assert!(documented.contains(include_str!("../../examples/scenes/palm.toml")));
+}
+
+#[test]
+fn a_plan_says_how_far_centroids_are_off_and_what_it_leaves_out() {
+    let folder = tempfile::tempdir().unwrap();
+    // Taxels 0, 1 and 2 are a row of the palm's board, and 1 is in its middle: pressed alike, 0 and 2 are the farthest;
+    // with the row above pressed alike too, four are equally far.
+    let path = folder.path().join("tie.csv");
+    std::fs::write(&path, "t,0,1,2,3,4,5\n0,5,5,5,0,0,0\n0.1,5,5,5,5,5,5\n0.2,7,3,1,2,9,4\n").unwrap();
+    let flags = ["--source", text_of(&path), "--backend", "cpu", "--fields", "hand/palm"];
+    let bill: Value = serde_json::from_str(&done(&[&["plan", "--json"][..], &flags].concat())).unwrap();
+    let frames_of = |backend: &str| {
+        let flags = ["--source", text_of(&path), "--fields", "hand/palm"];
+        frames(&done(&[&["run", "--backend", backend][..], &flags].concat()))
+    };
+    let (right, got) = (frames_of("reference"), frames_of("cpu"));
+    let ties = right.iter().filter(|frame| frame["fields"][0]["flags"].to_string().contains("tie")).count();
+    assert!((1..3).contains(&ties), "{right:?}");
+    assert_eq!(bill["left_out"]["orientation"], ties);
+    let place = |frame: &Value| [0, 1].map(|axis| frame["fields"][0]["centroid"][axis].as_f64().unwrap());
+    let apart = right.iter().zip(&got).map(|(right, got)| {
+        // What is written are the shortest digits that stand for a number in single precision.
+        let ([u, v], [got_u, got_v]) = (place(right), place(got).map(|number| f64::from(number as f32)));
+        (got_u - u).hypot(got_v - v)
+    });
+    let apart = apart.fold(0.0, f64::max);
+    let told = bill["worst_errors"]["centroid"].as_f64().unwrap();
+    assert!((told - apart).abs() <= 1e-3 * apart, "{told} told, {apart} found");
+    let text = done(&[&["plan"][..], &flags].concat());
+    assert!(text.contains("° (1 tie left out)") || text.contains(&format!("° ({ties} ties left out)")), "{text}");
 }

@@ -128,6 +128,8 @@ impl Bill {
         if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
             let errors = agreement.quantities.iter().map(|(name, of)| (name.clone(), of.worst_error.into()));
             bill["worst_errors"] = Value::Object(errors.collect());
+            let left_out = agreement.quantities.iter().filter(|(_, of)| of.undecided > 0);
+            bill["left_out"] = left_out.map(|(name, of)| (name.clone(), of.undecided)).collect();
             bill["agrees"] = agreement.holds().into();
         }
         bill
@@ -140,15 +142,21 @@ fn rounded(us: f64) -> f64 {
 
 /// What single precision costs, in the units that people think in.
 fn accuracy(agreement: &Agreement) -> String {
-    let worst = |name: &str| agreement.quantities.get(name).filter(|of| of.compared > 0).map(|of| of.worst_error);
     let mut words = Vec::new();
-    if let Some(metres) = worst("centroid") {
-        words.push(format!("centroid within {:.1e} mm", metres * 1e3));
-    }
-    for name in ["orientation", "axis", "direction"] {
-        if let Some(radians) = worst(name) {
-            words.push(format!("{name} within {:.1e}°", radians.to_degrees()));
-        }
+    for name in ["centroid", "orientation", "axis", "direction"] {
+        let Some(of) = agreement.quantities.get(name).filter(|of| of.compared + of.undecided > 0) else { continue };
+        let within = match name {
+            _ if of.compared == 0 => String::new(),
+            "centroid" => format!(" within {:.1e} mm", of.worst_error * 1e3),
+            _ => format!(" within {:.1e}°", of.worst_error.to_degrees()),
+        };
+        // There both answers are right.
+        let left_out = match (of.undecided, name) {
+            (0, _) => String::new(),
+            (ties, "orientation") => format!(" ({} left out)", count(ties, "tie")),
+            (undecided, _) => format!(" ({undecided} left out, too close to call)"),
+        };
+        words.push(format!("{name}{within}{left_out}"));
     }
     let verdict =
         if agreement.holds() { "as the reference, to rounding" } else { "NOT as the reference; run --verify" };
