@@ -10,12 +10,17 @@ use super::metric::{Errors, across, between_lines};
 use super::trial::{self, Moment, Signal, Trial};
 use crate::body::Body;
 use crate::error::Result;
+use crate::percept::Flags;
 
 const SPEEDS_MM_S: [f64; 3] = [5.0, 20.0, 80.0];
 const NOISES_COUNTS: [f64; 3] = [0.0, 1.0, 3.0];
 /// What the quick table has of both, and the table by angle.
 const USUAL_SPEED_MM_S: f64 = 20.0;
 const USUAL_NOISE_COUNTS: f64 = 1.0;
+/// What happens where taxels are nearly equally far hangs on the noise: each simulation with noise is run with so many seeds.
+const SEEDS: usize = 30;
+/// A rod that is seen farther off than this is seen across itself.
+const ACROSS_DEG: f64 = 45.0;
 const RATE_HZ: f64 = 50.0;
 /// Frames over which the steadier speed is taken, 0.1 s.
 const SPAN_FRAMES: usize = 5;
@@ -86,6 +91,12 @@ impl Case {
         cases
     }
 
+    /// No two angles have the same noise: they are whole, and below 360.
+    fn seeds(&self) -> Vec<u64> {
+        let runs = if self.noise_counts > 0.0 { SEEDS } else { 1 };
+        (0..runs).map(|run| self.angle_deg as u64 + 360 * run as u64).collect()
+    }
+
     /// A rod rolls across its own axis over the middle of the board; what is round passes the middle at 3.6 mm, so that
     /// it does not run along a row of sensors.
     fn simulation(&self) -> String {
@@ -100,11 +111,10 @@ impl Case {
         };
         let duration_s = 2.0 * REACH_MM / self.speed_mm_s;
         format!(
-            "rate_hz = {RATE_HZ}\nduration_s = {duration_s}\nseed = {}\n\
+            "rate_hz = {RATE_HZ}\nduration_s = {duration_s}\n\
              [skin]\nthickness_m = 0.007\nstiffness_pa = 400e3\n\
              [sensor]\nkind = \"fsr\"\ntap = 38\nnoise_sigma = {}\n\
              [[touch]]\non = \"hand/back\"\n{}\npath = [{}, {}]\ntimes_s = [0, {duration_s}]\n",
-            self.angle_deg,
             self.noise_counts,
             self.toucher.keys(self.angle_deg),
             at(-REACH_MM),
@@ -123,6 +133,10 @@ struct Scores {
     /// Degrees.
     two_points: Errors,
     axis: Errors,
+    /// Frames that are flagged `tie`, those of them in which two points are over [`ACROSS_DEG`] off, and all such frames.
+    tied: u64,
+    tied_across: u64,
+    across: u64,
     /// Per cent of the true speed: frame by frame, over 0.1 s, and the paper's own eq. 8.
     speed: Errors,
     steady_speed: Errors,
@@ -155,6 +169,12 @@ impl Scores {
             };
             compare(&mut self.two_points, percept.orientation);
             compare(&mut self.axis, percept.axis);
+            let tied = percept.flags.contains(Flags::TIE);
+            let is_across = |seen: f64| between_lines(seen, right).to_degrees() > ACROSS_DEG;
+            let across = percept.orientation.is_some_and(is_across);
+            self.tied += u64::from(tied);
+            self.tied_across += u64::from(tied && across);
+            self.across += u64::from(across);
         }
         let Some(right) = truth.speed.filter(|&speed| speed > 0.0) else { return };
         let per_cent = |seen: f64| 100.0 * (seen - right) / right;
@@ -174,13 +194,19 @@ impl Scores {
         self.centroid.merge(&other.centroid);
         self.two_points.merge(&other.two_points);
         self.axis.merge(&other.axis);
+        self.tied += other.tied;
+        self.tied_across += other.tied_across;
+        self.across += other.across;
         self.speed.merge(&other.speed);
         self.steady_speed.merge(&other.steady_speed);
         self.radial_speed.merge(&other.radial_speed);
     }
 }
 
-/// A row: all of a toucher's angles, or one. Errors are [RMS, worst].
+/// RMS and worst over everything, and the lowest and the highest RMS of one seed.
+type Spread = [f64; 4];
+
+/// A row: all of a toucher's angles, or one.
 #[derive(Clone, Debug, Serialize)]
 struct Row {
     indenter: &'static str,
@@ -191,16 +217,36 @@ struct Row {
     angle_deg: Option<f64>,
     frames: u64,
     felt_percent: f64,
-    centroid_mm: Option<[f64; 2]>,
-    two_points_deg: Option<[f64; 2]>,
-    axis_deg: Option<[f64; 2]>,
-    speed_percent: Option<[f64; 2]>,
-    speed_over_100_ms_percent: Option<[f64; 2]>,
-    radial_speed_percent: Option<[f64; 2]>,
+    centroid_mm: Option<Spread>,
+    two_points_deg: Option<Spread>,
+    axis_deg: Option<Spread>,
+    speed_percent: Option<Spread>,
+    speed_over_100_ms_percent: Option<Spread>,
+    radial_speed_percent: Option<Spread>,
+    /// Frames in which two points are over 45° off; frames flagged `tie`, and those of them.
+    across_frames: u64,
+    tied_frames: u64,
+    tied_across_frames: u64,
 }
 
 impl Row {
-    fn new(case: &Case, angle_deg: Option<f64>, signal: usize, scores: &Scores) -> Self {
+    /// Of all cases in `group`.
+    fn new(angle_deg: Option<f64>, signal: usize, group: &[Scored<'_>]) -> Self {
+        let case = group[0].0;
+        let mut scores = Scores::default();
+        let mut by_seed = vec![Scores::default(); SEEDS];
+        for (_, runs) in group {
+            for (of_seed, run) in by_seed.iter_mut().zip(*runs) {
+                scores.merge(&run[signal]);
+                of_seed.merge(&run[signal]);
+            }
+        }
+        let spread = |errors: fn(&Scores) -> &Errors| -> Option<Spread> {
+            let [rms, worst] = errors(&scores).summary()?;
+            let of_seeds = by_seed.iter().filter_map(|scores| errors(scores).summary()).map(|[rms, _]| rms);
+            let [low, high] = of_seeds.fold([rms, rms], |[low, high], rms| [low.min(rms), high.max(rms)]);
+            Some([rms, worst, low, high])
+        };
         Self {
             indenter: case.toucher.name(),
             signal: Signal::ALL[signal].name(),
@@ -209,15 +255,21 @@ impl Row {
             angle_deg,
             frames: scores.frames,
             felt_percent: 100.0 * scores.felt as f64 / scores.frames.max(1) as f64,
-            centroid_mm: scores.centroid.summary(),
-            two_points_deg: scores.two_points.summary(),
-            axis_deg: scores.axis.summary(),
-            speed_percent: scores.speed.summary(),
-            speed_over_100_ms_percent: scores.steady_speed.summary(),
-            radial_speed_percent: scores.radial_speed.summary(),
+            centroid_mm: spread(|scores| &scores.centroid),
+            two_points_deg: spread(|scores| &scores.two_points),
+            axis_deg: spread(|scores| &scores.axis),
+            speed_percent: spread(|scores| &scores.speed),
+            speed_over_100_ms_percent: spread(|scores| &scores.steady_speed),
+            radial_speed_percent: spread(|scores| &scores.radial_speed),
+            across_frames: scores.across,
+            tied_frames: scores.tied,
+            tied_across_frames: scores.tied_across,
         }
     }
 }
+
+/// A case, and its scores by seed and signal.
+type Scored<'a> = (&'a Case, &'a Vec<[Scores; 2]>);
 
 /// All rows: over all angles of a toucher, and for rods by angle.
 #[derive(Clone, Debug, Serialize)]
@@ -232,30 +284,27 @@ impl Table {
         let cases = Case::all(quick);
         let done = AtomicUsize::new(0);
         let scores = cases.par_iter().map(|case| {
-            let trial = trial::run("a simulation of the table", &case.simulation(), body, "hand/back")?;
-            let scores = [0, 1].map(|signal| Scores::of(&trial, signal));
+            let (name, text) = ("a simulation of the table", case.simulation());
+            let trials = trial::run_seeds(name, &text, body, "hand/back", &case.seeds())?;
+            let scores: Vec<_> = trials.iter().map(|trial| [0, 1].map(|signal| Scores::of(trial, signal))).collect();
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / cases.len() as f64);
             Ok(scores)
         });
-        let scores: Vec<[Scores; 2]> = scores.collect::<Result<_>>()?;
+        let scores: Vec<Vec<[Scores; 2]>> = scores.collect::<Result<_>>()?;
         let mut table = Self { over_all_angles: Vec::new(), rods_by_angle: Vec::new() };
-        let alike = |a: &(&Case, &[Scores; 2]), b: &(&Case, &[Scores; 2])| {
+        let alike = |a: &Scored<'_>, b: &Scored<'_>| {
             let key = |case: &Case| (case.toucher, case.speed_mm_s, case.noise_counts);
             key(a.0) == key(b.0)
         };
-        let pairs: Vec<(&Case, &[Scores; 2])> = cases.iter().zip(&scores).collect();
+        let pairs: Vec<Scored<'_>> = cases.iter().zip(&scores).collect();
         for group in pairs.chunk_by(alike) {
             let (case, _) = group[0];
-            for signal in 0..2 {
-                let mut all = Scores::default();
-                group.iter().for_each(|(_, scores)| all.merge(&scores[signal]));
-                table.over_all_angles.push(Row::new(case, None, signal, &all));
-            }
+            table.over_all_angles.extend((0..2).map(|signal| Row::new(None, signal, group)));
             let usual = case.speed_mm_s == USUAL_SPEED_MM_S && case.noise_counts == USUAL_NOISE_COUNTS;
             if case.toucher == Toucher::Rod && usual {
-                for (case, scores) in group {
-                    let rows = (0..2).map(|signal| Row::new(case, Some(case.angle_deg), signal, &scores[signal]));
-                    table.rods_by_angle.extend(rows);
+                for of_angle in group.chunks(1) {
+                    let angle_deg = Some(of_angle[0].0.angle_deg);
+                    table.rods_by_angle.extend((0..2).map(|signal| Row::new(angle_deg, signal, of_angle)));
                 }
             }
         }
@@ -264,8 +313,9 @@ impl Table {
 
     /// As Markdown, for people.
     pub(super) fn markdown(&self) -> String {
-        let mut text = String::from(
-            "Each cell is RMS / worst over all frames of all angles.\n\n\
+        let mut text = format!(
+            "Each cell is RMS / worst over all frames of all angles and, with noise, of {SEEDS} seeds; in brackets the\n\
+             lowest and the highest RMS of a seed, where they differ.\n\n\
              | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | two points ° | principal axis ° | \
              speed % | speed over 0.1 s % |\n|---|---|---|---|---|---|---|---|---|---|\n",
         );
@@ -305,10 +355,24 @@ impl Table {
                 cell(linearised.centroid_mm, 2),
             );
         }
+        let across = self.rods_by_angle.iter().filter(|row| row.across_frames > 0).map(|row| {
+            format!(
+                "{}°, {}: {} of {} frames, {} of them flagged `tie`",
+                row.angle_deg.unwrap_or(0.0),
+                row.signal,
+                row.across_frames,
+                row.frames,
+                row.tied_across_frames
+            )
+        });
+        let across: Vec<String> = across.collect();
+        let _ = writeln!(text, "\nTwo points are over {ACROSS_DEG}° off for rods at: {}.", across.join("; "));
         text
     }
 }
 
-fn cell(errors: Option<[f64; 2]>, decimals: usize) -> String {
-    errors.map_or_else(|| "–".to_owned(), |[rms, worst]| format!("{rms:.decimals$} / {worst:.decimals$}"))
+fn cell(errors: Option<Spread>, decimals: usize) -> String {
+    let Some(errors) = errors else { return "–".to_owned() };
+    let [rms, worst, low, high] = errors.map(|error| format!("{error:.decimals$}"));
+    if low == high { format!("{rms} / {worst}") } else { format!("{rms} ({low}–{high}) / {worst}") }
 }

@@ -71,47 +71,87 @@ pub(super) struct Trial {
 /// Runs the simulation in `text`, called `name` in messages, whose sensors give counts, over `field` of `body`.
 pub(super) fn run(name: &str, text: &str, body: &Body, field: &str) -> Result<Trial> {
     let mut source = SimulatedSource::on_body(name, text, body.clone())?;
-    let ids = source.taxels().to_vec();
-    let mut frame = Frame::missing(0.0, ids.len());
-    let mut moments = Vec::new();
-    let mut signals: [Vec<Frame>; 2] = Default::default();
-    while source.next_frame(&mut frame)? {
-        let counts: Vec<u16> = frame.values.iter().map(|value| value.number().unwrap_or(0.0) as u16).collect();
-        for (signal, frames) in Signal::ALL.iter().zip(&mut signals) {
-            let values = counts.iter().map(|&counts| RawValue::new(signal.value(counts))).collect();
-            frames.push(Frame { t_s: frame.t_s, values, pose: Vec::new() });
+    let mut series = Series::default();
+    series.read(&mut source)?;
+    Ok(Trial { ids: source.taxels().to_vec(), moments: series.felt(&source, field)? })
+}
+
+/// The same with the noise of each of `seeds`: as many trials, in that order.
+pub(super) fn run_seeds(name: &str, text: &str, body: &Body, field: &str, seeds: &[u64]) -> Result<Vec<Trial>> {
+    let mut source = SimulatedSource::on_body(name, text, body.clone())?;
+    // One series for all, as it takes far longer to make an engine than to use it.
+    let mut series = Series::default();
+    for &seed in seeds {
+        source.reseed(seed);
+        series.read(&mut source)?;
+    }
+    let (ids, mut moments) = (source.taxels().to_vec(), series.felt(&source, field)?.into_iter());
+    let frames = moments.len() / seeds.len().max(1);
+    let trial = |_| Trial { ids: ids.clone(), moments: moments.by_ref().take(frames).collect() };
+    Ok(seeds.iter().map(trial).collect())
+}
+
+/// Time between runs, s: longer than motion is measured over, so that none is from one run to the next.
+const BETWEEN_RUNS_S: f64 = 1000.0;
+
+/// What was read, run after run.
+#[derive(Default)]
+struct Series {
+    runs: u32,
+    read: Vec<(f64, Vec<u16>, Vec<f64>, Option<Truth>)>,
+    /// The frames for each of [`Signal::ALL`].
+    signals: [Vec<Frame>; 2],
+}
+
+impl Series {
+    /// Reads `source` to its end: another run.
+    fn read(&mut self, source: &mut SimulatedSource) -> Result<()> {
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        while source.next_frame(&mut frame)? {
+            let counts: Vec<u16> = frame.values.iter().map(|value| value.number().unwrap_or(0.0) as u16).collect();
+            for (signal, frames) in Signal::ALL.iter().zip(&mut self.signals) {
+                let values = counts.iter().map(|&counts| RawValue::new(signal.value(counts))).collect();
+                let t_s = frame.t_s + f64::from(self.runs) * BETWEEN_RUNS_S;
+                frames.push(Frame { t_s, values, pose: Vec::new() });
+            }
+            let forces_newton = source.forces_newton().to_vec();
+            self.read.push((frame.t_s, counts, forces_newton, source.truth().first().cloned()));
         }
-        let forces_newton = source.forces_newton().to_vec();
-        moments.push((frame.t_s, counts, forces_newton, source.truth().first().cloned()));
+        self.runs += 1;
+        Ok(())
     }
-    let mut percepts = Vec::with_capacity(2);
-    for frames in &signals {
-        let scene = Scene {
-            outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED,
-            filter: FILTER,
-            fields: vec![field.to_owned()],
-            ..Scene::default()
-        };
-        let options = Options {
-            scene,
-            calibration: None,
-            backend: BackendKind::Reference,
-            batch: frames.len(),
-            ..Options::default()
-        };
-        let mut engine = Engine::new(body, options)?;
-        engine.listen(&ids)?;
-        let batch = engine.process(frames)?;
-        percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
+
+    /// What was read, with the percepts of `field` on the body of `source`.
+    fn felt(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
+        let mut percepts = Vec::with_capacity(2);
+        for frames in &self.signals {
+            let scene = Scene {
+                outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED,
+                filter: FILTER,
+                fields: vec![field.to_owned()],
+                ..Scene::default()
+            };
+            let options = Options {
+                scene,
+                calibration: None,
+                backend: BackendKind::Reference,
+                batch: frames.len(),
+                ..Options::default()
+            };
+            let mut engine = Engine::new(source.body(), options)?;
+            engine.listen(source.taxels())?;
+            let batch = engine.process(frames)?;
+            percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
+        }
+        let moments = self.read.into_iter().enumerate().map(|(index, (t_s, counts, forces_newton, truth))| Moment {
+            t_s,
+            counts,
+            forces_newton,
+            truth,
+            percepts: array::from_fn(|signal| percepts[signal][index]),
+        });
+        Ok(moments.collect())
     }
-    let moments = moments.into_iter().enumerate().map(|(index, (t_s, counts, forces_newton, truth))| Moment {
-        t_s,
-        counts,
-        forces_newton,
-        truth,
-        percepts: array::from_fn(|signal| percepts[signal][index]),
-    });
-    Ok(Trial { ids, moments: moments.collect() })
 }
 
 #[cfg(test)]

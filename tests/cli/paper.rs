@@ -4,9 +4,9 @@ use serde_json::Value;
 
 use super::{done, fails, file, files_in, text_of};
 
-/// RMS and worst under `key`.
-fn errors(row: &Value, key: &str) -> [f64; 2] {
-    [0, 1].map(|i| row[key][i].as_f64().unwrap_or_else(|| panic!("no {key}: {row}")))
+/// RMS, worst, and the lowest and the highest RMS of a seed under `key`.
+fn errors(row: &Value, key: &str) -> [f64; 4] {
+    [0, 1, 2, 3].map(|i| row[key][i].as_f64().unwrap_or_else(|| panic!("no {key}: {row}")))
 }
 
 #[test]
@@ -41,7 +41,8 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with('|')).collect();
     // Two heads of two lines, a row for each indenter and signal, one for each angle.
     assert_eq!(rows.len(), 4 + 6 + 36);
-    for row in rows {
+    let across = table.lines().find(|line| line.starts_with("Two points are over 45° off")).unwrap();
+    for row in rows.into_iter().chain([across]) {
         assert!(docs.contains(row), "docs/paper.md is out of date, see how it is made there: {row}");
     }
     let shown =
@@ -52,9 +53,15 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     let rods = table["rods_by_angle"].as_array().unwrap();
     assert_eq!(rods.len(), 72);
     for row in rods {
-        let ([rms, worst], [axis, axis_worst]) = (errors(row, "two_points_deg"), errors(row, "axis_deg"));
-        // The method picks two of nine sensors: it is coarse, but no rod may be seen across itself.
-        assert!(rms <= worst && worst < 45.0 && rms < 20.0 && axis <= axis_worst && axis < 10.0, "{row}");
+        let ([rms, worst, low, high], [axis, axis_worst, ..]) =
+            (errors(row, "two_points_deg"), errors(row, "axis_deg"));
+        assert!(rms <= worst && rms < 20.0 && axis <= axis_worst && axis < 10.0, "{row}");
+        // Some seeds are kinder than others, and all of them together are in between.
+        assert!(low <= rms && rms <= high && row["frames"] == 30 * 40, "{row}");
+        // The method picks two of nine sensors: it is coarse, and a rod half-way between two columns may be seen across
+        // itself; noise breaks the tie that this is, but not always the right way.
+        let across = row["across_frames"].as_u64().unwrap();
+        assert!((across > 0) == (worst > 45.0) && (across > 0) == (row["angle_deg"] == 90.0), "{row}");
         if row["angle_deg"] == 0.0 {
             assert!(worst < 1.0 && axis_worst < 1.0, "along a row of sensors nothing is in doubt: {row}");
         }
