@@ -94,11 +94,19 @@ pub(super) fn run_seeds(name: &str, text: &str, body: &Body, field: &str, seeds:
 /// Time between runs, s: longer than motion is measured over, so that none is from one run to the next.
 const BETWEEN_RUNS_S: f64 = 1000.0;
 
+/// One frame as it was read: all of [`Moment`] but the percepts.
+struct Read {
+    t_s: f64,
+    counts: Vec<u16>,
+    forces_newton: Vec<f64>,
+    truth: Option<Truth>,
+}
+
 /// What was read, run after run.
 #[derive(Default)]
 struct Series {
     runs: u32,
-    read: Vec<(f64, Vec<u16>, Vec<f64>, Option<Truth>)>,
+    read: Vec<Read>,
     /// The frames for each of [`Signal::ALL`].
     signals: [Vec<Frame>; 2],
 }
@@ -115,7 +123,8 @@ impl Series {
                 frames.push(Frame { t_s, values, pose: Vec::new() });
             }
             let forces_newton = source.forces_newton().to_vec();
-            self.read.push((frame.t_s, counts, forces_newton, source.truth().first().cloned()));
+            let truth = source.truth().first().cloned();
+            self.read.push(Read { t_s: frame.t_s, counts, forces_newton, truth });
         }
         self.runs += 1;
         Ok(())
@@ -143,11 +152,11 @@ impl Series {
             let batch = engine.process(frames)?;
             percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
         }
-        let moments = self.read.into_iter().enumerate().map(|(index, (t_s, counts, forces_newton, truth))| Moment {
-            t_s,
-            counts,
-            forces_newton,
-            truth,
+        let moments = self.read.into_iter().enumerate().map(|(index, read)| Moment {
+            t_s: read.t_s,
+            counts: read.counts,
+            forces_newton: read.forces_newton,
+            truth: read.truth,
             percepts: array::from_fn(|signal| percepts[signal][index]),
         });
         Ok(moments.collect())
