@@ -4,7 +4,7 @@
 //! `[calibration]` and a row for each channel, `x y z nx ny nz` in metres in the link's frame. A row's number is its channel.
 //! Six zeros say that there is no such taxel. `taxel2Repr` has for each row the taxel that stands for its group (a triangle
 //! of 12, or what is left of one), −1 where there is no taxel, and −2 for a thermal pad. What real files do beyond that is
-//! survived and told: fewer ids than rows, several taxels on one point, ids without a place and places without an id,
+//! survived and told: fewer ids than rows or more, several taxels on one point, ids without a place and places without an id,
 //! normals that are no unit vectors.
 
 use std::collections::BTreeMap;
@@ -89,7 +89,7 @@ impl IcubFile {
     ///
     /// # Errors
     /// There is no `[calibration]`, a row does not have six numbers that are finite and of a robot's size, an id is no
-    /// number, there are more ids than rows, or no row has a taxel. The line is named.
+    /// number, a taxel's id has no row, or no row has a taxel. The line is named.
     pub fn read(text: &str) -> Result<Self> {
         let lines: Vec<&str> = text.trim_start_matches('\u{feff}').lines().map(str::trim).collect();
         let start = lines.iter().position(|line| line.eq_ignore_ascii_case("[calibration]")).ok_or_else(|| {
@@ -103,10 +103,11 @@ impl IcubFile {
             }
             raw.push(row(line).map_err(|e| e.at(format!("line {number}")))?);
         }
-        if ids.len() > raw.len() {
+        // Ids beyond the rows that say "no taxel" lack nothing.
+        if let Some(last) = ids.iter().rposition(|&id| id != NO_TAXEL).filter(|&last| last >= raw.len()) {
             return Err(Error::failed(format!(
-                "taxel2Repr has {} ids and there are only {} rows: the file is cut short",
-                ids.len(),
+                "taxel2Repr gives row {last} the id {} and there are only {} rows: the file is cut short",
+                ids[last],
                 raw.len()
             )));
         }
@@ -217,6 +218,8 @@ impl IcubFile {
         say(&taxel(|taxel| taxel.modality == Modality::Temperature), "thermal pads (id -2), of modality temperature");
         let without: Vec<u32> = that(&|_| true).into_iter().filter(|&channel| channel as usize >= self.ids).collect();
         say(&without, "rows beyond the last id, kept where they have a place");
+        let beyond: Vec<u32> = (self.rows.len()..self.ids).map(|channel| channel as u32).collect();
+        say(&beyond, "ids -1 beyond the last row, which say that there is no taxel");
         say(&taxel(|taxel| taxel.normal == NormalFrom::Scaled), "normals of another length than 1, made 1");
         say(&taxel(|taxel| taxel.normal == NormalFrom::Neighbours), "normals missing, made from their neighbours'");
         let shared = self.shared_places();
@@ -386,13 +389,28 @@ mod tests {
     }
 
     #[test]
+    fn ids_beyond_the_rows_may_only_say_that_there_is_no_taxel() {
+        let file = |ids: &str| format!("name a\ntaxel2Repr ({ids})\n[calibration]\n0 0 1 0 0 1\n0 0 2 0 0 1\n");
+        let read = IcubFile::read(&file("0 0 -1 -1 -1")).unwrap();
+        assert_eq!((read.rows.len(), read.ids, read.taxels().count()), (2, 5, 2));
+        assert!(
+            read.notes.iter().any(|note| note.starts_with("3 ids -1 beyond the last row") && note.ends_with("2–4"))
+        );
+        assert_eq!(read.fields(0).len(), 2);
+        for (ids, row) in [("0 0 -1 0 -1", 3), ("0 0 7", 2), ("0 0 -2", 2)] {
+            let why = IcubFile::read(&file(ids)).unwrap_err().to_string();
+            assert!(why.contains(&format!("gives row {row} the id")) && why.contains("cut short"), "{why}");
+        }
+    }
+
+    #[test]
     fn what_is_no_such_file_is_named() {
         let why = |text: &str| IcubFile::read(text).unwrap_err().to_string();
         assert!(why("").contains("[calibration]"));
         assert!(why("[calibration]\n0 0 1 0 0 1").contains("`name`"));
         let after = |rows: &str| why(&format!("name a\ntaxel2Repr (0 1)\n[calibration]\n{rows}"));
         assert!(after("0 0 1 0 0 1\n1 2 3").contains("line 5: `1 2 3`"));
-        assert!(after("0 0 1 0 0 1").contains("cut short"));
+        assert!(after("0 0 1 0 0 1").contains("row 1 the id 1 and there are only 1 rows: the file is cut short"));
         assert!(after("0 0 1 0 0 1\n0 0 nan 0 0 1").contains("line 5") && after("0 0 99 0 0 1").contains("metres"));
         assert!(after("0 0 0 0 0 0\n0 0 0 0 0 0").contains("none of its rows"));
         assert!(why("name a\ntaxel2Repr (0 x)\n[calibration]\n").contains("`x`"));

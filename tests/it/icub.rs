@@ -81,3 +81,23 @@ fn each_file_is_read_to_its_last_row() {
     }
     assert_eq!(seen, known.len());
 }
+
+#[test]
+fn a_board_with_more_ids_than_rows_goes_onto_a_body() {
+    // As the files of both feet, arms and lower legs: 960 ids for 384 rows, those beyond all −1.
+    let mut text = "name l_foot\nspatial_sampling taxel\ntaxel2Repr (".to_owned();
+    for channel in 0..960 {
+        text += &if channel < 384 { format!(" {}", channel / 12 * 12) } else { " -1".to_owned() };
+    }
+    text += " )\n[calibration]\n";
+    for channel in 0..384 {
+        text += &format!("{} {} 0 0 0 1\n", 0.004 * f64::from(channel % 24), 0.004 * f64::from(channel / 24));
+    }
+    let file = IcubFile::read(&text).unwrap();
+    assert_eq!((file.rows.len(), file.ids, file.taxels().count(), file.fields(0).len()), (384, 960, 384, 33));
+    assert!(file.notes.iter().any(|note| note.starts_with("576 ids -1 beyond the last row")), "{:?}", file.notes);
+    let body = Body::from_bytes("foot", &file.to_glb().to_bytes().unwrap()).unwrap();
+    assert_eq!(body.taxels.len(), 384);
+    let why = IcubFile::read(&text.replacen(" -1 )", " 12 )", 1)).unwrap_err().to_string();
+    assert!(why.contains("row 959 the id 12 and there are only 384 rows: the file is cut short"), "{why}");
+}
