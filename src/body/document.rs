@@ -224,6 +224,24 @@ impl Elements<'_> {
     }
 }
 
+/// Refuses `bytes` from a file called `name` whose ending says that it is a mesh or a robot in another format.
+pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
+    let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    let what = match ending.as_deref() {
+        _ if bytes.is_empty() || bytes.starts_with(b"glTF") || text.starts_with(b"{") => return Ok(()),
+        Some("stl") => "an STL mesh, not a glTF; import it",
+        Some("obj") => "an OBJ mesh, not a glTF; import it",
+        Some("dae") => "a COLLADA mesh, not a glTF; import it",
+        Some("ply") => "a PLY mesh, not a glTF; import it",
+        Some("urdf" | "xacro") => "a URDF, which only names mesh files; import those",
+        _ => return Ok(()),
+    };
+    Err(Error::failed(format!(
+        "this is {what} in Blender (File ▸ Import) and export a .glb (File ▸ Export ▸ glTF 2.0)"
+    )))
+}
+
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
 pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
     if bytes.is_empty() {

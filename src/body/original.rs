@@ -9,7 +9,7 @@ use base64::Engine as _;
 use serde_json::{Value, json};
 
 use super::details::{self, Details};
-use super::document::{Document, fetch, split};
+use super::document::{Document, fetch, refuse_other_formats, split};
 use super::glb::{Before, Glb};
 use super::splice::{Span, Splice};
 use super::{Body, strip};
@@ -54,6 +54,7 @@ impl Original {
     }
 
     fn take_up(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
+        refuse_other_formats(name, bytes)?;
         let buffers = Document::parse(bytes, folder)?.into_buffers();
         let (text, chunk) = split(bytes)?;
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);

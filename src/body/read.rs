@@ -8,7 +8,7 @@ use gltf::json;
 use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
-use super::document::Document;
+use super::document::{Document, refuse_other_formats};
 use super::layout::{AREA, MODALITY, NORMAL, TAXEL_ID};
 use super::nodes::{FARTHEST, Nodes, is_near};
 use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, mend};
@@ -42,6 +42,7 @@ pub struct TaxelSource {
 
 /// Reads the body called `name` from a whole file's bytes.
 pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
+    refuse_other_formats(name, bytes)?;
     let document = Document::parse(bytes, folder)?;
     let nodes = Nodes::of(&document)?;
     from_document(name, &document, &nodes, None)
