@@ -3,6 +3,7 @@
 use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, Source, SourceSpec};
 use somatic::{Error, Result, bundled};
 
+use super::check_body_name;
 use super::scene::Asked;
 
 /// A source, or the bundled touch.
@@ -26,9 +27,12 @@ impl Input {
         let Some(text) = asked.sources.first() else {
             return match asked.body.as_deref() {
                 None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new() }),
-                Some(body) => Err(Error::usage(format!(
-                    "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
-                ))),
+                Some(body) => {
+                    check_body_name(body)?;
+                    Err(Error::usage(format!(
+                        "body `{body}` needs a --source, such as csv:FILE or -; the bundled touch is for the bundled hand"
+                    )))
+                }
             };
         };
         let spec: SourceSpec = text.parse()?;

@@ -146,14 +146,18 @@ fn print(text: &str) -> Result<()> {
 
 /// The body in the file `name`, or the bundled one of that name where there is no such file.
 fn load_body(name: &str) -> Result<Body> {
-    // A link of this name to a serial port is no body.
-    if !Path::new(name).is_file() {
-        if let Some(bytes) = bundled::body(name) {
-            return Body::from_bytes(name, bytes);
-        }
-        if let Some(near) = nearest(name, bundled::BODIES) {
-            return Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name));
-        }
+    check_body_name(name)?;
+    match bundled::body(name) {
+        // A link of this name to a serial port is no body.
+        Some(bytes) if !Path::new(name).is_file() => Body::from_bytes(name, bytes),
+        _ => Body::load(name),
     }
-    Body::load(name)
+}
+
+/// Refuses a `name` that is neither a file nor a bundled body, but nearly one of those.
+fn check_body_name(name: &str) -> Result<()> {
+    let near = nearest(name, bundled::BODIES).filter(|&near| near != name && !Path::new(name).is_file());
+    near.map_or(Ok(()), |near| {
+        Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name))
+    })
 }

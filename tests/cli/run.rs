@@ -161,6 +161,9 @@ fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--nonsense"]).contains("--nonsense"));
     assert!(fails(2, &["run", "--backend", "gpo"]).contains("'gpu'"));
     assert!(fails(2, &["run", "--body", "mat"]).contains("needs a --source"));
+    for arguments in [&["run", "--body", "hnad"][..], &["run", "--body", "hnad", "--source", "a.csv"]] {
+        assert!(fails(1, arguments).contains("hnad: no such file; did you mean the bundled body `hand`?"));
+    }
     assert!(fails(2, &["run", "--source", "a.csv", "--source", "b.csv"]).contains("only serial lines"));
     assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
     assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
