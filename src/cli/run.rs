@@ -90,7 +90,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
     let body = asked.body_for(&input)?;
-    for finding in body.findings.iter().filter(|_| !asked.quiet) {
+    // Why a body without a layout cannot be run is said once, by the error.
+    let has_layout = !(body.taxels.is_empty() && body.fields.is_empty());
+    for finding in body.findings.iter().filter(|_| !asked.quiet && has_layout) {
         say(&format!("{}: {finding}", body.name));
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();

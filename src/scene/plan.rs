@@ -136,8 +136,8 @@ impl Plan {
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
-            let hint = body.findings.first().map_or("put some on it with `somatic author`", String::as_str);
-            return Err(Error::failed(format!("the body has no taxels: {hint}")).at(&body.name));
+            let what = "the body has no taxels: put some on it with `somatic author`, as by --taxels 500";
+            return Err(Error::failed(what).at(&body.name));
         }
         if fields.fields.is_empty() {
             return Err(Error::failed("the body has no fields: make some with `somatic author`").at(&body.name));

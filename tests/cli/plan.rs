@@ -181,3 +181,49 @@ fn a_plan_says_how_far_centroids_are_off_and_what_it_leaves_out() {
     let text = done(&[&["plan"][..], &flags].concat());
     assert!(text.contains("° (1 tie left out)") || text.contains(&format!("° ({ties} ties left out)")), "{text}");
 }
+
+#[test]
+fn a_body_without_taxels_is_sent_to_author_once() {
+    // As Blender writes a mesh that never had a skin.
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("arm.gltf");
+    let generator = "Khronos glTF Blender I/O v5.0.21";
+    let text = format!(r#"{{"asset":{{"version":"2.0","generator":"{generator}"}},"nodes":[{{"name":"arm"}}]}}"#);
+    std::fs::write(&body, text).unwrap();
+    let csv = folder.path().join("a.csv");
+    std::fs::write(&csv, "t,0\n0,1\n").unwrap();
+    let (body, csv) = (body.to_str().unwrap(), csv.to_str().unwrap());
+    for arguments in [&["run", "--body", body, "--source", csv][..], &["plan", "--body", body, "--estimate"]] {
+        let said = fails(1, arguments);
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(said.contains("no taxels") && said.contains("somatic author") && !said.contains("Blender"), "{said}");
+    }
+}
+
+#[test]
+fn a_mesh_in_another_format_says_how_it_becomes_a_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.glb");
+    for (name, text, format) in [
+        ("arm.stl", "solid arm\n", "STL"),
+        ("arm.STL", "\u{1}binary", "STL"),
+        ("arm.obj", "v 0 0 0\n", "OBJ"),
+        ("arm.dae", "<?xml version=\"1.0\"?>", "COLLADA"),
+        ("arm.ply", "ply\n", "PLY"),
+        ("arm.urdf", "<robot name=\"arm\"/>", "URDF"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let path = path.to_str().unwrap();
+        let author = ["author", path, "--taxels", "9", "-o", out.to_str().unwrap()];
+        for arguments in [&["inspect", path][..], &["plan", "--body", path], &author] {
+            let said = fails(1, arguments);
+            assert!(said.contains(format) && said.contains("export a .glb") && said.contains(name), "{said}");
+            assert_eq!(said.lines().count(), 1, "{said}");
+        }
+    }
+    // What is a glTF is read, whatever it is called.
+    let path = folder.path().join("hand.stl");
+    std::fs::write(&path, somatic::bundled::HAND).unwrap();
+    done(&["inspect", path.to_str().unwrap()]);
+}
