@@ -190,7 +190,10 @@ fn fill(
                 Err(fit) => return Err(wrong(format!("ask for at most {fit}"))),
             }
         }
-        How::Apart { spacing_m } => sampled(place::apart(positions, &triangles, *spacing_m, seed, progress)?),
+        How::Apart { spacing_m } => {
+            check_fits(canvas, &chosen, "spacing", *spacing_m)?;
+            sampled(place::apart(positions, &triangles, *spacing_m, seed, progress)?)
+        }
         How::Density { count, attribute } => {
             let painted = canvas.painted(attribute)?;
             let density = |p: &Placed| {
@@ -200,6 +203,7 @@ fn fill(
             sampled(place::by_density(positions, &triangles, *count, seed, density, progress)?)
         }
         How::Grid { hexagonal, pitch_m, origin, u } => {
+            check_fits(canvas, &chosen, "pitch", *pitch_m)?;
             let lattice = Lattice { hexagonal: *hexagonal, pitch_m: *pitch_m, origin: *origin, u: *u };
             let laid = lattice.lay(canvas, region, progress)?;
             if laid.placed.is_empty() {
@@ -229,6 +233,22 @@ fn fill(
             snap(canvas, region, &given, *within_m).map_err(|e| e.at(path.display()))?
         }
     })
+}
+
+/// Refuses a `length` that is wider than the triangles `chosen`: a number that was not meant in metres.
+fn check_fits(canvas: &Canvas<'_>, chosen: &[usize], key: &str, length_m: f64) -> Result<()> {
+    let corners = chosen.iter().flat_map(|&triangle| canvas.corners(triangle));
+    let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let across_m = low.distance(high);
+    if length_m <= across_m {
+        return Ok(());
+    }
+    Err(Error::failed(format!(
+        "a {key} of {} is wider than what it is for, which is {} across; numbers are metres: for millimetres write \"{} mm\"",
+        shown(length_m),
+        shown(across_m),
+        length_m
+    )))
 }
 
 /// Ids that are taken, each with who has it.

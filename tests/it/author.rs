@@ -485,6 +485,13 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ("[[place]]\ngrid = \"hexagonal\"\n".into(), 2, "`pitch`"),
         ("[[place]]\ngrid = \"hexagnal\"\n".into(), 2, "did you mean `hexagonal`?"),
         ("[[place]]\ngrid = \"hexagonal\"\npitch = 1e-6\n".into(), 2, "too many places"),
+        (
+            "[[place]]\n\nspacing = 4\n".into(),
+            3,
+            "a spacing of 4.00 m is wider than what it is for, which is 223.6 mm across",
+        ),
+        ("[[place]]\nspacing = 4\n".into(), 2, "write \"4 mm\""),
+        ("[[place]]\ngrid = \"hexagonal\"\npitch = 4\n".into(), 2, "a pitch of 4.00 m"),
         ("[[place]]\ntaxels = 5\npitch = 1\n".into(), 3, "`pitch` means nothing beside `taxels`"),
         ("[[place]]\ntaxels = 5\ncsv = \"a.csv\"\n".into(), 3, "remove `csv` or `taxels`"),
         ("[[place]]\ntaxls = 5\n".into(), 2, "did you mean `taxels`?"),
