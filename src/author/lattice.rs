@@ -74,7 +74,7 @@ impl Lattice {
             }
             let length = cell.length();
             let direction = if length > 0.0 { (u * cell.x + v * cell.y) / length } else { u };
-            let Some(place) = walk(topology, start.triangle, from, direction, length) else { continue };
+            let Ok(place) = walk(topology, start.triangle, from, direction, length) else { continue };
             let triangle = topology.given[place.triangle as usize] as usize;
             if !region[triangle] {
                 continue;
@@ -101,9 +101,7 @@ impl Lattice {
         let (area, sum) = sound.iter().map(weighted).fold((0.0, DVec3::ZERO), |(a, s), (b, t)| (a + b, s + t));
         let wanted = self.origin.unwrap_or(sum / area);
         let hit = index.nearest(wanted).ok_or_else(|| Error::failed("the surface has no area to lay a grid on"))?;
-        let mut place = Place::in_triangle(topology, sound[hit.triangle], hit.position);
-        place.barycentric = place.barycentric.map(|weight| weight * (1.0 - 3.0 * INWARD) + INWARD);
-        Ok(place)
+        Ok(inward(Place::in_triangle(topology, sound[hit.triangle], hit.position)))
     }
 
     /// The ways to all of the triangles `near`.
@@ -175,14 +173,20 @@ fn extent(map: &LogMap<'_>, near: &[u32]) -> f64 {
     places.map(|place| map.reach(&place).map_or(f64::INFINITY, |way| way.distance_m)).fold(0.0, f64::max)
 }
 
-/// Where somebody comes who goes straight on for `length` from `from` in `triangle`; `None` beyond the surface's edge.
-fn walk(
+/// `place`, moved off the edges of its triangle by so little that it does not count.
+pub(super) fn inward(place: Place) -> Place {
+    Place { barycentric: place.barycentric.map(|weight| weight * (1.0 - 3.0 * INWARD) + INWARD), ..place }
+}
+
+/// Where somebody comes who goes straight on for `length` from `from` in `triangle`; at the surface's edge, how much of it
+/// is left.
+pub(super) fn walk(
     topology: &Topology,
     mut triangle: u32,
     mut from: DVec3,
     mut direction: DVec3,
     mut length: f64,
-) -> Option<Place> {
+) -> Result<Place, f64> {
     let mut entered = NONE;
     // A walk crosses a triangle more than once only by coming round.
     for _ in 0..100 * topology.triangles.len().max(100) {
@@ -204,16 +208,16 @@ fn walk(
                 }
             }
         }
-        let (t, edge) = exit?;
+        let Some((t, edge)) = exit else { return Err(length) };
         if t >= length {
-            return Some(Place::in_triangle(topology, triangle, from + direction * length));
-        }
-        let beyond = topology.across[edge as usize];
-        if beyond == NONE {
-            return None;
+            return Ok(Place::in_triangle(topology, triangle, from + direction * length));
         }
         from += direction * t;
         length -= t;
+        let beyond = topology.across[edge as usize];
+        if beyond == NONE {
+            return Err(length);
+        }
         let [a, b] = [topology.ends(edge).0, topology.ends(edge).1].map(|v| topology.positions[v as usize]);
         let along = (b - a).normalize_or_zero();
         let (forward, aside) = (direction.dot(along.cross(normal)), direction.dot(along));
@@ -224,8 +228,8 @@ fn walk(
         let inward = (third - along * third.dot(along)).normalize_or_zero();
         direction = (along * aside + inward * forward).normalize_or_zero();
         if direction == DVec3::ZERO {
-            return None;
+            return Err(length);
         }
     }
-    None
+    Err(length)
 }

@@ -20,6 +20,7 @@
 
 mod canvas;
 mod carry;
+mod cells;
 mod coverage;
 mod crowd;
 mod glob;

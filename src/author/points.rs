@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::canvas::Canvas;
 use super::glob::Globs;
 use super::icub::IcubFile;
-use super::place::{Placed, nearest_on_its_side};
-use super::{SurfacePoint, recipe};
+use super::place::Placed;
+use super::{SurfacePoint, cells, recipe};
 use crate::body::{MAX_TAXEL_ID, Modality, SurfaceIndex};
 use crate::error::{Error, Result, nearest};
 use crate::field::geodesic::barycentric;
@@ -18,6 +18,8 @@ pub(super) struct Given {
     /// Its id, where one came along.
     pub(super) id: Option<u32>,
     position_in_world: DVec3,
+    /// The surface that it stands for, m², where that came along.
+    area_m2: Option<f64>,
     /// What messages call it.
     name: String,
 }
@@ -48,6 +50,7 @@ pub(super) fn of_marks(canvas: &Canvas<'_>, names: &Globs) -> Result<Vec<Given>>
         mark.positions_in_world.iter().enumerate().map(|(index, &position_in_world)| Given {
             id: None,
             position_in_world,
+            area_m2: None,
             name: if mark.positions_in_world.len() > 1 {
                 format!("point {index} of `{}`", mark.name)
             } else {
@@ -73,7 +76,14 @@ fn natural(name: &str) -> Vec<(String, u64)> {
     pieces
 }
 
-/// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres and, where they are in links' frames, `link`.
+/// Columns of a table of places.
+const COLUMNS: [&str; 6] = ["id", "x", "y", "z", "link", "area"];
+
+/// A taxel of more than this is measured in another unit, m².
+const LARGEST_M2: f64 = 1.0;
+
+/// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres; where they are in links' frames, `link`; and
+/// where it is known, `area` in m².
 pub(super) fn of_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
     read_table(canvas, path).map_err(|e| e.at(path.display()))
 }
@@ -89,14 +99,24 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
         Error::failed(format!("it is no table: {e}; give the columns id,x,y,z")).at(format!("line {row}"))
     };
     let header = reader.headers().map_err(|e| broken(&e))?.clone();
+    if let Some(unknown) = header.iter().find(|own| !COLUMNS.iter().any(|known| own.eq_ignore_ascii_case(known))) {
+        return Err(Error::failed(format!(
+            "there is no column `{unknown}` in a table of taxels; it may have {}: rename or remove it",
+            COLUMNS.join(", ")
+        ))
+        .at("line 1"));
+    }
     let column = |name: &str| header.iter().position(|own| own.eq_ignore_ascii_case(name));
     let needed = |name: &str| {
         let wrong = || {
-            Error::failed(format!("there is no column `{name}`; the first line names id,x,y,z and, if need be, link"))
+            Error::failed(format!(
+                "there is no column `{name}`; the first line names id,x,y,z and, if need be, link and area"
+            ))
         };
         column(name).ok_or_else(wrong)
     };
-    let (id, places, link) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?], column("link"));
+    let (id, places) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?]);
+    let (link, area) = (column("link"), column("area"));
     let mut given: Vec<Given> = Vec::new();
     let mut seen = std::collections::HashMap::new();
     for row in reader.records() {
@@ -130,12 +150,27 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
             })?;
             position = links[link].world_from_link.transform_point3(position);
         }
-        given.push(Given { id: Some(id), position_in_world: position, name: format!("line {line}: taxel {id}") });
+        let area_m2 =
+            area.map(cell).filter(|text| !text.is_empty()).map(|text| area_of(text).map_err(at)).transpose()?;
+        given.push(Given {
+            id: Some(id),
+            position_in_world: position,
+            area_m2,
+            name: format!("line {line}: taxel {id}"),
+        });
     }
     if given.is_empty() {
         return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));
     }
     Ok(given)
+}
+
+/// The area that `text` says, m².
+fn area_of(text: &str) -> Result<f64> {
+    let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= LARGEST_M2);
+    area.ok_or_else(|| {
+        Error::failed(format!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
+    })
 }
 
 /// The places in the iCub's position file at `path`, in the frame of the link that the file names or `link`: of its taxels
@@ -163,6 +198,7 @@ pub(super) fn of_icub(
         .map(|(channel, taxel)| Given {
             id: Some(first_id.saturating_add(channel)),
             position_in_world: world_from_link.transform_point3(taxel.position_in_link),
+            area_m2: None,
             name: format!("channel {channel} of {}", path.display()),
         })
         .collect();
@@ -202,10 +238,11 @@ pub(super) fn snap(canvas: &Canvas<'_>, region: &[bool], given: &[Given], within
         let point = SurfacePoint { position: hit.position, normal: hit.normal, area: 0.0 };
         snapped.push(Snapped { placed: Placed { point, triangle, barycentric }, id: place.id, moved_m });
     }
-    // A taxel stands for what a hexagonal grid of its distance from the nearest would give it.
-    let points: Vec<SurfacePoint> = snapped.iter().map(|snapped| snapped.placed.point).collect();
-    for (snapped, distance) in snapped.iter_mut().zip(nearest_on_its_side(&points)) {
-        snapped.placed.point.area = distance.map_or(0.0, |distance| distance * distance * 3.0_f64.sqrt() / 2.0);
+    let placed: Vec<Placed> = snapped.iter().map(|snapped| snapped.placed).collect();
+    let all_known = given.iter().all(|place| place.area_m2.is_some());
+    let cells = if all_known { vec![0.0; placed.len()] } else { cells::areas(canvas, &placed) };
+    for ((snapped, place), cell) in snapped.iter_mut().zip(given).zip(cells) {
+        snapped.placed.point.area = place.area_m2.unwrap_or(cell);
     }
     Ok(snapped)
 }

@@ -125,6 +125,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         }
         let own: Vec<u32> = filled.iter().zip(place.first_id..).map(|(one, next)| one.id.unwrap_or(next)).collect();
         ids.take(own.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
+        notes.extend(without_area(place, &filled, &own));
         let first = seated.len();
         seated.extend(filled.iter().zip(&own).map(|(one, &id)| canvas.seat(&one.placed, id, place.modality)));
         reports.push(report(&canvas, place, own, &filled, &seated[first..]));
@@ -249,6 +250,21 @@ fn check_fits(canvas: &Canvas<'_>, chosen: &[usize], key: &str, length_m: f64) -
         shown(across_m),
         length_m
     )))
+}
+
+/// What is said of taxels whose area is not known.
+fn without_area(place: &Place, filled: &[Filled], ids: &[u32]) -> Option<String> {
+    let lone = filled.iter().zip(ids).filter(|(one, _)| one.placed.point.area == 0.0);
+    let lone: Vec<u32> = lone.map(|(_, &id)| id).collect();
+    (!lone.is_empty()).then(|| {
+        format!(
+            "place `{}`: no area for {}, as no other taxel of the place is near on the same part of the surface; a csv can give \
+             it in a column `area`: {}",
+            place.name,
+            if lone.len() == 1 { "1 taxel".to_owned() } else { format!("{} taxels", lone.len()) },
+            listed(&lone)
+        )
+    })
 }
 
 /// Ids that are taken, each with who has it.

@@ -1,5 +1,6 @@
 //! Everything that is tested from outside, in one binary, so that all tests share one device.
 
+mod areas;
 mod author;
 mod batches;
 mod blender;

@@ -1,0 +1,391 @@
+//! How much of the surface each given taxel stands for: its Voronoi cell, which ends half a pitch outside the outermost taxels.
+//!
+//! Around each taxel the surface is unrolled: its neighbours become points of a plane with the taxel at the origin, each as
+//! far away as the shortest way along the surface is long. What another sheet carries is no neighbour, however close it
+//! lies. The cell is what the perpendicular bisectors leave, one for each neighbour. Where the taxels end, a neighbour's
+//! mirror image takes the place of the one that is missing. What of the cell lies beyond the surface's edge is taken off.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::{DVec2, DVec3};
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::canvas::Canvas;
+use super::crowd::face_alike;
+use super::lattice::{inward, walk};
+use super::place::Placed;
+use crate::body::{NONE, SurfaceIndex, Topology};
+use crate::field::geodesic::{LogMap, Place};
+
+/// Taxels nearer than this to each other are at one place, m.
+const ONE_PLACE_M: f64 = 1e-6;
+
+/// Ways are followed so many times as far as the sixth nearest taxel is in a straight line, and as the second nearest.
+const REACH_OF_SIXTH: f64 = 2.0;
+const REACH_OF_SECOND: f64 = 12.0;
+
+/// How often ways are followed twice as far, where they are long around what the straight line crosses.
+const MOST_DOUBLINGS: u32 = 3;
+
+/// A neighbour has another opposite it within 40° of the opposite direction, and so many times as far away. A square grid has
+/// its diagonals at 45°, which stand for nobody beside them.
+const OPPOSITE_COSINE: f64 = 0.766_044_443_118_978;
+const OPPOSITE_REACH: f64 = 1.9;
+
+/// The taxels end where a cell reaches farther than this part of the distance to the neighbour on its other side.
+const OPEN: f64 = 0.9;
+
+/// No two sides of a cell at its taxels' end face further apart than this, 115°: in a hexagonal grid they face 60° apart.
+const WIDEST_TURN: f64 = 115.0 / 360.0 * TAU;
+
+/// Sides shorter than this part of the distance to their neighbour are rounding.
+const LEAST_SIDE: f64 = 1e-6;
+
+/// Directions in which the surface's edge is looked for, 2° apart.
+const RAYS: u32 = 180;
+
+/// The area of the cell of each of `placed`, m²; taxels at one place share theirs. 0, not known, for one whose ways along
+/// the surface meet no other taxel.
+pub(super) fn areas(canvas: &Canvas<'_>, placed: &[Placed]) -> Vec<f64> {
+    let sites = Sites::of(canvas, placed);
+    let cells: Vec<f64> = (0..sites.places.len()).map(|site| sites.area(site).unwrap_or(0.0)).collect();
+    sites.of_taxel.iter().map(|&site| cells[site] / f64::from(sites.taxels[site])).collect()
+}
+
+type Spot = GeomWithData<[f64; 3], usize>;
+
+/// The places of taxels, each once.
+struct Sites<'a> {
+    topology: &'a Topology,
+    places: Vec<Place>,
+    positions: Vec<DVec3>,
+    tree: RTree<Spot>,
+    /// Per taxel its site.
+    of_taxel: Vec<usize>,
+    /// Per site how many taxels are there.
+    taxels: Vec<u32>,
+}
+
+impl<'a> Sites<'a> {
+    fn of(canvas: &'a Canvas<'_>, placed: &[Placed]) -> Self {
+        let topology = canvas.topology();
+        let mut sound = vec![NONE; canvas.triangles.len()];
+        (0..).zip(&topology.given).for_each(|(index, &given)| sound[given as usize] = index);
+        let mut index = None;
+        let mut place_of = |one: &Placed| match sound[one.triangle] {
+            // Its triangle has hardly any area, or is there twice.
+            NONE => {
+                let all = || (0..topology.triangles.len() as u32).map(|triangle| topology.corners(triangle));
+                let index = index.get_or_insert_with(|| SurfaceIndex::of_triangles(all()));
+                index.nearest(one.point.position).map_or(NONE, |hit| hit.triangle as u32)
+            }
+            triangle => triangle,
+        };
+        let tree = tree(placed.iter().map(|one| one.point.position));
+        let mut sites = Self {
+            topology,
+            places: Vec::new(),
+            positions: Vec::new(),
+            tree: RTree::new(),
+            of_taxel: Vec::new(),
+            taxels: Vec::new(),
+        };
+        for (taxel, one) in placed.iter().enumerate() {
+            let at = one.point.position;
+            let here = tree.locate_within_distance(at.to_array(), ONE_PLACE_M * ONE_PLACE_M).map(|spot| spot.data);
+            let first = here.filter(|&other| face_alike(&placed[other].point, &one.point)).min();
+            let site = first.filter(|&first| first < taxel).map_or(sites.places.len(), |first| sites.of_taxel[first]);
+            if site == sites.places.len() {
+                let triangle = place_of(one);
+                let barycentric = match triangle {
+                    NONE => [1.0, 0.0, 0.0],
+                    triangle => Place::in_triangle(topology, triangle, at).barycentric,
+                };
+                sites.places.push(Place { triangle, barycentric });
+                sites.positions.push(at);
+                sites.taxels.push(0);
+            }
+            sites.taxels[site] += 1;
+            sites.of_taxel.push(site);
+        }
+        sites.tree = self::tree(sites.positions.iter().copied());
+        sites
+    }
+
+    /// The area of the cell of `site`, m².
+    fn area(&self, site: usize) -> Option<f64> {
+        let here = self.positions[site];
+        let others = self.tree.nearest_neighbor_iter_with_distance_2(here.to_array());
+        let distances = others.map(|(_, squared)| squared.sqrt()).filter(|&distance| distance > ONE_PLACE_M);
+        let near: Vec<f64> = distances.take(6).collect();
+        let (&second, &sixth) = (near.get(1).or(near.first())?, near.last()?);
+        let mut limit_m = (REACH_OF_SIXTH * sixth).min(REACH_OF_SECOND * second);
+        let start = Some(self.places[site]).filter(|place| place.triangle != NONE).map(inward)?;
+        for doubling in 0..=MOST_DOUBLINGS {
+            let u = self.normal(start.triangle).any_orthonormal_vector();
+            let map = LogMap::new(self.topology, start, u, limit_m).ok()?;
+            let around = self.around(site, &map, limit_m);
+            if around.len() >= 2.min(near.len()) || (doubling == MOST_DOUBLINGS && !around.is_empty()) {
+                let cell = Cell::new(&around, limit_m);
+                return Some(cell.area() - self.beyond_edge(&cell, &map, start.triangle));
+            }
+            limit_m *= 2.0;
+        }
+        None
+    }
+
+    fn normal(&self, triangle: u32) -> DVec3 {
+        let [a, b, c] = self.topology.corners(triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Where the sites within `limit_m` of `site` are on `map`, the nearest first.
+    fn around(&self, site: usize, map: &LogMap<'_>, limit_m: f64) -> Vec<DVec2> {
+        let near = self.tree.locate_within_distance(self.positions[site].to_array(), limit_m * limit_m);
+        let mut others: Vec<usize> = near.map(|spot| spot.data).filter(|&other| other != site).collect();
+        others.sort_unstable();
+        let reached = others.into_iter().filter_map(|other| map.reach(&self.places[other]));
+        let reached = reached.filter(|way| way.distance_m <= limit_m && way.distance_m > ONE_PLACE_M);
+        let mut around: Vec<DVec2> = reached.map(|way| way.uv).collect();
+        around.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        around
+    }
+
+    /// How much of `cell` lies beyond the edge of the surface, seen from its taxel in `triangle`, m².
+    fn beyond_edge(&self, cell: &Cell, map: &LogMap<'_>, triangle: u32) -> f64 {
+        let [from, u, v, _] = map.frame();
+        let between = TAU / f64::from(RAYS);
+        let beyond = |ray: u32| {
+            let (sin, cos) = libm::sincos((f64::from(ray) + 0.5) * between);
+            let whole = cell.reach(DVec2::new(cos, sin));
+            match walk(self.topology, triangle, from, u * cos + v * sin, whole) {
+                Ok(_) => 0.0,
+                Err(left) => (whole * whole - (whole - left) * (whole - left)) / 2.0 * between,
+            }
+        };
+        (0..RAYS).map(beyond).sum()
+    }
+}
+
+fn tree(positions: impl Iterator<Item = DVec3>) -> RTree<Spot> {
+    RTree::bulk_load(positions.zip(0..).map(|(p, index)| Spot::new(p.to_array(), index)).collect())
+}
+
+/// What made a side of a cell.
+#[derive(Clone, Copy, PartialEq)]
+enum Beyond {
+    /// The square that all cells are cut from.
+    Nothing,
+    /// A neighbour at this point.
+    Taxel(DVec2),
+    /// A point where a regular layout would have gone on.
+    Image(DVec2),
+}
+
+impl Beyond {
+    fn point(self) -> Option<DVec2> {
+        match self {
+            Self::Nothing => None,
+            Self::Taxel(point) | Self::Image(point) => Some(point),
+        }
+    }
+}
+
+/// A side of a cell: where it begins, and what lies beyond it.
+#[derive(Clone, Copy)]
+struct Side {
+    from: DVec2,
+    beyond: Beyond,
+}
+
+/// A convex polygon around the origin, counter-clockwise.
+struct Cell(Vec<Side>);
+
+impl Cell {
+    /// The cell of a taxel whose neighbours are `around`, the nearest first, and known within `limit_m`.
+    fn new(around: &[DVec2], limit_m: f64) -> Self {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let side = |(x, y)| Side { from: DVec2::new(x, y) * limit_m, beyond: Beyond::Nothing };
+        let mut cell = Self(corners.map(side).to_vec());
+        around.iter().for_each(|&neighbour| cell.cut(Beyond::Taxel(neighbour)));
+        let images: Vec<DVec2> = cell.beside().filter_map(|side| side.beyond.point()).map(|point| -point).collect();
+        let mut lengths: Vec<f64> = images.iter().map(|image| image.length()).collect();
+        lengths.sort_by(f64::total_cmp);
+        // What lies across a gap is no measure: the median of those that are about as far as the second nearest.
+        let near = OPPOSITE_REACH * lengths.get(1).or(lengths.first()).copied().unwrap_or(0.0);
+        lengths.retain(|&length| length <= near);
+        let usual_m = lengths.get(lengths.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
+        let open: Vec<DVec2> = images.into_iter().filter(|&image| cell.is_open(image, usual_m, around)).collect();
+        open.into_iter().for_each(|image| cell.cut(Beyond::Image(image)));
+        let pitch_m = around.first().map_or(0.0, |nearest| nearest.length());
+        cell.close(pitch_m);
+        cell
+    }
+
+    /// Its sides towards taxels and images that are more than rounding.
+    fn beside(&self) -> impl Iterator<Item = &Side> {
+        (0..self.0.len()).map(|side| (&self.0[side], self.end(side))).filter_map(|(side, end)| {
+            let length = side.beyond.point()?.length();
+            (side.from.distance(end) > LEAST_SIDE * length).then_some(side)
+        })
+    }
+
+    fn end(&self, side: usize) -> DVec2 {
+        self.0[(side + 1) % self.0.len()].from
+    }
+
+    /// Cuts off what is nearer to the point `beyond` than to the origin.
+    fn cut(&mut self, beyond: Beyond) {
+        let Some(point) = beyond.point() else { return };
+        let over = |p: DVec2| p.dot(point) - point.length_squared() / 2.0;
+        if self.0.iter().all(|side| over(side.from) <= 0.0) {
+            return;
+        }
+        let mut kept = Vec::with_capacity(self.0.len() + 1);
+        for (index, side) in self.0.iter().enumerate() {
+            let end = self.end(index);
+            let (before, after) = (over(side.from), over(end));
+            let crossing = || side.from.lerp(end, before / (before - after));
+            if before <= 0.0 {
+                kept.push(*side);
+            }
+            if before <= 0.0 && after > 0.0 {
+                kept.push(Side { from: crossing(), beyond });
+            }
+            if before > 0.0 && after <= 0.0 {
+                kept.push(Side { from: crossing(), ..*side });
+            }
+        }
+        self.0 = kept;
+    }
+
+    /// Whether the taxels end on the side of `image`, the mirror image of a neighbour: neighbours are `usual_m` away.
+    fn is_open(&self, image: DVec2, usual_m: f64, around: &[DVec2]) -> bool {
+        let (towards, length) = (image.normalize(), image.length().max(usual_m));
+        let opposite = |other: &DVec2| {
+            other.dot(towards) >= OPPOSITE_COSINE * other.length() && other.length() <= OPPOSITE_REACH * length
+        };
+        let farthest = self.0.iter().map(|side| side.from.dot(towards)).fold(0.0, f64::max);
+        farthest > OPEN * length && !around.iter().any(opposite)
+    }
+
+    /// Closes what is still open, half of `pitch_m` away: at the end of a row, or at a sharp corner.
+    fn close(&mut self, pitch_m: f64) {
+        let sides: Vec<Side> = self.beside().copied().collect();
+        let meet = |side: &Side, next: &Side| {
+            let index = self.0.iter().position(|own| own.from == side.from && own.beyond == side.beyond);
+            index.is_some_and(|index| self.end(index).distance(next.from) <= LEAST_SIDE * pitch_m)
+        };
+        let mut images = Vec::new();
+        for (index, side) in sides.iter().enumerate() {
+            let next = &sides[(index + 1) % sides.len()];
+            let (Some(a), Some(b)) = (side.beyond.point(), next.beyond.point()) else { continue };
+            let both_real = matches!((side.beyond, next.beyond), (Beyond::Taxel(_), Beyond::Taxel(_)));
+            let turn = libm::atan2(a.perp_dot(b), a.dot(b)).rem_euclid(TAU);
+            let turn = if sides.len() == 1 { TAU } else { turn };
+            // Two taxels beside each other, however far apart, leave nothing open.
+            if turn < WIDEST_TURN || (both_real && sides.len() > 1 && meet(side, next)) {
+                continue;
+            }
+            let missing = (turn / FRAC_PI_2 - 1e-6).ceil() - 1.0;
+            for step in 1..=missing as u32 {
+                let (sin, cos) = libm::sincos(turn * f64::from(step) / (missing + 1.0));
+                images.push(DVec2::new(cos, sin).rotate(a).normalize() * pitch_m);
+            }
+        }
+        images.into_iter().for_each(|image| self.cut(Beyond::Image(image)));
+    }
+
+    /// How far it reaches in the direction of the unit vector `direction`.
+    fn reach(&self, direction: DVec2) -> f64 {
+        let sides = self.0.iter().filter_map(|side| side.beyond.point());
+        let across = sides.filter(|point| point.dot(direction) > 0.0);
+        across.map(|point| point.length_squared() / 2.0 / point.dot(direction)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn area(&self) -> f64 {
+        (0..self.0.len()).map(|side| self.0[side].from.perp_dot(self.end(side)) / 2.0).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The areas of the cells of `points`, each in units of `pitch`².
+    fn areas(points: &[DVec2], pitch: f64) -> Vec<f64> {
+        let area = |&own: &DVec2| {
+            let mut around: Vec<DVec2> = points.iter().filter(|&&p| p != own).map(|&p| p - own).collect();
+            around.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+            Cell::new(&around, 40.0 * pitch).area() / (pitch * pitch)
+        };
+        points.iter().map(area).collect()
+    }
+
+    fn grid(rows: u32, columns: u32, across: DVec2, up: DVec2) -> Vec<DVec2> {
+        (0..rows).flat_map(|y| (0..columns).map(move |x| across * f64::from(x) + up * f64::from(y))).collect()
+    }
+
+    /// That each of `areas` is `wanted`, but for the rounding of some ten operations on numbers that are 40 times as large.
+    fn all_are(areas: &[f64], wanted: f64) {
+        for area in areas {
+            assert!((area / wanted - 1.0).abs() < 1e-12, "{area} instead of {wanted}");
+        }
+    }
+
+    #[test]
+    fn every_cell_of_a_grid_is_that_of_the_grid_borders_included() {
+        let h = 3.0_f64.sqrt() / 2.0;
+        all_are(&areas(&grid(5, 6, DVec2::X, DVec2::Y), 1.0), 1.0);
+        all_are(&areas(&grid(2, 2, DVec2::X, DVec2::Y), 1.0), 1.0);
+        // Turned, and three times as long as wide.
+        let turned = DVec2::new(0.8, 0.6);
+        all_are(&areas(&grid(4, 5, turned, turned.perp() * 3.0), 1.0), 3.0);
+        // A rhombus has corners of 60° and of 120°; rows that are shifted back have ends that stand out and stand back.
+        all_are(&areas(&grid(5, 5, DVec2::X, DVec2::new(0.5, h)), 1.0), h);
+        let shifted: Vec<DVec2> = (0..6)
+            .flat_map(|y| (0..5).map(move |x| DVec2::new(f64::from(x) + 0.5 * f64::from(y % 2), h * f64::from(y))))
+            .collect();
+        all_are(&areas(&shifted, 1.0), h);
+        // A row, and two.
+        all_are(&areas(&grid(1, 7, turned, DVec2::Y), 1.0), 1.0);
+        all_are(&areas(&grid(1, 2, turned, DVec2::Y), 1.0), 1.0);
+    }
+
+    #[test]
+    fn what_lies_beyond_a_gap_takes_and_gives_nothing() {
+        // Two pads, three pitches apart, and a hole of one taxel in the first.
+        let mut points = grid(5, 5, DVec2::X, DVec2::Y);
+        points.extend(grid(4, 4, DVec2::X, DVec2::Y).into_iter().map(|p| p + DVec2::X * 7.0));
+        all_are(&areas(&points, 1.0), 1.0);
+        points.remove(12);
+        all_are(&areas(&points, 1.0), 1.0);
+    }
+
+    #[test]
+    fn cells_within_an_irregular_layout_tile_it() {
+        // A grid that is shaken by up to a fifth of its pitch each way.
+        let mut random = crate::author::random::Random::new(3);
+        let mut shaken = || (random.unit() - 0.5) * 0.4;
+        let points: Vec<DVec2> =
+            grid(20, 20, DVec2::X, DVec2::Y).into_iter().map(|p| p + DVec2::new(shaken(), shaken())).collect();
+        let cells = areas(&points, 1.0);
+        // What each point of a fine raster is nearest to, for points away from the border.
+        let inner: Vec<usize> =
+            (0..points.len()).filter(|&i| (points[i] - DVec2::splat(9.5)).abs().max_element() < 7.0).collect();
+        for &i in &inner {
+            let mut near: Vec<usize> = (0..points.len()).collect();
+            near.sort_by(|&a, &b| points[a].distance(points[i]).total_cmp(&points[b].distance(points[i])));
+            near.truncate(30);
+            let fine = 200;
+            let raster = grid(fine, fine, DVec2::X * 0.015, DVec2::Y * 0.015);
+            let own = raster.iter().map(|&p| points[i] + p - DVec2::splat(1.4925)).filter(|p| {
+                near.iter().all(|&other| p.distance_squared(points[i]) <= p.distance_squared(points[other]))
+            });
+            let counted = own.count() as f64 * 0.015 * 0.015;
+            // The raster's own error: its squares along a border about 4 long, half of them wrong by half at most.
+            assert!((counted - cells[i]).abs() < 0.02, "{i}: {counted} {}", cells[i]);
+        }
+    }
+}
