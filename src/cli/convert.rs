@@ -58,15 +58,17 @@ enum Target {
 }
 
 pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
-    let from: SourceSpec = arguments.from.parse()?;
-    let to: SourceSpec = arguments.to.parse()?;
-    let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
-        return Err(Error::usage("a recording becomes csv:FILE or mcap:FILE").at(&arguments.to));
-    };
-    if !matches!(from, SourceSpec::Csv(_) | SourceSpec::Mcap(_) | SourceSpec::Sim(_)) {
+    if arguments.from == "-" || arguments.from.starts_with("serial:") {
         return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
             .at(&arguments.from));
     }
+    let from = SourceSpec::one_of(&arguments.from, &["csv", "mcap", "sim"]);
+    let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
+    let to = SourceSpec::one_of(&arguments.to, &["csv", "mcap"]);
+    let to = to.map_err(|e| e.at(format!("output `{}`", arguments.to)))?;
+    let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
+        unreachable!("it is of one of these kinds");
+    };
     if let SourceSpec::Csv(path) | SourceSpec::Mcap(path) = &from
         && std::fs::canonicalize(path).ok().is_some_and(|path| std::fs::canonicalize(to_path).ok() == Some(path))
     {

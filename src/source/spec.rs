@@ -6,8 +6,15 @@ use std::str::FromStr;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source};
 use crate::error::{Error, Result, nearest};
 
-const FORMS: &str =
-    "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, or - for NDJSON and csv:- for CSV on standard input";
+/// How each kind of source is written.
+const FORMS: [(&str, &str); 6] = [
+    ("csv", "csv:FILE"),
+    ("serial", "serial:PORT[@BAUD]"),
+    ("mcap", "mcap:FILE"),
+    ("sim", "sim:FILE.toml"),
+    ("-", "- for NDJSON on standard input"),
+    ("csv:-", "csv:- for CSV on standard input"),
+];
 
 /// A source as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,40 +43,7 @@ impl FromStr for SourceSpec {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        if text == "-" {
-            return Ok(Self::Stdin);
-        }
-        let bad = |what: String| Err(Error::usage(what).at(format!("source `{text}`")));
-        if is_port(text) {
-            return bad(format!("a serial port is written serial:{text}"));
-        }
-        let (kind, rest) = text.split_once(':').unwrap_or(("", text));
-        match kind {
-            "csv" | "serial" | "mcap" | "sim" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
-            "csv" if rest == "-" => Ok(Self::CsvStdin),
-            "csv" => Ok(Self::Csv(rest.into())),
-            "mcap" => Ok(Self::Mcap(rest.into())),
-            "sim" => Ok(Self::Sim(rest.into())),
-            "serial" => match rest.rsplit_once('@') {
-                None => Ok(Self::Serial { port: rest.to_owned(), baud: None }),
-                Some((port, baud)) => match baud.parse() {
-                    Ok(baud) if baud > 0 && !port.is_empty() => {
-                        Ok(Self::Serial { port: port.to_owned(), baud: Some(baud) })
-                    }
-                    _ => bad(format!("`{baud}` is no baud rate; write serial:PORT@115200")),
-                },
-            },
-            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) => {
-                Ok(Self::Csv(text.into()))
-            }
-            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) => {
-                Ok(Self::Mcap(text.into()))
-            }
-            kind => match nearest(kind, ["csv", "serial", "mcap", "sim"]) {
-                Some(near) => bad(format!("there is no source `{kind}:`; did you mean `{near}:`?")),
-                None => bad(format!("a source is one of {FORMS}")),
-            },
-        }
+        Self::one_of(text, &FORMS.map(|(kind, _)| kind)).map_err(|e| e.at(format!("source `{text}`")))
     }
 }
 
@@ -81,6 +55,60 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
+    /// The source that `text` names, which is of one of `kinds`: `csv`, `serial`, `mcap`, `sim`, `-`
+    /// and `csv:-`.
+    ///
+    /// # Errors
+    /// A usage error that lists how those kinds are written, and no others.
+    pub fn one_of(text: &str, kinds: &[&str]) -> Result<Self> {
+        let forms: Vec<&str> = FORMS.iter().filter(|(kind, _)| kinds.contains(kind)).map(|(_, form)| *form).collect();
+        let forms = match &forms[..] {
+            [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+            forms => forms.concat(),
+        };
+        let bad = |what: String| Err(Error::usage(what));
+        let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
+        if kinds.contains(&"serial") && is_port(text) {
+            return bad(format!("a serial port is written serial:{text}"));
+        }
+        let (kind, rest) = match text.split_once(':') {
+            Some(("csv", "-")) => ("csv:-", text),
+            Some((kind, rest)) if kind != "-" && FORMS.iter().any(|(known, _)| *known == kind) => (kind, rest),
+            _ if text == "-" => ("-", text),
+            _ if ending("csv") => ("csv", text),
+            _ if ending("mcap") => ("mcap", text),
+            Some((kind, _)) => {
+                return match nearest(kind, kinds.iter().copied().filter(|kind| !kind.ends_with('-'))) {
+                    Some(near) => bad(format!("there is no source `{kind}:`; did you mean `{near}:`?")),
+                    None => bad(format!("this should be {forms}")),
+                };
+            }
+            None => return bad(format!("this should be {forms}")),
+        };
+        if !kinds.contains(&kind) {
+            return bad(format!("this should be {forms}"));
+        }
+        if rest.is_empty() {
+            return bad(format!("nothing follows `{kind}:`; this should be {forms}"));
+        }
+        Ok(match kind {
+            "csv" => Self::Csv(rest.into()),
+            "mcap" => Self::Mcap(rest.into()),
+            "sim" => Self::Sim(rest.into()),
+            "-" => Self::Stdin,
+            "csv:-" => Self::CsvStdin,
+            _ => match rest.rsplit_once('@') {
+                None => Self::Serial { port: rest.to_owned(), baud: None },
+                Some((port, baud)) => match baud.parse() {
+                    Ok(baud) if baud > 0 && !port.is_empty() => {
+                        Self::Serial { port: port.to_owned(), baud: Some(baud) }
+                    }
+                    _ => return bad(format!("`{baud}` is no baud rate; write serial:PORT@115200")),
+                },
+            },
+        })
+    }
+
     /// Whether it is read from standard input.
     #[must_use]
     pub fn is_stdin(&self) -> bool {
@@ -146,7 +174,15 @@ mod tests {
         };
         assert!(why("csv:").contains("nothing follows"));
         assert!(why("seril:a").contains("did you mean `serial:`"));
-        assert!(why("a.txt").contains("csv:FILE"));
+        assert!(why("a.txt").contains(
+            "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, - for NDJSON on standard input or csv:- for CSV"
+        ));
+        let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();
+        for text in ["a.ndjson", "-", "csv:-", "sim:a.toml", "serial:a", "csv:", "seril:a"] {
+            let why = of_recordings(text);
+            assert!(why.ends_with("this should be csv:FILE or mcap:FILE"), "{text}: {why}");
+        }
+        assert!(of_recordings("mcp:a").contains("did you mean `mcap:`"));
         assert!(why("").contains("csv:FILE"));
         assert!(why("serial:a@fast").contains("baud"));
         for port in ["/dev/ttyUSB0", "/dev/ttyACM0@9600", "/dev/serial/by-path/pci-0:1.0-port0", "/dev/cu.usb1", "COM3"]
