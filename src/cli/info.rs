@@ -49,7 +49,8 @@ struct Known {
 
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
-    let known = match arguments.recording.parse()? {
+    let recording = SourceSpec::one_of(&arguments.recording, &["csv", "mcap"]);
+    let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
             if arguments.rate.is_some() {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
@@ -86,11 +87,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 losses,
             }
         }
-        _ => {
-            return Err(
-                Error::usage("`somatic info` is for recordings, mcap:FILE and csv:FILE").at(&arguments.recording)
-            );
-        }
+        _ => unreachable!("it is of one of these kinds"),
     };
     drop(bar);
     print(&if arguments.json { format!("{}\n", as_json(&known)) } else { text(&arguments.recording, &known) })?;
@@ -128,13 +125,14 @@ fn as_json(known: &Known) -> Value {
 }
 
 fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, .. } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", style(name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
     line("kind", format!("{kind}, {}{}", size_words(*bytes), if *has_end { "" } else { ", never ended" }));
     let rate = rhythm.rate_hz().map_or(String::new(), |rate| format!(" at {} Hz", number(rate)));
-    line("frames", format!("{}{rate}", rhythm.frames));
+    let whole = if losses.is_empty() { "" } else { " whole" };
+    line("frames", format!("{}{whole}{rate}", rhythm.frames));
     if let (Some(duration), Some([start, _])) = (duration_s(rhythm), rhythm.span_s) {
         line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
     }

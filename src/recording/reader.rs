@@ -41,7 +41,8 @@ pub struct Reader {
     /// What is given for values that are stale, and whether any was so far.
     stale: RawValue,
     seen_stale: bool,
-    /// The time of the last frame.
+    /// How many frames were whole, and the time of the last.
+    whole: u64,
     last_s: Option<f64>,
     damage: Damage,
     losses: Vec<String>,
@@ -52,9 +53,9 @@ pub struct Reader {
 struct Damage {
     places: u64,
     bytes: u64,
-    /// After which time it was first found.
+    /// The times of the frames before and after the first of it.
     after_s: Option<f64>,
-    first: bool,
+    before_s: Option<f64>,
 }
 
 impl Reader {
@@ -92,6 +93,7 @@ impl Reader {
             ended: false,
             stale: RawValue::MISSING,
             seen_stale: false,
+            whole: 0,
             last_s: None,
             damage: Damage::default(),
             losses: Vec::new(),
@@ -226,10 +228,19 @@ impl Reader {
             let data = &self.chunk[message.data.clone()];
             if frames::decode(data, self.taxels.len(), self.stale, frame).is_some() {
                 self.seen_stale |= frames::has_stale(data);
-                self.last_s = Some(frame.t_s);
+                self.saw(frame.t_s);
                 return Ok(true);
             }
             self.damaged(message.data.len() as u64);
+        }
+    }
+
+    /// Notes that there was a whole frame at `t_s`.
+    pub(super) fn saw(&mut self, t_s: f64) {
+        self.whole += 1;
+        self.last_s = Some(t_s);
+        if self.damage.places > 0 {
+            self.damage.before_s.get_or_insert(t_s);
         }
     }
 
@@ -386,11 +397,11 @@ impl Reader {
     }
 
     fn damaged(&mut self, bytes: u64) {
-        self.damage.places += 1;
-        self.damage.bytes += bytes;
-        if !std::mem::replace(&mut self.damage.first, true) {
+        if self.damage.places == 0 {
             self.damage.after_s = self.last_s;
         }
+        self.damage.places += 1;
+        self.damage.bytes += bytes;
     }
 
     fn tell_cut(&mut self, bytes: u64) {
@@ -407,18 +418,21 @@ impl Reader {
         if std::mem::replace(&mut self.ended, true) || self.damage.places == 0 {
             return;
         }
-        let Damage { places, bytes, after_s, .. } = self.damage;
-        let places = if places == 1 { "one place".to_owned() } else { format!("{places} places") };
-        self.losses.push(format!(
-            "{}: damaged in {places}, the first {}: {bytes} bytes not read",
-            self.name,
-            after(after_s)
-        ));
+        let Damage { places, bytes, after_s, before_s } = self.damage;
+        let places = if places == 1 { "one place".to_owned() } else { format!("{places} places, the first") };
+        let when = match (after_s, before_s) {
+            (Some(after), Some(before)) => format!("between t = {after} s and t = {before} s"),
+            (Some(after), None) => format!("after t = {after} s"),
+            (None, Some(before)) => format!("before t = {before} s"),
+            (None, None) => "before any frame".to_owned(),
+        };
+        let frames = match self.whole {
+            0 => "no frame is whole".to_owned(),
+            1 => "1 frame is whole".to_owned(),
+            whole => format!("{whole} frames are whole"),
+        };
+        self.losses.push(format!("{}: damaged in {places} {when}: {bytes} bytes not read, {frames}", self.name));
     }
-}
-
-fn after(time_s: Option<f64>) -> String {
-    time_s.map_or_else(|| "before the first frame".to_owned(), |t_s| format!("after t = {t_s} s"))
 }
 
 /// Why a file is not read.

@@ -126,8 +126,10 @@ impl Survey {
             counts[index].1 += 1;
             counts[index].2 += data.len() as u64;
             if reader.channels.get(&message.channel).is_some_and(|channel| channel.topic == FRAMES) {
-                survey.rhythm.see(frames::time_of(data).unwrap_or(message.log_time as f64 / 1e9));
+                let t_s = frames::time_of(data).unwrap_or(message.log_time as f64 / 1e9);
+                survey.rhythm.see(t_s);
                 survey.posed += u64::from(frames::is_posed(data));
+                reader.saw(t_s);
                 if survey.rhythm.frames.is_multiple_of(64) {
                     progress(reader.progress());
                 }

@@ -158,7 +158,14 @@ fn conversion_comes_back_with_every_bit() {
     done(&["convert", text_of(&csv), text_of(&mcap), "--force"]);
     assert!(fails(2, &["convert", text_of(&csv), text_of(&csv), "--force"]).contains("name another file"));
     assert!(fails(2, &["convert", "-", text_of(&csv)]).contains("only a recording"));
-    assert!(fails(2, &["info", "-"]).contains("recordings"));
+    for text in ["-", "x.ndjson", "sim:a.toml", "serial:/dev/ttyUSB0"] {
+        let why = fails(2, &["info", text]);
+        assert!(why.ends_with("this should be csv:FILE or mcap:FILE\n") && why.contains(text), "{why}");
+    }
+    let why = fails(2, &["convert", text_of(&csv), "b.parquet"]);
+    assert!(why.ends_with("output `b.parquet`: this should be csv:FILE or mcap:FILE\n"), "{why}");
+    let why = fails(2, &["convert", "x.ndjson", text_of(&csv)]);
+    assert!(why.ends_with("recording `x.ndjson`: this should be csv:FILE, mcap:FILE or sim:FILE.toml\n"), "{why}");
     assert_eq!(files_in(folder.path()), ["a.mcap", "b.csv", "c.mcap"]);
 }
 
@@ -266,6 +273,8 @@ fn a_process_that_is_killed_loses_less_than_a_second() {
         let (code, info) = json(&path);
         assert_eq!((code, &info["ended"]), (Some(3), &false.into()));
         let kept_s = info["start"].as_f64().unwrap() + info["duration"].as_f64().unwrap();
+        let [lost] = &info["losses"].as_array().unwrap()[..] else { panic!("{info}") };
+        assert!(lost.as_str().unwrap().contains(&format!("what came after t = {kept_s} s is missing")), "{info}");
         assert!(last_s - kept_s < 1.0, "delivered up to {last_s} s, kept up to {kept_s} s");
         // What is there replays, with its body, and what it gives is what was given.
         let replay = output(&["run", "--source", &source(&path), "--backend", "cpu"]);
@@ -395,6 +404,41 @@ fn damage_to_the_first_chunk_costs_that_chunk_alone() {
         let (count, losses) = count_of(&path);
         assert!(all / 3 < count && count < all, "{name}: {count} of {all}");
         assert!(losses.iter().any(|loss| loss.contains("damaged in one place")), "{name}: {losses:?}");
+    }
+}
+
+#[test]
+fn damage_is_placed_in_time_whoever_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let all = recorded(&path, 30_000, true);
+    let whole = std::fs::read(&path).unwrap();
+    let chunks = records_of(&whole, 0x06);
+    assert!(chunks.len() > 2);
+    // The frames of a chunk begin where those before it end, at its start time in ns.
+    let start_s = |chunk: usize| {
+        let bytes = whole[chunks[chunk].start..chunks[chunk].start + 8].try_into().unwrap();
+        u64::from_le_bytes(bytes) as f64 / 1e9
+    };
+    let first_of = |chunk: usize| all.iter().position(|frame| frame.t_s >= start_s(chunk) - 1e-9).unwrap();
+    for chunk in [0, 1, chunks.len() - 1] {
+        let mut bytes = whole.clone();
+        bytes[chunks[chunk].start + 1000] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        let (first, end) = (first_of(chunk), if chunk + 1 < chunks.len() { first_of(chunk + 1) } else { all.len() });
+        let when = match (first, end) {
+            (0, end) => format!("before t = {} s", all[end].t_s),
+            (first, end) if end == all.len() => format!("after t = {} s", all[first - 1].t_s),
+            (first, end) => format!("between t = {} s and t = {} s", all[first - 1].t_s, all[end].t_s),
+        };
+        let left = all.len() - (end - first);
+        let said = fails(3, &["info", text_of(&path)]);
+        assert!(said.contains(&format!("damaged in one place {when}: ")), "{when}: {said}");
+        assert!(said.contains(&format!("{left} frames are whole")), "{left}: {said}");
+        let (count, losses) = count_of(&path);
+        assert!(count == left && said.contains(&losses[0]), "{losses:?}");
+        let (_, told) = json(&path);
+        assert_eq!(told["frames"].as_u64().unwrap() as usize, left);
     }
 }
 
