@@ -13,8 +13,8 @@ use glam::DVec3;
 pub use view::View;
 
 use self::colour::{PALETTE, PAPER, linear};
-use self::shape::Dots;
-use self::view::{Arrangement, CAPTION};
+use self::shape::{Dots, RIM};
+use self::view::Arrangement;
 use self::words::Words;
 use crate::backend::gpu::raster::{self, Drawing};
 use crate::body::Body;
@@ -22,10 +22,10 @@ use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::ink;
 
-/// Pixels above the views, for the title.
-const TITLE: u32 = 44;
 /// The narrowest picture, pixels: a title must fit.
 const NARROWEST: u32 = 240;
+/// A chart leaves so much room around its discs, in their radii: about the distance to a neighbour.
+const AROUND: f64 = 2.5;
 
 /// How a picture is to be.
 #[derive(Clone, Debug, Default)]
@@ -58,23 +58,24 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     let shown = Shown::of(fields, &options.fields, &dots);
     let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
 
-    let mut words = Words::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")));
+    let mut words = Words::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")), width);
     let below = words.key(shown.key(fields), [width, height]);
-    let taken = TITLE + below;
+    let taken = words.above() + below;
     if height <= taken + 40 {
         return Err(Error::usage(format!("no room is left for the body; make it higher than {} pixels", taken + 40)));
     }
     let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
-    // Discs reach beyond their middles.
-    let reach = dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - middle - r, p - middle + r]);
+    // Discs reach beyond their middles, and their rims beyond them.
+    let reach = dots.places.iter().zip(&dots.radii).map(|(&p, &r)| (p - middle, RIM * r));
+    let reach = reach.flat_map(|(p, r)| [p - r, p + r]);
     let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(reach).collect();
-    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], TITLE);
+    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], words.above(), words.above_view());
     let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
 
     let (corners, faces) = shape::surface(&triangles, middle);
     let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
     let drawing = Drawing {
-        size: [width, TITLE + arrangement.height + below],
+        size: [width, words.above() + arrangement.height + below],
         background: linear(PAPER),
         corners,
         triangles: faces,
@@ -85,7 +86,7 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     let mut pixels = raster::draw(&drawing)?;
     for (view, placed) in views.iter().zip(&arrangement.views) {
         let [left, top, width, _] = placed.part;
-        words.caption(view.name(), [left + width / 2, top.saturating_sub(CAPTION as u32 / 2)]);
+        words.caption(view.name(), [left + width / 2, top.saturating_sub(words.above_view() / 2)]);
     }
     words.bar(arrangement.scale);
     words.draw(&mut pixels, drawing.size)?;
@@ -108,8 +109,10 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     let mut places = vec![DVec3::NAN; body.taxels.len()];
     field.members.iter().for_each(|member| places[member.taxel] = member.place.with_z(0.0));
     let held: Vec<usize> = field.members.iter().map(|member| member.taxel).collect();
-    let dots =
-        Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], field.radius_m());
+    // A single taxel is drawn by the area that it stands for.
+    let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
+    let extent = field.radius_m().max(10.0 * side);
+    let dots = Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], extent);
     // The fields as the chart numbers its members.
     let within: Vec<Field> = fields
         .iter()
@@ -127,23 +130,25 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
         .collect();
     let shown = Shown::of(&within, &options.fields, &dots);
     let kind = format!("{:?}", chart.kind).to_lowercase();
-    let mut words = Words::new(&format!(
+    let title = format!(
         "{} · {}, {kind} chart, distortion {:.1} %",
         field.name,
         counted(field.members.len(), "taxel"),
         100.0 * chart.distortion
-    ));
+    );
+    let mut words = Words::new(&title, width);
     let below = words.key(shown.key(&within), [width, height]);
-    let points: Vec<DVec3> =
-        dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - r, p + r]).chain([DVec3::ZERO]).collect();
-    let taken = TITLE + below;
+    let around = dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - AROUND * r, p + AROUND * r]);
+    let points: Vec<DVec3> = around.chain([DVec3::ZERO]).collect();
+    let taken = words.above() + below;
     if height <= taken + 40 {
         return Err(Error::usage(format!("no room is left for the chart; make it higher than {} pixels", taken + 40)));
     }
-    let arrangement = Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], TITLE);
+    let arrangement =
+        Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], words.above(), words.above_view());
     let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
     let drawing = Drawing {
-        size: [width, TITLE + arrangement.height + below],
+        size: [width, words.above() + arrangement.height + below],
         background: linear(PAPER),
         slices: dots.slices(&shown.coloured(&within), DVec3::ZERO, usual > 2.0),
         fan: fan(usual),
@@ -232,9 +237,9 @@ impl Shown {
     }
 }
 
-/// Triangles that make a disc of `radius` pixels look round.
+/// Triangles that make a disc of `radius` pixels look round: its outline is a quarter of a pixel off at most.
 fn fan(radius: f64) -> u32 {
-    (2.5 * radius.max(0.0).sqrt() + 6.0).min(48.0) as u32
+    (4.5 * radius.max(0.0).sqrt() + 6.0).min(256.0) as u32
 }
 
 /// The file's name without folder and ending.

@@ -19,7 +19,7 @@ const RADIUS: f64 = 0.40;
 /// No disc is larger than so many times the usual one.
 const LARGEST: f64 = 2.0;
 /// The dark disc under each, as a part of its radius.
-const RIM: f64 = 1.16;
+pub(super) const RIM: f64 = 1.16;
 /// How far discs are moved towards the eye, in radii, so that a curved surface does not swallow them.
 const LIFT: f64 = 0.6;
 /// Fields whose taxels are nearer than so many times the usual distance lie beside each other.

@@ -9,8 +9,6 @@ use crate::error::{Error, Result, nearest};
 
 /// Pixels around each view.
 const MARGIN: f64 = 14.0;
-/// Pixels above a view for its name.
-pub(super) const CAPTION: f64 = 26.0;
 /// A side that sees less than this part of what the best one sees shows nothing worth a picture.
 const LEAST_SEEN: f64 = 0.02;
 
@@ -122,8 +120,15 @@ pub(super) struct Arrangement {
 
 impl Arrangement {
     /// Arranges `views` of `points` (in m, about their middle) in rows within `width` × `height` pixels, as large as they
-    /// can be; the first row starts at `top`.
-    pub(super) fn of(views: &[[DVec3; 3]], points: &[DVec3], [width, height]: [u32; 2], top: u32) -> Self {
+    /// can be; the first row starts at `top`, and each view has `caption` pixels above it.
+    pub(super) fn of(
+        views: &[[DVec3; 3]],
+        points: &[DVec3],
+        [width, height]: [u32; 2],
+        top: u32,
+        caption: u32,
+    ) -> Self {
+        let caption = f64::from(caption);
         let spans: Vec<[[f64; 2]; 2]> =
             views.iter().map(|axes| [span(points, axes[0]), span(points, axes[1])]).collect();
         let sizes: Vec<[f64; 2]> = spans.iter().map(|span| span.map(|[low, high]| high - low)).collect();
@@ -136,7 +141,7 @@ impl Arrangement {
             let heights: Vec<f64> = sizes.chunks(columns).map(|row| largest(row, 1)).collect();
             let room = |pixels: u32, count: usize, each: f64| (f64::from(pixels) - count as f64 * each).max(1.0);
             let across = room(width, columns, 2.0 * MARGIN) / widths.iter().sum::<f64>();
-            let down = room(height, heights.len(), 2.0 * MARGIN + CAPTION) / heights.iter().sum::<f64>();
+            let down = room(height, heights.len(), 2.0 * MARGIN + caption) / heights.iter().sum::<f64>();
             (across.min(down), widths, heights)
         });
         let best = arranged.max_by(|a, b| a.0.total_cmp(&b.0));
@@ -154,12 +159,12 @@ impl Arrangement {
                 let size = [wide * scale + 2.0 * MARGIN, tall * scale + 2.0 * MARGIN];
                 placed.push(Placed {
                     axes: *axes,
-                    part: [x, y + CAPTION, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),
+                    part: [x, y + caption, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),
                     middle: [(across[0] + across[1]) / 2.0, (up[0] + up[1]) / 2.0],
                 });
                 x += size[0];
             }
-            y += tall * scale + 2.0 * MARGIN + CAPTION;
+            y += tall * scale + 2.0 * MARGIN + caption;
         }
         // Rounding may take a part over the edge by one.
         for Placed { part, .. } in &mut placed {
@@ -238,7 +243,7 @@ mod tests {
             (0..64).map(|i| DVec3::new(f64::from(i % 4), f64::from(i / 4 % 4) * 3.0, 7.0)).collect();
         for count in 1..=7 {
             let views: Vec<_> = View::ALL[..count].iter().map(|view| view.axes()).collect();
-            let arrangement = Arrangement::of(&views, &points, [900, 700], 40);
+            let arrangement = Arrangement::of(&views, &points, [900, 700], 40, 26);
             assert!(arrangement.height <= 701);
             for (eye, placed) in arrangement.eyes(20.0).iter().zip(&arrangement.views) {
                 let [left, top, width, height] = placed.part;

@@ -3,14 +3,24 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::colour::PAPER;
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
 
 const INK: RGBColor = RGBColor(0x2A, 0x2A, 0x2C);
 const FAINT: RGBColor = RGBColor(0x6A, 0x6A, 0x6E);
-/// Height of a row of the legend, and of the words in it, pixels.
+/// Up to this width of the picture words are as large as they must be to be read, pixels; beyond, they grow with it. All
+/// lengths below are those up to this width.
+const READABLE: f64 = 1000.0;
+/// Height of a row of the legend, and of the words in it and in the title, pixels.
 const ROW: u32 = 26;
 const SIZE: u32 = 16;
+const TITLE_SIZE: u32 = 22;
+/// The smallest that a title is made to fit, pixels.
+const LEAST_SIZE: u32 = 10;
+/// Pixels above the views for the title, and above each for its name.
+const TITLE: u32 = 44;
+const CAPTION: u32 = 26;
 /// Left and right of the words.
 const SIDE: u32 = 20;
 /// Pixels of a swatch with the gap behind it, and of the gap between two entries.
@@ -22,6 +32,8 @@ const BAR: u32 = 220;
 /// Everything that is written into a picture.
 pub(super) struct Words {
     title: String,
+    /// Pixels across the picture.
+    width: u32,
     key: Vec<(Option<[u8; 3]>, String)>,
     captions: Vec<(String, [u32; 2])>,
     /// Pixels a metre.
@@ -31,8 +43,24 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub(super) fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), key: Vec::new(), captions: Vec::new(), scale: None, axes: None }
+    /// For a picture of `width` pixels.
+    pub(super) fn new(title: &str, width: u32) -> Self {
+        Self { title: title.to_owned(), width, key: Vec::new(), captions: Vec::new(), scale: None, axes: None }
+    }
+
+    /// `pixels` of a picture that is just readable, in this one.
+    fn grown(&self, pixels: u32) -> u32 {
+        (f64::from(pixels) * (f64::from(self.width) / READABLE).max(1.0)).round() as u32
+    }
+
+    /// Pixels above the views, for the title.
+    pub(super) fn above(&self) -> u32 {
+        self.grown(TITLE)
+    }
+
+    /// Pixels above each view, for its name.
+    pub(super) fn above_view(&self) -> u32 {
+        self.grown(CAPTION)
     }
 
     /// Sets what the legend has, colours and names, and gives the pixels that it takes. One that would take over a third
@@ -40,14 +68,32 @@ impl Words {
     pub(super) fn key(&mut self, key: Vec<(Option<[u8; 3]>, String)>, size: [u32; 2]) -> u32 {
         let named = key.len();
         self.key = key;
-        if 3 * self.legend_height(size[0]) > size[1] {
+        if 3 * self.legend_height() > size[1] {
             self.key = vec![(None, format!("{named} fields"))];
         }
-        self.legend_height(size[0])
+        self.legend_height()
     }
 
-    fn legend_height(&self, width: u32) -> u32 {
-        ROW * self.rows(width).last().map_or(1, |(_, row)| row + 1) + 12
+    fn legend_height(&self) -> u32 {
+        self.grown(ROW) * (self.bar_row() + 1) + self.grown(12)
+    }
+
+    /// The row of the bar: the last, or one of its own where a name is so long that it takes the bar's place.
+    fn bar_row(&self) -> u32 {
+        let rows = self.rows();
+        let (Some(&(x, row)), Some((_, name))) = (rows.last(), self.key.last()) else { return 0 };
+        row + u32::from(x + self.wide(name) > self.end())
+    }
+
+    /// Where the bar's place begins.
+    fn end(&self) -> u32 {
+        self.width.saturating_sub(self.grown(SIDE + BAR)).max(self.grown(SIDE) + 1)
+    }
+
+    /// Pixels of an entry of the legend.
+    fn wide(&self, name: &str) -> u32 {
+        // What cannot be measured cannot be written either, and that is told there.
+        self.grown(SWATCH) + ink::width(name, self.grown(SIZE)).unwrap_or_default()
     }
 
     /// `text` with its middle at `at`.
@@ -64,20 +110,27 @@ impl Words {
     }
 
     /// Left and row of each entry of the legend; every row keeps the bar's place free.
-    fn rows(&self, width: u32) -> Vec<(u32, u32)> {
-        let end = width.saturating_sub(SIDE + BAR).max(SIDE + 1);
-        let (mut x, mut row) = (SIDE, 0);
+    fn rows(&self) -> Vec<(u32, u32)> {
+        let (side, end) = (self.grown(SIDE), self.end());
+        let (mut x, mut row) = (side, 0);
         let mut places = Vec::with_capacity(self.key.len());
         for (_, name) in &self.key {
-            // What cannot be measured cannot be written either, and that is told there.
-            let wide = SWATCH + ink::width(name, SIZE).unwrap_or_default();
-            if x > SIDE && x + wide > end {
-                (x, row) = (SIDE, row + 1);
+            let wide = self.wide(name);
+            if x > side && x + wide > end {
+                (x, row) = (side, row + 1);
             }
             places.push((x, row));
-            x += wide + GAP;
+            x += wide + self.grown(GAP);
         }
         places
+    }
+
+    /// How large the title is written so that it fits, pixels.
+    fn title_size(&self) -> u32 {
+        let room = self.width.saturating_sub(2 * self.grown(SIDE));
+        let sizes = (LEAST_SIZE..=self.grown(TITLE_SIZE)).rev();
+        let mut fitting = sizes.filter(|&size| ink::width(&self.title, size).is_ok_and(|wide| wide <= room));
+        fitting.next().unwrap_or(LEAST_SIZE)
     }
 
     /// Writes everything into `pixels`.
@@ -89,42 +142,56 @@ impl Words {
             (FAMILY, pixels).into_font().color(&colour).pos(Pos::new(side, VPos::Center))
         };
         let place = |x: u32, y: u32| (x as i32, y as i32);
-        area.draw_text(&self.title, &text(22, INK, HPos::Left), place(SIDE, 24)).map_err(cannot)?;
+        let grown = |pixels: u32| self.grown(pixels);
+        let (side, size) = (grown(SIDE), grown(SIZE));
+        let title = text(self.title_size(), INK, HPos::Left);
+        area.draw_text(&self.title, &title, place(side, grown(24))).map_err(cannot)?;
         for (caption, [x, y]) in &self.captions {
-            area.draw_text(caption, &text(SIZE, FAINT, HPos::Center), place(*x, *y)).map_err(cannot)?;
+            area.draw_text(caption, &text(size, FAINT, HPos::Center), place(*x, *y)).map_err(cannot)?;
         }
-        let top = height.saturating_sub(self.legend_height(width)) + ROW / 2;
-        let style = text(SIZE, INK, HPos::Left);
-        for ((colour, name), (x, row)) in self.key.iter().zip(self.rows(width)) {
-            let middle = top + ROW * row;
+        let top = height.saturating_sub(self.legend_height()) + grown(ROW) / 2;
+        let style = text(size, INK, HPos::Left);
+        for ((colour, name), (x, row)) in self.key.iter().zip(self.rows()) {
+            let middle = top + grown(ROW) * row;
             let mut left = x;
             if let Some([r, g, b]) = *colour {
-                let dot = |radius: i32, colour: RGBColor| Circle::new(place(x + 7, middle), radius, colour.filled());
+                let dot = |radius: u32, colour: RGBColor| {
+                    Circle::new(place(x + grown(7), middle), grown(radius) as i32, colour.filled())
+                };
                 area.draw(&dot(8, INK)).and_then(|()| area.draw(&dot(7, RGBColor(r, g, b)))).map_err(cannot)?;
-                left += SWATCH;
+                left += grown(SWATCH);
             }
             area.draw_text(name, &style, place(left, middle)).map_err(cannot)?;
         }
         if let Some(scale) = self.scale {
-            let (metres, name) = round_length(f64::from(BAR - 100) / scale);
-            let (right, y) = (width - SIDE, height.saturating_sub(ROW / 2 + 12));
+            let (metres, name) = round_length(f64::from(grown(BAR - 100)) / scale);
+            let (right, y) = (width - side, height.saturating_sub(grown(ROW / 2 + 12)));
             let left = right - (metres * scale).round() as u32;
-            let stroke = |from, to| PathElement::new([from, to], INK.stroke_width(2));
+            let end = grown(5);
+            let stroke = |from, to| PathElement::new([from, to], INK.stroke_width(grown(2)));
             for (from, to) in [
                 (place(left, y), place(right, y)),
-                (place(left, y - 5), place(left, y + 5)),
-                (place(right, y - 5), place(right, y + 5)),
+                (place(left, y - end), place(left, y + end)),
+                (place(right, y - end), place(right, y + end)),
             ] {
                 area.draw(&stroke(from, to)).map_err(cannot)?;
             }
-            area.draw_text(&name, &text(SIZE, INK, HPos::Right), place(left - 8, y)).map_err(cannot)?;
+            area.draw_text(&name, &text(size, INK, HPos::Right), place(left - grown(8), y)).map_err(cannot)?;
         }
         if let Some([x, y]) = self.axes {
             let (x, y) = (x.round() as i32, y.round() as i32);
-            for (to, name, at) in [((x + 44, y), "u", (x + 54, y)), ((x, y - 44), "v", (x, y - 54))] {
-                let line = PathElement::new([(x, y), to], INK.stroke_width(3));
-                area.draw(&line).map_err(cannot)?;
-                area.draw_text(name, &text(SIZE, INK, HPos::Center), at).map_err(cannot)?;
+            let [long, beyond, around] = [44, 56, 11].map(|pixels| grown(pixels) as i32);
+            let [r, g, b] = PAPER;
+            let paper = RGBColor(r, g, b);
+            let axes = [((x + long, y), "u", (x + beyond, y)), ((x, y - long), "v", (x, y - beyond))];
+            // On paper of their own, so that they are seen over whatever disc.
+            for (to, _, at) in axes {
+                area.draw(&PathElement::new([(x, y), to], paper.stroke_width(grown(7)))).map_err(cannot)?;
+                area.draw(&Circle::new(at, around, paper.filled())).map_err(cannot)?;
+            }
+            for (to, name, at) in axes {
+                area.draw(&PathElement::new([(x, y), to], INK.stroke_width(grown(3)))).map_err(cannot)?;
+                area.draw_text(name, &text(size, INK, HPos::Center), at).map_err(cannot)?;
             }
         }
         area.present().map_err(cannot)
@@ -139,6 +206,7 @@ fn round_length(most_m: f64) -> (f64, String) {
         m if m >= 1.0 => format!("{m:.0} m"),
         m if m >= 0.01 => format!("{:.0} cm", m * 1e2),
         m if m >= 0.001 => format!("{:.0} mm", m * 1e3),
+        m if m >= 1e-6 => format!("{} mm", (m * 1e6).round() / 1e3),
         m => format!("{:.0e} m", m),
     };
     (metres, name)
@@ -150,20 +218,34 @@ mod tests {
 
     #[test]
     fn a_bar_has_a_round_length() {
-        let names = [0.0234, 0.07, 12.0, 0.0051, 0.19].map(|most| round_length(most).1);
-        assert_eq!(names, ["2 cm", "5 cm", "10 m", "5 mm", "10 cm"]);
+        let names = [0.0234, 0.07, 12.0, 0.0051, 0.19, 0.00023].map(|most| round_length(most).1);
+        assert_eq!(names, ["2 cm", "5 cm", "10 m", "5 mm", "10 cm", "0.2 mm"]);
     }
 
     #[test]
     fn a_legend_breaks_its_rows_before_the_bar() {
-        let mut words = Words::new("x");
+        let mut words = Words::new("x", 800);
         let key = vec![(None, "a field of some name".to_owned()); 9];
         let below = words.key(key.clone(), [800, 800]);
-        let rows = words.rows(800);
+        let rows = words.rows();
         assert!(rows.iter().all(|&(x, _)| x < 800 - BAR));
         assert_eq!((rows.last().unwrap().1, below), (4, 5 * ROW + 12));
         // No room: they are counted.
         assert_eq!(words.key(key, [800, 400]), ROW + 12);
         assert_eq!(words.key[0].1, "9 fields");
+        // A name that takes the bar's place has the bar below it.
+        let mut narrow = Words::new("x", 400);
+        assert_eq!(narrow.key(vec![(None, "a field of a rather long name".to_owned())], [400, 400]), 2 * ROW + 12);
+    }
+
+    #[test]
+    fn words_grow_with_the_picture_and_a_title_fits() {
+        let [small, large] = [500, 3000].map(|width| Words::new("hand/midhand/index · 5 taxels, plane chart", width));
+        assert_eq!((small.grown(SIZE), large.grown(SIZE)), (SIZE, 3 * SIZE));
+        assert_eq!((small.above(), large.above()), (TITLE, 3 * TITLE));
+        assert_eq!(large.title_size(), 3 * TITLE_SIZE);
+        let long = Words::new("hand/midhand/index · 5 taxels, plane chart, distortion 3.2 %", 400);
+        assert!((LEAST_SIZE..TITLE_SIZE).contains(&long.title_size()));
+        assert!(ink::width(&long.title, long.title_size()).unwrap() <= 400 - 2 * SIDE);
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::skips::skip;
-use super::{fails, file, files_in, output, somatic, stderr, text_of};
+use super::{done, fails, file, files_in, output, somatic, stderr, text_of};
 
 /// Renders with `arguments` into a folder of its own. `None`, and a skip, where no adapter answers.
 fn render(arguments: &[&str]) -> Option<Picture> {
@@ -130,12 +130,62 @@ fn without_a_driver_it_says_what_would_help() {
 
 #[test]
 fn force_replaces_a_picture() {
-    let (folder, path) = file("there.png", "not a picture");
-    let output = output(&["render", "hand", "--size", "300", "--view", "top", "-o", text_of(&path), "--force"]);
-    if stderr(&output).contains("no GPU driver answers") {
-        return skip("GPU", "no adapter answers");
+    // Where there is no adapter it cannot be told.
+    if render(&["hand", "--size", "300", "--view", "top"]).is_none() {
+        return;
     }
-    assert!(output.status.success(), "{}", stderr(&output));
+    let (folder, path) = file("there.png", "not a picture");
+    done(&["render", "hand", "--size", "300", "--view", "top", "-o", text_of(&path), "--force"]);
     assert_eq!(Picture::read(&path).width, 300);
     assert_eq!(files_in(folder.path()), ["there.png"]);
+}
+
+#[test]
+fn a_small_field_is_drawn_whole_with_its_words() {
+    // One taxel, two, and those of a finger.
+    let (folder, recipe) = file("recipe.toml", "existing = \"keep\"\n[[fields]]\nname = \"one\"\ntaxels = [3]\n");
+    let one = folder.path().join("one.glb");
+    done(&["author", "hand", "--recipe", text_of(&recipe), "-o", text_of(&one)]);
+    let fields = [
+        (text_of(&one), "one", 1),
+        ("hand", "hand/side", 2),
+        ("hand", "hand/midhand/index", 5),
+        ("hand", "hand/palm", 9),
+    ];
+    for size in ["400", "1000"] {
+        for (body, field, taxels) in fields {
+            let Some(chart) = render(&[body, "--uv", field, "--size", size]) else { return };
+            let paper = chart.at(0, 0);
+            // The border is paper: neither disc nor rim nor word is cut off.
+            let (right, bottom) = (chart.width - 1, chart.height - 1);
+            assert!(
+                (0..chart.height).all(|y| chart.at(0, y) == paper && chart.at(right, y) == paper),
+                "{field} {size}"
+            );
+            assert!((0..chart.width).all(|x| chart.at(x, bottom) == paper), "{field} {size}");
+            // Between the title and the discs there is paper, and so between them and the legend.
+            let inked = |y: u32| (0..chart.width).any(|x| chart.at(x, y) != paper);
+            let bands = (1..chart.height).filter(|&y| inked(y) && !inked(y - 1)).count();
+            assert!(bands >= 3, "{field} {size}: {bands} bands");
+            // A single disc stands in the middle with room around it.
+            if taxels == 1 {
+                let share = chart.of_colour(BLUE) as f64 / f64::from(chart.width * chart.height);
+                assert!((0.02..0.3).contains(&share), "{size}: {share}");
+            }
+        }
+    }
+}
+
+#[test]
+fn words_grow_with_the_picture() {
+    // The title is the first band of ink.
+    let title = |size: &str| -> Option<u32> {
+        let chart = render(&["hand", "--uv", "hand/side", "--size", size])?;
+        let paper = chart.at(0, 0);
+        let inked = |y: &u32| (0..chart.width).any(|x| chart.at(x, *y) != paper);
+        let top = (0..chart.height).find(inked).unwrap();
+        Some((top..chart.height).take_while(inked).count() as u32)
+    };
+    let (Some(small), Some(large)) = (title("1000"), title("3000")) else { return };
+    assert!((3 * small).abs_diff(large) <= 4, "{small} {large} pixels");
 }
