@@ -359,17 +359,17 @@ impl Engine {
             cadence.look(&raw, &frames[range.clone()]);
         }
         let host = Host { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref() };
-        host.run(&mut *self.backend, &frames[range.clone()], &raw, &mut self.percepts, &mut self.side)?;
-        let mut right = None;
-        if let Some(check) = check {
-            let mut bounds = check.reference.bounds(&raw);
-            if let Some(cadence) = &self.cadence {
-                cadence.bounds(&mut bounds, raw.steps, &mut check.last_bounds);
+        let (backend, percepts, side) = (&mut *self.backend, &mut self.percepts, &mut self.side);
+        let right = match check {
+            None => {
+                host.run(backend, &frames[range.clone()], &raw, percepts, side)?;
+                None
             }
-            check.bounds.extend(bounds);
-            host.run(&mut check.reference, &frames[range.clone()], &raw, &mut check.right, &mut check.side)?;
-            right = Some(&mut check.right);
-        }
+            Some(check) => {
+                check.run(&host, backend, &frames[range.clone()], &raw, percepts, side)?;
+                Some(&mut check.right)
+            }
+        };
         if let Some(kept) = &mut self.upkeep {
             let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();
             kept.note(&self.percepts.flags[cells.clone()]);

@@ -1,76 +1,118 @@
-//! Holding a single-precision backend to the reference, cell by cell, by derived bounds.
+//! Holding a single-precision backend to the reference, value by value, by derived bounds.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use super::reference::CellBound;
+use super::bounds::CellBound;
 use crate::percept::{Flags, Outputs, Percept, Percepts, Touch};
 use crate::stage::angle::{between_directions, between_lines};
+use crate::stage::limit::Limit;
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
-    /// Cells (a field in a frame) looked at.
-    pub cells: u64,
-    /// Per quantity, what came of comparing it.
+    /// Percepts (a field in a frame) looked at.
+    pub percepts: u64,
+    /// Per quantity, what came of comparing it: every output under its name, `flags` and `contact`, and of separate touches
+    /// `touches` (each one's identity and number of taxels), `touches.total`, `touches.centroid` and `touches.position`.
     pub quantities: BTreeMap<String, Comparison>,
-    /// Cells in which a flag or a quantity's presence was not compared, as the reference's own margin to that decision is
-    /// below the bound.
-    pub undecided_flags: u64,
-    /// Cells that break a bound, differ in a certain flag, or lack a quantity.
+    /// Percepts in which a value differs.
     pub failed: u64,
     /// The first of those, in words.
     pub failures: Vec<String>,
 }
 
-/// What came of comparing one quantity.
+/// What came of comparing one quantity. Every value that the backend or the reference has is counted once: compared, too
+/// close to call, or not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {
     /// Values compared.
     pub compared: u64,
-    /// Values not compared, as the reference's own margin to a choice they hang on is below the bound.
-    pub undecided: u64,
+    /// Those of them that agree: within their bounds, or equal where there is none.
+    pub agreeing: u64,
+    /// Values not compared, as the reference's own margin to a choice they hang on is below the bound of that choice. Of flags
+    /// these are the sets that have such a flag; the others in them are compared.
+    pub too_close: u64,
+    /// Values not compared, as they hang on what the frame before left, which was too close to call, and which is not among
+    /// the outputs: motion from a centroid that is not asked for.
+    pub not_compared: u64,
     /// Largest error, in the quantity's unit.
     pub worst_error: f64,
-    /// Largest share of its bound that an error took: over 1 is a failure.
+    /// Largest share of its bound that an error took: over 1 is a disagreement.
     pub worst_share: f64,
 }
 
+impl Comparison {
+    /// All values that the backend or the reference has.
+    #[must_use]
+    pub fn values(&self) -> u64 {
+        self.compared + self.too_close + self.not_compared
+    }
+
+    fn add(&mut self, more: &Self) {
+        self.compared += more.compared;
+        self.agreeing += more.agreeing;
+        self.too_close += more.too_close;
+        self.not_compared += more.not_compared;
+        self.worst_error = self.worst_error.max(more.worst_error);
+        self.worst_share = self.worst_share.max(more.worst_share);
+    }
+}
+
 impl Agreement {
-    /// Whether nothing failed.
+    /// Whether nothing differs.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.failed == 0
     }
 
+    /// All quantities together.
+    #[must_use]
+    pub fn whole(&self) -> Comparison {
+        let mut whole = Comparison::default();
+        self.quantities.values().for_each(|comparison| whole.add(comparison));
+        whole
+    }
+
     /// Adds what another batch gave.
     pub fn merge(&mut self, other: Self) {
-        self.cells += other.cells;
-        self.undecided_flags += other.undecided_flags;
+        self.percepts += other.percepts;
         self.failed += other.failed;
         self.failures.extend(other.failures);
         self.failures.truncate(MOST_WORDS);
         for (name, more) in other.quantities {
-            let sum = self.quantities.entry(name).or_default();
-            sum.compared += more.compared;
-            sum.undecided += more.undecided;
-            sum.worst_error = sum.worst_error.max(more.worst_error);
-            sum.worst_share = sum.worst_share.max(more.worst_share);
+            self.quantities.entry(name).or_default().add(&more);
         }
     }
 }
 
 impl fmt::Display for Agreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = if self.holds() { "agrees" } else { "DISAGREES" };
-        write!(f, "{verdict} with the reference in {} of {} percepts", self.cells - self.failed, self.cells)?;
-        for (name, c) in &self.quantities {
-            write!(f, "\n  {name:<21} worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
-            write!(f, "; {} compared, {} too close to call", c.compared, c.undecided)?;
+        let whole = self.whole();
+        let verdict = match whole.compared {
+            _ if !self.holds() => "DISAGREES",
+            0 => "could not be compared",
+            _ => "agrees",
+        };
+        let plural = |count: u64| if count == 1 { "" } else { "s" };
+        let (values, percepts) = (whole.values(), self.percepts);
+        let different = whole.compared - whole.agreeing;
+        write!(f, "{verdict} with the reference: of {values} value{}", plural(values))?;
+        write!(f, " in {percepts} percept{}, {} agreeing, {different} different", plural(percepts), whole.agreeing)?;
+        write!(f, ", {} too close to call, {} not compared", whole.too_close, whole.not_compared)?;
+        if whole.not_compared > 0 {
+            write!(f, ", as motion hangs on a centroid before that was too close to call")?;
         }
-        write!(f, "\n  {} percepts with a flag too close to call", self.undecided_flags)?;
+        for (name, c) in &self.quantities {
+            let different = c.compared - c.agreeing;
+            write!(f, "\n  {name:<21} {} agreeing, {different} different", c.agreeing)?;
+            write!(f, ", {} too close, {} not compared", c.too_close, c.not_compared)?;
+            if c.worst_error > 0.0 {
+                write!(f, "; worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
+            }
+        }
         for failure in &self.failures {
             write!(f, "\n  {failure}")?;
         }
@@ -78,7 +120,7 @@ impl fmt::Display for Agreement {
     }
 }
 
-/// Failures that are put in words; the rest is counted.
+/// Disagreements that are put in words; the rest is counted.
 const MOST_WORDS: usize = 10;
 
 /// Compares `candidate` with `reference`, whose cells may differ by `bounds`.
@@ -92,11 +134,11 @@ pub(crate) fn compare(
     for frame in 0..reference.frames() {
         for (field, name) in names.iter().enumerate() {
             let bound = &bounds[frame * names.len() + field];
-            let mut cell = Cell { agreement: &mut agreement, failure: None };
+            let mut cell = Cell { quantities: &mut agreement.quantities, failure: None };
             cell.compare(&reference.get(frame, field), bound, &candidate.get(frame, field));
             cell.compare_touches(reference.touches(frame, field), bound, candidate.touches(frame, field));
             let failure = cell.failure;
-            agreement.cells += 1;
+            agreement.percepts += 1;
             if let Some(what) = failure {
                 agreement.failed += 1;
                 if agreement.failures.len() < MOST_WORDS {
@@ -109,8 +151,28 @@ pub(crate) fn compare(
 }
 
 struct Cell<'a> {
-    agreement: &'a mut Agreement,
+    quantities: &'a mut BTreeMap<String, Comparison>,
     failure: Option<String>,
+}
+
+fn distance(a: &f64, b: &f64) -> f64 {
+    (a - b).abs()
+}
+
+fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    DVec2::from_array(*a).distance(DVec2::from_array(*b))
+}
+
+fn apart_in_space(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    DVec3::from_array(*a).distance(DVec3::from_array(*b))
+}
+
+/// By how much the rounding of f64 in poses and far origins adds to a bound on places, on both sides.
+fn far(limit: Limit, place: Option<[f64; 3]>) -> Limit {
+    match (limit, place) {
+        (Limit::Within(bound), Some(place)) => Limit::Within(bound + 4e-15 * DVec3::from_array(place).length()),
+        _ => limit,
+    }
 }
 
 impl Cell<'_> {
@@ -119,125 +181,186 @@ impl Cell<'_> {
     }
 
     fn compare(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
-        if !bound.in_doubt.is_empty() {
-            self.agreement.undecided_flags += 1;
-        }
+        self.compare_flags(right, bound, got);
+        self.number(Outputs::TOTAL, right.total, got.total, bound.total);
+        self.number(Outputs::PEAK, right.peak, got.peak, bound.peak);
+        self.number(Outputs::ACTIVE, right.active.map(f64::from), got.active.map(f64::from), bound.active);
+        self.number(Outputs::AREA, right.area, got.area, bound.area);
+        self.centroid(&name(Outputs::CENTROID), right.centroid, got.centroid, bound.centroid);
+        self.centroid_is_apart(right, bound, got);
+        self.place(right, bound, got);
+        self.quantity(&name(Outputs::NORMAL), right.normal, got.normal, bound.normal, apart_in_space);
+        let line = |a: &f64, b: &f64| between_lines(*a, *b);
+        self.quantity(&name(Outputs::ORIENTATION), right.orientation, got.orientation, bound.orientation, line);
+        self.number(Outputs::ANISOTROPY, right.anisotropy, got.anisotropy, bound.anisotropy);
+        self.quantity(&name(Outputs::AXIS), right.axis, got.axis, bound.axis, line);
+        self.quantity(&name(Outputs::DISPLACEMENT), right.displacement, got.displacement, bound.displacement, apart);
+        let way = |a: &f64, b: &f64| between_directions(*a, *b);
+        self.quantity(&name(Outputs::DIRECTION), right.direction, got.direction, bound.direction, way);
+        self.number(Outputs::DISTANCE, right.distance, got.distance, bound.distance);
+        self.number(Outputs::RADIAL_DISTANCE, right.radial_distance, got.radial_distance, bound.radial_distance);
+        self.number(Outputs::SPEED, right.speed, got.speed, bound.speed);
+        self.number(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed);
+        let (right_step, got_step) = (right.filtered_displacement, got.filtered_displacement);
+        self.quantity(&name(Outputs::FILTERED_DISPLACEMENT), right_step, got_step, bound.filtered_displacement, apart);
+        let (right_way, got_way) = (right.filtered_direction, got.filtered_direction);
+        self.quantity(&name(Outputs::FILTERED_DIRECTION), right_way, got_way, bound.filtered_direction, way);
+        self.number(Outputs::FILTERED_SPEED, right.filtered_speed, got.filtered_speed, bound.filtered_speed);
+    }
+
+    fn compare_flags(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
         let certain = !bound.in_doubt;
-        if (right.flags ^ got.flags).intersects(certain) {
+        let equal = !(right.flags ^ got.flags).intersects(certain);
+        if !equal {
             let names = |flags: Flags| (flags & certain).names().collect::<Vec<_>>().join(" ");
             self.fail(format!("flags [{}], but the reference has [{}]", names(got.flags), names(right.flags)));
         }
-        // When the input itself lies on a threshold, another set of taxels may be pressed, and nothing is comparable.
-        if bound.in_doubt == Flags::all() {
-            return;
+        // A set with a flag in doubt is too close to call, but for a certain one that differs.
+        let flags = if equal && !bound.in_doubt.is_empty() { Limit::TooClose } else { Limit::Within(()) };
+        self.choice("flags", flags, equal);
+        let contact = if bound.in_doubt.contains(Flags::NO_CONTACT) { Limit::TooClose } else { Limit::Within(()) };
+        self.choice("contact", contact, right.contact == got.contact);
+        if contact == Limit::Within(()) && right.contact != got.contact {
+            self.fail(format!("contact is {}, not {}", got.contact, right.contact));
         }
-        if right.active != got.active {
-            self.fail(format!("active is {:?}, not {:?}", got.active, right.active));
-        }
-        let distance = |a: &f64, b: &f64| (a - b).abs();
-        self.quantity(Outputs::TOTAL, right.total, got.total, bound.total, distance);
-        self.quantity(Outputs::PEAK, right.peak, got.peak, bound.peak, distance);
-        self.quantity(Outputs::AREA, right.area, got.area, bound.area, distance);
-        for axis in 0..2 {
-            let part = |centroid: Option<[f64; 2]>| centroid.map(|c| c[axis]);
-            let bound = bound.centroid.map(|c| c[axis]);
-            self.quantity(Outputs::CENTROID, part(right.centroid), part(got.centroid), bound, distance);
-        }
-        self.centroid_is_apart(right, bound, got);
-        let apart = |a: &[f64; 3], b: &[f64; 3]| glam::DVec3::from_array(*a).distance(glam::DVec3::from_array(*b));
-        // Poses and far origins add the rounding of f64, on both sides.
-        let far = right.position.map_or(0.0, |p| 4e-15 * glam::DVec3::from_array(p).length());
-        self.quantity(Outputs::POSITION, right.position, got.position, bound.position.map(|b| b + far), apart);
-        self.quantity(Outputs::NORMAL, right.normal, got.normal, bound.normal, apart);
-        let between = |a: &f64, b: &f64| between_lines(*a, *b);
-        self.quantity(Outputs::ORIENTATION, right.orientation, got.orientation, bound.orientation, between);
-        self.quantity(Outputs::ANISOTROPY, right.anisotropy, got.anisotropy, bound.anisotropy, distance);
-        self.quantity(Outputs::AXIS, right.axis, got.axis, bound.axis, between);
-        let apart = |a: &[f64; 2], b: &[f64; 2]| DVec2::from_array(*a).distance(DVec2::from_array(*b));
-        self.quantity(Outputs::DISPLACEMENT, right.displacement, got.displacement, bound.displacement, apart);
-        let between = |a: &f64, b: &f64| between_directions(*a, *b);
-        self.quantity(Outputs::DIRECTION, right.direction, got.direction, bound.direction, between);
-        self.quantity(Outputs::DISTANCE, right.distance, got.distance, bound.distance, distance);
-        let (limit, right_radial, got_radial) = (bound.radial_distance, right.radial_distance, got.radial_distance);
-        self.quantity(Outputs::RADIAL_DISTANCE, right_radial, got_radial, limit, distance);
-        self.quantity(Outputs::SPEED, right.speed, got.speed, bound.speed, distance);
-        self.quantity(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed, distance);
-        let (right_step, got_step) = (right.filtered_displacement, got.filtered_displacement);
-        self.quantity(Outputs::FILTERED_DISPLACEMENT, right_step, got_step, bound.filtered_displacement, apart);
-        let (right_way, got_way) = (right.filtered_direction, got.filtered_direction);
-        self.quantity(Outputs::FILTERED_DIRECTION, right_way, got_way, bound.filtered_direction, between);
-        let (right_speed, got_speed) = (right.filtered_speed, got.filtered_speed);
-        self.quantity(Outputs::FILTERED_SPEED, right_speed, got_speed, bound.filtered_speed, distance);
+    }
+
+    fn place(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
+        let limit = far(bound.position, right.position);
+        // A place in another frame of coordinates is another place, wherever that is.
+        let elsewhere = right.in_world != got.in_world;
+        let between = |a: &[f64; 3], b: &[f64; 3]| if elsewhere { f64::INFINITY } else { apart_in_space(a, b) };
+        self.quantity(&name(Outputs::POSITION), right.position, got.position, limit, between);
     }
 
     /// Coordinates are held to a bound each; what a centroid is off by is the distance, up to √2 times as much.
     fn centroid_is_apart(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
-        if let (Some(right), Some(got), Some(_)) = (right.centroid, got.centroid, bound.centroid) {
-            let distance_m = DVec2::from_array(right).distance(DVec2::from_array(got));
-            let comparison = self.agreement.quantities.entry("centroid".to_owned()).or_default();
-            comparison.worst_error = comparison.worst_error.max(distance_m);
+        if let (Some(right), Some(got), Limit::Within(_)) = (&right.centroid, &got.centroid, bound.centroid) {
+            let comparison = self.quantities.entry(name(Outputs::CENTROID)).or_default();
+            comparison.worst_error = comparison.worst_error.max(apart(right, got));
         }
     }
 
     fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
-        let Some(limit) = bound.touch else { return };
-        if right.len() != got.len() {
-            self.fail(format!("touches are {}, not {}", got.len(), right.len()));
-            return;
+        let touches = name(Outputs::TOUCHES);
+        for index in 0..right.len().max(got.len()) {
+            let (right, got) = (right.get(index), got.get(index));
+            let same = |a: &(u64, u32), b: &(u64, u32)| if a == b { 0.0 } else { f64::INFINITY };
+            let (who, total, place, position) = match bound.touch {
+                Limit::Within(limit) => (
+                    Limit::Within(0.0),
+                    Limit::Within(limit.total * right.map_or(0.0, |touch| touch.total)),
+                    Limit::Within([limit.place; 2]),
+                    Limit::Within(limit.position),
+                ),
+                Limit::TooClose => (Limit::TooClose, Limit::TooClose, Limit::TooClose, Limit::TooClose),
+                Limit::Unread => (Limit::Unread, Limit::Unread, Limit::Unread, Limit::Unread),
+            };
+            let identity = |touch: &Touch| (touch.id, touch.active);
+            self.quantity(&touches, right.map(identity), got.map(identity), who, same);
+            let of = |touch: &Touch| touch.total;
+            self.quantity(&format!("{touches}.total"), right.map(of), got.map(of), total, distance);
+            let of = |touch: &Touch| touch.centroid;
+            self.centroid(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
+            let of = |touch: &Touch| touch.position;
+            let limit = far(position, right.map(of));
+            self.quantity(&format!("{touches}.position"), right.map(of), got.map(of), limit, apart_in_space);
         }
-        for (right, got) in right.iter().zip(got) {
-            if (right.id, right.active) != (got.id, got.active) {
-                self.fail(format!(
-                    "touch {} of {} taxels is touch {} of {}",
-                    right.id, right.active, got.id, got.active
-                ));
+    }
+
+    /// A choice, which every percept has: whether it is `equal`.
+    fn choice(&mut self, name: &str, limit: Limit<()>, equal: bool) {
+        let comparison = self.quantities.entry(name.to_owned()).or_default();
+        match limit {
+            Limit::Within(()) => {
+                comparison.compared += 1;
+                comparison.agreeing += u64::from(equal);
             }
-            let distance = |a: &f64, b: &f64| (a - b).abs();
-            let total = Some(limit.total * right.total);
-            self.quantity(Outputs::TOUCHES, Some(right.total), Some(got.total), total, distance);
-            let part = |touch: &Touch, axis: usize| touch.centroid.map(|c| c[axis]);
-            for axis in 0..2 {
-                self.quantity(Outputs::TOUCHES, part(right, axis), part(got, axis), Some(limit.place), distance);
+            Limit::TooClose => comparison.too_close += 1,
+            Limit::Unread => comparison.not_compared += 1,
+        }
+    }
+
+    fn number(&mut self, output: Outputs, right: Option<f64>, got: Option<f64>, limit: Limit) {
+        self.quantity(&name(output), right, got, limit, distance);
+    }
+
+    /// A place on a chart, each coordinate by its own bound.
+    fn centroid(&mut self, name: &str, right: Option<[f64; 2]>, got: Option<[f64; 2]>, limit: Limit<[f64; 2]>) {
+        // The coordinate that takes more of its bound stands for both.
+        let (mut axis, mut most) = (0, f64::NEG_INFINITY);
+        if let (Some(right), Some(got), Limit::Within(bounds)) = (right, got, limit) {
+            for index in 0..2 {
+                let share = share(distance(&right[index], &got[index]), bounds[index]);
+                if share.is_nan() || share > most {
+                    (axis, most) = (index, if share.is_nan() { f64::INFINITY } else { share });
+                }
             }
         }
+        let limit = match limit {
+            Limit::Within(bounds) => Limit::Within(bounds[axis]),
+            Limit::TooClose => Limit::TooClose,
+            Limit::Unread => Limit::Unread,
+        };
+        self.quantity(name, right, got, limit, |a, b| distance(&a[axis], &b[axis]));
     }
 
     fn quantity<T: fmt::Debug>(
         &mut self,
-        output: Outputs,
+        name: &str,
         right: Option<T>,
         got: Option<T>,
-        bound: Option<f64>,
+        limit: Limit,
         distance: impl Fn(&T, &T) -> f64,
     ) {
-        let name = output.names().next().unwrap_or_default();
-        let (right, got) = match (right, got) {
-            (None, None) => return,
-            (Some(right), Some(got)) => (right, got),
-            (right, got) => {
-                // Present in one of them: fine only where the flag that explains it may differ.
-                if bound.is_some() {
-                    self.fail(format!("{name} is {got:?}, not {right:?}"));
-                } else {
-                    self.agreement.quantities.entry(name).or_default().undecided += 1;
-                }
+        if right.is_none() && got.is_none() {
+            return;
+        }
+        if !self.quantities.contains_key(name) {
+            self.quantities.insert(name.to_owned(), Comparison::default());
+        }
+        let Some(comparison) = self.quantities.get_mut(name) else { return };
+        let bound = match limit {
+            Limit::TooClose => {
+                comparison.too_close += 1;
                 return;
             }
-        };
-        let error = distance(&right, &got);
-        let comparison = self.agreement.quantities.entry(name.clone()).or_default();
-        let Some(bound) = bound else {
-            comparison.undecided += 1;
-            return;
+            Limit::Unread => {
+                comparison.not_compared += 1;
+                return;
+            }
+            Limit::Within(bound) => bound,
         };
         comparison.compared += 1;
-        let share = if error == 0.0 { 0.0 } else { error / bound };
+        let (Some(of_reference), Some(of_backend)) = (&right, &got) else {
+            self.fail(format!("{name} is {}, not {}", shown(&got), shown(&right)));
+            return;
+        };
+        let error = distance(of_reference, of_backend);
+        let share = share(error, bound);
         comparison.worst_error = comparison.worst_error.max(error);
         comparison.worst_share = comparison.worst_share.max(share);
-        if share.is_nan() || share > 1.0 {
-            self.fail(format!("{name} is {got:?}, not {right:?}: off by {error:.3e}, bound {bound:.3e}"));
+        if share <= 1.0 {
+            comparison.agreeing += 1;
+        } else {
+            self.fail(format!("{name} is {of_backend:?}, not {of_reference:?}: off by {error:.3e}, bound {bound:.3e}"));
         }
     }
+}
+
+/// The share of `bound` that `error` takes.
+fn share(error: f64, bound: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { error / bound }
+}
+
+/// A value, or that there is none.
+fn shown<T: fmt::Debug>(value: &Option<T>) -> String {
+    value.as_ref().map_or("absent".to_owned(), |value| format!("{value:?}"))
+}
+
+/// What the one output of `output` is called.
+fn name(output: Outputs) -> String {
+    output.names().next().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -265,13 +388,12 @@ mod tests {
     }
 
     fn bound() -> CellBound {
-        let near = Some(0.01);
+        let near = Limit::Within(0.01);
         CellBound {
-            in_doubt: Flags::empty(),
             total: near,
             peak: near,
             area: near,
-            centroid: Some([0.01; 2]),
+            centroid: Limit::Within([0.01; 2]),
             position: near,
             normal: near,
             orientation: near,
@@ -283,10 +405,10 @@ mod tests {
             radial_distance: near,
             speed: near,
             radial_speed: near,
-            touch: None,
             filtered_displacement: near,
             filtered_direction: near,
             filtered_speed: near,
+            ..CellBound::default()
         }
     }
 
@@ -354,12 +476,19 @@ mod tests {
         let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
-        let limit = CellBound { touch: Some(TouchBound { total: 1e-6, place: 1e-6 }), ..bound() };
+        let limit =
+            CellBound { touch: Limit::Within(TouchBound { total: 1e-6, place: 1e-6, position: 1e-6 }), ..bound() };
         assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
         let moved = |by: f64| Touch { centroid: Some([0.1, 0.2 + by]), ..touch };
         assert!(compare(&right, &[limit], &touched(&[moved(0.9e-6)]), &NAMES).holds());
-        let others =
-            [moved(1.1e-6), Touch { id: 2, ..touch }, Touch { active: 2, ..touch }, Touch { total: 10.1, ..touch }];
+        let others = [
+            moved(1.1e-6),
+            Touch { id: 2, ..touch },
+            Touch { active: 2, ..touch },
+            Touch { total: 10.1, ..touch },
+            Touch { position: [0.0, 0.0, 1.1e-6], ..touch },
+            Touch { centroid: None, ..touch },
+        ];
         for other in others {
             assert!(!compare(&right, &[limit], &touched(&[other]), &NAMES).holds(), "{other:?}");
         }
@@ -368,14 +497,56 @@ mod tests {
 
     #[test]
     fn what_is_too_close_to_call_is_counted_and_not_compared() {
-        let loose = CellBound { orientation: None, in_doubt: Flags::TIE, ..bound() };
+        let loose = CellBound { orientation: Limit::TooClose, in_doubt: Flags::TIE, ..bound() };
         let agreement = against(loose, |p, c| {
             c.orientation[0] = 1.5;
             p.flags[0] |= Flags::TIE;
         });
         assert!(agreement.holds());
-        assert_eq!((agreement.undecided_flags, agreement.quantities["orientation"].undecided), (1, 1));
+        assert_eq!((agreement.quantities["flags"].too_close, agreement.quantities["orientation"].too_close), (1, 1));
         let other_flag = against(loose, |p, _| p.flags[0] |= Flags::COINCIDENT);
-        assert!(!other_flag.holds());
+        assert!(!other_flag.holds() && other_flag.quantities["flags"].compared == 1);
+    }
+
+    #[test]
+    fn every_value_is_counted_once() {
+        for limit in [Limit::Within(0.01), Limit::TooClose, Limit::Unread] {
+            // One side has it, the other, both, neither.
+            for (right, got) in [(true, true), (true, false), (false, true), (false, false)] {
+                let with = |has: bool| percepts(|p, _| p.present[0].set(Outputs::SPEED, has));
+                let bound = CellBound { speed: limit, ..bound() };
+                let agreement = compare(&with(right), &[bound], &with(got), &NAMES);
+                let speed = agreement.quantities.get("speed").copied().unwrap_or_default();
+                assert_eq!(speed.values(), u64::from(right || got));
+                assert_eq!(agreement.holds(), right == got || limit != Limit::Within(0.01), "{agreement}");
+                assert_eq!(speed.compared - speed.agreeing, u64::from(!agreement.holds()));
+            }
+        }
+    }
+
+    #[test]
+    fn the_verdict_says_in_its_first_line_what_could_not_be_compared() {
+        let first = |bound: CellBound, change: fn(&mut Percepts, &mut crate::percept::Columns<f64>)| {
+            against(bound, change).to_string().lines().next().unwrap().to_owned()
+        };
+        assert_eq!(
+            first(bound(), |_, _| {}),
+            "agrees with the reference: of 21 values in 1 percept, 21 agreeing, 0 different, 0 too close to call, \
+             0 not compared"
+        );
+        let loose = CellBound { axis: Limit::TooClose, speed: Limit::Unread, ..bound() };
+        assert_eq!(
+            first(loose, |_, c| c.speed[0] = 9.0),
+            "agrees with the reference: of 21 values in 1 percept, 19 agreeing, 0 different, 1 too close to call, \
+             1 not compared, as motion hangs on a centroid before that was too close to call"
+        );
+        assert!(first(loose, |_, c| c.total[0] = 9.0).starts_with(
+            "DISAGREES with the reference: of 21 values in 1 percept, 18 agreeing, 1 different, 1 too close to call, 1 not"
+        ));
+        let nothing = Agreement::default().to_string();
+        assert!(
+            nothing.starts_with("could not be compared with the reference: of 0 values in 0 percepts"),
+            "{nothing}"
+        );
     }
 }

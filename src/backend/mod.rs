@@ -1,6 +1,7 @@
 //! Backends: three ways to run a plan, all with the same percepts.
 
 pub(crate) mod agreement;
+pub(crate) mod bounds;
 pub(crate) mod cpu;
 #[cfg(feature = "gpu")]
 pub mod gpu;

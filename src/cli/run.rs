@@ -112,6 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
     asked.line_flags().check_taps(settled.options.calibration.as_ref(), &ids)?;
     let mut engine = Engine::new(&body, settled.options)?;
+    let verify = asked.verify && has_another_to_compare(&engine, settled.why.as_deref())?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
     let (source, live) = match recorded {
         Some(mut source) => {
@@ -163,7 +164,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         None => Feed::start(source, Manner { most: batch, gather, speed }),
         Some(_) => Feed::start_live(source, batch),
     };
-    let agreement = asked.verify.then(Agreement::default);
+    let agreement = verify.then(Agreement::default);
     let heeds_stale = live.is_some();
     let mut pump = Pump {
         engine,
@@ -192,6 +193,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             Err(error)
         }
     }
+}
+
+/// Whether there is another backend than the reference to compare with it: an error where the reference was asked for, and
+/// said where a measurement chose it.
+fn has_another_to_compare(engine: &Engine, chosen: Option<&str>) -> Result<bool> {
+    if engine.backend().0 != "reference" {
+        return Ok(true);
+    }
+    if chosen.is_none() {
+        return Err(Error::usage(
+            "--verify would compare the reference with itself; take backend cpu or gpu in single precision, or leave \
+             --verify out",
+        ));
+    }
+    say("nothing to verify: the reference itself was chosen");
+    Ok(false)
 }
 
 /// Takes frames from a feed through the engine to whoever is to have the percepts.

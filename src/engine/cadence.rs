@@ -4,7 +4,7 @@
 //! leap. What is measured from frame to frame is measured from change to change instead. Coverage `touched` leaves out work
 //! and changes no bit; this changes what motion says.
 
-use crate::backend::reference::CellBound;
+use crate::backend::bounds::CellBound;
 use crate::backend::{RawBatch, Step};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::Plan;
@@ -103,7 +103,7 @@ impl OnChange {
                     let bound = &mut bounds[cell];
                     // One rounding more, where a rate's bound has six.
                     for rate in [&mut bound.speed, &mut bound.radial_speed] {
-                        *rate = rate.map(|rate| rate * times * 7.0 / 6.0);
+                        *rate = rate.times(times * 7.0 / 6.0);
                     }
                 }
             }

@@ -1,18 +1,27 @@
 //! What is right, beside what a backend says.
+//!
+//! Where the reference cannot tell by its own margin, a backend may choose otherwise and remember another state: that of a
+//! contact, a centroid, touches, a filter. From there on the reference goes on from the state that the backend took, field by
+//! field, so that what follows is comparable, and the percepts compared are those that the backend gives without a
+//! comparison, to the bit.
 
-use super::host::Side;
-use crate::backend::reference::{CellBound, Reference};
+use super::host::{Host, Side};
+use crate::backend::bounds::{CellBound, Left};
+use crate::backend::reference::Reference;
+use crate::backend::{Backend, RawBatch};
+use crate::error::Result;
 use crate::percept::{Percepts, Precision};
 use crate::scene::Plan;
+use crate::signal::Frame;
 
 /// The reference's side of a comparison.
 pub(super) struct Check {
     pub(super) reference: Reference,
-    pub(super) side: Side,
+    side: Side,
     pub(super) right: Percepts,
     pub(super) bounds: Vec<CellBound>,
     /// Those of the frame before, where percepts are kept.
-    pub(super) last_bounds: Vec<CellBound>,
+    last_bounds: Vec<CellBound>,
 }
 
 impl Check {
@@ -26,5 +35,303 @@ impl Check {
             bounds: Vec::new(),
             last_bounds: Vec::new(),
         }
+    }
+
+    /// Does what [`Host::run`] does with `backend`, and the same with the reference.
+    pub(super) fn run(
+        &mut self,
+        host: &Host<'_>,
+        backend: &mut dyn Backend,
+        frames: &[Frame],
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        side: &mut Side,
+    ) -> Result<()> {
+        backend.run(raw, percepts)?;
+        let first = self.bounds.len();
+        for (offset, frame) in frames.iter().enumerate() {
+            // Before the host keeps any percept in its stead.
+            let left = Left::by(host.plan, percepts, raw.first + offset);
+            host.frame(offset, frame, raw, percepts, side);
+            let advances = |field| host.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
+            let bounds = self.reference.checked(raw, offset, &mut self.right, advances);
+            host.frame(offset, frame, raw, &mut self.right, &mut self.side);
+            for (field, bound) in bounds.iter().enumerate() {
+                self.resume(field, bound, left[field], side);
+            }
+            self.bounds.extend(bounds);
+        }
+        host.finish(raw, percepts, side);
+        host.finish(raw, &self.right, &mut self.side);
+        if let Some(cadence) = host.cadence {
+            cadence.bounds(&mut self.bounds[first..], raw.steps, &mut self.last_bounds);
+        }
+        Ok(())
+    }
+
+    /// Goes on from the state that the backend and its host, whose is `other`, took where it may differ.
+    fn resume(&mut self, field: usize, bound: &CellBound, left: Left, other: &Side) {
+        let (memory, may_remember) = (&other.memories[field], bound.may_remember);
+        if may_remember.contact {
+            self.reference.resume(field, left);
+            self.side.held[field] = other.held[field];
+        }
+        if may_remember.touches {
+            self.side.memories[field].touches = memory.touches.clone();
+            self.reference.resume_touches(field, &memory.touches);
+        }
+        if may_remember.filter {
+            self.side.memories[field].filter = memory.filter;
+            self.reference.resume_filter(field, &memory.filter);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::BackendKind;
+    use crate::backend::agreement::{Agreement, compare};
+    use crate::body::Body;
+    use crate::engine::{Engine, Options};
+    use crate::percept::{Columns, Flags, Outputs, Percept, Touch, Values};
+    use crate::scene::Scene;
+    use crate::signal::RawValue;
+    use crate::stage::limit::Limit;
+
+    /// What a backend said of some frames, and what is right.
+    struct Compared {
+        engine: Engine,
+        check: Box<Check>,
+    }
+
+    impl Compared {
+        /// A touch that moves over the bundled hand, under a calibration that single precision has to round.
+        fn on(backend: BackendKind) -> Option<Self> {
+            let body = Body::from_bytes("hand", crate::bundled::HAND).unwrap();
+            let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+            let calibration = Some(crate::signal::Calibration::parse("[all]\ngain = 0.7\n", &ids).unwrap());
+            let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
+            let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
+            let mut engine = match Engine::new(&body, options) {
+                Err(error) if error.is_no_adapter() => return None,
+                made => made.unwrap(),
+            };
+            let frame = |index: usize| {
+                let mut frame = engine.frame(0.01 * index as f64);
+                let value = |i: usize| 100.0 + 37.0 * ((i * (index + 3)) % 11) as f64;
+                frame.values = (0..frame.values.len()).map(|i| RawValue::new(value(i))).collect();
+                frame
+            };
+            let frames: Vec<Frame> = (0..8).map(frame).collect();
+            let (_, agreement) = engine.process_and_compare(&frames).unwrap();
+            assert!(agreement.holds() && agreement.quantities.len() == 25, "{backend:?}: {agreement}");
+            let check = engine.check.take().unwrap();
+            Some(Self { engine, check })
+        }
+
+        fn with(&self, percepts: &Percepts) -> Agreement {
+            let names = vec!["field"; percepts.fields()];
+            compare(&self.check.right, &self.check.bounds, percepts, &names)
+        }
+
+        /// The first percept for which `right` and `limit` give a value and a bound over 0.
+        fn find(&self, right: Right, limit: Bound) -> (usize, f64, f64) {
+            let right_of = |cell: usize| self.right(cell).and_then(|(percept, touch)| right(&percept, touch.as_ref()));
+            let mut cells = (0..self.check.bounds.len()).rev();
+            let found = cells.find_map(|cell| match limit(&self.check.bounds[cell], &self.right(cell)?) {
+                Limit::Within(bound) if bound > 0.0 => Some((cell, right_of(cell)?, bound)),
+                _ => None,
+            });
+            found.expect("a value that is compared")
+        }
+
+        fn right(&self, cell: usize) -> Option<(Percept, Option<Touch>)> {
+            let (frame, field) = (cell / self.check.right.fields(), cell % self.check.right.fields());
+            Some((self.check.right.get(frame, field), self.check.right.touches(frame, field).first().copied()))
+        }
+    }
+
+    type Right = fn(&Percept, Option<&Touch>) -> Option<f64>;
+    type Bound = fn(&CellBound, &(Percept, Option<Touch>)) -> Limit;
+    type Put = fn(&mut Percepts, usize, f64);
+
+    /// Puts `value` into a column of single precision.
+    fn put(percepts: &mut Percepts, cell: usize, value: f64, column: impl Fn(&mut Columns<f32>) -> &mut Vec<f32>) {
+        let Values::F32(columns) = &mut percepts.values else { unreachable!("the reference is not held to itself") };
+        column(columns)[cell] = value as f32;
+    }
+
+    fn put_step(percepts: &mut Percepts, cell: usize, value: f64) {
+        let Values::F32(columns) = &mut percepts.values else { unreachable!("the reference is not held to itself") };
+        columns.displacement[cell][0] = value as f32;
+    }
+
+    /// The numbers next to each other that are within `bound` of `right` and beyond it, in what the column holds.
+    fn around(right: f64, bound: f64, single: bool) -> [f64; 2] {
+        if single {
+            let near = (right + bound) as f32;
+            [near.next_down().into(), near.next_up().into()]
+        } else {
+            // A small part of the bound is more than what f64 makes of the comparison itself.
+            [right + 0.99 * bound, right + 1.01 * bound]
+        }
+    }
+
+    #[test]
+    fn an_error_just_over_the_bound_is_a_disagreement_and_one_just_under_it_is_not() {
+        macro_rules! column {
+            ($output:literal, $name:ident) => {
+                (
+                    $output,
+                    |p, _| p.$name,
+                    |b, _| b.$name,
+                    |p, cell, value| put(p, cell, value, |columns| &mut columns.$name),
+                    true,
+                )
+            };
+        }
+        fn touched(percepts: &mut Percepts, cell: usize, change: impl Fn(&mut Touch)) {
+            percepts.change_first_touch(cell, change);
+        }
+        let quantities: [(&str, Right, Bound, Put, bool); 22] = [
+            column!("total", total),
+            column!("peak", peak),
+            column!("area", area),
+            column!("orientation", orientation),
+            column!("axis", axis),
+            column!("anisotropy", anisotropy),
+            column!("direction", direction),
+            column!("distance", distance),
+            column!("radial_distance", radial_distance),
+            column!("speed", speed),
+            column!("radial_speed", radial_speed),
+            (
+                "centroid",
+                |p, _| p.centroid.map(|c| c[0]),
+                |b, _| match b.centroid {
+                    Limit::Within(bounds) => Limit::Within(bounds[0]),
+                    _ => Limit::TooClose,
+                },
+                |p, cell, value| put(p, cell, value, |columns| &mut columns.centroid_u),
+                true,
+            ),
+            (
+                "centroid",
+                |p, _| p.centroid.map(|c| c[1]),
+                |b, _| match b.centroid {
+                    Limit::Within(bounds) => Limit::Within(bounds[1]),
+                    _ => Limit::TooClose,
+                },
+                |p, cell, value| put(p, cell, value, |columns| &mut columns.centroid_v),
+                true,
+            ),
+            ("displacement", |p, _| p.displacement.map(|d| d[0]), |b, _| b.displacement, put_step, true),
+            (
+                "position",
+                |p, _| p.position.map(|x| x[1]),
+                |b, _| b.position,
+                |p, cell, value| p.position[cell][1] = value,
+                false,
+            ),
+            (
+                "normal",
+                |p, _| p.normal.map(|x| x[2]),
+                |b, _| b.normal,
+                |p, cell, value| p.normal[cell][2] = value,
+                false,
+            ),
+            (
+                "filtered_displacement",
+                |p, _| p.filtered_displacement.map(|x| x[1]),
+                |b, _| b.filtered_displacement,
+                |p, cell, value| p.filtered_displacement[cell][1] = value,
+                false,
+            ),
+            (
+                "filtered_direction",
+                |p, _| p.filtered_direction,
+                |b, _| b.filtered_direction,
+                |p, cell, value| p.filtered_direction[cell] = value,
+                false,
+            ),
+            (
+                "filtered_speed",
+                |p, _| p.filtered_speed,
+                |b, _| b.filtered_speed,
+                |p, cell, value| p.filtered_speed[cell] = value,
+                false,
+            ),
+            (
+                "touches.total",
+                |_, touch| Some(touch?.total),
+                |b, (_, touch)| match (b.touch, touch) {
+                    (Limit::Within(limit), Some(touch)) => Limit::Within(limit.total * touch.total),
+                    _ => Limit::TooClose,
+                },
+                |p, cell, value| touched(p, cell, |touch| touch.total = value),
+                false,
+            ),
+            (
+                "touches.centroid",
+                |_, touch| Some(touch?.centroid?[1]),
+                |b, _| match b.touch {
+                    Limit::Within(limit) => Limit::Within(limit.place),
+                    _ => Limit::TooClose,
+                },
+                |p, cell, value| touched(p, cell, |touch| touch.centroid = touch.centroid.map(|[u, _]| [u, value])),
+                false,
+            ),
+            (
+                "touches.position",
+                |_, touch| Some(touch?.position[0]),
+                |b, _| match b.touch {
+                    Limit::Within(limit) => Limit::Within(limit.position),
+                    _ => Limit::TooClose,
+                },
+                |p, cell, value| touched(p, cell, |touch| touch.position[0] = value),
+                false,
+            ),
+        ];
+        let mut backends = 0;
+        for backend in [BackendKind::Cpu, BackendKind::Gpu] {
+            let Some(compared) = Compared::on(backend) else { continue };
+            backends += 1;
+            for (name, right, limit, put, single) in quantities {
+                let (cell, right, bound) = compared.find(right, limit);
+                let [under, over] = around(right, bound, single);
+                let with = |value: f64| {
+                    let mut percepts = compared.engine.percepts.clone();
+                    put(&mut percepts, cell, value);
+                    compared.with(&percepts)
+                };
+                // Of a vector the other parts are off by something of their own.
+                let vector = ["displacement", "position", "normal", "filtered_displacement", "touches.position"];
+                let under = if vector.contains(&name) { right + 0.5 * bound } else { under };
+                let agreement = with(under);
+                assert!(agreement.holds(), "{backend:?}, {name} under its bound {bound:e}: {agreement}");
+                let agreement = with(over);
+                assert!(!agreement.holds(), "{backend:?}, {name} over its bound {bound:e}: {agreement}");
+                assert!(agreement.failures[0].contains(&format!(": {name} is")), "{name}: {agreement}");
+                let of = agreement.quantities[name];
+                assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
+            }
+            // What has no bound differs by the least that it can.
+            let choices: [(&str, fn(&mut Percepts)); 5] = [
+                ("active", |p| p.active[0] += 1),
+                ("flags", |p| p.flags[0] ^= Flags::SATURATED),
+                ("contact", |p| p.flags[0] ^= Flags::NO_CONTACT),
+                ("touches", |p| p.change_first_touch(0, |touch| touch.id += 1)),
+                ("touches", |p| p.change_first_touch(0, |touch| touch.active += 1)),
+            ];
+            for (name, change) in choices {
+                let mut percepts = compared.engine.percepts.clone();
+                change(&mut percepts);
+                let agreement = compared.with(&percepts);
+                let of = agreement.quantities[name];
+                assert!(!agreement.holds() && of.compared - of.agreeing == 1, "{backend:?}, {name}: {agreement}");
+            }
+        }
+        assert!(backends > 0);
     }
 }

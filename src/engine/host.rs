@@ -7,9 +7,10 @@ use glam::{DAffine3, DVec3};
 use super::cadence::{self, OnChange};
 use crate::backend::{Backend, RawBatch, Step};
 use crate::error::Result;
-use crate::percept::{Flags, Outputs, Percepts, Touch, Values};
+use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
+use crate::stage::layout::Member;
 use crate::stage::{filter, motion, position, touches};
 
 /// What poses are applied to: the body's links and how they hang together at rest.
@@ -25,16 +26,16 @@ pub(super) struct Links {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
     /// The touches of the frame before.
-    touches: touches::Memory,
-    filter: filter::Memory,
+    pub(super) touches: touches::Memory,
+    pub(super) filter: filter::Memory,
 }
 
 /// What is remembered from call to call.
 pub(super) struct Side {
     /// Per field.
-    memories: Vec<Memory>,
+    pub(super) memories: Vec<Memory>,
     /// Per field, whether its memory holds anything of a contact.
-    held: Vec<bool>,
+    pub(super) held: Vec<bool>,
     /// The percepts of the frame before, where some may be kept.
     last: Option<Percepts>,
 }
@@ -81,55 +82,71 @@ impl Host<'_> {
         side: &mut Side,
     ) -> Result<()> {
         backend.run(raw, percepts)?;
-        let stages = self.plan.stages();
+        for (offset, frame) in frames.iter().enumerate() {
+            self.frame(offset, frame, raw, percepts, side);
+        }
+        self.finish(raw, percepts, side);
+        Ok(())
+    }
+
+    /// The host's part of frame `offset` of `raw`, which is `frame`.
+    pub(super) fn frame(
+        &self,
+        offset: usize,
+        frame: &Frame,
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        side: &mut Side,
+    ) {
+        let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         let Side { memories, held, last } = side;
-        for ((index, frame), step) in (raw.first..).zip(frames).zip(raw.steps) {
-            percepts.t_s[index] = frame.t_s;
-            if !(stages.position || stages.filter || self.cadence.is_some()) {
+        percepts.t_s[index] = frame.t_s;
+        if !(stages.position || stages.filter || self.cadence.is_some()) {
+            return;
+        }
+        for (number, field) in self.plan.fields.iter().enumerate() {
+            let cell = index * self.plan.fields.len() + number;
+            if let Some(cadence) = self.cadence {
+                match cadence.since(offset, number) {
+                    Some(since) => cadence::rates(percepts, cell, step, since),
+                    None => {
+                        self.keep(number, index, last.as_ref(), percepts);
+                        continue;
+                    }
+                }
+            }
+            let contact = percepts.in_contact(index, number);
+            if !contact && !held[number] {
+                // Most of a skin, most of the time.
+                if stages.touches {
+                    percepts.push_touches([]);
+                }
                 continue;
             }
-            for (number, field) in self.plan.fields.iter().enumerate() {
-                let cell = index * self.plan.fields.len() + number;
-                if let Some(cadence) = self.cadence {
-                    match cadence.since(index - raw.first, number) {
-                        Some(since) => cadence::rates(percepts, cell, step, since),
-                        None => {
-                            self.keep(number, index, last.as_ref(), percepts);
-                            continue;
-                        }
-                    }
-                }
-                let contact = percepts.in_contact(index, number);
-                if !contact && !held[number] {
-                    // Most of a skin, most of the time.
-                    if stages.touches {
-                        percepts.push_touches([]);
-                    }
-                    continue;
-                }
-                held[number] = contact;
-                let posed = contact && stages.position;
-                let world =
-                    if posed { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
-                if posed {
-                    self.place(field, world.as_ref(), cell, percepts);
-                }
-                if stages.touches {
-                    self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number].touches);
-                }
-                if stages.filter && field.charted {
-                    self.filter(field, step, cell, percepts, &mut memories[number].filter);
-                }
+            held[number] = contact;
+            let posed = contact && stages.position;
+            let world = if posed { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
+            if posed {
+                self.place(field, world.as_ref(), cell, percepts);
+            }
+            if stages.touches {
+                self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number].touches);
+            }
+            if stages.filter && field.charted {
+                self.filter(field, step, cell, percepts, &mut memories[number].filter);
             }
         }
+    }
+
+    /// Remembers the last percepts of a call, where some may be kept.
+    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &Percepts, side: &mut Side) {
         if self.cadence.is_some() && raw.frames > 0 {
-            let mut one = last.take().unwrap_or_else(|| percepts.clone());
+            let mut one = side.last.take().unwrap_or_else(|| percepts.clone());
             one.reset(1);
             let fields = 0..self.plan.fields.len();
             fields.for_each(|field| one.take_over(percepts, raw.first + raw.frames - 1, field));
-            *last = Some(one);
+            side.last = Some(one);
         }
-        Ok(())
     }
 
     /// Keeps the percept of a field in frame `index` as it was in the frame before, which is in `last` where it was of
@@ -214,8 +231,12 @@ impl Host<'_> {
         }
         let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
         let members = self.plan.members_of(field);
-        let pulls: Vec<f64> =
-            members.iter().map(|member| f64::from(member.weight) * pressures[member.slot as usize]).collect();
+        let right = percepts.precision() == Precision::F64;
+        let weight = |index: usize, member: &Member| {
+            if right { self.plan.weight(field, index) } else { f64::from(member.weight) }
+        };
+        let pull = |(index, member): (usize, &Member)| weight(index, member) * pressures[member.slot as usize];
+        let pulls: Vec<f64> = members.iter().enumerate().map(pull).collect();
         let unit_m = f64::from(field.unit_m);
         let found = memory.follow(&field.skin(), &pulls);
         let several = found.len() > 1;

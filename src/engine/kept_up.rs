@@ -98,21 +98,19 @@ impl KeptUp {
 /// What upkeep is to know of the taxel at `channel`.
 fn kept(plan: &Plan, channel: usize) -> Kept {
     let taxel = &plan.calibrations[channel];
-    let knots = plan.knots_of(channel);
-    let (falls, felt) = match knots {
-        [] => (taxel.gain < 0.0, f64::from(taxel.dead_band) / f64::from(taxel.gain.abs())),
+    let (falls, felt) = match plan.curve_of(channel).rounded {
+        [] => (taxel.gain < 0.0, f64::from(taxel.dead_band as f32) / f64::from(taxel.gain.abs() as f32)),
         [first, .., last] => (last.p < first.p, felt(plan, channel, [first.raw, last.raw].map(f64::from))),
         [_] => (false, 0.0),
     };
-    Kept { baseline: taxel.baseline, raw_range: taxel.raw_range, felt, falls, mask: taxel.mask }
+    Kept { baseline: taxel.baseline as f32, raw_range: taxel.raw_range, felt, falls, mask: taxel.mask }
 }
 
 /// How far the raw value of a taxel with a curve must go from its baseline for it to be felt, between `ends` of the curve.
 /// 0 where it is felt at the baseline already.
 fn felt(plan: &Plan, channel: usize, ends: [f64; 2]) -> f64 {
-    let (taxel, knots) = (&plan.calibrations[channel], plan.knots_of(channel));
-    let is_felt =
-        |step: f64| calibrate::reference(RawValue::new(f64::from(taxel.baseline) + step), taxel, knots).value > 0.0;
+    let (taxel, curve) = (&plan.calibrations[channel], plan.curve_of(channel));
+    let is_felt = |step: f64| calibrate::reference(RawValue::new(taxel.baseline + step), taxel, curve).value > 0.0;
     let Some(end) = ends.into_iter().find(|&end| is_felt(end)).filter(|_| !is_felt(0.0)) else { return 0.0 };
     let (mut still, mut felt) = (0.0, end);
     for _ in 0..32 {

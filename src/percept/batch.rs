@@ -262,6 +262,13 @@ impl Percepts {
         self.touch_ends.push(self.touches.len() as u32);
     }
 
+    /// Changes a cell's first touch.
+    #[cfg(test)]
+    pub(crate) fn change_first_touch(&mut self, cell: usize, change: impl Fn(&mut Touch)) {
+        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
+        change(&mut self.touches[start as usize]);
+    }
+
     /// All percepts of the batch's frame `frame`, in field order.
     pub fn frame(&self, frame: usize) -> impl Iterator<Item = Percept> + '_ {
         (0..self.fields).map(move |field| self.get(frame, field))

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use crate::error::Result;
 use crate::signal::{Calibration, Curve, FsrSignal, Response, TaxelCalibration, slope};
+use crate::stage::calibrate::Table;
 use crate::stage::layout;
 
 /// Curves, one after the other.
@@ -11,12 +12,14 @@ use crate::stage::layout;
 pub(crate) struct Curves {
     pub(crate) curves: Vec<layout::Curve>,
     pub(crate) knots: Vec<layout::Knot>,
+    /// The knots as the calibration has them, (raw, P).
+    written: Vec<[f64; 2]>,
     /// Taxels that respond alike share a curve.
     known: HashMap<Alike, u32>,
 }
 
 /// What makes a taxel's curve: its kind or number, then whatever else there is, as bits.
-type Alike = (usize, u8, u64, u32);
+type Alike = (usize, u8, u64, u64);
 
 impl Curves {
     /// What [`layout::Taxel::response`] says for `taxel`.
@@ -51,14 +54,16 @@ impl Curves {
         let knots = curve.knots();
         self.curves.push(layout::Curve { first: self.knots.len() as u32, count: knots.len() as u32 });
         let slopes = knots.windows(2).map(|pair| slope(pair[0], pair[1]) as f32).chain([0.0]);
+        self.written.extend_from_slice(curve.written());
         self.knots.extend(knots.iter().zip(slopes).map(|(&[raw, p], slope)| layout::Knot { raw, p, slope }));
     }
 
-    /// The knots of a taxel that responds by `response`; none for a straight line.
-    pub(crate) fn of(&self, response: u32) -> &[layout::Knot] {
+    /// The curve of a taxel that responds by `response`; without knots for a straight line.
+    pub(crate) fn of(&self, response: u32) -> Table<'_> {
         let index = response.checked_sub(layout::FIRST_CURVE).map(|index| index as usize);
-        let Some(curve) = index.map(|index| self.curves[index]) else { return &[] };
-        &self.knots[curve.first as usize..][..curve.count as usize]
+        let Some(curve) = index.map(|index| self.curves[index]) else { return Table::default() };
+        let range = curve.first as usize..(curve.first + curve.count) as usize;
+        Table { written: &self.written[range.clone()], rounded: &self.knots[range] }
     }
 }
 
@@ -77,11 +82,11 @@ mod tests {
             calibration.taxels.iter().map(|taxel| curves.response_of(&calibration, taxel, None).unwrap()).collect();
         assert_eq!(codes, [2, 3, 4, 5, 3, layout::MASKED, layout::STRAIGHT]);
         assert_eq!((curves.curves.len(), curves.knots.len()), (4, 2 * 1024 + 4));
-        assert_eq!(curves.of(4)[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
-        assert_eq!(curves.of(5).iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
-        assert!(curves.of(layout::STRAIGHT).is_empty() && curves.of(layout::MASKED).is_empty());
+        assert_eq!(curves.of(4).rounded[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
+        assert_eq!(curves.of(5).rounded.iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
+        assert!([layout::STRAIGHT, layout::MASKED].iter().all(|&response| curves.of(response).written.is_empty()));
         // The other signal is another curve.
         assert_eq!(curves.response_of(&calibration, &calibration.taxels[0], Some(FsrSignal::Raw)).unwrap(), 6);
-        assert_eq!(curves.of(6)[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
+        assert_eq!(curves.of(6).rounded[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
     }
 }

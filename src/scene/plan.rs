@@ -13,6 +13,7 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, Field, FieldSet, Lift, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, ContactThresholds, Letter, Mark, Receptor, Response, TaxelCalibration};
+use crate::stage::calibrate::Table;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::{Sums, filter, layout, touches};
 
@@ -54,6 +55,8 @@ pub struct Plan {
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
     change_threshold: f32,
+    /// Up to where changes count as 0, in P per second, as the calibration has it.
+    pub(crate) change_dead_band: f64,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
@@ -105,6 +108,8 @@ pub(crate) struct PlanField {
     pub(crate) beside: Vec<Vec<u32>>,
     /// About how far members lie apart, in the unit.
     pub(crate) spacing: f64,
+    /// Members' weights as the layout has them; empty where single precision holds each.
+    pub(crate) weights: Vec<f64>,
     /// Members' places in the unit, in double precision.
     pub(crate) places: Vec<DVec3>,
     /// Members' third coordinate in the unit.
@@ -176,6 +181,7 @@ impl Plan {
             letters: scene.letters.clone(),
             knobs: scene.knobs,
             change_threshold: scene.change_threshold as f32,
+            change_dead_band: calibration.change.dead_band,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -210,6 +216,7 @@ impl Plan {
                 divided: parents.contains(&index),
                 above: None,
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
+                weights: weights(field),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
                 unit_m,
                 thresholds: Thresholds::default(),
@@ -270,7 +277,11 @@ impl Plan {
             self.taxels[slot] = layout::Taxel { baseline, response, ..made[slot] };
             self.calibrations[channel].mask = response == layout::MASKED;
         }
-        self.calibrations[channel].baseline = baseline;
+        // One that has not moved stays as it is written.
+        let kept = &mut self.calibrations[channel].baseline;
+        if *kept as f32 != baseline {
+            *kept = baseline.into();
+        }
     }
 
     /// Per channel, whether one of its own fields is in lasting contact, where `touched` says it of each field. A taxel's
@@ -358,12 +369,17 @@ impl Plan {
     }
 
     /// Per slot that is calibrated.
-    pub(crate) fn knots_of(&self, slot: usize) -> &[layout::Knot] {
+    pub(crate) fn curve_of(&self, slot: usize) -> Table<'_> {
         self.curves.of(self.taxels[slot].response)
     }
 
     pub(crate) fn members_of(&self, field: &PlanField) -> &[layout::Member] {
         &self.members[field.first..field.first + field.count]
+    }
+
+    /// The weight of member `member` of `field`, as the layout has it.
+    pub(crate) fn weight(&self, field: &PlanField, member: usize) -> f64 {
+        field.weights.get(member).copied().unwrap_or_else(|| self.members[field.first + member].weight.into())
     }
 
     /// How many taxels' pressures percepts keep.
@@ -433,6 +449,12 @@ fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let member_of = |taxel: u32| field.members.binary_search_by_key(&(taxel as usize), |member| member.taxel).ok();
     let beside = |taxel: usize| around[taxel].iter().filter_map(|&n| member_of(n)).map(|m| m as u32).collect();
     field.members.iter().map(|member| beside(member.taxel)).collect()
+}
+
+/// Per member of `field` its weight; empty where single precision holds each.
+fn weights(field: &Field) -> Vec<f64> {
+    let weights = field.members.iter().map(|member| member.weight);
+    if weights.clone().all(|weight| f64::from(weight as f32) == weight) { Vec::new() } else { weights.collect() }
 }
 
 fn thresholds(calibration: &Calibration, field: &str, receptor: Receptor) -> Thresholds {

@@ -36,7 +36,7 @@ impl Plan {
                 continue;
             }
             first_slots.push(self.taxels.len() as u32);
-            let dead_band = calibration.change.dead_band;
+            let dead_band = calibration.change.dead_band as f32;
             self.taxels.extend((pressures as u32..).zip(&self.areas).map(|(response, &area)| layout::Taxel {
                 dead_band,
                 p_max: f32::MAX,
@@ -51,10 +51,10 @@ impl Plan {
 
 fn taxel(calibration: &TaxelCalibration, area: f64, response: u32) -> layout::Taxel {
     layout::Taxel {
-        baseline: calibration.baseline,
-        gain: calibration.gain,
-        dead_band: calibration.dead_band,
-        p_max: calibration.p_max,
+        baseline: calibration.baseline as f32,
+        gain: calibration.gain as f32,
+        dead_band: calibration.dead_band as f32,
+        p_max: calibration.p_max as f32,
         raw_low: calibration.raw_range[0],
         raw_high: calibration.raw_range[1],
         area: area as f32,

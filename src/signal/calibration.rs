@@ -25,18 +25,20 @@ pub(super) const GAINS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 /// Baselines and dead bands beyond this are beyond belief, as values are.
 pub(super) const MOST: f64 = 1.15e18;
 
-/// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 unless over the dead band.
+/// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 unless over the dead band. The constants are as
+/// they are written; backends `cpu` and `gpu` round each once to single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaxelCalibration {
     /// Raw value at rest.
-    pub baseline: f32,
+    pub baseline: f64,
     /// Pressure per raw unit; negative for a sensor that falls when pressed (`invert`).
-    pub gain: f32,
+    pub gain: f64,
     /// Pressures up to this one, in the unit of P, count as 0.
-    pub dead_band: f32,
+    pub dead_band: f64,
     /// The largest pressure the sensor is good for: kept above it, but flagged `saturated`.
-    pub p_max: f32,
-    /// The raw values the sensor can deliver: kept beyond them, but flagged `out_of_range`.
+    pub p_max: f64,
+    /// The raw values the sensor can deliver: kept beyond them, but flagged `out_of_range`. In single precision, as raw
+    /// values are: one that reads as the limit is written is at the limit.
     pub raw_range: [f32; 2],
     /// Never believe this taxel.
     pub mask: bool,
@@ -50,7 +52,7 @@ impl Default for TaxelCalibration {
             baseline: 0.0,
             gain: 1.0,
             dead_band: 0.0,
-            p_max: f32::MAX,
+            p_max: f32::MAX.into(),
             raw_range: [-f32::MAX, f32::MAX],
             mask: false,
             response: Response::Linear,
@@ -228,11 +230,11 @@ impl Calibration {
         curve.map(Some)
     }
 
-    /// How far `value` of the taxel `index` is from rest, in raw units, pressed being positive.
+    /// How far `value` of the taxel `index` is from rest, in raw units, pressed being positive. In single precision's
+    /// constants, whatever the backend: all of them are to distrust the same values.
     pub(crate) fn rise(&self, index: usize, value: f64) -> f64 {
         let taxel = &self.taxels[index];
-        let above = value - f64::from(taxel.baseline);
-        let signed = above * f64::from(taxel.gain.signum());
+        let signed = (value - f64::from(taxel.baseline as f32)) * taxel.gain.signum();
         match taxel.response {
             Response::Linear => signed,
             Response::Curve(curve) => self.curves.get(curve).map_or(0.0, |curve| curve.rise(signed)),
@@ -246,10 +248,10 @@ impl Keys {
         draft.take(self, curves, text)?;
         let taxel = &mut draft.taxel;
         let number =
-            |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f32>> {
+            |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f64>> {
                 let Some(value) = value else { return Ok(None) };
                 if fits(*value.get_ref()) {
-                    return Ok(Some(*value.get_ref() as f32));
+                    return Ok(Some(*value.get_ref()));
                 }
                 let line = line_of(text, value.span().start);
                 Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref()))

@@ -9,6 +9,8 @@ use crate::error::{Error, Result};
 pub struct Curve {
     /// (raw, P); raw strictly increasing, P all the way up or all the way down.
     knots: Vec<[f32; 2]>,
+    /// The same as they are written.
+    written: Vec<[f64; 2]>,
 }
 
 /// Which of a table's columns a flaw is in.
@@ -56,7 +58,7 @@ impl Curve {
                 return Err(Flaw { column, knot, what });
             }
         }
-        let curve = Self { knots: raw.iter().zip(p).map(|(&raw, &p)| [raw as f32, p as f32]).collect() };
+        let curve = Self::through(raw.iter().zip(p).map(|(&raw, &p)| [raw, p]).collect());
         let falls = curve.falls();
         for (knot, pair) in curve.knots.windows(2).enumerate() {
             let ([from, low], [to, high]) = (pair[0], pair[1]);
@@ -96,20 +98,28 @@ impl Curve {
             FsrSignal::Raw => circuit.logarithmic(counts),
             FsrSignal::Linear => circuit.linearised(counts, sensor.full_scale_newton),
         };
-        Self { knots: (0..=FsrCircuit::OPEN_COUNTS).map(|n| [f32::from(n), signal(n) as f32]).collect() }
+        Self::through((0..=FsrCircuit::OPEN_COUNTS).map(|n| [f64::from(n), signal(n)]).collect())
+    }
+
+    fn through(written: Vec<[f64; 2]>) -> Self {
+        Self { knots: written.iter().map(|knot| knot.map(|x| x as f32)).collect(), written }
     }
 
     /// The curve for P = |gain| · curve(±x), with the sign of `gain`.
     ///
     /// # Errors
     /// A slope would leave single precision.
-    pub(crate) fn scaled(&self, gain: f32) -> Result<Self> {
-        let mut knots: Vec<[f32; 2]> = self.knots.iter().map(|&[raw, p]| [raw, p * gain.abs()]).collect();
+    pub(crate) fn scaled(&self, gain: f64) -> Result<Self> {
+        let single = gain.abs() as f32;
+        let mut knots: Vec<[f32; 2]> = self.knots.iter().map(|&[raw, p]| [raw, p * single]).collect();
+        let mut written: Vec<[f64; 2]> = self.written.iter().map(|&[raw, p]| [raw, p * gain.abs()]).collect();
         if gain < 0.0 {
             knots.reverse();
             knots.iter_mut().for_each(|[raw, _]| *raw = -*raw);
+            written.reverse();
+            written.iter_mut().for_each(|[raw, _]| *raw = -*raw);
         }
-        let scaled = Self { knots };
+        let scaled = Self { knots, written };
         match scaled.steep() {
             None => Ok(scaled),
             Some((_, slope)) => Err(Error::failed(format!(
@@ -119,10 +129,15 @@ impl Curve {
         }
     }
 
-    /// (raw, P) of every knot, raw rising.
+    /// (raw, P) of every knot, raw rising, in single precision.
     #[must_use]
     pub fn knots(&self) -> &[[f32; 2]] {
         &self.knots
+    }
+
+    /// (raw, P) of every knot, raw rising, as it is written.
+    pub(crate) fn written(&self) -> &[[f64; 2]] {
+        &self.written
     }
 
     /// Whether the raw value falls when the sensor is pressed.
@@ -189,6 +204,10 @@ mod tests {
         let turned = curve.scaled(-1.0).unwrap();
         assert_eq!(turned.knots(), [[-30.0, 8.0], [-10.0, 1.0], [0.0, 0.0]]);
         assert_eq!((curve.rise(4.0), turned.rise(-4.0)), (4.0, 4.0));
+        // As it is written, a gain is no single-precision number.
+        let tenth = curve.scaled(-0.1).unwrap();
+        assert_eq!(tenth.written(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);
+        assert_eq!(tenth.knots(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);
         assert!(curve.scaled(1e12).is_ok() && curve.scaled(1e13).unwrap_err().to_string().contains("`gain`"));
     }
 
@@ -198,8 +217,9 @@ mod tests {
             for (signal, full_scale_newton) in [(Raw, 10.0), (Linear, 10.0), (Linear, 0.1), (Linear, 1e6)] {
                 let curve = Curve::fsr(&FsrResponse { tap, signal, full_scale_newton });
                 let column = |i: usize| curve.knots.iter().map(|knot| f64::from(knot[i])).collect::<Vec<_>>();
-                assert_eq!(Curve::new(&column(0), &column(1)).unwrap(), curve);
+                assert_eq!(Curve::new(&column(0), &column(1)).unwrap().knots, curve.knots);
                 assert!(curve.falls() && curve.knots[1023] == [1023.0, 0.0]);
+                assert_eq!(curve.written[1023], [1023.0, 0.0]);
             }
         }
         let circuit = FsrCircuit { tap: 100 };

@@ -4,15 +4,21 @@
 //! masked is left out; one under 2⁻⁶⁰ and not zero counts as 0; each puts `faulty_input` on its fields. All of these are
 //! decided by the bits, because shader compilers may assume that NaN and infinity never occur.
 //!
-//! **Curve.** Gain and sign are in the table, which is single precision's on every backend. Between two knots
+//! **Constants.** The reference takes the calibration's as they are written, in f64; `cpu` and `gpu` have each rounded once
+//! to single precision. The limits of the raw range are single precision's everywhere, as raw values are.
+//!
+//! **Curve.** Gain and sign are in the table. Between two knots
 //! c(x) = p₀ + (x − x₀) · s with s = (p₁ − p₀)/(x₁ − x₀), kept within p₀ and p₁ so that it stays monotone; before the
 //! first knot and after the last it is that knot's p. The knot is found by halving.
 //!
-//! **Bound.** Two roundings on a straight line: |δP| ≤ 2u·P; none where difference and product are single-precision
+//! **Bound.** What the constants' rounding makes of P is no estimate: P̃, the exact result with the rounded constants, is
+//! worked out beside P, and |P̃ − P| is what it is (and u² of P for f64's own rounding). To this comes what the arithmetic
+//! loses of P̃. On a straight line two roundings: 2u·P̃; none where difference and product are single-precision
 //! numbers themselves. On a curve x̂ = x(1 + δ), |δ| ≤ u, and as c is monotone it is at most
 //! max |c(x ± u|x|) − c(x)| off for that. Then s, the difference and the product round, each by u of at most
 //! |p₁ − p₀|, and the sum by u|c|: 3u|p₁ − p₀| + u|c|, over all the knots that x̂ may lie between. Nothing is lost at a
-//! knot, beyond the ends, and where each of these is a single-precision number.
+//! knot, beyond the ends, and where each of these is a single-precision number. Where P lies nearer to a threshold than the
+//! bound and the threshold's own rounding together, the choice is in doubt.
 
 use super::layout::Knot;
 use super::{SLACK, U};
@@ -37,12 +43,23 @@ pub(crate) struct Pressure {
     pub(crate) status: u32,
     /// How far a single-precision P may be off.
     pub(crate) bound: f64,
-    /// The value lies so near a threshold that single precision may decide otherwise.
+    /// It lies so near a threshold that single precision may count it where it counts as nothing, or the other way round.
     pub(crate) in_doubt: bool,
+    /// Flags of `status` that may differ.
+    pub(crate) flags_in_doubt: Flags,
 }
 
-/// What is right, in f64; `curve` is the taxel's, empty for a straight line.
-pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: &[Knot]) -> Pressure {
+/// A taxel's curve; no knots for a straight line.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Table<'a> {
+    /// (raw − baseline, P) as the calibration has them.
+    pub(crate) written: &'a [[f64; 2]],
+    /// The same in single precision.
+    pub(crate) rounded: &'a [Knot],
+}
+
+/// What is right, in f64; `curve` is the taxel's.
+pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Pressure {
     let unusable = |flag: Flags| Pressure { status: flag.bits() | UNUSABLE, ..Pressure::default() };
     if raw.is_missing() {
         return unusable(Flags::INCOMPLETE);
@@ -57,31 +74,50 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: &[Knot])
     }
     let nothing = value != 0.0 && value.abs() < TINY;
     let value = if nothing { 0.0 } else { value };
-    let above = value - f64::from(taxel.baseline);
-    let (pressure, bound) = if curve.is_empty() {
-        let pressure = above * f64::from(taxel.gain);
-        (pressure, if is_single(&[above, pressure]) { 0.0 } else { 2.0 * U * pressure.abs() })
-    } else {
-        on_curve(curve, above)
+    let above = value - taxel.baseline;
+    let pressure =
+        if curve.written.is_empty() { above * taxel.gain } else { interpolate(curve.written, |&knot| knot, above).0 };
+    let bound = bound(value, taxel, curve.rounded, pressure);
+    let near = |threshold: f64| {
+        let apart = bound + (f64::from(threshold as f32) - threshold).abs();
+        apart > 0.0 && (pressure - threshold).abs() <= apart
     };
-    if pressure.abs() > HUGE {
-        return Pressure { in_doubt: pressure.abs() - HUGE <= bound, ..unusable(Flags::FAULTY_INPUT) };
-    }
+    let near_in_size = |size: f64| near(size.copysign(pressure));
     let tiny = pressure != 0.0 && pressure.abs() < TINY;
+    let mut flags_in_doubt = Flags::empty();
+    if near_in_size(TINY) {
+        flags_in_doubt |= Flags::FAULTY_INPUT;
+    }
+    if near_in_size(HUGE) {
+        flags_in_doubt |= Flags::FAULTY_INPUT | Flags::OUT_OF_RANGE | Flags::SATURATED;
+    }
+    let in_doubt = near(taxel.dead_band) || near_in_size(TINY) || near_in_size(HUGE);
+    if near(taxel.p_max) || (in_doubt && pressure + bound > taxel.p_max) {
+        flags_in_doubt |= Flags::SATURATED;
+    }
+    if pressure.abs() > HUGE {
+        return Pressure { in_doubt, flags_in_doubt, ..unusable(Flags::FAULTY_INPUT) };
+    }
     if nothing || tiny {
         flags |= Flags::FAULTY_INPUT;
     }
-    let over = !tiny && pressure > taxel.dead_band.into();
-    if over && pressure > taxel.p_max.into() {
+    let over = !tiny && pressure > taxel.dead_band;
+    if over && pressure > taxel.p_max {
         flags |= Flags::SATURATED;
     }
-    let near = |threshold: f64| (pressure.abs() - threshold).abs() <= bound && bound > 0.0;
-    Pressure {
-        value: if over { pressure } else { 0.0 },
-        status: flags.bits(),
-        bound,
-        in_doubt: [taxel.dead_band.into(), taxel.p_max.into(), HUGE, TINY].into_iter().any(near),
-    }
+    Pressure { value: if over { pressure } else { 0.0 }, status: flags.bits(), bound, in_doubt, flags_in_doubt }
+}
+
+/// How far single precision's P, from constants that are rounded to it, may be off `pressure`.
+fn bound(value: f64, taxel: &TaxelCalibration, knots: &[Knot], pressure: f64) -> f64 {
+    let above = value - f64::from(taxel.baseline as f32);
+    let (rounded, lost) = if knots.is_empty() {
+        let rounded = above * f64::from(taxel.gain as f32);
+        (rounded, if is_single(&[above, rounded]) { 0.0 } else { 2.0 * U * rounded.abs() })
+    } else {
+        on_curve(knots, above)
+    };
+    if rounded == pressure { lost } else { lost + (rounded - pressure).abs() + U * U * pressure.abs() }
 }
 
 /// Whether all are single-precision numbers.
@@ -89,15 +125,20 @@ fn is_single(numbers: &[f64]) -> bool {
     numbers.iter().all(|&x| f64::from(x as f32) == x)
 }
 
+/// (raw, P) of a knot.
+fn of_knot(knot: &Knot) -> [f64; 2] {
+    [knot.raw.into(), knot.p.into()]
+}
+
 /// c(x), and how far single precision may be off.
 fn on_curve(knots: &[Knot], x: f64) -> (f64, f64) {
-    let (p, steps) = interpolate(knots, x);
+    let (p, steps) = interpolate(knots, of_knot, x);
     let rounding = if is_single(&[x]) { 0.0 } else { U * x.abs() };
     if rounding == 0.0 && is_single(&[steps[0], steps[1], steps[2], p]) {
         return (p, 0.0);
     }
     let ends = [x - rounding, x + rounding];
-    let around = ends.map(|x| interpolate(knots, x).0);
+    let around = ends.map(|x| interpolate(knots, of_knot, x).0);
     let off = around.map(|c| (c - p).abs());
     let [low, high] = ends.map(|x| knots.partition_point(|knot| f64::from(knot.raw) <= x));
     if high == 0 || low == knots.len() {
@@ -108,14 +149,15 @@ fn on_curve(knots: &[Knot], x: f64) -> (f64, f64) {
     (p, SLACK * (off[0].max(off[1]) + 3.0 * U * (to - from).abs() + U * size))
 }
 
-/// c(x), and on the way to it x − x₀, s and their product.
-fn interpolate(knots: &[Knot], x: f64) -> (f64, [f64; 3]) {
-    let after = knots.partition_point(|knot| f64::from(knot.raw) <= x);
-    let Some(from) = after.checked_sub(1).map(|before| knots[before]) else { return (knots[0].p.into(), [0.0; 3]) };
-    let Some(to) = knots.get(after) else { return (from.p.into(), [0.0; 3]) };
-    let [low, high] = [from.p, to.p].map(f64::from);
-    let run = x - f64::from(from.raw);
-    let slope = (high - low) / (f64::from(to.raw) - f64::from(from.raw));
+/// c(x), and on the way to it x − x₀, s and their product; `of` gives a knot's (raw, P).
+fn interpolate<K>(knots: &[K], of: impl Fn(&K) -> [f64; 2], x: f64) -> (f64, [f64; 3]) {
+    let after = knots.partition_point(|knot| of(knot)[0] <= x);
+    let Some([start, low]) = after.checked_sub(1).map(|before| of(&knots[before])) else {
+        return (of(&knots[0])[1], [0.0; 3]);
+    };
+    let Some([end, high]) = knots.get(after).map(of) else { return (low, [0.0; 3]) };
+    let run = x - start;
+    let slope = (high - low) / (end - start);
     let rise = run * slope;
     if run == 0.0 {
         return (low, [0.0; 3]);
@@ -133,7 +175,7 @@ mod tests {
     use super::*;
 
     fn of(raw: f64) -> Pressure {
-        reference(RawValue::new(raw), &TaxelCalibration::default(), &[])
+        reference(RawValue::new(raw), &TaxelCalibration::default(), Table::default())
     }
 
     #[test]
@@ -158,7 +200,7 @@ mod tests {
         for raw in [1e-19, -1e-19, 1e-45, 1e-300] {
             assert_eq!((of(raw).value, of(raw).status), (0.0, faulty), "{raw}");
         }
-        let missing = reference(RawValue::MISSING, &TaxelCalibration::default(), &[]);
+        let missing = reference(RawValue::MISSING, &TaxelCalibration::default(), Table::default());
         assert_eq!(missing.status, Flags::INCOMPLETE.bits() | UNUSABLE);
     }
 
@@ -166,24 +208,96 @@ mod tests {
     fn an_inverted_sensor_rises_when_its_value_falls() {
         let taxel =
             TaxelCalibration { baseline: 250.0, gain: -1.0, dead_band: 5.0, p_max: 200.0, ..Default::default() };
-        let at = |raw: f64| reference(RawValue::new(raw), &taxel, &[]);
+        let at = |raw: f64| reference(RawValue::new(raw), &taxel, Table::default());
         assert_eq!(at(240.0).value, 10.0);
         assert_eq!(at(246.0).value, 0.0);
         assert_eq!(at(252.0).value, 0.0);
         assert_eq!(at(30.0).status, Flags::SATURATED.bits());
     }
 
-    /// What a plan makes of `curve`.
-    fn table(curve: &[[f32; 2]]) -> Vec<Knot> {
+    /// What a plan makes of a curve.
+    struct Knots {
+        written: Vec<[f64; 2]>,
+        rounded: Vec<Knot>,
+    }
+
+    impl Knots {
+        fn table(&self) -> Table<'_> {
+            Table { written: &self.written, rounded: &self.rounded }
+        }
+    }
+
+    fn knots_of(written: &[[f64; 2]]) -> Knots {
+        let curve: Vec<[f32; 2]> = written.iter().map(|knot| knot.map(|x| x as f32)).collect();
         let slope = |i: usize| curve.get(i + 1).map_or(0.0, |&to| crate::signal::slope(curve[i], to) as f32);
-        curve.iter().enumerate().map(|(i, &[raw, p])| Knot { raw, p, slope: slope(i) }).collect()
+        let rounded = curve.iter().enumerate().map(|(i, &[raw, p])| Knot { raw, p, slope: slope(i) }).collect();
+        Knots { written: written.to_vec(), rounded }
+    }
+
+    /// What the backends compute, a rounding at a time, without a curve.
+    fn single(raw: f32, taxel: &TaxelCalibration) -> f32 {
+        let pressure = (raw - taxel.baseline as f32) * taxel.gain as f32;
+        if pressure > taxel.dead_band as f32 { pressure } else { 0.0 }
+    }
+
+    #[test]
+    fn a_gain_counts_as_it_is_written_and_its_rounding_is_in_the_bound() {
+        let taxel = TaxelCalibration { gain: 0.1, dead_band: 1.0, ..Default::default() };
+        let at = |raw: f64| reference(RawValue::new(raw), &taxel, Table::default());
+        // 0.1 · 10 is 1, which is not over 1; 0.1 in single precision is more than a tenth.
+        assert_eq!((at(10.0).value, single(10.0, &taxel)), (0.0, 0.0));
+        assert!(at(10.0).in_doubt && !at(9.0).in_doubt && !at(11.0).in_doubt);
+        for raw in 11..5000_u16 {
+            let right = at(raw.into());
+            assert_eq!(right.value, f64::from(raw) * 0.1);
+            let off = (f64::from(single(raw.into(), &taxel)) - right.value).abs();
+            // The gain's rounding by a quarter of u and two more; not a wide net either.
+            assert!(off <= right.bound && right.bound <= 3.0 * U * right.value, "{raw}: {off} {right:?}");
+        }
+        // A baseline of a tenth, and a value near it: without the constants' part the bound would not hold.
+        let taxel = TaxelCalibration { baseline: 0.1, gain: 0.7, ..Default::default() };
+        let right = reference(RawValue::new(0.1001), &taxel, Table::default());
+        let off = (f64::from(single(0.1001, &taxel)) - right.value).abs();
+        assert!(off > 2.0 * U * right.value && off <= right.bound, "{off} {right:?}");
+    }
+
+    #[test]
+    fn a_threshold_counts_as_it_is_written() {
+        let third = 1.0 / 3.0;
+        for (taxel, flags) in [
+            (TaxelCalibration { dead_band: third, ..Default::default() }, Flags::empty()),
+            (TaxelCalibration { baseline: third, ..Default::default() }, Flags::FAULTY_INPUT),
+            (TaxelCalibration { p_max: third, ..Default::default() }, Flags::SATURATED),
+        ] {
+            // The single-precision number next to a third is over it.
+            let right = reference(RawValue::new(third), &taxel, Table::default());
+            assert!(right.value > 0.0 && (right.in_doubt || taxel.p_max == third), "{taxel:?}: {right:?}");
+            assert_eq!(right.flags_in_doubt, flags, "{taxel:?}");
+            let clear = reference(RawValue::new(0.334), &taxel, Table::default());
+            assert!(!clear.in_doubt && clear.flags_in_doubt.is_empty(), "{taxel:?}: {clear:?}");
+        }
+    }
+
+    #[test]
+    fn a_curve_counts_as_it_is_written() {
+        let knots = knots_of(&[[0.1, 0.3], [0.7, 1.1], [2.3, 7.7]]);
+        let taxel = TaxelCalibration::default();
+        for raw in (1..2300_u16).map(|raw| f64::from(raw) / 1000.0) {
+            let right = reference(RawValue::new(raw), &taxel, knots.table());
+            let raw = f64::from(raw as f32);
+            let written = interpolate(&knots.written, |&knot| knot, raw).0;
+            assert_eq!(right.value, written);
+            let of_rounded = on_curve(&knots.rounded, raw);
+            let most = of_rounded.1 + (of_rounded.0 - written).abs() + U * U;
+            assert!(right.bound >= (of_rounded.0 - written).abs() && right.bound <= most, "{raw}: {right:?}");
+        }
     }
 
     #[test]
     fn a_curve_is_straight_between_knots_and_held_beyond_them() {
-        let knots = table(&[[0.0, 100.0], [16.0, 90.0], [20.0, 10.0], [255.0, 0.0]]);
+        let knots = knots_of(&[[0.0, 100.0], [16.0, 90.0], [20.0, 10.0], [255.0, 0.0]]);
         let taxel = TaxelCalibration { dead_band: 2.0, p_max: 95.0, raw_range: [0.0, 255.0], ..Default::default() };
-        let at = |raw: f64| reference(RawValue::new(raw), &taxel, &knots);
+        let at = |raw: f64| reference(RawValue::new(raw), &taxel, knots.table());
         for (raw, p) in [(16.0, 90.0), (18.0, 50.0), (20.0, 10.0), (17.0, 70.0), (8.0, 95.0)] {
             assert_eq!(at(raw), Pressure { value: p, ..Pressure::default() }, "{raw}");
         }
@@ -202,15 +316,15 @@ mod tests {
 
     #[test]
     fn what_a_difference_loses_is_in_the_bound() {
-        let knots = table(&[[-1.0, 0.0], [0.0, 10.0], [1.0, 1000.0]]);
+        let knots = knots_of(&[[-1.0, 0.0], [0.0, 10.0], [1.0, 1000.0]]);
         let taxel = TaxelCalibration { baseline: 0.1, ..Default::default() };
-        let p = reference(RawValue::new(1e-9), &taxel, &knots);
+        let p = reference(RawValue::new(1e-9), &taxel, knots.table());
         // x = −0.1 to u of itself; 10 a unit below 0.
         assert!(p.bound >= 10.0 * 0.1 * U && p.bound < 10.0 * 5.0 * U, "{p:?}");
         // Across the knot the steeper side counts.
         let taxel = TaxelCalibration { baseline: 16_777_216.0, ..Default::default() };
-        let far = table(&[[-16_777_216.0, 0.0], [-16_777_215.0, 1.0], [0.0, 2.0]]);
-        let p = reference(RawValue::new(0.75), &taxel, &far);
+        let far = knots_of(&[[-16_777_216.0, 0.0], [-16_777_215.0, 1.0], [0.0, 2.0]]);
+        let p = reference(RawValue::new(0.75), &taxel, far.table());
         assert!((p.value - 0.75).abs() < 1e-6 && p.bound > 0.25, "{p:?}");
     }
 }

@@ -51,6 +51,7 @@ mod tests {
     fn what_pressures_are_off_by_is_in_the_bounds() {
         let taxel = |u: f64, v: f64, weight: f64, pressure: f64, excess: f64| Pressed {
             weight,
+            weight_rounding: 0.0,
             pressure,
             excess,
             place: DVec3::new(u, v, 0.0),

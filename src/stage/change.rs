@@ -29,16 +29,17 @@ pub(crate) struct Heard {
 
 /// What is right, in f64: the change from `before` to `now` over `dt_s`, with its bound. `unusable` is why that time
 /// cannot be used, empty when it can.
-pub(crate) fn reference(now: Heard, before: Heard, dt_s: f64, unusable: Flags, dead_band: f32) -> Pressure {
+pub(crate) fn reference(now: Heard, before: Heard, dt_s: f64, unusable: Flags, dead_band: f64) -> Pressure {
     let (now, before, same) = (now.pressure, before.pressure, now.raw == before.raw);
     if !unusable.is_empty() {
         let status = now.status | unusable.bits() | UNUSABLE;
-        return Pressure { status, in_doubt: now.in_doubt, ..Pressure::default() };
+        return Pressure { status, flags_in_doubt: now.flags_in_doubt, ..Pressure::default() };
     }
     let status = now.status | before.status;
     let in_doubt = now.in_doubt || before.in_doubt;
+    let mut flags_in_doubt = now.flags_in_doubt | before.flags_in_doubt;
     if same || status & UNUSABLE != 0 {
-        return Pressure { status, in_doubt, ..Pressure::default() };
+        return Pressure { status, in_doubt, flags_in_doubt, ..Pressure::default() };
     }
     let change = (now.value - before.value).abs() / dt_s;
     let off = |pressure: Pressure| if pressure.value > 0.0 { pressure.bound } else { 0.0 };
@@ -46,23 +47,34 @@ pub(crate) fn reference(now: Heard, before: Heard, dt_s: f64, unusable: Flags, d
     // A division of 0 is exact; all else rounds.
     let rounding = (2.0 * U + DIVISION) * change;
     let bound = SLACK * (inexact / dt_s + rounding);
-    let near = |threshold: f64| bound > 0.0 && (change - threshold).abs() <= bound;
-    let in_doubt = in_doubt || [dead_band.into(), HUGE, TINY].into_iter().any(near);
-    if change > HUGE {
-        return Pressure { status: Flags::FAULTY_INPUT.bits() | UNUSABLE, in_doubt, ..Pressure::default() };
+    let near = |threshold: f64| {
+        let apart = bound + (f64::from(threshold as f32) - threshold).abs();
+        apart > 0.0 && (change - threshold).abs() <= apart
+    };
+    let in_doubt = in_doubt || [dead_band, HUGE, TINY].into_iter().any(near);
+    if near(HUGE) {
+        flags_in_doubt |= Flags::all();
     }
-    let over = change >= TINY && change > dead_band.into();
-    Pressure { value: if over { change } else { 0.0 }, status, bound, in_doubt }
+    if change > HUGE {
+        return Pressure {
+            status: Flags::FAULTY_INPUT.bits() | UNUSABLE,
+            in_doubt,
+            flags_in_doubt,
+            ..Pressure::default()
+        };
+    }
+    let over = change >= TINY && change > dead_band;
+    Pressure { value: if over { change } else { 0.0 }, status, bound, in_doubt, flags_in_doubt }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::signal::TaxelCalibration;
-    use crate::stage::calibrate;
+    use crate::stage::calibrate::{self, Table};
 
     fn heard(raw: RawValue, taxel: &TaxelCalibration) -> Heard {
-        Heard { raw, pressure: calibrate::reference(raw, taxel, &[]) }
+        Heard { raw, pressure: calibrate::reference(raw, taxel, Table::default()) }
     }
 
     /// From raw value `before` to `now` in `dt_s`.

@@ -25,11 +25,13 @@
 //! **Bound.** With b the sum of both centroids' bounds, a step is off by δ = b and the rounding of f64 here, and so is
 //! either measure (each is 1-Lipschitz in both places). The choice is certain where the measure keeps δ from the ends of
 //! the window. A unit vector is off by asin(δ/‖Δ‖) at most, an average by e ← (1 − share)·e + share·asin(δ/‖Δ‖), its
-//! direction by asin(e/‖h‖), a speed by δ/Δt. After a choice in doubt nothing is comparable until filtering starts anew.
+//! direction by asin(e/‖h‖), a speed by δ/Δt. After a choice in doubt the comparison goes on from what the backend's own
+//! filter remembers.
 
 use glam::DVec2;
 
 use super::layout::Still;
+use super::limit::Limit;
 use super::motion::{Centroid, SHORTEST_STEP_S};
 use super::{SLACK, U};
 use crate::percept::{Flags, Outputs};
@@ -201,15 +203,17 @@ impl Memory {
     }
 }
 
-/// How far a filter that is fed single-precision centroids may be off. `None`: not compared.
+/// How far a filter that is fed single-precision centroids may be off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FilterBound {
     /// Flags that may differ.
     pub(crate) in_doubt: Flags,
     /// As a distance, m.
-    pub(crate) displacement: Option<f64>,
-    pub(crate) direction: Option<f64>,
-    pub(crate) speed: Option<f64>,
+    pub(crate) displacement: Limit,
+    pub(crate) direction: Limit,
+    pub(crate) speed: Limit,
+    /// Whether another centroid may be the last that counted from now on.
+    pub(crate) may_remember: bool,
 }
 
 /// What the bound of a field's next frame hangs on.
@@ -220,14 +224,17 @@ pub(crate) struct Doubt {
     anchor: f64,
     /// The same for the average.
     heading: f64,
-    /// Whether the other filter may remember another centroid.
-    lost: bool,
 }
 
 impl Doubt {
-    /// Of a field of which not even contact is certain.
-    pub(crate) fn of_contact() -> Self {
-        Self { lost: true, ..Self::default() }
+    /// After a frame that left `memory` for certain.
+    pub(crate) fn after(memory: &Memory) -> Self {
+        Self { right: *memory, ..Self::default() }
+    }
+
+    /// Forgets the contact that has ended.
+    pub(crate) fn release(&mut self) {
+        *self = Self::default();
     }
 
     /// The bounds of the next frame of a contact, whose centroid is off by up to `place_bound` (m).
@@ -240,49 +247,35 @@ impl Doubt {
     ) -> FilterBound {
         let before = *self;
         self.right.follow(settings, clock, centroid);
-        let fresh = Self { right: self.right, anchor: place_bound, heading: 0.0, lost: false };
+        let fresh = Self { right: self.right, anchor: place_bound, heading: 0.0 };
         let mut bound = FilterBound::default();
-        if before.lost {
-            if before.right.anchor.is_none() {
-                // Whether the other was in contact is not known either.
-                bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT;
-            }
-            if clock == Clock::Broken {
-                // Wherever the other was, it starts here too.
-                *self = fresh;
-            } else {
-                *self = Self { lost: true, ..fresh };
-                bound.in_doubt |= Flags::HELD | Flags::JUMPED | Flags::STILL;
-            }
-            return bound;
-        }
-        let from = match (before.right.anchor, clock) {
+        let (from, dt_s) = match (before.right.anchor, clock) {
             (None, _) | (Some(_), Clock::Broken) => {
                 *self = fresh;
                 return bound;
             }
             (Some(_), Clock::Stands) => return self.directed(bound),
-            (Some(from), Clock::Runs(_)) => from,
+            (Some(from), Clock::Runs(dt_s)) => (from, dt_s),
         };
         let step = centroid.place - from.place;
         // Beside f32's error, a few roundings of f64 on both sides.
         let moved = SLACK * (before.anchor + place_bound + U * U * (centroid.place.length() + from.place.length()));
         let (choice, in_doubt) = settings.judge(from, centroid, moved);
         if in_doubt {
-            *self = Self { lost: true, ..fresh };
-            bound.in_doubt |= Flags::HELD | Flags::JUMPED | Flags::STILL;
-            return bound;
+            let in_doubt = Flags::HELD | Flags::JUMPED | Flags::STILL;
+            let near = Limit::TooClose;
+            return FilterBound { in_doubt, displacement: near, direction: near, speed: near, may_remember: true };
         }
         match choice {
             Choice::Held => {}
             Choice::Jumped => *self = fresh,
             Choice::Counts => {
-                let since_s = before.right.since_s + if let Clock::Runs(dt_s) = clock { dt_s } else { 0.0 };
+                let since_s = before.right.since_s + dt_s;
                 let share = Memory { since_s, ..before.right }.share(settings);
                 let turned = (moved / step.length()).min(1.0).asin() + U * U;
                 *self = Self { heading: before.heading + share * (turned - before.heading), ..fresh };
-                bound.displacement = Some(moved);
-                bound.speed = Some((moved + U * U * step.length()) / since_s);
+                bound.displacement = Limit::Within(moved);
+                bound.speed = Limit::Within((moved + U * U * step.length()) / since_s);
             }
         }
         self.directed(bound)
@@ -292,10 +285,10 @@ impl Doubt {
     fn directed(&self, mut bound: FilterBound) -> FilterBound {
         if let Some(length) = self.right.heading.map(DVec2::length) {
             let near = (length - LEAST_HEADING).abs() <= self.heading;
+            let angle = (self.heading < 0.5 * length).then(|| (self.heading / length).asin() + U * U);
+            bound.direction = Limit::of(angle, length > LEAST_HEADING, near);
             if near {
                 bound.in_doubt |= Flags::STILL;
-            } else if length > LEAST_HEADING && self.heading < 0.5 * length {
-                bound.direction = Some((self.heading / length).asin() + U * U);
             }
         }
         bound
@@ -466,15 +459,22 @@ mod tests {
                 return Err(format!("{:?} {:?}", a.flags, b.flags));
             }
             doubted += u32::from(!bound.in_doubt.is_empty());
+            if bound.may_remember {
+                (right, doubt) = (other, Doubt::after(&other));
+            }
             let apart = (a.displacement - b.displacement).length();
             let turned = super::super::angle::between_directions(a.direction, b.direction);
             let faster = (a.speed - b.speed).abs();
-            for (error, limit) in [(apart, bound.displacement), (turned, bound.direction), (faster, bound.speed)] {
-                let Some(limit) = limit else { continue };
-                if a.present != b.present || error > limit {
+            for (error, limit, output) in [
+                (apart, bound.displacement, Outputs::FILTERED_DISPLACEMENT),
+                (turned, bound.direction, Outputs::FILTERED_DIRECTION),
+                (faster, bound.speed, Outputs::FILTERED_SPEED),
+            ] {
+                let Limit::Within(limit) = limit else { continue };
+                if (a.present ^ b.present).contains(output) || error > limit {
                     return Err(format!("{error} over {limit}"));
                 }
-                compared += 1;
+                compared += u32::from(a.present.contains(output));
             }
         }
         Ok([compared, doubted])

@@ -5,35 +5,35 @@
 //!
 //! A field that is pressed and not in contact keeps its sums, and loses what needs a touch.
 //!
-//! **Bound.** S carries the bound of its sum. A decision whose margin is below that is in doubt, and so is every later
-//! one that hangs on it: until S leaves the band between the thresholds.
+//! **Bound.** S carries the bound of its sum, and the threshold its rounding to single precision. A decision whose margin
+//! is below these is in doubt. What hangs on it in the next frame is compared from the state that the backend took.
 
 /// The sums at which a field's contact begins and ends, in the unit of S.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Thresholds {
-    pub(crate) on: f32,
-    pub(crate) off: f32,
+    pub(crate) on: f64,
+    pub(crate) off: f64,
 }
 
-/// Contact, and whether single precision might see it otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct ContactState {
-    pub(crate) contact: bool,
-    pub(crate) in_doubt: bool,
+impl Thresholds {
+    /// On and off, as single precision has them.
+    pub(crate) fn rounded(self) -> [f32; 2] {
+        [self.on as f32, self.off as f32]
+    }
 }
 
 /// What is right, in f64: contact given S, and whether there was contact before.
 pub(crate) fn reference(total: f64, thresholds: Thresholds, before: bool) -> bool {
-    total > f64::from(thresholds.on) || (before && total > f64::from(thresholds.off))
+    total > thresholds.on || (before && total > thresholds.off)
 }
 
-/// The next state, with the doubt that a sum off by up to `bound` leaves.
-pub(crate) fn doubt(total: f64, bound: f64, thresholds: Thresholds, before: ContactState) -> ContactState {
-    let contact = reference(total, thresholds, before.contact);
-    let near = |threshold: f32| threshold > 0.0 && (total - f64::from(threshold)).abs() <= bound;
-    let between = total > f64::from(thresholds.off) && total <= f64::from(thresholds.on);
-    let in_doubt = near(thresholds.on) || near(thresholds.off) || (between && before.in_doubt);
-    ContactState { contact, in_doubt }
+/// Whether single precision may see contact otherwise, given a sum that is off by up to `bound` and contact before.
+pub(crate) fn in_doubt(total: f64, bound: f64, thresholds: Thresholds, before: bool) -> bool {
+    let near = |threshold: f64| {
+        let apart = bound + (f64::from(threshold as f32) - threshold).abs();
+        threshold > 0.0 && (total - threshold).abs() <= apart
+    };
+    near(if before { thresholds.off } else { thresholds.on })
 }
 
 #[cfg(test)]
@@ -43,24 +43,24 @@ mod tests {
     #[test]
     fn contact_ends_lower_than_it_begins() {
         let thresholds = Thresholds { on: 10.0, off: 4.0 };
-        let mut state = ContactState::default();
-        let mut seen = Vec::new();
-        for total in [0.0, 9.0, 10.0, 11.0, 7.0, 5.0, 4.0, 5.0, 0.0] {
-            state = doubt(total, 0.0, thresholds, state);
-            seen.push(state.contact);
-        }
+        let mut contact = false;
+        let seen = [0.0, 9.0, 10.0, 11.0, 7.0, 5.0, 4.0, 5.0, 0.0].map(|total| {
+            contact = reference(total, thresholds, contact);
+            contact
+        });
         assert_eq!(seen, [false, false, false, true, true, true, false, false, false]);
     }
 
     #[test]
-    fn doubt_lasts_until_the_sum_leaves_the_band() {
+    fn only_the_threshold_that_counts_is_in_doubt() {
         let thresholds = Thresholds { on: 10.0, off: 4.0 };
-        let mut state = ContactState::default();
-        let mut seen = Vec::new();
-        for total in [10.1, 7.0, 7.0, 12.0, 7.0, 3.0] {
-            state = doubt(total, 0.2, thresholds, state);
-            seen.push(state.in_doubt);
-        }
-        assert_eq!(seen, [true, true, true, false, false, false]);
+        let doubts = |total, before| in_doubt(total, 0.2, thresholds, before);
+        assert_eq!([9.7, 9.9, 10.2, 4.1].map(|total| doubts(total, false)), [false, true, true, false]);
+        assert_eq!([9.9, 4.3, 4.1, 3.9].map(|total| doubts(total, true)), [false, false, true, true]);
+        // A threshold that single precision has not: what lies between the two is over one of them.
+        let third = Thresholds { on: 1.0 / 3.0, off: 0.0 };
+        assert!(in_doubt((1.0_f32 / 3.0).into(), 0.0, third, false) && !in_doubt(0.333, 0.0, third, false));
+        // Without thresholds contact is that a taxel is pressed.
+        assert!(!in_doubt(0.0, 1.0, Thresholds::default(), false));
     }
 }

@@ -18,6 +18,7 @@ pub(crate) mod contact;
 pub(crate) mod filter;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;
+pub(crate) mod limit;
 pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
@@ -72,6 +73,8 @@ impl Sums {
 pub(crate) struct Pressed {
     /// w > 0.
     pub(crate) weight: f64,
+    /// By how much single precision's w is off.
+    pub(crate) weight_rounding: f64,
     /// P > 0.
     pub(crate) pressure: f64,
     /// By how much more than 2u·P single precision's P may be off, in the unit of P: what a curve loses.
@@ -88,8 +91,8 @@ impl Pressed {
         self.weight * self.pressure
     }
 
-    /// How far that may be off for the excess.
+    /// How far that may be off for the excess, and for the rounding of the weight.
     pub(crate) fn pull_excess(&self) -> f64 {
-        self.weight * self.excess
+        self.weight * self.excess + self.weight_rounding * (self.pressure + self.excess)
     }
 }

@@ -81,7 +81,7 @@ pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2)
         let taxel = &pressed[*index];
         let x = taxel.place.truncate();
         let q = taxel.pull() / total;
-        let share = 9.0 * U + (taxel.excess / taxel.pressure + lost) / (1.0 - lost);
+        let share = 9.0 * U + (taxel.pull_excess() / taxel.pull() + lost) / (1.0 - lost);
         SLACK * (q * (centroid_bound.length() + U * x.length() + share * x.distance(centroid)) + 2.2e-19)
     };
     let far = |point: &(usize, DVec2)| point.1.length();

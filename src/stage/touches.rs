@@ -12,11 +12,14 @@
 //! This stage is the host's, in f64, on every backend: which taxels connect is a search, not a sum, and it is made only
 //! where it is asked for. The pressures are the backend's own.
 //!
-//! **Bound.** Which taxels are pressed is the same on every backend, and so are the touches. A total carries its pressures'
-//! 2u; a mean 2u above and below of places that lie within the unit. Where a pressure may be off by ε more than 2u, with r
-//! the largest ε/P, a total is off by r of itself more, and a mean by at most r/(1 − r) of the 2 that places lie apart. From
-//! then on identities are certain only while there is one touch and there was no more than one, not as far apart as a
-//! touch may leap.
+//! **Bound.** Where it is certain which taxels are pressed, it is certain which touches there are. A total carries its
+//! pressures' 2u; a mean 2u above and below of places that lie within the unit. Where a pull wP may be off by ε more than
+//! 2u of itself, with r the largest ε/wP, a total is off by r of itself more, and a mean by at most r/(1 − r) of the 2 that
+//! places lie apart.
+//!
+//! Identities are certain while every choice between claims is. With e the whole error of a pull, Σ min(P, P′) is off by
+//! Σ max(e, e′) at most and a mean by Σ e‖x − c‖/(S − Σ e). In doubt are two claims of one touch that differ by less than
+//! both their errors, and a leap that is as near to the farthest one. Where pulls are not off at all nothing is.
 
 use glam::DVec3;
 
@@ -29,49 +32,63 @@ const LEAP: f64 = 3.0;
 const BOUND: f64 = SLACK * 4.0 * U;
 
 /// How far a single-precision touch may be off.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TouchBound {
     /// Relatively.
     pub(crate) total: f64,
     /// Per coordinate, as a length.
     pub(crate) place: f64,
+    /// As a distance on the surface.
+    pub(crate) position: f64,
 }
 
-/// The bound, in the unit, of touches whose pressures are off by up to `lost` of themselves more than 2u.
+/// The bound, in the unit, of touches whose pulls are off by up to `lost` of themselves more than 2u. How far that is on the
+/// surface is the field's to say.
 pub(crate) fn bound(lost: f64) -> TouchBound {
     let moved = if lost < 0.5 { 2.0 * lost / (1.0 - lost) } else { 2.0 };
-    TouchBound { total: BOUND + SLACK * lost, place: BOUND + SLACK * moved }
+    TouchBound { total: 0.5 * BOUND + SLACK * lost, place: BOUND + SLACK * moved, position: 0.0 }
 }
 
 /// What the doubt about a field's identities hangs on.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Doubt {
-    /// Whether identities have been in doubt since the start.
-    pub(crate) in_doubt: bool,
-    /// Touches in the frame before, the field's mean place then, and how far its pressures may have been off.
-    before: (usize, DVec3, f64),
+    right: Memory,
+    /// By member, how far the pulls that are remembered may be off; empty where they are not.
+    off: Vec<f64>,
 }
 
 impl Doubt {
-    /// No identity is certain any more.
-    pub(crate) const FOR_GOOD: Self = Self { in_doubt: true, before: (0, DVec3::ZERO, 0.0) };
-
-    /// The doubt after a frame without contact.
-    pub(crate) fn release(self) -> Self {
-        Self { in_doubt: self.in_doubt, before: (0, DVec3::ZERO, 0.0) }
+    /// After a frame that left `memory` for certain.
+    pub(crate) fn after(memory: &Memory) -> Self {
+        Self { right: memory.clone(), off: Vec::new() }
     }
 
-    /// The doubt after a frame of `pulls`, wP by member, each off by up to `lost` of itself more than 2u.
-    pub(crate) fn after(self, skin: &Skin<'_>, pulls: &[f64], place: DVec3, lost: f64) -> Self {
-        let count = components(skin.beside, pulls).len();
-        let (count_before, place_before, lost_before) = self.before;
-        let leap = (place.distance(place_before) - LEAP * skin.spacing).abs();
-        // Per coordinate, of which there are three.
-        let near_the_limit = count_before > 0 && leap <= 2.0 * (bound(lost).place + bound(lost_before).place);
-        let doubtful = count > 1 || count_before > 1 || near_the_limit;
-        let in_doubt = self.in_doubt || (lost.max(lost_before) > 0.0 && doubtful);
-        Self { in_doubt, before: (count, place, lost) }
+    /// After a frame without contact.
+    pub(crate) fn release(&mut self) {
+        self.right.release();
+        self.off.clear();
     }
+
+    /// Takes the next frame, of `pulls` by member that may each be `off`: whether its touches may have other identities.
+    pub(crate) fn follow(&mut self, skin: &Skin<'_>, pulls: &[f64], off: Vec<f64>) -> bool {
+        let found = found(skin, pulls);
+        let in_doubt = self.right.is_close(&found, skin, &off, &self.off);
+        self.right.follow(skin, pulls);
+        self.off = off;
+        in_doubt
+    }
+}
+
+/// How far the mean place of `touch` may be off for pulls that are `off`.
+fn place_off(touch: &Found, skin: &Skin<'_>, off: &[f64]) -> f64 {
+    let off_of = |member: u32| off.get(member as usize).copied().unwrap_or_default();
+    let whole: f64 = touch.members.iter().map(|&(member, _)| off_of(member)).sum();
+    if whole == 0.0 {
+        return 0.0;
+    }
+    let moment: f64 =
+        touch.members.iter().map(|&(m, _)| off_of(m) * skin.places[m as usize].distance(touch.place)).sum();
+    if whole < touch.total { SLACK * moment / (touch.total - whole) + U * U } else { f64::INFINITY }
 }
 
 /// One touch of a field in one frame.
@@ -113,18 +130,45 @@ impl Memory {
 
     /// The touches of a frame, the oldest first; `pulls` is wP by member, 0 where it is not pressed.
     pub(crate) fn follow(&mut self, skin: &Skin<'_>, pulls: &[f64]) -> &[Found] {
-        let mut found: Vec<Found> = components(skin.beside, pulls)
-            .into_iter()
-            .map(|members| {
-                let total: f64 = members.iter().map(|(_, pull)| pull).sum();
-                let moment: DVec3 = members.iter().map(|&(m, pull)| pull * skin.places[m as usize]).sum();
-                Found { id: 0, total, active: members.len() as u32, place: moment / total, members }
-            })
-            .collect();
+        let mut found = found(skin, pulls);
         self.name(&mut found, LEAP * skin.spacing);
         found.sort_by_key(|touch| touch.id);
         self.before = found;
         &self.before
+    }
+
+    /// Whether the touches in `found` may continue others, if their pulls are `off` and those before `off_before`.
+    fn is_close(&self, found: &[Found], skin: &Skin<'_>, off: &[f64], off_before: &[f64]) -> bool {
+        let reach = LEAP * skin.spacing;
+        // (claim, how far it may be off, old, new)
+        let mut claims: Vec<(f64, f64, usize, usize)> = Vec::new();
+        let places_off = |touches: &[Found], off: &[f64]| -> Vec<f64> {
+            touches.iter().map(|touch| place_off(touch, skin, off)).collect()
+        };
+        let (place_off, place_off_before) = (places_off(found, off), places_off(&self.before, off_before));
+        let off_of = |off: &[f64], member: u32| off.get(member as usize).copied().unwrap_or_default();
+        for (new, touch) in found.iter().enumerate() {
+            for (old, before) in self.before.iter().enumerate() {
+                let most = |member: u32| off_of(off, member).max(off_of(off_before, member));
+                let shared_off = both(&touch.members, &before.members, |member, _, _| most(member));
+                let shared = shared(&touch.members, &before.members);
+                let apart = touch.place.distance(before.place);
+                let apart_off = place_off[new] + place_off_before[old];
+                if shared > 0.0 {
+                    claims.push((shared, shared_off, old, new));
+                } else if apart_off > 0.0 && (apart - reach).abs() <= apart_off {
+                    return true;
+                } else if apart <= reach {
+                    claims.push((-apart, apart_off, old, new));
+                }
+            }
+        }
+        claims.iter().enumerate().any(|(index, a)| {
+            claims[index + 1..].iter().any(|b| {
+                let (apart, off) = ((a.0 - b.0).abs(), SLACK * (a.1 + b.1));
+                (a.2 == b.2 || a.3 == b.3) && off > 0.0 && apart <= off
+            })
+        })
     }
 
     /// Gives every touch in `found` its identity.
@@ -158,15 +202,30 @@ impl Memory {
     }
 }
 
+/// The touches of a frame, still without identities.
+fn found(skin: &Skin<'_>, pulls: &[f64]) -> Vec<Found> {
+    let touch = |members: Vec<(u32, f64)>| {
+        let total: f64 = members.iter().map(|(_, pull)| pull).sum();
+        let moment: DVec3 = members.iter().map(|&(m, pull)| pull * skin.places[m as usize]).sum();
+        Found { id: 0, total, active: members.len() as u32, place: moment / total, members }
+    };
+    components(skin.beside, pulls).into_iter().map(touch).collect()
+}
+
 /// Σ min(a, b) over the members in both; both ascend.
 fn shared(a: &[(u32, f64)], b: &[(u32, f64)]) -> f64 {
+    both(a, b, |_, a, b| a.min(b))
+}
+
+/// The sum of `what` over the members in both, each with its pulls; both ascend.
+fn both(a: &[(u32, f64)], b: &[(u32, f64)], what: impl Fn(u32, f64, f64) -> f64) -> f64 {
     let (mut i, mut j, mut sum) = (0, 0, 0.0);
     while i < a.len() && j < b.len() {
         match a[i].0.cmp(&b[j].0) {
             std::cmp::Ordering::Less => i += 1,
             std::cmp::Ordering::Greater => j += 1,
             std::cmp::Ordering::Equal => {
-                sum += a[i].1.min(b[j].1);
+                sum += what(a[i].0, a[i].1, b[j].1);
                 (i, j) = (i + 1, j + 1);
             }
         }
@@ -242,5 +301,33 @@ mod tests {
         assert_eq!(row.press([0, 0, 1, 1, 1, 3, 3, 0, 0, 0]), [(1, 9.0, 4.666_666_666_666_667)]);
         assert_eq!(row.press([0, 0, 1, 1, 0, 3, 3, 0, 0, 0]), [(1, 6.0, 5.5), (2, 2.0, 2.5)]);
         assert_eq!(row.press([0, 0, 1, 1, 1, 3, 3, 0, 0, 0]), [(1, 9.0, 4.666_666_666_666_667)]);
+    }
+
+    #[test]
+    fn identities_are_in_doubt_where_two_claims_are_as_good_as_equal_and_nowhere_else() {
+        let row = Row::new();
+        let skin = Skin { places: &row.places, beside: &row.beside, spacing: 1.0 };
+        // Of frames one after the other, whether the last one's identities are in doubt.
+        let doubt = |frames: &[[f64; 10]], off: f64| {
+            let mut doubt = Doubt::default();
+            frames.iter().map(|pulls| doubt.follow(&skin, pulls, pulls.map(|pull| off * pull).to_vec())).last().unwrap()
+        };
+        // One touch of five splits into two that share as much with it, or nearly.
+        let split = |right: f64| [[1.0; 10], [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, right]];
+        assert!(doubt(&split(1.0), 1e-7) && doubt(&split(0.9999999), 1e-7) && !doubt(&split(0.99), 1e-7));
+        // Where nothing is off the tie is decided alike.
+        assert!(!doubt(&split(1.0), 0.0));
+        // Two touches that stay where they are do not compete.
+        let two = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        assert!(!doubt(&[two, two], 1e-7));
+        // A leap of three spacings is the farthest that there is: by a taxel's place alone it is certain, by the mean of two
+        // not.
+        let at = |a: usize, b: usize| std::array::from_fn(|i| if i == a || i == b { 1.0 } else { 0.0 });
+        assert!(!doubt(&[at(0, 0), at(4, 4)], 1e-7) && doubt(&[at(0, 1), at(3, 4)], 1e-7));
+        assert!(!doubt(&[at(0, 1), at(3, 4)], 0.0));
+        // From a state that is certain the next frame is again.
+        let mut memory = Memory::default();
+        memory.follow(&skin, &two);
+        assert!(!Doubt::after(&memory).follow(&skin, &two, two.map(|pull| 1e-7 * pull).to_vec()));
     }
 }

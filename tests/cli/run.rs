@@ -142,9 +142,47 @@ fn verify_reports_how_the_backend_compares() {
     let output = output(&["run", "--backend", "cpu", "--verify"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let report = stderr(&output);
-    assert!(report.contains("backend cpu agrees with the reference in 3640 of 3640 percepts"), "{report}");
+    let verdict = report.lines().find(|line| line.starts_with("backend cpu agrees with the reference: of ")).unwrap();
+    assert!(verdict.contains(" in 3640 percepts, ") && verdict.ends_with(" not compared"), "{report}");
     assert!(report.contains("orientation"), "{report}");
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 280);
+}
+
+#[test]
+fn a_dead_band_on_a_value_is_too_close_to_call_and_said_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // A tenth of 10 is 1, which is not over 1. A gain that is rounded to single precision is more than a tenth.
+    std::fs::write(at("ten.csv"), "t,0,1,2,3,4,5,6,7,8\n0,10,10,10,10,10,10,10,10,10\n").unwrap();
+    std::fs::write(at("tenth.toml"), "[all]\ngain = 0.1\ndead_band = 1\n").unwrap();
+    let run = |backend: &str, more: &[&str]| {
+        let (source, calibration) = (at("ten.csv"), at("tenth.toml"));
+        let given = ["run", "--body", "hand", "--source", &source, "--calibration", &calibration, "--all-fields"];
+        output(&[&given[..], &["--fields", "hand/palm", "--backend", backend], more].concat())
+    };
+    let (reference, cpu) = (run("reference", &[]), run("cpu", &["--verify"]));
+    assert_eq!((reference.status.code(), cpu.status.code()), (Some(0), Some(0)), "{}", stderr(&cpu));
+    for output in [&reference, &cpu] {
+        assert!(String::from_utf8_lossy(&output.stdout).contains("no_contact"), "{output:?}");
+    }
+    let report = stderr(&cpu);
+    let verdict = report.lines().find(|line| line.starts_with("backend cpu ")).unwrap();
+    // Of the percept's values its flags, contact and sums are all that there are.
+    assert_eq!(
+        verdict,
+        "backend cpu could not be compared with the reference: of 6 values in 1 percept, 0 agreeing, 0 different, 6 too \
+         close to call, 0 not compared"
+    );
+}
+
+#[test]
+fn the_reference_is_not_compared_with_itself() {
+    for given in [&["--backend", "reference"][..], &["--arithmetic", "double"]] {
+        let output = output(&[&["run", "--verify"], given].concat());
+        assert_eq!(output.status.code(), Some(2), "{given:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("--verify would compare the reference with itself"), "{}", stderr(&output));
+        assert!(output.stdout.is_empty());
+    }
 }
 
 #[test]

@@ -180,26 +180,28 @@ fn a_field_of_one_taxel_and_one_without_a_chart_have_no_filtered_motion() {
 }
 
 #[test]
-fn a_choice_too_close_to_call_is_counted_until_filtering_starts_anew() {
+fn a_choice_too_close_to_call_is_counted_and_the_comparison_goes_on_after_it() {
     // A third is no binary fraction: on the very end of the window, f32 may take it either way.
     let low = 1.0 / 3.0;
     let step = |t_s: f64, part: f64| frame(t_s, &[part, 0.0, 0.0, 0.0, 3.0 - part]);
     let mut frames = vec![step(0.0, 0.0), step(0.1, 1.0), step(0.2, 2.5), frame(0.3, &[0.0; 5])];
     frames.extend([step(0.4, 0.0), step(0.5, 2.0)]);
     for (run, agreement) in runs(filter(low, 3.0, 0.1), "", &frames) {
-        assert_eq!(agreement.undecided_flags, 2, "{agreement}");
+        // The one choice; the step after it is from where the backend's own filter was then.
+        assert_eq!(agreement.quantities["flags"].too_close, 1, "{agreement}");
         let direction = agreement.quantities["filtered_direction"];
-        assert!(direction.undecided >= 1 && direction.compared == 1, "{agreement}");
+        assert_eq!((direction.compared, direction.agreeing), (2, 2), "{agreement}");
         assert!(near(run[5].filtered_direction, 0.0));
     }
     // Clear of the end nothing is in doubt.
     for (_, agreement) in runs(filter(0.3, 3.0, 0.1), "", &frames) {
-        assert_eq!((agreement.undecided_flags, agreement.quantities["filtered_direction"].compared), (0, 3));
+        let close = agreement.quantities["flags"].too_close;
+        assert_eq!((close, agreement.quantities["filtered_direction"].compared), (0, 3));
     }
 }
 
 #[test]
-fn doubt_about_contact_is_doubt_about_the_filter_until_it_starts_anew() {
+fn doubt_about_contact_is_doubt_about_the_filter_in_that_frame_alone() {
     // 0.1 + 0.2 is over 0.3 in one precision and not in the other; 64 is far above.
     let frames = [
         frame(0.0, &[0.1, 0.2, 0.0, 0.0, 0.0]),
@@ -210,8 +212,9 @@ fn doubt_about_contact_is_doubt_about_the_filter_until_it_starts_anew() {
         at(0.5, 0.5, 0.0),
     ];
     for (run, agreement) in runs(filter(0.1, 0.9, 0.0), "[contact]\non = 0.3\noff = 0.3", &frames) {
-        assert_eq!(agreement.undecided_flags, 3, "{agreement}");
-        assert_eq!(agreement.quantities["filtered_speed"].compared, 1, "{agreement}");
+        assert_eq!(agreement.quantities["flags"].too_close, 1, "{agreement}");
+        let speed = agreement.quantities["filtered_speed"];
+        assert!(speed.compared >= 2 && speed.too_close == 0, "{agreement}");
         assert!(near(run[5].filtered_speed, 3.0));
     }
 }
@@ -233,7 +236,7 @@ fn over_the_bundled_touch_every_backend_agrees_and_few_choices_are_close() {
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
         assert!(agreement.holds(), "{backend:?}: {agreement}");
         let direction = agreement.quantities["filtered_direction"];
-        assert!(direction.compared > 300 && direction.undecided == 0, "{agreement}");
+        assert!(direction.compared > 300 && direction.too_close == 0, "{agreement}");
         assert!(
             backend == BackendKind::Reference || direction.worst_error > 0.0,
             "one compared with itself: {agreement}"

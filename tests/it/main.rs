@@ -37,5 +37,6 @@ mod skips;
 mod touch;
 mod upkeep;
 mod validator;
+mod verify;
 mod wire;
 mod worst;

@@ -399,7 +399,7 @@ fn with_care<S: Simd>(
         for lane in 0..width::<S>() {
             let slot = first + at + lane;
             if tile.response[at + lane] >= FIRST_CURVE {
-                pressure[lane] = on_curve(plan.knots_of(slot), above[lane]);
+                pressure[lane] = on_curve(plan.curve_of(slot).rounded, above[lane]);
             }
         }
     }

@@ -22,7 +22,8 @@ pub(super) fn scan(plan: &Plan, frames: usize, cells: &mut CellsMut<'_>, touched
         for (index, (field, touched)) in plan.fields.iter().zip(touched.iter_mut()).enumerate() {
             let cell = frame * fields + index;
             let total = cells.total[cell];
-            *touched = total > field.thresholds.on || (*touched && total > field.thresholds.off);
+            let [on, off] = field.thresholds.rounded();
+            *touched = total > on || (*touched && total > off);
             if !*touched {
                 cells.flags[cell] = (cells.flags[cell] & KEPT) | Flags::NO_CONTACT;
                 cells.present[cell] &= SUMS;

@@ -206,7 +206,7 @@ impl Gpu {
         let careful = (replaced, careful);
         stages.extend(over_fields(direct));
         if wanted.hysteresis {
-            let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| [f.thresholds.on, f.thresholds.off]).collect();
+            let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| f.thresholds.rounded()).collect();
             let buffers = [&batch, &table(&device, "thresholds", &thresholds), &results, &touched];
             let told = columns.of_hysteresis();
             stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));

@@ -126,10 +126,15 @@ impl Bill {
             "stages": self.stages.iter().map(stage).collect::<Vec<_>>(),
         });
         if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
-            let errors = agreement.quantities.iter().map(|(name, of)| (name.clone(), of.worst_error.into()));
+            // What is counted or chosen has no error to speak of.
+            let measured = agreement
+                .quantities
+                .iter()
+                .filter(|(name, _)| !["flags", "contact", "active"].contains(&name.as_str()));
+            let errors = measured.map(|(name, of)| (name.clone(), of.worst_error.into()));
             bill["worst_errors"] = Value::Object(errors.collect());
-            let left_out = agreement.quantities.iter().filter(|(_, of)| of.undecided > 0);
-            bill["left_out"] = left_out.map(|(name, of)| (name.clone(), of.undecided)).collect();
+            let left_out = agreement.quantities.iter().filter(|(_, of)| of.too_close > 0);
+            bill["left_out"] = left_out.map(|(name, of)| (name.clone(), of.too_close)).collect();
             bill["agrees"] = agreement.holds().into();
         }
         bill
@@ -144,14 +149,14 @@ fn rounded(us: f64) -> f64 {
 fn accuracy(agreement: &Agreement) -> String {
     let mut words = Vec::new();
     for name in ["centroid", "orientation", "axis", "direction"] {
-        let Some(of) = agreement.quantities.get(name).filter(|of| of.compared + of.undecided > 0) else { continue };
+        let Some(of) = agreement.quantities.get(name).filter(|of| of.compared + of.too_close > 0) else { continue };
         let within = match name {
             _ if of.compared == 0 => String::new(),
             "centroid" => format!(" within {:.1e} mm", of.worst_error * 1e3),
             _ => format!(" within {:.1e}°", of.worst_error.to_degrees()),
         };
         // There both answers are right.
-        let left_out = match (of.undecided, name) {
+        let left_out = match (of.too_close, name) {
             (0, _) => String::new(),
             (ties, "orientation") => format!(" ({} left out)", count(ties, "tie")),
             (undecided, _) => format!(" ({undecided} left out, too close to call)"),

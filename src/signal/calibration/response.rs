@@ -200,11 +200,11 @@ impl Draft {
     fn check_baseline(&self) -> Result<()> {
         let Some(line) = self.baseline_line else { return Ok(()) };
         let TaxelCalibration { baseline, gain, p_max, raw_range: [low, high], .. } = self.taxel;
-        let what = if self.range_given && gain > 0.0 && baseline >= high {
+        let what = if self.range_given && gain > 0.0 && baseline >= high.into() {
             format!("`baseline` is {baseline}, and `raw_range` ends at {high}: no reading is above it")
-        } else if self.range_given && gain < 0.0 && baseline <= low {
+        } else if self.range_given && gain < 0.0 && baseline <= low.into() {
             format!("`baseline` is {baseline}, and `raw_range` begins at {low}: no reading is below it")
-        } else if !self.range_given && gain > 0.0 && f64::from(gain) * f64::from(baseline) > f64::from(p_max) {
+        } else if !self.range_given && gain > 0.0 && gain * baseline > p_max {
             format!(
                 "`baseline` is {baseline}, above `p_max` {p_max}; lower it, or give the `raw_range` of a sensor that \
                  reads that high"

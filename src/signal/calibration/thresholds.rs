@@ -13,16 +13,16 @@ use crate::error::{Error, Result};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactThresholds {
     /// Contact begins over this.
-    pub on: f32,
+    pub on: f64,
     /// Contact ends at this or below; at most `on`.
-    pub off: f32,
+    pub off: f64,
 }
 
 /// What holds for the letter [`crate::signal::Receptor::Change`] of every taxel and field, in P per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChangeCalibration {
     /// Changes up to this one count as 0.
-    pub dead_band: f32,
+    pub dead_band: f64,
     /// When a field counts as touched by what changes in it.
     pub contact: ContactThresholds,
 }
@@ -75,7 +75,7 @@ impl ChangeKeys {
                     .at(format!("line {line}")))
             }
             _ => Ok(ChangeCalibration {
-                dead_band: dead_band as f32,
+                dead_band,
                 contact: thresholds(self.on.as_ref(), self.off.as_ref(), OF_CHANGES, text)?,
             }),
         }
@@ -98,6 +98,6 @@ fn thresholds(
     match (on, off) {
         (Some(on), _) if !(0.0..=MOST).contains(&on_value) => wrong("on", on, &format!("0 or more, {unit}")),
         (_, Some(off)) if !(0.0..=on_value).contains(&off_value) => wrong("off", off, "between 0 and `on`"),
-        _ => Ok(ContactThresholds { on: on_value as f32, off: off_value as f32 }),
+        _ => Ok(ContactThresholds { on: on_value, off: off_value }),
     }
 }

@@ -1,0 +1,331 @@
+//! How far single precision may be off in every cell, what is too close to call, and where the comparison goes on after that.
+
+use glam::DVec2;
+
+use super::Step;
+use super::reference::{Before, Reference};
+use crate::percept::{Flags, Outputs, Percepts, Values};
+use crate::scene::{Plan, PlanField};
+use crate::stage::calibrate::Pressure;
+use crate::stage::limit::Limit;
+use crate::stage::touches::TouchBound;
+use crate::stage::{Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, position, touches};
+
+/// How far a single-precision percept may be off in one cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct CellBound {
+    /// Flags that may differ.
+    pub(crate) in_doubt: Flags,
+    pub(crate) total: Limit,
+    pub(crate) peak: Limit,
+    pub(crate) active: Limit,
+    pub(crate) area: Limit,
+    /// Per coordinate, m.
+    pub(crate) centroid: Limit<[f64; 2]>,
+    /// As a distance, m.
+    pub(crate) position: Limit,
+    pub(crate) normal: Limit,
+    pub(crate) orientation: Limit,
+    pub(crate) axis: Limit,
+    pub(crate) anisotropy: Limit,
+    /// As a distance, m.
+    pub(crate) displacement: Limit,
+    pub(crate) direction: Limit,
+    pub(crate) distance: Limit,
+    pub(crate) radial_distance: Limit,
+    pub(crate) speed: Limit,
+    pub(crate) radial_speed: Limit,
+    /// Each touch's; lengths in m.
+    pub(crate) touch: Limit<TouchBound>,
+    /// As a distance, m.
+    pub(crate) filtered_displacement: Limit,
+    pub(crate) filtered_direction: Limit,
+    pub(crate) filtered_speed: Limit,
+    /// What the other may remember otherwise from now on.
+    pub(crate) may_remember: MayRemember,
+}
+
+/// What of a field's state may differ after a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct MayRemember {
+    /// Whether there was contact, and where: the rest hangs on that too.
+    pub(crate) contact: bool,
+    /// Which touches there were.
+    pub(crate) touches: bool,
+    /// The last centroid that counted.
+    pub(crate) filter: bool,
+}
+
+impl CellBound {
+    /// Of a cell of which not even contact is certain, nor are the flags `flags`.
+    fn of_contact(flags: Flags) -> Self {
+        let near = Limit::TooClose;
+        Self {
+            in_doubt: (Flags::all() - INPUT) | flags,
+            total: near,
+            peak: near,
+            active: near,
+            area: near,
+            centroid: Limit::TooClose,
+            position: near,
+            normal: near,
+            orientation: near,
+            axis: near,
+            anisotropy: near,
+            displacement: near,
+            direction: near,
+            distance: near,
+            radial_distance: near,
+            speed: near,
+            radial_speed: near,
+            touch: Limit::TooClose,
+            filtered_displacement: near,
+            filtered_direction: near,
+            filtered_speed: near,
+            may_remember: MayRemember { contact: true, touches: true, filter: true },
+        }
+    }
+
+    fn set_motion(&mut self, limit: Limit) {
+        (self.displacement, self.direction, self.distance) = (limit, limit, limit);
+        (self.radial_distance, self.speed, self.radial_speed) = (limit, limit, limit);
+    }
+}
+
+/// Flags that tell of the input and of the field, not of a touch.
+const INPUT: Flags = Flags::SATURATED
+    .union(Flags::FAULTY_INPUT)
+    .union(Flags::OUT_OF_RANGE)
+    .union(Flags::INCOMPLETE)
+    .union(Flags::NO_CHART);
+
+/// What a field's next bound hangs on, beside what its next percept does.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Doubt {
+    /// How far the centroid of the frame before may be off, as a distance in the unit.
+    place: f64,
+    /// That centroid is not known, as it was too close to call and is not in the percepts.
+    unread: bool,
+    touches: touches::Doubt,
+    filter: filter::Doubt,
+}
+
+/// What a backend's frame left of a field: what its next frame hangs on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Left {
+    contact: bool,
+    /// The centroid, m, and its pressed taxels, where percepts have them.
+    centroid: Option<motion::Centroid>,
+}
+
+impl Left {
+    /// By field, what frame `frame` of `percepts` left, as the backend has filled them.
+    pub(crate) fn by(plan: &Plan, percepts: &Percepts, frame: usize) -> Vec<Self> {
+        let told = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::FILTERED;
+        let counted = plan.outputs.intersects(Outputs::ACTIVE | Outputs::FILTERED);
+        let place = |cell: usize| match &percepts.values {
+            Values::F32(columns) => columns.centroid(cell),
+            Values::F64(columns) => columns.centroid(cell),
+        };
+        (0..plan.fields.len())
+            .map(|field| {
+                let contact = percepts.in_contact(frame, field);
+                let known = contact && plan.fields[field].charted && plan.outputs.intersects(told) && counted;
+                let cell = frame * plan.fields.len() + field;
+                let centroid = known
+                    .then(|| place(cell))
+                    .map(|[u, v, _]| motion::Centroid { place: DVec2::new(u, v), pressed: percepts.active[cell] });
+                Self { contact, centroid }
+            })
+            .collect()
+    }
+}
+
+/// One field in one frame.
+pub(super) struct Cell<'a> {
+    pub(super) index: usize,
+    pub(super) pressures: &'a [Pressure],
+    pub(super) step: &'a Step,
+    /// What the reference has.
+    pub(super) present: Outputs,
+    /// What the frame before left of it.
+    pub(super) before: Before,
+    /// Whether what the host remembers goes on, as it does unless the percept is kept.
+    pub(super) advances: bool,
+}
+
+impl Reference {
+    /// Goes on from what another backend left of field `index`, where the reference cannot tell.
+    pub(crate) fn resume(&mut self, index: usize, left: Left) {
+        let field = &self.plan.fields[index];
+        let moves = left.contact && field.charted && self.plan.stages().motion;
+        let in_unit = |c: motion::Centroid| motion::Centroid { place: c.place / f64::from(field.unit_m), ..c };
+        let centroid = left.centroid.filter(|_| moves).map(in_unit);
+        self.before[index] = Before { contact: left.contact, centroid };
+        (self.doubts[index].place, self.doubts[index].unread) = (0.0, moves && centroid.is_none());
+    }
+
+    /// The same for what the host remembers of the touches.
+    pub(crate) fn resume_touches(&mut self, index: usize, memory: &touches::Memory) {
+        self.doubts[index].touches = touches::Doubt::after(memory);
+    }
+
+    /// The same for what the host's filter remembers.
+    pub(crate) fn resume_filter(&mut self, index: usize, memory: &filter::Memory) {
+        self.doubts[index].filter = filter::Doubt::after(memory);
+    }
+
+    /// How far single precision may be off in `cell`.
+    pub(super) fn bound(&mut self, cell: &Cell<'_>) -> CellBound {
+        let mut doubt = std::mem::take(&mut self.doubts[cell.index]);
+        let bound = self.bound_after(cell, &mut doubt);
+        self.doubts[cell.index] = doubt;
+        bound
+    }
+
+    fn bound_after(&self, cell: &Cell<'_>, doubt: &mut Doubt) -> CellBound {
+        let (plan, pressures) = (&self.plan, cell.pressures);
+        let field = &plan.fields[cell.index];
+        let of_members = plan.members_of(field).iter().map(|member| pressures[member.slot as usize]);
+        let (flags, in_doubt) = of_members.fold((Flags::empty(), false), |(flags, in_doubt), pressure| {
+            (flags | pressure.flags_in_doubt, in_doubt || pressure.in_doubt)
+        });
+        if in_doubt {
+            return CellBound::of_contact(flags);
+        }
+        let pressed = self.pressed(field, pressures);
+        let how = plan.sums(field.count);
+        let sums = contact::bound(&pressed, how);
+        let mut bound = CellBound {
+            in_doubt: flags,
+            total: Limit::Within(sums.total),
+            peak: Limit::Within(sums.peak),
+            area: Limit::Within(sums.area),
+            ..CellBound::default()
+        };
+        let total = contact::reference(&pressed).total;
+        if hysteresis::in_doubt(total, sums.total, field.thresholds, cell.before.contact) {
+            // Whether there is a touch at all is in doubt, and with it all that a touch has; the sums are not.
+            let CellBound { total, peak, active, area, .. } = bound;
+            return CellBound { total, peak, active, area, ..CellBound::of_contact(flags) };
+        }
+        let before = std::mem::replace(&mut doubt.place, 0.0);
+        let unread = std::mem::take(&mut doubt.unread);
+        if !hysteresis::reference(total, field.thresholds, cell.before.contact) {
+            if cell.advances {
+                doubt.touches.release();
+                doubt.filter.release();
+            }
+            return bound;
+        }
+        let unit = f64::from(field.unit_m);
+        let c = centroid::reference(&pressed);
+        let c_bound = centroid::bound(&pressed, how);
+        doubt.place = c_bound.truncate().length();
+        bound.centroid = Limit::Within([c_bound.x * unit, c_bound.y * unit]);
+        match &field.lift {
+            Some(lift) => {
+                let (position, normal) = position::bound(lift, doubt.place * unit);
+                (bound.position, bound.normal) = (Limit::Within(position), Limit::Within(normal));
+            }
+            None => bound.position = Limit::Within(c_bound.length() * unit + U * U * field.origin_in_anchor.length()),
+        }
+        if field.charted {
+            self.lines(&mut bound, &pressed, cell, [c.truncate(), c_bound.truncate()]);
+        }
+        let touched = motion::Centroid { place: c.truncate(), pressed: pressed.len() as u32 };
+        if field.charted && plan.stages().motion {
+            if unread {
+                bound.set_motion(Limit::Unread);
+                bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT | Flags::STILL;
+            } else {
+                moved(&mut bound, field, cell, (touched, doubt.place), before);
+            }
+        }
+        if plan.stages().touches {
+            self.touches(&mut bound, &pressed, cell, &mut doubt.touches);
+        }
+        if field.charted && plan.stages().filter && cell.advances {
+            let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
+            let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
+            let limit = doubt.filter.follow(&field.filter, clock, in_metres, doubt.place * unit);
+            bound.in_doubt |= limit.in_doubt;
+            bound.filtered_displacement = limit.displacement;
+            bound.filtered_direction = limit.direction;
+            bound.filtered_speed = limit.speed;
+            bound.may_remember.filter = limit.may_remember;
+        }
+        bound
+    }
+
+    /// Adds the bounds of orientation and axis about a centroid, which comes with its bound.
+    fn lines(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, [c, c_bound]: [DVec2; 2]) {
+        let limit = |value, output, in_doubt| Limit::of(value, cell.present.contains(output), in_doubt);
+        if self.plan.stages().orientation {
+            let line = orientation::bound(pressed, c, c_bound);
+            let in_doubt = line.in_doubt.contains(Flags::COINCIDENT);
+            bound.orientation = limit(line.angle, Outputs::ORIENTATION, in_doubt);
+            bound.in_doubt |= line.in_doubt;
+        }
+        if self.plan.stages().axis {
+            let how = self.plan.sums(self.plan.fields[cell.index].count);
+            let axis = axis::bound(pressed, how, c, c_bound);
+            let together = axis.line.in_doubt.contains(Flags::COINCIDENT);
+            let in_doubt = together || axis.line.in_doubt.contains(Flags::ISOTROPIC);
+            bound.axis = limit(axis.line.angle, Outputs::AXIS, in_doubt);
+            bound.anisotropy = limit(axis.anisotropy, Outputs::ANISOTROPY, together);
+            bound.in_doubt |= axis.line.in_doubt;
+        }
+    }
+
+    /// Adds the bounds of separate touches.
+    fn touches(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, doubt: &mut touches::Doubt) {
+        let field = &self.plan.fields[cell.index];
+        let pulls = |member: usize, slot: u32, weight: f32| {
+            let pressure = cell.pressures[slot as usize];
+            let right = self.plan.weight(field, member);
+            let rounding = (f64::from(weight) - right).abs() * (pressure.value + pressure.bound);
+            let pressed = pressure.value > 0.0;
+            (right * pressure.value, if pressed { right * pressure.bound + rounding } else { 0.0 })
+        };
+        let members = self.plan.members_of(field).iter().enumerate();
+        let (pulls, off): (Vec<f64>, Vec<f64>) =
+            members.map(|(index, member)| pulls(index, member.slot, member.weight)).unzip();
+        let in_doubt = cell.advances && doubt.follow(&field.skin(), &pulls, off);
+        bound.may_remember.touches = in_doubt;
+        if in_doubt {
+            bound.touch = Limit::TooClose;
+            return;
+        }
+        let lost = pressed.iter().map(|taxel| taxel.pull_excess() / taxel.pull()).fold(0.0, f64::max);
+        let limit = touches::bound(lost);
+        let place = limit.place * f64::from(field.unit_m);
+        // A place has two coordinates on a chart, and three without one.
+        let position = match &field.lift {
+            Some(lift) => position::bound(lift, 2.0_f64.sqrt() * place).0,
+            None => 3.0_f64.sqrt() * place + U * U * field.origin_in_anchor.length(),
+        };
+        bound.touch = Limit::Within(TouchBound { place, position, ..limit });
+    }
+}
+
+/// Adds the bounds of motion to `now`, a centroid with its bound as the one before has `before`.
+fn moved(bound: &mut CellBound, field: &PlanField, cell: &Cell<'_>, now: (motion::Centroid, f64), before: f64) {
+    let Some(then) = cell.before.centroid else { return };
+    if !cell.step.flags.is_empty() {
+        return;
+    }
+    let (unit, dt_s) = (f64::from(field.unit_m), cell.step.dt_s);
+    let right = motion::reference(now.0, then, &field.still);
+    let limit = motion::bound(now.0, then, &field.still, now.1, before);
+    let rate = |right, bound| Limit::Within(motion::rate_bound(right, bound, dt_s) * unit);
+    bound.displacement = Limit::Within(limit.displacement * unit);
+    bound.direction = Limit::of(limit.direction, right.direction.is_some(), limit.still_in_doubt);
+    bound.distance = Limit::Within(limit.distance * unit);
+    bound.radial_distance = Limit::Within(limit.radial_distance * unit);
+    bound.speed = rate(right.distance, limit.distance);
+    bound.radial_speed = rate(right.radial_distance, limit.radial_distance);
+    if limit.still_in_doubt {
+        bound.in_doubt |= Flags::STILL;
+    }
+}
