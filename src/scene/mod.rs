@@ -4,6 +4,7 @@ mod curves;
 mod explain;
 mod filter;
 mod knobs;
+mod members;
 mod plan;
 mod slots;
 

@@ -288,7 +288,7 @@ mod tests {
             let written = interpolate(&knots.written, |&knot| knot, raw).0;
             assert_eq!(right.value, written);
             let of_rounded = on_curve(&knots.rounded, raw);
-            let most = of_rounded.1 + (of_rounded.0 - written).abs() + U * U;
+            let most = of_rounded.1 + (of_rounded.0 - written).abs() + U * U * written;
             assert!(right.bound >= (of_rounded.0 - written).abs() && right.bound <= most, "{raw}: {right:?}");
         }
     }

@@ -1,0 +1,33 @@
+//! What a plan makes of a field: its members' weights and neighbours, its thresholds, its unit.
+
+use crate::field::Field;
+use crate::signal::{Calibration, ContactThresholds, Receptor};
+use crate::stage::hysteresis::Thresholds;
+
+/// Per member of `field`, the members beside it; `around` has each taxel's neighbours.
+pub(super) fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let member_of = |taxel: u32| field.members.binary_search_by_key(&(taxel as usize), |member| member.taxel).ok();
+    let beside = |taxel: usize| around[taxel].iter().filter_map(|&n| member_of(n)).map(|m| m as u32).collect();
+    field.members.iter().map(|member| beside(member.taxel)).collect()
+}
+
+/// Per member of `field` its weight; empty where single precision holds each.
+pub(super) fn weights(field: &Field) -> Vec<f64> {
+    let weights = field.members.iter().map(|member| member.weight);
+    if weights.clone().all(|weight| f64::from(weight as f32) == weight) { Vec::new() } else { weights.collect() }
+}
+
+/// When `field` counts as touched, as `receptor` feels it.
+pub(super) fn thresholds(calibration: &Calibration, field: &str, receptor: Receptor) -> Thresholds {
+    let contact: ContactThresholds = match receptor {
+        Receptor::Sustained => calibration.fields.get(field).copied().unwrap_or(calibration.contact),
+        Receptor::Change => calibration.change.contact,
+    };
+    Thresholds { on: contact.on, off: contact.off }
+}
+
+/// The least power of two that is at least `radius_m`, within what single precision can square.
+pub(super) fn unit_of(radius_m: f64) -> f32 {
+    let exponent = if radius_m > 0.0 { radius_m.log2().ceil().clamp(-60.0, 60.0) } else { 0.0 };
+    exponent.exp2() as f32
+}
