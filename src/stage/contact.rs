@@ -22,10 +22,11 @@ pub(crate) struct Contact {
 /// What is right, in f64.
 pub(crate) fn reference(pressed: &[Pressed]) -> Contact {
     Contact {
-        total: pressed.iter().map(Pressed::pull).sum(),
+        // An empty sum is −0.
+        total: pressed.iter().map(Pressed::pull).sum::<f64>() + 0.0,
         peak: pressed.iter().map(|taxel| taxel.pressure).fold(0.0, f64::max),
         active: pressed.len() as u32,
-        area: pressed.iter().map(|taxel| taxel.area).sum(),
+        area: pressed.iter().map(|taxel| taxel.area).sum::<f64>() + 0.0,
     }
 }
 

@@ -142,7 +142,7 @@ fn verify_reports_how_the_backend_compares() {
     let output = output(&["run", "--backend", "cpu", "--verify"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let report = stderr(&output);
-    let verdict = report.lines().find(|line| line.starts_with("backend cpu agrees with the reference: of ")).unwrap();
+    let verdict = report.lines().find(|line| line.contains("backend cpu agrees with the reference: of ")).unwrap();
     assert!(verdict.contains(" in 3640 percepts, ") && verdict.ends_with(" not compared"), "{report}");
     assert!(report.contains("orientation"), "{report}");
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 280);
@@ -163,14 +163,15 @@ fn a_dead_band_on_a_value_is_too_close_to_call_and_said_so() {
     let (reference, cpu) = (run("reference", &[]), run("cpu", &["--verify"]));
     assert_eq!((reference.status.code(), cpu.status.code()), (Some(0), Some(0)), "{}", stderr(&cpu));
     for output in [&reference, &cpu] {
-        assert!(String::from_utf8_lossy(&output.stdout).contains("no_contact"), "{output:?}");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(said.contains("no_contact") && said.contains("\"total\":0.0"), "{said}");
     }
     let report = stderr(&cpu);
-    let verdict = report.lines().find(|line| line.starts_with("backend cpu ")).unwrap();
+    let verdict = report.lines().find(|line| line.contains("backend cpu ")).unwrap();
     // Of the percept's values its flags, contact and sums are all that there are.
     assert_eq!(
         verdict,
-        "backend cpu could not be compared with the reference: of 6 values in 1 percept, 0 agreeing, 0 different, 6 too \
+        "somatic: backend cpu could not be compared with the reference: of 6 values in 1 percept, 0 agreeing, 0 different, 6 too \
          close to call, 0 not compared"
     );
 }

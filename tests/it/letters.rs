@@ -121,7 +121,9 @@ fn every_reading_of_the_circuit_is_exact_in_both_signals() {
                         Some(FsrSignal::Linear) => sensor.linearised(counts, 10.0),
                         _ => sensor.logarithmic(counts),
                     };
-                    assert_eq!(cell.total, Some(f64::from(right as f32)), "{kind:?} {signal:?} {tap} {counts}");
+                    // The reference has the circuit's own numbers, the others those next to them in single precision.
+                    let right = if kind == BackendKind::Reference { right } else { f64::from(right as f32) };
+                    assert_eq!(cell.total, Some(right), "{kind:?} {signal:?} {tap} {counts}");
                 }
             }
         }
