@@ -62,6 +62,7 @@ mod ink;
 #[doc(hidden)]
 pub mod keys;
 mod length;
+pub mod output;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
@@ -76,8 +77,6 @@ mod stage;
 pub mod survey;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
-#[doc(hidden)]
-pub mod whole;
 pub mod wire;
 
 pub use backend::BackendKind;
@@ -85,6 +84,7 @@ pub use backend::agreement::{Agreement, Comparison};
 pub use body::Body;
 pub use engine::{Engine, Options};
 pub use error::{Error, Result};
+pub use output::OutputPath;
 pub use percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};

@@ -77,12 +77,12 @@ def prepare(body):
     text = f'body = "{body}"\nrate_hz = {rate_hz}\nduration_s = 10\nseed = 5\n{SENSOR}{touches}'
     if not csv.exists() or not scene.exists() or scene.read_text() != text:
         scene.write_text(text)
-        somatic("simulate", scene, "-o", csv)
+        somatic("simulate", scene, "-o", csv, "--force")
     layout, calibration = PLACE / f"{body}.layout.json", PLACE / f"{body}.calibration.toml"
     layout.write_bytes(somatic("inspect", body, "--json"))
     calibration.write_text(f"[all]\ndead_band = {DEAD_BAND}\n")
     ours, theirs = PLACE / f"{body}.somatic.ndjson", PLACE / f"{body}.pandas.ndjson"
-    run = ["run", "--body", body, "--source", f"csv:{csv}", "--sink", f"ndjson:{ours}"]
+    run = ["run", "--body", body, "--source", f"csv:{csv}", "--sink", f"ndjson:{ours}", "--force"]
     run += ["--calibration", calibration, "--backend", "cpu", "--outputs", OUTPUTS, "--quiet"]
     script = [sys.executable, Path(__file__).with_name("with_pandas.py"), csv, layout, DEAD_BAND, theirs]
     return csv, layout, (ours, [SOMATIC, *run]), (theirs, script)

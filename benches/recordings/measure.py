@@ -25,7 +25,7 @@ def run(arguments):
 out = os.path.join(place, "percepts.mcap")
 text = os.path.join(place, "percepts.ndjson")
 mcap = ["--sink", "mcap:" + out, "--force"]
-run(["--outputs", every, "--sink", "ndjson:" + text])
+run(["--outputs", every, "--sink", "ndjson:" + text, "--force"])
 touched, lines, fields = 0, 0, set()
 with open(text) as file:
     for line in file:

@@ -3,7 +3,6 @@
 //! Nothing already in the file is understood or touched: accessors and bytes are appended, nodes are added.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use glam::DVec3;
 use serde_json::{Map, Value, json};
@@ -11,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
 use super::{FieldSpec, Taxel};
 use crate::error::{Error, Result};
+use crate::output::OutputPath;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
@@ -282,12 +282,11 @@ impl Glb {
         .map_err(|e| Error::failed(e.to_string()))
     }
 
-    /// Writes the file at `path`, whole or not at all.
+    /// Writes the file to `output`, whole or not at all.
     ///
     /// # Errors
     /// The folder cannot be written to, or the disk is full.
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
-        let path = path.as_ref();
-        crate::whole::write(path, &self.to_bytes()?)
+    pub fn save(&self, output: OutputPath) -> Result<()> {
+        output.write(&self.to_bytes()?)
     }
 }

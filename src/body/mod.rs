@@ -8,6 +8,7 @@
 //! mirrored or scaled node keeps its rigid part as the frame and its points are stretched into it.
 
 mod amend;
+mod beside;
 mod details;
 mod document;
 mod glb;
@@ -21,7 +22,7 @@ mod strip;
 mod surface;
 mod topology;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -146,6 +147,13 @@ impl Body {
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
         let name = path.display().to_string();
         read::body(&name, &bytes, path.parent()).map_err(|e| e.at(name))
+    }
+
+    /// The file at `path` and those beside it that it takes buffers and images from, as far as it can be read: what a
+    /// program that reads the body must not write over.
+    #[must_use]
+    pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
+        beside::files(path.as_ref())
     }
 
     /// Reads the body in `bytes`, a whole `.glb` (or a `.gltf` that holds its own buffers), called `name` in messages.

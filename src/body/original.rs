@@ -14,6 +14,7 @@ use super::glb::{Before, Glb};
 use super::splice::{Span, Splice};
 use super::{Body, strip};
 use crate::error::{Error, Result};
+use crate::output::OutputPath;
 
 /// The lists that a layout adds to.
 const LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
@@ -319,16 +320,14 @@ impl Original {
         splice.apply()
     }
 
-    /// Writes the file at `path`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`. What is there is
-    /// replaced only if `replace` says so.
+    /// Writes the file to `output`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`.
     ///
     /// # Errors
-    /// Something is there, the folder cannot be written to, or the disk is full.
-    pub fn save(&self, path: impl AsRef<Path>, replace: bool) -> Result<()> {
-        let path = path.as_ref();
-        let is_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+    /// The folder cannot be written to, or the disk is full.
+    pub fn save(&self, output: OutputPath) -> Result<()> {
+        let is_text = output.name().extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
         let bytes = if is_text { self.to_gltf().into_bytes() } else { self.to_glb()? };
-        if replace { crate::whole::write(path, &bytes) } else { crate::whole::write_new(path, &bytes) }
+        output.write(&bytes)
     }
 }
 

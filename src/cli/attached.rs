@@ -4,11 +4,8 @@ use std::path::Path;
 
 use somatic::body::{Body, Original};
 use somatic::recording::{BODY, CALIBRATION, Reader, SCENE};
-use somatic::sink::SinkSpec;
-use somatic::source::SourceSpec;
 use somatic::{Error, Result, bundled};
 
-use super::input::Input;
 use super::scene::Asked;
 
 /// The body in the recording at `path`: its name, and its bytes as `.glb`.
@@ -77,21 +74,4 @@ pub(super) fn body_bytes(name: &str) -> Result<Vec<u8>> {
 /// The last part of a path, by which calibrations name a body.
 pub(super) fn file_name(path: &str) -> String {
     Path::new(path).file_name().map_or_else(|| path.to_owned(), |name| name.to_string_lossy().into_owned())
-}
-
-/// Refuses to record over what is being read.
-///
-/// # Errors
-/// A usage error that names the file.
-pub(super) fn check_apart(input: &Input, sinks: &[SinkSpec]) -> Result<()> {
-    let Some(SourceSpec::Mcap(source) | SourceSpec::Csv(source)) = &input.spec else { return Ok(()) };
-    let whole = |path: &Path| std::fs::canonicalize(path).ok();
-    for sink in sinks {
-        if let SinkSpec::Mcap(path) = sink
-            && whole(path).is_some_and(|path| Some(path) == whole(source))
-        {
-            return Err(Error::usage("it is read and would be written; name another file").at(path.display()));
-        }
-    }
-    Ok(())
 }

@@ -12,6 +12,7 @@ use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
 use super::bar::Bar;
+use super::files::FilesRead;
 use super::table::{plain, right, shown};
 use super::words::{bullet, count, millimetres};
 use super::{DONE, print};
@@ -80,7 +81,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "BODY.glb")]
     output: PathBuf,
 
-    /// Replace the output if it is there, even where it is the mesh itself.
+    /// Replace the output if it is there. The mesh itself is never replaced.
     #[arg(long)]
     force: bool,
 
@@ -90,7 +91,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    check_output(&arguments.output, arguments.force)?;
+    check_ending(&arguments.output)?;
     let mut recipe = match &arguments.recipe {
         Some(path) => Recipe::load(path)?,
         None if arguments.taxels.is_none() && arguments.spacing.is_none() && arguments.region.is_empty() => {
@@ -98,6 +99,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         }
         None => Recipe::simple(arguments.taxels, arguments.spacing.as_deref(), &arguments.region)?,
     };
+    let read = FilesRead::default().body(&arguments.mesh).files(&arguments.recipe).files(recipe.files());
+    let output = read.outputs(arguments.force).add(&arguments.output)?;
     if let Some(seed) = arguments.seed {
         recipe = recipe.with_seed(seed);
     }
@@ -109,7 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         let mut bar = Bar::new("placing taxels");
         author(file, &recipe, |share| bar.show(share))?
     };
-    authored.file.save(&arguments.output, arguments.force)?;
+    authored.file.save(output)?;
     print(&match arguments.json {
         true => format!("{}\n", summary(&arguments.output, &authored)),
         false => text(&arguments.output, &authored),
@@ -117,14 +120,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     Ok(DONE)
 }
 
-/// Refuses an output that could not be written, before any work is done.
-fn check_output(path: &Path, force: bool) -> Result<()> {
+/// Refuses an output that would be no body, before any work is done.
+fn check_ending(path: &Path) -> Result<()> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     if !matches!(ending.as_deref(), Some("glb" | "gltf")) {
         return Err(Error::usage("a body is a .glb or a .gltf; name the output so").at(path.display()));
-    }
-    if path.exists() && !force {
-        return Err(Error::failed("it is there already; choose another name, or say --force").at(path.display()));
     }
     Ok(())
 }

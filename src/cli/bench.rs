@@ -10,9 +10,11 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use serde_json::json;
 use somatic::experiments::dump;
 use somatic::experiments::shape::Shape;
+use somatic::output::OutputFolder;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
+use super::files::FilesRead;
 use super::run::stop_on_signal;
 use super::scene::output;
 use super::words::count;
@@ -88,6 +90,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
 
+    /// Replace the files of --dump if they are there.
+    #[arg(long)]
+    force: bool,
+
     /// Print JSON: times of a call in µs, rate in memberships/s.
     #[arg(long)]
     json: bool,
@@ -98,14 +104,19 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
     let outputs = arguments.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or_default();
     shape.check()?;
     check_memory(&shape, outputs)?;
-    if arguments.dump.is_some() {
-        dump::check(outputs)?;
-    }
+    let files = match &arguments.dump {
+        None => None,
+        Some(folder) => {
+            dump::check(outputs)?;
+            let mut outputs_of = FilesRead::default().outputs(arguments.force);
+            Some(outputs_of.add_folder(folder, dump::files(&shape, outputs))?)
+        }
+    };
     let stop = stop_on_signal()?;
     let body = shape.body();
     let mut frames = shape.frames();
     let mut engine = shape.engine(&body, arguments.backend, outputs)?;
-    if let Some(folder) = &arguments.dump {
+    if let Some(folder) = files {
         write_first_call(folder, &shape, &body, &frames, &mut engine)?;
     }
     let times = measure(&mut engine, &shape, &mut frames, arguments.calls, &stop)?;
@@ -169,7 +180,7 @@ fn available_bytes() -> Option<u128> {
 
 /// The first call of all: its percepts have no frame before, as those of whoever computes the same.
 fn write_first_call(
-    folder: &std::path::Path,
+    folder: OutputFolder,
     shape: &Shape,
     body: &Body,
     frames: &[Frame],

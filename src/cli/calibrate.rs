@@ -9,10 +9,11 @@ use console::style;
 use serde_json::json;
 use somatic::source::{Lines, Source, SourceSpec};
 use somatic::survey::{Findings, Found, Survey, Wishes};
-use somatic::{Body, Calibration, Error, Result, whole};
+use somatic::{Body, Calibration, Error, Result};
 
 use super::feed::{Arrival, Feed, Manner};
-use super::plot::Format;
+use super::files::FilesRead;
+use super::plot::Plot;
 use super::ports::LineFlags;
 use super::run::stop_on_signal;
 use super::table::{plain, right, shown};
@@ -77,7 +78,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
 
-    /// Replace the calibration that is there.
+    /// Replace the calibration and the plot if they are there.
     #[arg(long)]
     force: bool,
 
@@ -88,13 +89,13 @@ pub(super) struct Arguments {
 
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
-    if output.exists() && !arguments.force {
-        return Err(Error::failed("is there already; --force replaces it").at(output.display()));
-    }
+    let read = FilesRead::default().body(&arguments.body).sources(&arguments.sources).files(&arguments.lines.wiring);
+    let mut outputs = read.outputs(arguments.force);
+    let to = outputs.add(output)?;
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
         return Err(Error::usage("--rest and --press are times over 0, in seconds"));
     }
-    let format = arguments.plot.as_deref().map(Format::of).transpose()?;
+    let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;
@@ -125,10 +126,9 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let known: Vec<u32> =
         ids.iter().copied().filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
     Calibration::parse(&text, &known).map_err(|e| e.at("the calibration that follows from this survey"))?;
-    let write = if arguments.force { whole::write } else { whole::write_new };
-    write(output, text.as_bytes())?;
-    if let (Some(path), Some(format)) = (&arguments.plot, format) {
-        format.write(path, || findings.svg(), || findings.png())?;
+    to.write(text.as_bytes())?;
+    if let Some(plot) = plot {
+        plot.draw(|| findings.svg(), || findings.png())?;
     }
     print(&if arguments.json { json_of(&findings) } else { table_of(&findings) })?;
     for loss in &lost {

@@ -1,6 +1,7 @@
 //! `somatic convert`: recordings from one kind of file to another.
 
 use std::path::PathBuf;
+use std::slice;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
@@ -10,6 +11,7 @@ use somatic::{Error, Frame, Result};
 
 use super::attached::{body_bytes, file_name};
 use super::bar::Bar;
+use super::files::FilesRead;
 use super::run::stop_on_signal;
 use super::words::count;
 use super::{DONE, LOST, say};
@@ -69,11 +71,9 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
         unreachable!("it is of one of these kinds");
     };
-    if let SourceSpec::Csv(path) | SourceSpec::Mcap(path) = &from
-        && std::fs::canonicalize(path).ok().is_some_and(|path| std::fs::canonicalize(to_path).ok() == Some(path))
-    {
-        return Err(Error::usage("it is read and would be written; name another file").at(to_path.display()));
-    }
+    let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
+    let read = arguments.body.iter().fold(read, |files, body| files.body(body));
+    let output = read.outputs(arguments.force).add(to_path)?;
     let mut source = from.open(&[], arguments.rate)?;
     source.tell_stale();
     let attached = files(arguments, &from)?;
@@ -81,9 +81,9 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
             return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
         }
-        SourceSpec::Csv(path) => Target::Csv(CsvFile::create(path, source.taxels(), arguments.force)?),
+        SourceSpec::Csv(_) => Target::Csv(CsvFile::create(output, source.taxels())?),
         _ => {
-            let mut recorder = Recorder::create(to_path, source.taxels(), arguments.force)?;
+            let mut recorder = Recorder::create(output, source.taxels())?;
             for (name, media_type, bytes) in &attached {
                 recorder.attach(name, media_type, bytes)?;
             }

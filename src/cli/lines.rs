@@ -1,13 +1,13 @@
 //! What a person is told of serial lines while they are read, and in the end.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use console::style;
 use serde_json::{Value, json};
-use somatic::source::{BoardAccount, BoardState, Lines};
 use somatic::{Error, Result};
+use somatic::output::OutputPath;
+use somatic::source::{BoardAccount, BoardState, Lines};
 
 use super::latency::Latency;
 use super::repeats::Repeats;
@@ -34,12 +34,12 @@ pub(super) struct Live {
     /// Said while a table stood there.
     kept: Vec<String>,
     latest: VecDeque<Latest>,
-    summary: Option<PathBuf>,
+    summary: Option<OutputPath>,
     quiet: bool,
 }
 
 impl Live {
-    pub(super) fn new(lines: Lines, summary: Option<PathBuf>, quiet: bool) -> Self {
+    pub(super) fn new(lines: Lines, summary: Option<OutputPath>, quiet: bool) -> Self {
         Self {
             lines,
             latency: Latency::default(),
@@ -117,10 +117,10 @@ impl Live {
                 say(&format!("from the last byte read to the percept written: {}", self.latency.words()));
             }
         }
-        if let Some(path) = &self.summary {
+        if let Some(summary) = self.summary.take() {
             let boards: Vec<Value> = accounts.iter().map(as_json).collect();
             let text = format!("{:#}\n", json!({"boards": boards, "latency": self.latency.json()}));
-            std::fs::write(path, text).map_err(|e| Error::io(path, &e))?;
+            summary.write(text.as_bytes())?;
         }
         if !answered {
             let what =

@@ -12,6 +12,7 @@ mod convert;
 mod devices;
 mod doubts;
 mod feed;
+mod files;
 mod info;
 mod input;
 mod inspect;

@@ -8,6 +8,7 @@ use somatic::error::Result;
 use somatic::experiments;
 
 use super::bar::Bar;
+use super::files::FilesRead;
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -31,16 +32,21 @@ pub(super) struct Arguments {
     /// Do one speed (20 mm/s) and one noise (1 count) of the table only.
     #[arg(long)]
     quick: bool,
+
+    /// Replace the files if they are there.
+    #[arg(long)]
+    force: bool,
 }
 
 pub(super) fn paper(arguments: &Arguments) -> Result<u8> {
+    let folder = FilesRead::default().outputs(arguments.force).add_folder(&arguments.out, experiments::FILES)?;
     let bar = Mutex::new(Bar::new("simulating"));
     let progress = |share: f64| {
         if let Ok(mut bar) = bar.lock() {
             bar.show(share);
         }
     };
-    let written = experiments::write(&arguments.out, arguments.quick, &progress);
+    let written = experiments::write(folder, arguments.quick, &progress);
     drop(bar);
     let names: Vec<String> = written?.iter().map(|path| format!("{}\n", path.display())).collect();
     print(&names.concat())?;

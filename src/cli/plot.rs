@@ -2,39 +2,46 @@
 
 use std::path::Path;
 
-use somatic::{Error, Result, whole};
+use somatic::output::{OutputPath, OutputPaths};
+use somatic::{Error, Result};
 
-/// A picture's format.
-#[derive(Clone, Copy)]
-pub(super) enum Format {
+/// A plot that is to be drawn.
+pub(super) struct Plot {
+    format: Format,
+    output: OutputPath,
+}
+
+enum Format {
     Svg,
     Png,
 }
 
-impl Format {
-    /// The one that the ending of `path` names.
-    pub(super) fn of(path: &Path) -> Result<Self> {
-        match path.extension().and_then(|ending| ending.to_str()) {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(Error::usage(format!(
-                "--plot {} is neither .svg nor .png; a plot ends in .svg or .png",
-                path.display()
-            ))),
-        }
+impl Plot {
+    /// One in the format that the ending of `path` names, which is one of `outputs`.
+    pub(super) fn at(path: &Path, outputs: &mut OutputPaths) -> Result<Self> {
+        let format = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("svg") => Format::Svg,
+            Some("png") => Format::Png,
+            _ => {
+                return Err(Error::usage(format!(
+                    "--plot {} is neither .svg nor .png; a plot ends in .svg or .png",
+                    path.display()
+                )));
+            }
+        };
+        Ok(Self { format, output: outputs.add(path)? })
     }
 
-    /// Draws in this format and writes it at `path`, whole or not at all.
-    pub(super) fn write(
+    /// Draws it in its format and writes it, whole or not at all.
+    pub(super) fn draw(
         self,
-        path: &Path,
         svg: impl FnOnce() -> Result<String>,
         png: impl FnOnce() -> Result<Vec<u8>>,
     ) -> Result<()> {
-        let bytes = match self {
-            Self::Svg => svg()?.into_bytes(),
-            Self::Png => png()?,
+        let bytes = match self.format {
+            Format::Svg => svg()?.into_bytes(),
+            Format::Png => png()?,
         };
-        whole::write(path, &bytes)
+        self.output.write(&bytes)
     }
 }

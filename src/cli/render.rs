@@ -10,6 +10,7 @@ use somatic::field::FieldSet;
 use somatic::picture::{self, Options, View};
 use somatic::scene::choose_fields;
 
+use super::files::FilesRead;
 use super::{DONE, load_body};
 
 const EXAMPLES: &str = "\
@@ -75,7 +76,7 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
     }
-    picture::may_write(path, arguments.force)?;
+    let output = FilesRead::default().body(&arguments.body).outputs(arguments.force).add(path)?;
     let mut views = Vec::new();
     for name in &arguments.views {
         match name.as_str() {
@@ -99,6 +100,6 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
             picture::of_chart(&body, &set.fields, charted, &options)?
         }
     };
-    picture::write(path, &picture, arguments.force)?;
+    output.write(&picture)?;
     Ok(DONE)
 }

@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use console::Term;
 use somatic::signal::Unfit;
-use somatic::sink::{FieldNames, Flow, Heard, Session, Sink, SinkSpec};
+use somatic::sink::{FieldNames, Flow, Heard, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
 use super::attached;
 use super::doubts::Doubts;
 use super::feed::{Arrival, Feed, Manner};
+use super::files::FilesRead;
 use super::input::Input;
 #[cfg(unix)]
 use super::keys::{self, Keys};
@@ -89,6 +90,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
+    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
+    let targets = sinks.iter().map(|sink| sink.target(&mut outputs)).collect::<Result<Vec<SinkTarget>>>()?;
+    let summary = arguments.summary.as_deref().map(|path| outputs.add(path)).transpose()?;
+    if sinks.is_empty() {
+        outputs.add_standard_output()?;
+    }
     let body = asked.body_for(&input)?;
     // Why a body without a layout cannot be run is said once, by the error.
     let has_layout = !(body.taxels.is_empty() && body.fields.is_empty());
@@ -96,10 +103,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         say(&format!("{}: {finding}", body.name));
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    attached::check_apart(&input, &sinks)?;
     let recorded = if input.lines.is_empty() { Some(input.open(&ids, &asked)?) } else { None };
     let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
-    if arguments.summary.is_some() && recorded.is_some() {
+    if summary.is_some() && recorded.is_some() {
         return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
     }
 
@@ -123,7 +129,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             let source = input.open_lines(&ids, &asked)?;
             engine.heed_stale();
             engine.wire(source.wiring());
-            let live = Live::new(source.lines(), arguments.summary.clone(), asked.quiet);
+            let live = Live::new(source.lines(), summary, asked.quiet);
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
     };
@@ -142,14 +148,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
-    let sinks = if sinks.is_empty() && !at_terminal { vec![SinkSpec::Stdout] } else { sinks };
+    let targets = if sinks.is_empty() && !at_terminal { vec![SinkTarget::Stdout] } else { targets };
     let names = field_names(engine.plan());
     let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if at_terminal && !input.is_stdin() { Keys::listen() } else { None };
-    let records = sinks.iter().any(|sink| matches!(sink, SinkSpec::Mcap(_)));
+    let records = targets.iter().any(|target| matches!(target, SinkTarget::Mcap(_)));
     let session = Session {
         names,
         all_fields: asked.all_fields,
@@ -157,9 +163,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         body: Some(&body),
         attached: if records { attached::files(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
         parts: asked.record.clone(),
-        force: asked.force,
     };
-    let sinks = sinks.iter().map(|sink| sink.open(&session)).collect::<Result<_>>()?;
+    let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
     let feed = match live {
         None => Feed::start(source, Manner { most: batch, gather, speed }),
         Some(_) => Feed::start_live(source, batch),

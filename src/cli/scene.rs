@@ -156,7 +156,7 @@ pub(super) struct Asked {
     #[schemars(with = "OneOrMany")]
     pub(super) record: Vec<Part>,
 
-    /// Replace the file of mcap:FILE if it is there.
+    /// Replace the files that are written if they are there.
     #[arg(long)]
     pub(super) force: bool,
 

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use somatic::Result;
 use somatic::source::{SimulatedSource, write_recording};
-use somatic::{Result, whole};
 
+use super::files::FilesRead;
 use super::{DONE, say};
 
 const EXAMPLES: &str = "\
@@ -24,21 +25,29 @@ pub(super) struct Arguments {
     #[arg(value_name = "FILE.toml")]
     simulation: PathBuf,
 
-    /// The recording to write, CSV; replaced if it is there.
+    /// The recording to write, CSV.
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
 
     /// Where the truth goes, CSV [default: beside the recording, as NAME.truth.csv].
     #[arg(long, value_name = "FILE.csv")]
     truth: Option<PathBuf>,
+
+    /// Replace the files if they are there.
+    #[arg(long)]
+    force: bool,
 }
 
 pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
-    let mut simulation = SimulatedSource::open(&arguments.simulation)?;
     let truth = arguments.truth.clone().unwrap_or_else(|| arguments.output.with_extension("truth.csv"));
-    let frames = write_recording(&mut simulation, &arguments.output, &truth)?;
+    let read = FilesRead::default().files(SimulatedSource::files(&arguments.simulation));
+    let mut outputs = read.outputs(arguments.force);
     let calibration = arguments.output.with_extension("calibration.toml");
-    whole::write(&calibration, simulation.calibration().as_bytes())?;
+    let (frames_to, truth_to) = (outputs.add(&arguments.output)?, outputs.add(&truth)?);
+    let calibration_to = outputs.add(&calibration)?;
+    let mut simulation = SimulatedSource::open(&arguments.simulation)?;
+    let frames = write_recording(&mut simulation, frames_to, truth_to)?;
+    calibration_to.write(simulation.calibration().as_bytes())?;
     let (output, truth, calibration) = (arguments.output.display(), truth.display(), calibration.display());
     say(&format!("{frames} frames in {output}, the truth in {truth}, the calibration in {calibration}"));
     Ok(DONE)

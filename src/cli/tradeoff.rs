@@ -11,12 +11,13 @@ use console::style;
 use somatic::signal::Frame;
 use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
-use somatic::{BackendKind, Body, Engine, Error, Options, Result};
+use somatic::{BackendKind, Body, Engine, Error, Options, OutputPath, Result};
 
 pub(super) use self::settled::{Settled, driver, settled};
 use super::bar::Bar;
+use super::files::FilesRead;
 use super::input::Input;
-use super::plot::Format;
+use super::plot::Plot;
 use super::run::{RECORDED_BATCH, stop_on_signal};
 use super::scene::Asked;
 use super::table::{plain, right, shown};
@@ -83,13 +84,15 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is no time span; give seconds over 0", arguments.seconds)));
     }
-    let format = arguments.plot.as_deref().map(Format::of).transpose()?;
+    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
+    let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
         (Some(_), true) if wish.is_empty() => {
             return Err(Error::usage("--write writes what is picked; say by what with --within or --budget"));
         }
-        (scene, true) => scene.as_deref(),
+        // The one input that is written: to change it is what is asked for.
+        (Some(path), true) => Some((path, OutputPath::edit(path)?)),
         _ => None,
     };
     let input = Input::named(&asked)?;
@@ -124,8 +127,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     }
     let way = if asked.batch.is_some_and(|batch| batch > 1) { Way::Batch } else { Way::Live };
     let pick = if wish.is_empty() { None } else { wish.pick(&report, way) };
-    if let (Some(path), Some(format)) = (&arguments.plot, format) {
-        format.write(path, || plot_svg(&report), || plot_png(&report))?;
+    if let Some(plot) = plot {
+        plot.draw(|| plot_svg(&report), || plot_png(&report))?;
     }
     print(&if arguments.json { json(&report, pick.as_ref())? } else { text(&report, arguments.all) })?;
     let Some(pick) = pick else { return Ok(DONE) };
@@ -135,8 +138,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         return Ok(FAILED);
     }
     say(&format!("{} for {}: {combination}; {:.2} µs a frame", picked(way), wish.words(), pick.row.p50_us));
-    if let Some(path) = scene {
-        written::write(path, &settled::of_row(pick.row, &report)?, &wish)?;
+    if let Some((path, edit)) = scene {
+        written::write(edit, &settled::of_row(pick.row, &report)?, &wish)?;
         say(&format!("written into {}", path.display()));
     }
     Ok(DONE)

@@ -10,10 +10,11 @@ use std::time::Duration;
 use clap::Args;
 use somatic::signal::{FsrCircuit, Wiring};
 use somatic::survey::tuning::{MOST_ROUNDS, Tuned, Tuning};
-use somatic::{Error, Result, whole};
+use somatic::{Error, Result};
 
 use self::bench::{Bench, Until, Went};
 use super::calibrate::name_of;
+use super::files::FilesRead;
 use super::ports::LineFlags;
 use super::run::stop_on_signal;
 use super::{DONE, FAILED, load_body, print, say};
@@ -76,10 +77,10 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
-    let outputs = [&arguments.output, &arguments.fsr_calibration];
-    if let Some(there) = outputs.into_iter().flatten().find(|path| path.exists() && !arguments.force) {
-        return Err(Error::failed("is there already; --force replaces it").at(there.display()));
-    }
+    let read = FilesRead::default().body(&arguments.body).files(&arguments.lines.wiring);
+    let mut outputs = read.outputs(arguments.force);
+    let mut add = |path: &Option<PathBuf>| path.as_ref().map(|path| outputs.add(path)).transpose();
+    let (output, fsr_calibration) = (add(&arguments.output)?, add(&arguments.fsr_calibration)?);
     let spans = [Some(arguments.rest), arguments.press];
     let [rest, press] = spans.map(|s| s.map(|s| Duration::try_from_secs_f64(s).ok().filter(|span| !span.is_zero())));
     let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {
@@ -123,15 +124,17 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
         // What a board does not set says nothing of what it has.
         sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.tap).or_else(|| own(board, channel))
     };
-    let write = if arguments.force { whole::write } else { whole::write_new };
-    if let Some(path) = &arguments.output {
-        write(path, report::wiring(&wiring.with_taps(tapped)).as_bytes())?;
+    if let Some(output) = output {
+        output.write(report::wiring(&wiring.with_taps(tapped)).as_bytes())?;
     }
     print(&if arguments.json { report::json(&tuning, &now) } else { report::table(&tuning, &now) })?;
-    if let Some(path) = &arguments.fsr_calibration {
-        write(path, report::fsr(&tuning, &name_of(&body))?.as_bytes())?;
+    if let Some(output) = fsr_calibration {
+        output.write(report::fsr(&tuning, &name_of(&body))?.as_bytes())?;
     }
-    outputs.into_iter().flatten().for_each(|path| say(&format!("wrote {}", path.display())));
+    [&arguments.output, &arguments.fsr_calibration]
+        .into_iter()
+        .flatten()
+        .for_each(|path| say(&format!("wrote {}", path.display())));
     if arguments.output.is_none() {
         say("a board that starts again forgets its taps; with -o FILE they can be set again");
     }

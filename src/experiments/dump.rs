@@ -1,8 +1,5 @@
 //! A bench's inputs and outputs as arrays, so that anybody can check them with their own program.
 
-use std::fs;
-use std::path::Path;
-
 use serde_json::{Map, Value, json};
 
 use super::npy;
@@ -10,12 +7,23 @@ use super::shape::{Shape, width};
 use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
+use crate::output::OutputFolder;
 use crate::percept::{Flags, Outputs, Percept, Percepts, Precision};
 use crate::signal::Frame;
-use crate::whole;
 
-/// Writes what went in and came out of an engine's first call into `folder`, made where there is none: arrays as .npy,
-/// and `dump.json`, written last, which names them.
+/// The files that [`write()`] writes for `shape` and `outputs`.
+#[must_use]
+pub fn files(shape: &Shape, outputs: Outputs) -> Vec<String> {
+    let fields = |prefix: &str| ["members", "weights", "uv"].map(|name| format!("{prefix}{name}"));
+    let mut names = vec!["values".to_owned(), "present".to_owned(), "flags".to_owned()];
+    names.extend(fields(""));
+    names.extend(Some(fields("wide_")).filter(|_| shape.wide > 0).into_iter().flatten());
+    names.extend(outputs.iter().map(name_of));
+    names.iter().map(|name| format!("{name}.npy")).chain(["dump.json".to_owned()]).collect()
+}
+
+/// Writes what went in and came out of an engine's first call into `folder`, which has [`files`] and is made where there
+/// is none: arrays as .npy, and `dump.json`, written last, which names them.
 ///
 /// `values` (frames, sensors); `members`, sensors, and `weights` (fields, members), `uv` (fields, members, 2), m; the same
 /// of the wide field, if there is one, as `wide_...`; each output (frames, fields) or (frames, fields, 2 or 3), with the
@@ -25,15 +33,15 @@ use crate::whole;
 /// # Errors
 /// Touches were asked for, which are no array; or a file cannot be written.
 pub fn write(
-    folder: &Path,
+    mut folder: OutputFolder,
     shape: &Shape,
     body: &Body,
     frames: &[Frame],
     percepts: &Percepts,
     backend: &str,
 ) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
-    let mut dump = Dump { folder, arrays: Map::new() };
+    folder.make()?;
+    let mut dump = Dump { folder: &mut folder, arrays: Map::new() };
     let fields = FieldSet::new(body)?.fields;
     dump.input(shape, &fields, frames)?;
     dump.output(percepts)?;
@@ -51,7 +59,7 @@ pub fn write(
         "flag_bits": flag_bits,
     });
     let text = serde_json::to_string_pretty(&index).map_err(|e| Error::failed(e.to_string()))?;
-    whole::write(&folder.join("dump.json"), (text + "\n").as_bytes())
+    folder.take("dump.json").write((text + "\n").as_bytes())
 }
 
 /// Whether `outputs` can be written.
@@ -66,7 +74,7 @@ pub fn check(outputs: Outputs) -> Result<()> {
 }
 
 struct Dump<'a> {
-    folder: &'a Path,
+    folder: &'a mut OutputFolder,
     arrays: Map<String, Value>,
 }
 
@@ -79,7 +87,7 @@ impl Dump<'_> {
         numbers: impl Iterator<Item = N>,
     ) -> Result<()> {
         let file = format!("{name}.npy");
-        npy::write(&self.folder.join(&file), shape, numbers)?;
+        npy::write(self.folder.take(&file), shape, numbers)?;
         self.arrays.insert(name.to_owned(), json!({ "file": file, "dtype": N::DTYPE, "shape": shape, "unit": unit }));
         Ok(())
     }

@@ -9,36 +9,39 @@ pub mod shape;
 mod table;
 mod trial;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use self::table::Table;
 use crate::body::Body;
 use crate::bundled;
 use crate::error::{Error, Result};
-use crate::whole;
+use crate::output::OutputFolder;
 
-/// Writes the paper's figures and the table into `folder`, which is made where there is none, and gives the files
-/// written: each complete, or not there. `quick` leaves most of the table away. `progress` hears the share done.
+/// The files that [`write()`] writes.
+pub const FILES: [&str; 8] =
+    ["fig3.svg", "fig3.png", "fig6.svg", "fig6.png", "fig7.svg", "fig7.png", "table.md", "table.json"];
+
+/// Writes the paper's figures and the table into `folder`, which has [`FILES`] and is made where there is none, and gives
+/// the files written: each complete, or not there. `quick` leaves most of the table away. `progress` hears the share done.
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write(folder: &Path, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+pub fn write(mut folder: OutputFolder, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Vec<PathBuf>> {
+    folder.make()?;
     let body = Body::from_bytes("hand", bundled::HAND)?;
     let mut written = Vec::new();
-    let mut put = |name: String, bytes: &[u8]| {
-        let path = folder.join(name);
-        whole::write(&path, bytes)?;
-        written.push(path);
-        Ok::<(), Error>(())
+    let mut put = |name: &str, bytes: &[u8]| {
+        let output = folder.take(name);
+        written.push(output.name().to_owned());
+        output.write(bytes)
     };
     for figures::Named { name, figure } in figures::figures(&body)? {
-        put(format!("{name}.svg"), figure.svg()?.as_bytes())?;
-        put(format!("{name}.png"), &figure.png()?)?;
+        put(&format!("{name}.svg"), figure.svg()?.as_bytes())?;
+        put(&format!("{name}.png"), &figure.png()?)?;
     }
     let table = Table::new(&body, quick, progress)?;
-    put("table.md".to_owned(), table.markdown().as_bytes())?;
+    put("table.md", table.markdown().as_bytes())?;
     let json = serde_json::to_string_pretty(&table).map_err(|e| Error::failed(e.to_string()))?;
-    put("table.json".to_owned(), (json + "\n").as_bytes())?;
+    put("table.json", (json + "\n").as_bytes())?;
     Ok(written)
 }

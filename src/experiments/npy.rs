@@ -1,10 +1,9 @@
 //! NumPy's array files, version 1.0 of the format: written only, one number after the other.
 
 use std::io::{BufWriter, Write as _};
-use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::whole::beside;
+use crate::output::OutputPath;
 
 /// A number that an array can hold, little-endian.
 pub(super) trait Number: Copy {
@@ -28,10 +27,11 @@ macro_rules! numbers {
 }
 numbers!(u32: "<u4", f32: "<f4", f64: "<f8");
 
-/// Writes `numbers`, as many as `shape` says, the last index fastest, as the array at `path`: whole, or not at all.
-pub(super) fn write<N: Number>(path: &Path, shape: &[usize], numbers: impl Iterator<Item = N>) -> Result<()> {
-    let failed = |e: &std::io::Error| Error::io(path, e);
-    let mut file = BufWriter::with_capacity(1 << 16, beside(path)?);
+/// Writes `numbers`, as many as `shape` says, the last index fastest, as an array to `output`: whole, or not at all.
+pub(super) fn write<N: Number>(output: OutputPath, shape: &[usize], numbers: impl Iterator<Item = N>) -> Result<()> {
+    let path = output.name().to_owned();
+    let failed = |e: &std::io::Error| Error::io(&path, e);
+    let mut file = BufWriter::with_capacity(1 << 16, output.begin()?);
     file.write_all(&header(N::DTYPE, shape)).map_err(|e| failed(&e))?;
     let mut count = 0;
     for number in numbers {
@@ -39,9 +39,7 @@ pub(super) fn write<N: Number>(path: &Path, shape: &[usize], numbers: impl Itera
         count += 1;
     }
     debug_assert_eq!(count, shape.iter().product::<usize>(), "{}", path.display());
-    let file = file.into_inner().map_err(|e| failed(e.error()))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
-    Ok(())
+    file.into_inner().map_err(|e| failed(e.error()))?.finish()
 }
 
 /// Magic, version, and a Python dictionary padded so that the numbers begin at a multiple of 64 bytes.
@@ -66,7 +64,8 @@ mod tests {
     fn an_array_is_laid_out_as_the_format_says() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npy");
-        write(&path, &[2, 3], [1_u32, 2, 3, 4, 5, 0x0102_0304].into_iter()).unwrap();
+        let to = || OutputPath::new(&path, true, &[]).unwrap();
+        write(to(), &[2, 3], [1_u32, 2, 3, 4, 5, 0x0102_0304].into_iter()).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
         assert_eq!((&bytes[..8], (10 + length) % 64), (&b"\x93NUMPY\x01\x00"[..], 0));
@@ -75,7 +74,7 @@ mod tests {
         assert!(dictionary.ends_with('\n'));
         assert_eq!(bytes.len(), 10 + length + 24);
         assert_eq!(bytes[bytes.len() - 4..], [4, 3, 2, 1]);
-        write(&path, &[1], [0.5_f32].into_iter()).unwrap();
+        write(to(), &[1], [0.5_f32].into_iter()).unwrap();
         assert!(
             std::fs::read(&path).unwrap().windows(5).any(|w| w == b"(1,),"),
             "a shape of one number keeps its comma"

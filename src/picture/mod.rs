@@ -163,26 +163,6 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     ink::png(&pixels, drawing.size)
 }
 
-/// Writes a picture at `path`, whole or not at all; over what is there only where `force` says so.
-///
-/// # Errors
-/// Something is there, or the folder cannot be written to.
-pub fn write(path: &Path, picture: &[u8], force: bool) -> Result<()> {
-    may_write(path, force)?;
-    crate::whole::write(path, picture)
-}
-
-/// Whether [`write()`] would write at `path`, to be asked before any work is done.
-///
-/// # Errors
-/// Something is there, and `force` does not say that it may go.
-pub fn may_write(path: &Path, force: bool) -> Result<()> {
-    match path.try_exists() {
-        Ok(true) if !force => Err(Error::failed("it is there already; --force replaces it").at(path.display())),
-        _ => Ok(()),
-    }
-}
-
 fn checked(size: [u32; 2]) -> Result<[u32; 2]> {
     if size[0] < NARROWEST || size.iter().any(|&side| side > raster::LONGEST_SIDE) {
         return Err(Error::usage(format!(

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{BufWriter, Write as _};
 use std::time::{Duration, Instant};
 
 use mcap::McapError;
@@ -15,6 +14,7 @@ use super::{
     words_of,
 };
 use crate::error::{Error, Result};
+use crate::output::{GrowingFile, OutputPath};
 use crate::signal::Frame;
 
 /// The longest that anything is held back, so that a process that is killed loses less than a second.
@@ -28,7 +28,7 @@ const FIRST_CHANNEL: u16 = 1;
 /// Writes frames, and messages about them, to a file that can be read however the writing ends.
 pub struct Recorder {
     name: String,
-    path: PathBuf,
+    file: GrowingFile,
     /// `None` once the end is written.
     writer: Option<Writer>,
     /// By topic, in the order in which they came up.
@@ -45,26 +45,14 @@ pub struct Recorder {
 type Writer = mcap::Writer<NoSeek<BufWriter<File>>>;
 
 impl Recorder {
-    /// Begins a recording at `path` of the taxels `ids`, in the order of a frame's values. A file that is there is
-    /// replaced only with `force`.
+    /// Begins a recording at `output` of the taxels `ids`, in the order of a frame's values. It grows there from the first
+    /// frame on.
     ///
     /// # Errors
-    /// The file is there, or cannot be made.
-    pub fn create(path: impl AsRef<Path>, ids: &[u32], force: bool) -> Result<Self> {
-        let path = path.as_ref();
-        let made = File::options().write(true).create_new(true).open(path);
-        let is_there = made.as_ref().is_err_and(|e| e.kind() == ErrorKind::AlreadyExists);
-        let file = match made {
-            Err(_) if is_there && force => File::options().write(true).truncate(true).open(path),
-            made => made,
-        };
-        let file = file.map_err(|e| match e.kind() {
-            ErrorKind::AlreadyExists => {
-                Error::failed("it is there already; choose another name, or say --force").at(path.display())
-            }
-            _ => Error::io(path, &e),
-        })?;
-        let name = path.display().to_string();
+    /// The file cannot be made.
+    pub fn create(output: OutputPath, ids: &[u32]) -> Result<Self> {
+        let name = output.name().display().to_string();
+        let (to, file) = output.grow()?;
         let options = mcap::WriteOptions::new()
             .compression(None)
             .library(concat!("somatic ", env!("CARGO_PKG_VERSION")))
@@ -73,19 +61,18 @@ impl Recorder {
             .disable_seeking(true)
             // Every chunk has its own.
             .calculate_data_section_crc(false);
-        let file = NoSeek::new(BufWriter::with_capacity(1 << 16, file));
-        let writer = options.create(file).map_err(|e| explained(&name, e))?;
+        let to = NoSeek::new(BufWriter::with_capacity(1 << 16, to));
+        let writer = options.create(to).map_err(|e| explained(&name, e))?;
         let mut recorder = Self {
             name,
-            path: path.to_owned(),
+            file,
             writer: Some(writer),
             channels: Vec::new(),
             taxels: words_of(ids),
             message: Vec::new(),
             flushed: Instant::now(),
             pending: false,
-            // What was there before, be it a device, is not ours to take away.
-            worth_keeping: is_there,
+            worth_keeping: false,
         };
         // Outside of any chunk and before all else: what every frame's meaning hangs on.
         let preface = [(TAXEL_IDS, recorder.taxels.clone()), (FRAMES_CHANNEL, FIRST_CHANNEL.to_string())];
@@ -198,7 +185,7 @@ impl Drop for Recorder {
         // The writer ends the file on its own, as well as it still can.
         self.writer = None;
         if !self.worth_keeping {
-            let _ = std::fs::remove_file(&self.path);
+            self.file.remove();
         }
     }
 }

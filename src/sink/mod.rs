@@ -13,7 +13,7 @@ mod spec;
 pub use ndjson::NdjsonSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
-pub use spec::SinkSpec;
+pub use spec::{SinkSpec, SinkTarget};
 
 use std::str::FromStr;
 
@@ -101,8 +101,6 @@ pub struct Session<'a> {
     pub attached: Vec<(String, String, Vec<u8>)>,
     /// What recordings hold; none is all.
     pub parts: Vec<Part>,
-    /// Whether a recording replaces a file.
-    pub force: bool,
 }
 
 /// What a recording can hold.

@@ -3,47 +3,54 @@
 //! What is absent is left out. Numbers have the digits of the arithmetic that made them, the fewest that read back to
 //! the same bits.
 
-use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Write};
-use std::path::{Path, PathBuf};
 
 use super::line::Composer;
 use super::{FieldNames, Flow, Sink};
 use crate::error::{Error, Result};
+use crate::output::{OutputFile, OutputPath};
 use crate::percept::Percepts;
 
 /// Writes percepts as NDJSON.
 pub struct NdjsonSink {
     name: String,
-    // Dropped before `part`, so that the file is closed when it is renamed or removed.
-    writer: BufWriter<Box<dyn Write + Send>>,
-    part: Option<Part>,
+    writer: BufWriter<To>,
     composer: Composer,
     line: Vec<u8>,
     closed: bool,
 }
 
+/// Where lines go.
+enum To {
+    File(OutputFile),
+    Writer(Box<dyn Write + Send>),
+}
+
+impl Write for To {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Writer(writer) => writer.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Writer(writer) => writer.flush(),
+        }
+    }
+}
+
 impl NdjsonSink {
-    /// Writes to `path`, which is replaced when the sink is finished and untouched until then. Fields without contact
-    /// are listed only with `all_fields`.
+    /// Writes to `output`; a file is there when the sink is finished, and what was there stays until then. Fields without
+    /// contact are listed only with `all_fields`.
     ///
     /// # Errors
     /// The file cannot be made.
-    pub fn to_file(path: impl AsRef<Path>, names: &[FieldNames], all_fields: bool) -> Result<Self> {
-        let path = path.as_ref();
-        let kind = std::fs::metadata(path).map(|m| m.file_type());
-        if kind.as_ref().is_ok_and(std::fs::FileType::is_dir) {
-            return Err(Error::io(path, &io::Error::from(ErrorKind::IsADirectory)));
-        }
-        let name = path.display().to_string();
-        if kind.is_ok_and(|kind| !kind.is_file()) {
-            // A device or a named pipe: there is nothing to rename over.
-            let file = File::options().write(true).open(path).map_err(|e| Error::io(path, &e))?;
-            return Ok(Self::new(name, Box::new(file), None, names, all_fields));
-        }
-        let part = Part::beside(path);
-        let file = File::create(&part.path).map_err(|e| Error::io(path, &e))?;
-        Ok(Self::new(name, Box::new(file), Some(part), names, all_fields))
+    pub fn to_file(output: OutputPath, names: &[FieldNames], all_fields: bool) -> Result<Self> {
+        let name = output.name().display().to_string();
+        Ok(Self::new(name, To::File(output.begin()?), names, all_fields))
     }
 
     /// Writes to `writer`, which messages call `name`.
@@ -54,20 +61,13 @@ impl NdjsonSink {
         names: &[FieldNames],
         all_fields: bool,
     ) -> Self {
-        Self::new(name.into(), Box::new(writer), None, names, all_fields)
+        Self::new(name.into(), To::Writer(Box::new(writer)), names, all_fields)
     }
 
-    fn new(
-        name: String,
-        writer: Box<dyn Write + Send>,
-        part: Option<Part>,
-        names: &[FieldNames],
-        all_fields: bool,
-    ) -> Self {
+    fn new(name: String, to: To, names: &[FieldNames], all_fields: bool) -> Self {
         Self {
             name,
-            writer: BufWriter::with_capacity(1 << 16, writer),
-            part,
+            writer: BufWriter::with_capacity(1 << 16, to),
             composer: Composer::new(names, all_fields),
             line: Vec::new(),
             closed: false,
@@ -114,44 +114,10 @@ impl Sink for NdjsonSink {
 
     fn finish(mut self: Box<Self>) -> Result<()> {
         let flow = self.flush()?;
-        let Self { writer, part, name, .. } = *self;
-        if flow == Flow::Closed {
-            // What is still in the buffer has no reader; dropping the writer would try again.
-            let _ = writer.into_parts();
-            return Ok(());
-        }
-        drop(writer);
-        part.map_or(Ok(()), Part::keep).map_err(|e| Error::failed(format!("cannot write: {e}")).at(name))
-    }
-}
-
-/// A file on its way to become another, gone unless it is kept.
-struct Part {
-    path: PathBuf,
-    target: PathBuf,
-    kept: bool,
-}
-
-impl Part {
-    fn beside(path: &Path) -> Self {
-        // Through a link to the file itself, or the link would be what is replaced.
-        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let mut name = target.clone().into_os_string();
-        name.push(".part");
-        Self { path: name.into(), target, kept: false }
-    }
-
-    fn keep(mut self) -> io::Result<()> {
-        std::fs::rename(&self.path, &self.target)?;
-        self.kept = true;
-        Ok(())
-    }
-}
-
-impl Drop for Part {
-    fn drop(&mut self) {
-        if !self.kept {
-            let _ = std::fs::remove_file(&self.path);
+        // Nothing is left in the buffer, or what is left has no reader.
+        match self.writer.into_parts().0 {
+            To::File(file) if flow == Flow::Open => file.finish(),
+            _ => Ok(()),
         }
     }
 }
@@ -284,37 +250,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.ndjson");
         let files = || std::fs::read_dir(folder.path()).unwrap().count();
-        let mut sink = NdjsonSink::to_file(&path, &names(), false).unwrap();
+        let to = |force: bool| OutputPath::new(&path, force, &[]).unwrap();
+        let mut sink = NdjsonSink::to_file(to(false), &names(), false).unwrap();
         let _ = sink.write(&percepts(Precision::F32)).unwrap();
-        assert!(!path.exists() && folder.path().join("out.ndjson.part").exists());
+        assert!(!path.exists() && files() == 1);
         drop(sink);
         assert_eq!(files(), 0);
 
         std::fs::write(&path, "old").unwrap();
-        let mut sink = Box::new(NdjsonSink::to_file(&path, &names(), false).unwrap());
+        let mut sink = Box::new(NdjsonSink::to_file(to(true), &names(), false).unwrap());
         let _ = sink.write(&percepts(Precision::F32)).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         sink.finish().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 2);
         assert_eq!(files(), 1);
-
-        let nowhere = NdjsonSink::to_file(folder.path().join("no/such/out"), &names(), false);
-        assert!(nowhere.err().unwrap().is_not_found());
-        assert!(NdjsonSink::to_file(folder.path(), &names(), false).err().unwrap().to_string().contains("folder"));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn devices_and_links_stay_what_they_are() {
-        let folder = tempfile::tempdir().unwrap();
-        Box::new(NdjsonSink::to_file("/dev/null", &names(), false).unwrap()).finish().unwrap();
-        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
-        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
-        std::fs::write(&file, "old").unwrap();
-        std::os::unix::fs::symlink(&file, &link).unwrap();
-        Box::new(NdjsonSink::to_file(&link, &names(), false).unwrap()).finish().unwrap();
-        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), "");
     }
 
     struct Failing(ErrorKind);

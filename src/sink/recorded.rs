@@ -1,11 +1,10 @@
 //! A sink that records: frames, the percepts made of them, and what viewers show.
 
-use std::path::Path;
-
 use super::line::Composer;
 use super::scenery::Scenery;
 use super::{Flow, Heard, Part, Session, Sink};
 use crate::error::Result;
+use crate::output::OutputPath;
 use crate::percept::Percepts;
 use crate::recording::{PERCEPTS, Recorder};
 
@@ -19,12 +18,12 @@ pub struct RecordingSink {
 }
 
 impl RecordingSink {
-    /// Begins a recording at `path`.
+    /// Begins a recording at `output`.
     ///
     /// # Errors
-    /// The file is there and is not to be replaced, or it cannot be written.
-    pub fn create(path: impl AsRef<Path>, session: &Session<'_>) -> Result<Self> {
-        let mut recorder = Recorder::create(path, session.taxels, session.force)?;
+    /// It cannot be written.
+    pub fn create(output: OutputPath, session: &Session<'_>) -> Result<Self> {
+        let mut recorder = Recorder::create(output, session.taxels)?;
         for (name, media_type, bytes) in &session.attached {
             recorder.attach(name, media_type, bytes)?;
         }

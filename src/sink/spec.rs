@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::{NdjsonSink, Session, Sink};
 use crate::error::{Error, Result, nearest};
+use crate::output::{OutputPath, OutputPaths};
 
 const FORMS: &str = "ndjson:FILE, mcap:FILE, or - for NDJSON on standard output";
 
@@ -48,22 +49,51 @@ impl FromStr for SinkSpec {
 }
 
 impl SinkSpec {
+    /// Asks for its file, or for standard output, as one of a command's `outputs`.
+    ///
+    /// # Errors
+    /// As [`OutputPaths::add`].
+    pub fn target(&self, outputs: &mut OutputPaths) -> Result<SinkTarget> {
+        Ok(match self {
+            Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
+            Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
+            Self::Stdout => {
+                outputs.add_standard_output()?;
+                SinkTarget::Stdout
+            }
+        })
+    }
+}
+
+/// A sink that may be opened: nothing that the command reads is lost by it.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum SinkTarget {
+    /// A line of JSON a frame.
+    Ndjson(OutputPath),
+    /// A recording in MCAP.
+    Mcap(OutputPath),
+    /// NDJSON on standard output.
+    Stdout,
+}
+
+impl SinkTarget {
     /// Opens the sink for `session`.
     ///
     /// # Errors
     /// It cannot be opened.
-    pub fn open(&self, session: &Session<'_>) -> Result<Box<dyn Sink + Send>> {
+    pub fn open(self, session: &Session<'_>) -> Result<Box<dyn Sink + Send>> {
         let (names, all_fields) = (&session.names, session.all_fields);
         match self {
-            Self::Ndjson(path) => Ok(Box::new(NdjsonSink::to_file(path, names, all_fields)?)),
+            Self::Ndjson(output) => Ok(Box::new(NdjsonSink::to_file(output, names, all_fields)?)),
             Self::Stdout => {
                 Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
             }
             #[cfg(feature = "mcap")]
-            Self::Mcap(path) => Ok(Box::new(super::RecordingSink::create(path, session)?)),
+            Self::Mcap(output) => Ok(Box::new(super::RecordingSink::create(output, session)?)),
             #[cfg(not(feature = "mcap"))]
-            Self::Mcap(path) => {
-                Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(path.display()))
+            Self::Mcap(output) => {
+                Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(output.name().display()))
             }
         }
     }

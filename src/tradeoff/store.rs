@@ -9,8 +9,8 @@ use super::{Rates, Report};
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
+use crate::output::OutputPaths;
 use crate::scene::Knobs;
-use crate::whole;
 
 /// What files are like; another is not read.
 const VERSION: u32 = 2;
@@ -147,9 +147,12 @@ impl Store {
     }
 
     fn write(&self, path: &Path, stored: &impl Serialize) -> Result<()> {
-        std::fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, &e))?;
         let text = serde_json::to_string_pretty(stored).map_err(|e| Error::failed(e.to_string()))?;
-        whole::write(path, text.as_bytes())
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        // What is kept is this program's own.
+        let mut folder = OutputPaths::new(true, [""; 0]).add_folder(&self.folder, [&*name])?;
+        folder.make()?;
+        folder.take(&name).write(text.as_bytes())
     }
 }
 

@@ -63,9 +63,14 @@ fn a_recipe_places_region_by_region_and_says_so_as_json() {
 fn nothing_is_overwritten_unless_forced() {
     let (folder, path, _) = skin(&["--taxels", "300"]);
     let before = std::fs::read(&path).unwrap();
-    let again = ["author", text_of(&path), "--taxels", "20", "-o", text_of(&path)];
+    let again = ["author", "humanoid", "--taxels", "20", "-o", text_of(&path)];
     let line = fails(1, &again);
     assert!(line.contains("--force") && line.lines().count() == 1, "{line}");
+    assert!(std::fs::read(&path).unwrap() == before);
+    // What it is made of is replaced by nothing.
+    let onto_itself = ["author", text_of(&path), "--taxels", "20", "-o", text_of(&path), "--force"];
+    let line = fails(2, &onto_itself);
+    assert!(line.contains("is the input") && line.lines().count() == 1, "{line}");
     assert!(std::fs::read(&path).unwrap() == before);
     done(&[&again[..], &["--force"]].concat());
     assert!(std::fs::read(&path).unwrap() != before);

@@ -102,7 +102,7 @@ fn what_was_put_right_on_reading_is_said_by_inspect_and_by_run() {
     glb.taxels("taxels", Some(arm), &[taxel(1, 0.0), taxel(2, 0.01), taxel(2, 0.02)], None);
     let members = [1, 2, 7].map(|id| (id, MemberSpec::default())).into();
     glb.field(&FieldSpec { name: "arm".into(), members, ..FieldSpec::default() }, Some(arm), DVec3::ZERO);
-    glb.save(&path).unwrap();
+    glb.save(somatic::OutputPath::new(&path, false, &[]).unwrap()).unwrap();
     let told = ["2 on link `arm` is now 3", "field `arm` names taxel 7"];
 
     let strict = output(&["inspect", text_of(&path), "--strict"]);

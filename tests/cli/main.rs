@@ -10,6 +10,7 @@ mod doubts;
 mod fields;
 mod inspect;
 mod live;
+mod outputs;
 mod paper;
 mod plan;
 // The library's own numbers that look like chance.

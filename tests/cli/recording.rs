@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use somatic::recording::{Reader, Recorder};
-use somatic::{Frame, RawValue};
+use somatic::{Frame, OutputPath, RawValue};
 
 use super::random::Random;
 use super::skips::skip;
@@ -30,7 +30,7 @@ fn ids() -> Vec<u32> {
 /// Makes a recording of `count` frames at 50 Hz of 16 taxels at `path`, and gives its frames if asked to.
 fn recorded(path: &Path, count: u64, keep: bool) -> Vec<Frame> {
     let ids = ids();
-    let mut recorder = Recorder::create(path, &ids, false).unwrap();
+    let mut recorder = Recorder::create(OutputPath::new(path, false, &[]).unwrap(), &ids).unwrap();
     recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
     let mut chance = Random::new(7);
     let mut kept = Vec::new();
@@ -587,7 +587,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     let place = |name: &str| folder.path().join(name);
     let body = somatic::Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let mut recorder = Recorder::create(place("a.mcap"), &ids, false).unwrap();
+    let mut recorder = Recorder::create(OutputPath::new(place("a.mcap"), false, &[]).unwrap(), &ids).unwrap();
     recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
     // The first frames are all there, then a third of them is stale, then most are; one is only missing.
     let stale_in = |index: usize, value: usize| value < [0, ids.len() / 3, ids.len() - 5][index / 100];

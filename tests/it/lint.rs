@@ -77,7 +77,7 @@ impl Plate {
     }
 
     pub(crate) fn save(&self, path: &Path) {
-        self.glb().save(path).unwrap();
+        self.glb().save(somatic::OutputPath::new(path, true, &[]).unwrap()).unwrap();
     }
 
     fn glb(&self) -> Glb {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use somatic::signal::FsrCircuit;
 use somatic::source::{CsvSource, SimulatedSource, Source as _, SourceSpec, write_recording};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Percept};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, OutputPath, Percept};
 
 use crate::common::{Flat, engine};
 
@@ -55,10 +55,14 @@ fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/simulations").join(name)
 }
 
+fn new(path: &Path) -> OutputPath {
+    OutputPath::new(path, false, &[]).unwrap()
+}
+
 fn written(simulation: &mut SimulatedSource) -> (Vec<u8>, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
     let (frames, truth) = (folder.path().join("a.csv"), folder.path().join("a.truth.csv"));
-    write_recording(simulation, &frames, &truth).unwrap();
+    write_recording(simulation, new(&frames), new(&truth)).unwrap();
     (std::fs::read(frames).unwrap(), std::fs::read(truth).unwrap())
 }
 
@@ -109,7 +113,7 @@ fn a_recording_reads_back_as_the_source_delivers_it() {
     let folder = tempfile::tempdir().unwrap();
     let (frames, truth) = (folder.path().join("rod.csv"), folder.path().join("rod.truth.csv"));
     let mut simulation = SimulatedSource::open(example("rod.toml")).unwrap();
-    assert_eq!(write_recording(&mut simulation, &frames, &truth).unwrap(), 200);
+    assert_eq!(write_recording(&mut simulation, new(&frames), new(&truth)).unwrap(), 200);
     let mut read = CsvSource::open(&frames, None).unwrap();
     let spec: SourceSpec = format!("sim:{}", example("rod.toml").display()).parse().unwrap();
     let mut direct = spec.open(read.taxels(), None).unwrap();
@@ -136,16 +140,13 @@ fn a_recording_reads_back_as_the_source_delivers_it() {
         assert!((0.0..PI).contains(&number(row, "angle")));
     }
 
-    let same = write_recording(&mut simulation, &frames, &frames).unwrap_err();
-    assert!(same.is_usage());
-    let nowhere = folder.path().join("no/such.csv");
-    let fresh = folder.path().join("fresh.csv");
-    assert!(write_recording(&mut simulation, &fresh, &nowhere).is_err());
-    // A folder in the truth's place is found out last.
-    let taken = folder.path().join("taken");
-    std::fs::create_dir_all(taken.join("inside")).unwrap();
-    assert!(write_recording(&mut simulation, &fresh, &taken).is_err());
+    // Somebody else's file that comes up in the truth's place is found out last.
+    let (fresh, taken) = (folder.path().join("fresh.csv"), folder.path().join("taken.csv"));
+    let (to_fresh, to_taken) = (new(&fresh), new(&taken));
+    std::fs::write(&taken, "mine").unwrap();
+    assert!(write_recording(&mut simulation, to_fresh, to_taken).is_err());
     assert!(!fresh.exists(), "both files or none");
+    assert_eq!(std::fs::read_to_string(&taken).unwrap(), "mine");
 }
 
 /// What sampling a footprint with spread σ at the pitch p may miss of its sum, and of its first and second moments over

@@ -170,6 +170,16 @@ impl Recipe {
         file::parse(name, text, folder)
     }
 
+    /// The files that places are read from: tables and position files.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let named = self.places.iter().filter_map(|place| match &place.how {
+            How::Table { path, .. } | How::Icub { path, .. } => Some(path.clone()),
+            _ => None,
+        });
+        named.collect()
+    }
+
     /// No taxels: those that the body has are grouped.
     #[must_use]
     pub fn none() -> Self {

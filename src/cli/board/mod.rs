@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use somatic::output::OutputLink;
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec};
 use somatic::wire::board::{Faults, Make, Potentiometers, VirtualBoard};
@@ -17,6 +18,7 @@ use somatic::{Error, Frame, Result, bundled};
 
 use self::station::{Common, Station};
 use super::feed::{Arrival, Feed, Manner};
+use super::files::FilesRead;
 use super::run::stop_on_signal;
 use super::{DONE, load_body, print, words};
 
@@ -274,6 +276,9 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
         Some(hz) if (0.001..=1e6).contains(&hz) => (hz * 1e3).round() as u32,
         Some(hz) => return Err(Error::usage(format!("--rate {hz} is no rate; give 0.001 to 1000000 Hz"))),
     };
+    let read = FilesRead::default().sources(arguments.source.as_slice()).files(&arguments.wiring);
+    let read = arguments.body.iter().fold(read, |files, body| files.body(body));
+    let mut outputs = read.outputs(false);
     let mut stations = Vec::new();
     let mut most = 0;
     for wired in wiring.boards() {
@@ -302,6 +307,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
             [_] => link.clone(),
             _ => PathBuf::from(format!("{}-{}", link.display(), wired.id)),
         });
+        let link = link.map(|link| outputs.add_link(link)).transpose()?;
         let places = wired.taxels.iter().map(place).collect();
         stations.push(Station::new(wired.id, VirtualBoard::new(make, Duration::ZERO), places, link, arguments.seed));
     }
@@ -323,7 +329,7 @@ fn in_order(taxels: &[u32], arguments: &Arguments) -> Result<Wiring> {
 
 fn tell_where(arguments: &Arguments, stations: &[Station]) -> Result<()> {
     let about = |station: &Station| {
-        json!({"board": station.id, "port": station.port(), "link": station.link, "baud": arguments.baud,
+        json!({"board": station.id, "port": station.port(), "link": station.link.as_ref().map(OutputLink::path), "baud": arguments.baud,
             "channels": station.places.len()})
     };
     if arguments.json {
@@ -331,7 +337,7 @@ fn tell_where(arguments: &Arguments, stations: &[Station]) -> Result<()> {
         return print(&format!("{}\n", json!({"playing": boards})));
     }
     let line = |station: &Station| {
-        let link = station.link.as_ref().map(|link| format!(" ({})", link.display())).unwrap_or_default();
+        let link = station.link.as_ref().map(|link| format!(" ({})", link.path().display())).unwrap_or_default();
         let channels = words::count(station.places.len() as u64, "channel");
         format!("board {} at {}{link}: {channels}, {} baud\n", station.id, station.port(), arguments.baud)
     };

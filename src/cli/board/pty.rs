@@ -1,7 +1,7 @@
 //! A pseudo-terminal: a serial line whose one end is this process. The only user of `rustix`.
 
 use std::os::fd::OwnedFd;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -81,16 +81,4 @@ pub(super) fn wait<'a>(ends: impl Iterator<Item = &'a Pty>, most: Duration) {
         ends.filter(|pty| pty.is_open()).map(|pty| PollFd::new(&pty.end, PollFlags::IN)).collect();
     let most = Timespec { tv_sec: 0, tv_nsec: most.subsec_nanos().into() };
     let _ = poll(&mut ask, Some(&most));
-}
-
-/// A symbolic link `link` to `path`, in the place of a link that was there.
-pub(super) fn link(path: &Path, link: &Path) -> Result<()> {
-    if std::fs::symlink_metadata(link).is_ok_and(|there| !there.is_symlink()) {
-        return Err(Error::failed("there is a file of this name; give --link another").at(link.display()));
-    }
-    let mut beside = link.as_os_str().to_owned();
-    beside.push(".new");
-    let _ = std::fs::remove_file(&beside);
-    let made = std::os::unix::fs::symlink(path, &beside).and_then(|()| std::fs::rename(&beside, link));
-    made.map_err(|e| Error::io(link, &e))
 }

@@ -1,13 +1,13 @@
 //! A board with its line: paced to its speed, with the faults it is to have.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use serde_json::{Value, json};
 use somatic::Result;
+use somatic::output::OutputLink;
 use somatic::wire::board::{BadLine, Faults, VirtualBoard, Window};
 
-use super::pty::{self, Pty};
+use super::pty::Pty;
 
 /// A line that was not looked after for so long has not sent meanwhile.
 const MOST_AT_ONCE: Duration = Duration::from_millis(50);
@@ -26,7 +26,7 @@ pub(super) struct Station {
     /// Per channel, its place in a row of readings.
     pub(super) places: Vec<Option<usize>>,
     pub(super) plug: Option<Pty>,
-    pub(super) link: Option<PathBuf>,
+    pub(super) link: Option<OutputLink>,
     to_host: BadLine,
     from_host: BadLine,
     /// Bytes that the line has had time for.
@@ -44,7 +44,7 @@ impl Station {
         id: u16,
         board: VirtualBoard,
         places: Vec<Option<usize>>,
-        link: Option<PathBuf>,
+        link: Option<OutputLink>,
         seed: u64,
     ) -> Self {
         let seed = seed.wrapping_mul(0x1_0001).wrapping_add(id.into());
@@ -69,7 +69,7 @@ impl Station {
     pub(super) fn plug_in(&mut self) -> Result<()> {
         let pty = Pty::open()?;
         if let Some(link) = &self.link {
-            pty::link(&pty.path, link)?;
+            link.lead_to(&pty.path)?;
         }
         self.plug = Some(pty);
         Ok(())
@@ -78,7 +78,7 @@ impl Station {
     pub(super) fn pull_out(&mut self) {
         // The link first: the terminal's name may at once be another's.
         if let (Some(_), Some(link)) = (&self.plug, &self.link) {
-            let _ = std::fs::remove_file(link);
+            link.remove();
         }
         self.plug = None;
     }

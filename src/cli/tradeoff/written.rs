@@ -1,19 +1,16 @@
 //! A pick, written into a scene file in place of the wish that it grants. Whatever else stands there stays, comments too.
 
-use std::path::Path;
-
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Combination, Wish};
-use somatic::{BackendKind, Error, Result, whole};
+use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
-/// Writes `combination` into the scene file at `path`.
-pub(super) fn write(path: &Path, combination: &Combination, wish: &Wish) -> Result<()> {
+/// Writes `combination` into the scene file that is edited.
+pub(super) fn write(scene: OutputPath, combination: &Combination, wish: &Wish) -> Result<()> {
+    let path = scene.name();
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let text = with(&text, combination, wish).map_err(|e| e.at(path.display()))?;
-    let permissions = std::fs::metadata(path).map_err(|e| Error::io(path, &e))?.permissions();
-    whole::write(path, text.as_bytes())?;
-    std::fs::set_permissions(path, permissions).map_err(|e| Error::io(path, &e))
+    scene.write(text.as_bytes())
 }
 
 /// `text` with `combination` in it.

@@ -17,7 +17,7 @@ mod truth;
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -70,6 +70,18 @@ impl SimulatedSource {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_text(&path.display().to_string(), &text, folder)
+    }
+
+    /// The files that the simulation at `path` is read from, as far as it can be read: its own and its body's.
+    #[must_use]
+    pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
+        let path = path.as_ref();
+        let mut files = vec![path.to_owned()];
+        let text = if path.is_file() { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
+        if let Ok(File { body: Some(body), .. }) = Text(&text).parse() {
+            files.extend(Body::files(path.parent().unwrap_or(Path::new("")).join(body.get_ref())));
+        }
+        files
     }
 
     /// The simulation in `text`, called `name` in messages, whose body is bundled or a file named as from `folder`.

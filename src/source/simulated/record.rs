@@ -1,15 +1,14 @@
 //! A simulation written down: its frames as a recording, and the truth beside them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use tempfile::NamedTempFile;
 
 use super::{SimulatedSource, Truth};
 use crate::error::{Error, Result};
+use crate::output::{OutputFile, OutputPath};
 use crate::signal::Frame;
 use crate::source::{Source as _, csv_file::put_value};
-use crate::whole::beside;
 
 /// The truth's columns.
 const COLUMNS: [&str; 22] = [
@@ -17,36 +16,25 @@ const COLUMNS: [&str; 22] = [
     "vz", "vu", "vv", "speed", "force",
 ];
 
-/// Writes all frames of `simulation`, from its first, as CSV at `csv_path`, and what is true in them at `truth_path`:
-/// both files complete, or neither. Returns the number of frames.
+/// Writes all frames of `simulation`, from its first, as CSV to `frames`, and what is true in them to `truth`: both files
+/// complete, or neither. Returns the number of frames.
 ///
 /// The truth has a row for each frame and touch that presses; `docs/simulation.md` lists its columns.
 ///
 /// # Errors
-/// A path leaves the surface, a file cannot be written, or both are one; the files are then not there.
-pub fn write_recording(simulation: &mut SimulatedSource, csv_path: &Path, truth_path: &Path) -> Result<u64> {
-    if csv_path == truth_path {
-        return Err(Error::usage("the frames and the truth need a file each").at(csv_path.display()));
-    }
-    let mut frames_file = beside(csv_path)?;
-    let mut truth_file = beside(truth_path)?;
+/// A path leaves the surface, or a file cannot be written; the files are then not there.
+pub fn write_recording(simulation: &mut SimulatedSource, frames: OutputPath, truth: OutputPath) -> Result<u64> {
+    let (mut frames, mut truth) = (frames.begin()?, truth.begin()?);
     simulation.seek(0);
-    write(simulation, &mut frames_file, &mut truth_file, [csv_path, truth_path])?;
-    let place = |file: NamedTempFile, path: &Path| file.persist(path).map_err(|e| Error::io(path, &e.error));
-    place(frames_file, csv_path)?;
-    place(truth_file, truth_path).inspect_err(|_| {
-        // Frames without their truth would look like a recording of their own.
-        let _ = std::fs::remove_file(csv_path);
-    })?;
+    write(simulation, &mut frames, &mut truth)?;
+    // Frames without their truth would look like a recording of their own.
+    frames.finish_with(truth)?;
     Ok(simulation.frames())
 }
 
-fn write(
-    simulation: &mut SimulatedSource,
-    frames_file: &mut NamedTempFile,
-    truth_file: &mut NamedTempFile,
-    [frames_path, truth_path]: [&Path; 2],
-) -> Result<()> {
+fn write(simulation: &mut SimulatedSource, frames_file: &mut OutputFile, truth_file: &mut OutputFile) -> Result<()> {
+    let paths = [frames_file.name().to_owned(), truth_file.name().to_owned()];
+    let [frames_path, truth_path] = paths.each_ref().map(PathBuf::as_path);
     let writer = |file| csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file));
     let (mut frames, mut truth) = (writer(frames_file), writer(truth_file));
     let failed = |path: &Path, e: csv::Error| Error::failed(e.to_string()).at(path.display());

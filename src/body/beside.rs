@@ -1,0 +1,41 @@
+//! The files that a body is made of.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::document::split;
+
+/// The file at `path`, and those that its buffers and images lie in.
+pub(super) fn files(path: &Path) -> Vec<PathBuf> {
+    let mut files = vec![path.to_owned()];
+    // A device would be read without end.
+    let bytes = if path.is_file() { std::fs::read(path).unwrap_or_default() } else { Vec::new() };
+    let Ok(root) = split(&bytes).map(|(text, _)| serde_json::from_slice::<Value>(text).unwrap_or_default()) else {
+        return files;
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let parts = ["buffers", "images"].into_iter().filter_map(|key| root[key].as_array()).flatten();
+    let uris = parts.filter_map(|part| part["uri"].as_str()).filter(|uri| !uri.starts_with("data:"));
+    files.extend(
+        uris.filter_map(|uri| Some(folder.join(&*percent_encoding::percent_decode_str(uri).decode_utf8().ok()?))),
+    );
+    files
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_names_the_files_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gltf");
+        let text = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"my%20arm.bin"},{"uri":"data:,x"},{}],
+            "images":[{"uri":"skin.png"},{"bufferView":0}]}"#;
+        std::fs::write(&path, text).unwrap();
+        assert_eq!(files(&path), [path, folder.path().join("my arm.bin"), folder.path().join("skin.png")]);
+        let none = folder.path().join("none.glb");
+        assert_eq!(files(&none), [none]);
+    }
+}

@@ -1,0 +1,46 @@
+//! The files that a command reads: none of its outputs may be one of them.
+
+use std::path::{Path, PathBuf};
+
+use somatic::Body;
+use somatic::output::OutputPaths;
+use somatic::source::{SimulatedSource, SourceSpec};
+
+use super::scene::Asked;
+
+/// Files that a command reads, whether they are there or not.
+#[derive(Default)]
+pub(super) struct FilesRead(Vec<PathBuf>);
+
+impl FilesRead {
+    /// Those of `asked`, by flags or by the scene file at `scene`.
+    pub(super) fn of(asked: &Asked, scene: Option<&Path>) -> Self {
+        let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
+        asked.body.iter().fold(Self::default().files(named), |files, body| files.body(body)).sources(&asked.sources)
+    }
+
+    pub(super) fn files(mut self, paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
+        self.0.extend(paths.into_iter().map(|path| path.as_ref().to_owned()));
+        self
+    }
+
+    /// A body, with what lies beside it.
+    pub(super) fn body(self, name: &str) -> Self {
+        self.files(Body::files(name))
+    }
+
+    /// What `sources` are read from; one that is none is found out when it is opened.
+    pub(super) fn sources(self, sources: &[String]) -> Self {
+        sources.iter().filter_map(|source| source.parse().ok()).fold(self, |files, source| match source {
+            SourceSpec::Csv(path) | SourceSpec::Mcap(path) => files.files([path]),
+            SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
+            SourceSpec::Stdin | SourceSpec::CsvStdin => files.files(["/dev/stdin"]),
+            _ => files,
+        })
+    }
+
+    /// What is asked for every output of the command.
+    pub(super) fn outputs(self, force: bool) -> OutputPaths {
+        OutputPaths::new(force, self.0)
+    }
+}

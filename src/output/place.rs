@@ -1,0 +1,172 @@
+//! What a path leads to, and whether two lead to the same.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// Links that are followed one after the other: as many as Linux follows.
+const MOST_LINKS: usize = 40;
+
+/// What a path leads to, all links followed.
+#[derive(Debug)]
+pub(super) enum Place {
+    /// Nothing yet: here a file would be made.
+    Nothing(PathBuf),
+    /// A regular file.
+    File(PathBuf),
+    /// A pipe, a terminal or a device.
+    Device(PathBuf),
+    /// A stream of this process, such as `/dev/stdout`, wherever it leads.
+    Stream(Stream),
+    Folder,
+}
+
+/// A stream of this process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    Output,
+    Error,
+}
+
+/// The folder that the last part of `path` is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+impl Place {
+    /// Where `path` leads. Its folder must be there; the file need not, nor what a link points at.
+    pub(super) fn of(path: &Path) -> io::Result<Self> {
+        let mut at = path.to_owned();
+        for _ in 0..MOST_LINKS {
+            let ends_as_folder = at.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| byte == b'/');
+            let Some(name) = at.file_name().filter(|_| !ends_as_folder) else { return Ok(Self::Folder) };
+            let folder = folder_of(&at).canonicalize()?;
+            if let Some(stream) = Stream::called(&folder, name) {
+                return Ok(Self::Stream(stream));
+            }
+            at = folder.join(name);
+            let there = match fs::symlink_metadata(&at) {
+                Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Self::Nothing(at)),
+                there => there?,
+            };
+            if !there.is_symlink() {
+                return Ok(Self::there(at, &there));
+            }
+            let next = folder.join(fs::read_link(&at)?);
+            match fs::metadata(&at) {
+                // A pipe that a shell hands over as /dev/fd/63 has no name that the link could lead to.
+                Ok(there) if fs::symlink_metadata(&next).is_err() => return Ok(Self::there(at, &there)),
+                _ => at = next,
+            }
+        }
+        Err(io::Error::other("too many links, one after the other"))
+    }
+
+    fn there(at: PathBuf, metadata: &Metadata) -> Self {
+        match metadata {
+            there if there.is_dir() => Self::Folder,
+            there if there.is_file() => Self::File(at),
+            _ => Self::Device(at),
+        }
+    }
+
+    /// Which file it is, or would be. `None` for what takes output from many sides, such as a terminal.
+    pub(super) fn identity(&self) -> Option<Identity> {
+        match self {
+            Self::Nothing(at) => {
+                let folder = folder_of(at);
+                Some(Identity::NotYet(number(folder, &fs::metadata(folder).ok()?)?, at.file_name()?.to_owned()))
+            }
+            Self::File(at) | Self::Device(at) => Identity::of_input(at),
+            Self::Stream(stream) => Identity::of_stream(*stream),
+            Self::Folder => None,
+        }
+    }
+}
+
+/// Which file something is, however it is spelt.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Identity {
+    There(Number),
+    /// The file of this name that would be made in a folder.
+    NotYet(Number, OsString),
+}
+
+impl Identity {
+    /// Of the file at `path`. `None` where there is no regular file and no named pipe.
+    pub(super) fn of_input(path: &Path) -> Option<Self> {
+        let there = fs::metadata(path).ok()?;
+        if there.is_file() || is_pipe(&there) { number(path, &there).map(Self::There) } else { None }
+    }
+
+    /// Of the regular file that `stream` leads into, if it is one.
+    #[cfg(unix)]
+    fn of_stream(stream: Stream) -> Option<Self> {
+        let there = stream.duplicate().ok()?.metadata().ok()?;
+        if there.is_file() { number(Path::new(""), &there).map(Self::There) } else { None }
+    }
+
+    #[cfg(not(unix))]
+    fn of_stream(_: Stream) -> Option<Self> {
+        None
+    }
+}
+
+/// The device and the file's number on it.
+#[cfg(unix)]
+type Number = (u64, u64);
+/// The path without links, where the library knows no numbers of files.
+#[cfg(not(unix))]
+type Number = PathBuf;
+
+#[cfg(unix)]
+fn number(_: &Path, there: &Metadata) -> Option<Number> {
+    use std::os::unix::fs::MetadataExt as _;
+    Some((there.dev(), there.ino()))
+}
+
+#[cfg(not(unix))]
+fn number(path: &Path, _: &Metadata) -> Option<Number> {
+    path.canonicalize().ok()
+}
+
+#[cfg(unix)]
+fn is_pipe(there: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    there.file_type().is_fifo()
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Metadata) -> bool {
+    false
+}
+
+impl Stream {
+    /// The one that has this name in this folder.
+    fn called(folder: &Path, name: &OsStr) -> Option<Self> {
+        let stream = match name.to_str()? {
+            "1" => Self::Output,
+            "2" => Self::Error,
+            _ => return None,
+        };
+        let own = [Path::new("/proc/self/fd"), Path::new("/dev/fd")];
+        own.iter().any(|own| own.canonicalize().is_ok_and(|own| own == folder)).then_some(stream)
+    }
+
+    /// A file that writes where the stream does: at its end, if it was opened to be appended to.
+    #[cfg(unix)]
+    pub(super) fn duplicate(self) -> io::Result<File> {
+        use std::os::fd::AsFd as _;
+        let owned = match self {
+            Self::Output => io::stdout().as_fd().try_clone_to_owned(),
+            Self::Error => io::stderr().as_fd().try_clone_to_owned(),
+        };
+        owned.map(File::from)
+    }
+
+    #[cfg(not(unix))]
+    pub(super) fn duplicate(self) -> io::Result<File> {
+        Err(ErrorKind::Unsupported.into())
+    }
+}
