@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         }
         None => Recipe::simple(arguments.taxels, arguments.spacing.as_deref(), &arguments.region)?,
     };
-    let read = FilesRead::default().body(&arguments.mesh).files(&arguments.recipe).files(recipe.files());
+    let read = FilesRead::default().bodies([&arguments.mesh]).files(&arguments.recipe).files(recipe.files());
     let output = read.outputs(arguments.force).add(&arguments.output)?;
     if let Some(seed) = arguments.seed {
         recipe = recipe.with_seed(seed);

@@ -89,7 +89,8 @@ pub(super) struct Arguments {
 
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
-    let read = FilesRead::default().body(&arguments.body).sources(&arguments.sources).files(&arguments.lines.wiring);
+    let read =
+        FilesRead::default().bodies([&arguments.body]).sources(&arguments.sources).files(&arguments.lines.wiring);
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {

@@ -72,8 +72,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         unreachable!("it is of one of these kinds");
     };
     let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
-    let read = arguments.body.iter().fold(read, |files, body| files.body(body));
-    let output = read.outputs(arguments.force).add(to_path)?;
+    let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
     let mut source = from.open(&[], arguments.rate)?;
     source.tell_stale();
     let attached = files(arguments, &from)?;

@@ -16,7 +16,7 @@ impl FilesRead {
     /// Those of `asked`, by flags or by the scene file at `scene`.
     pub(super) fn of(asked: &Asked, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
-        asked.body.iter().fold(Self::default().files(named), |files, body| files.body(body)).sources(&asked.sources)
+        Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
     }
 
     pub(super) fn files(mut self, paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
@@ -24,9 +24,9 @@ impl FilesRead {
         self
     }
 
-    /// A body, with what lies beside it.
-    pub(super) fn body(self, name: &str) -> Self {
-        self.files(Body::files(name))
+    /// Bodies, with what lies beside them.
+    pub(super) fn bodies<'a>(self, names: impl IntoIterator<Item = &'a String>) -> Self {
+        self.files(names.into_iter().flat_map(Body::files))
     }
 
     /// What `sources` are read from; one that is none is found out when it is opened.

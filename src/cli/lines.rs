@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use console::style;
 use serde_json::{Value, json};
-use somatic::{Error, Result};
 use somatic::output::OutputPath;
 use somatic::source::{BoardAccount, BoardState, Lines};
+use somatic::{Error, Result};
 
 use super::latency::Latency;
 use super::repeats::Repeats;

@@ -76,7 +76,7 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
     }
-    let output = FilesRead::default().body(&arguments.body).outputs(arguments.force).add(path)?;
+    let output = FilesRead::default().bodies([&arguments.body]).outputs(arguments.force).add(path)?;
     let mut views = Vec::new();
     for name in &arguments.views {
         match name.as_str() {

@@ -77,7 +77,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
-    let read = FilesRead::default().body(&arguments.body).files(&arguments.lines.wiring);
+    let read = FilesRead::default().bodies([&arguments.body]).files(&arguments.lines.wiring);
     let mut outputs = read.outputs(arguments.force);
     let mut add = |path: &Option<PathBuf>| path.as_ref().map(|path| outputs.add(path)).transpose();
     let (output, fsr_calibration) = (add(&arguments.output)?, add(&arguments.fsr_calibration)?);
