@@ -305,7 +305,7 @@ impl Cell<'_> {
         self.quantity(name, right, got, limit, |a, b| distance(&a[axis], &b[axis]));
     }
 
-    fn quantity<T: fmt::Debug>(
+    fn quantity<T: fmt::Debug + Copy>(
         &mut self,
         name: &str,
         right: Option<T>,

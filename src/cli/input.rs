@@ -82,7 +82,11 @@ impl Input {
         let (SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path)) = spec else { return None };
         let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
         let file = std::fs::metadata(path).ok();
-        Some(format!("{place:?} {:?} {:?}", file.as_ref().map(|f| f.len()), file.as_ref().map(|f| f.modified().ok())))
+        Some(format!(
+            "{place:?} {:?} {:?}",
+            file.as_ref().map(std::fs::Metadata::len),
+            file.as_ref().map(|f| f.modified().ok())
+        ))
     }
 
     /// Opens the serial lines.

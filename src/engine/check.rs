@@ -155,6 +155,9 @@ mod tests {
     type Right = fn(&Percept, Option<&Touch>) -> Option<f64>;
     type Bound = fn(&CellBound, &(Percept, Option<Touch>)) -> Limit;
     type Put = fn(&mut Percepts, usize, f64);
+    type Change = fn(&mut Percepts);
+    /// Its name, what is right, how far off it may be, how to put another, and whether that is kept in single precision.
+    type Quantity = (&'static str, Right, Bound, Put, bool);
 
     /// Puts `value` into a column of single precision.
     fn put(percepts: &mut Percepts, cell: usize, value: f64, column: impl Fn(&mut Columns<f32>) -> &mut Vec<f32>) {
@@ -194,7 +197,7 @@ mod tests {
         fn touched(percepts: &mut Percepts, cell: usize, change: impl Fn(&mut Touch)) {
             percepts.change_first_touch(cell, change);
         }
-        let quantities: [(&str, Right, Bound, Put, bool); 22] = [
+        let quantities: [Quantity; 22] = [
             column!("total", total),
             column!("peak", peak),
             column!("area", area),
@@ -317,7 +320,7 @@ mod tests {
                 assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
             }
             // What has no bound differs by the least that it can.
-            let choices: [(&str, fn(&mut Percepts)); 5] = [
+            let choices: [(&str, Change); 5] = [
                 ("active", |p| p.active[0] += 1),
                 ("flags", |p| p.flags[0] ^= Flags::SATURATED),
                 ("contact", |p| p.flags[0] ^= Flags::NO_CONTACT),
