@@ -210,12 +210,8 @@ impl Cell {
         let mut cell = Self(corners.map(side).to_vec());
         around.iter().for_each(|&neighbour| cell.cut(Beyond::Taxel(neighbour)));
         let images: Vec<DVec2> = cell.beside().filter_map(|side| side.beyond.point()).map(|point| -point).collect();
-        let mut lengths: Vec<f64> = images.iter().map(|image| image.length()).collect();
-        lengths.sort_by(f64::total_cmp);
-        // What lies across a gap is no measure: the median of those that are about as far as the second nearest.
-        let near = OPPOSITE_REACH * lengths.get(1).or(lengths.first()).copied().unwrap_or(0.0);
-        lengths.retain(|&length| length <= near);
-        let usual_m = lengths.get(lengths.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
+        // The third nearest stands for all: in an irregular layout the nearest is too near, and others lie across a gap.
+        let usual_m = around.get(2).or(around.last()).map_or(0.0, |neighbour| neighbour.length());
         let open: Vec<DVec2> = images.into_iter().filter(|&image| cell.is_open(image, usual_m, around)).collect();
         open.into_iter().for_each(|image| cell.cut(Beyond::Image(image)));
         let pitch_m = around.first().map_or(0.0, |nearest| nearest.length());
