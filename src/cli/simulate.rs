@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::Result;
 use somatic::source::{SimulatedSource, write_recording};
+use somatic::{Error, Result};
 
 use super::files::FilesRead;
 use super::{DONE, say};
@@ -39,16 +39,25 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
-    let truth = arguments.truth.clone().unwrap_or_else(|| arguments.output.with_extension("truth.csv"));
     let read = FilesRead::default().files(SimulatedSource::files(&arguments.simulation));
     let mut outputs = read.outputs(arguments.force);
-    let calibration = arguments.output.with_extension("calibration.toml");
-    let (frames_to, truth_to) = (outputs.add(&arguments.output)?, outputs.add(&truth)?);
-    let calibration_to = outputs.add(&calibration)?;
+    let frames_to = outputs.add(&arguments.output)?;
+    let output = arguments.output.display();
+    let truth = match &arguments.truth {
+        Some(truth) => truth.clone(),
+        None if frames_to.is_file() => arguments.output.with_extension("truth.csv"),
+        None => return Err(Error::usage("nothing lies beside a pipe or a device; name the --truth too").at(output)),
+    };
+    let calibration = frames_to.is_file().then(|| arguments.output.with_extension("calibration.toml"));
+    let truth_to = outputs.add(&truth)?;
+    let calibration_to = calibration.as_ref().map(|path| outputs.add(path)).transpose()?;
     let mut simulation = SimulatedSource::open(&arguments.simulation)?;
     let frames = write_recording(&mut simulation, frames_to, truth_to)?;
-    calibration_to.write(simulation.calibration().as_bytes())?;
-    let (output, truth, calibration) = (arguments.output.display(), truth.display(), calibration.display());
-    say(&format!("{frames} frames in {output}, the truth in {truth}, the calibration in {calibration}"));
+    let mut told = format!("{frames} frames in {output}, the truth in {}", truth.display());
+    if let Some(to) = calibration_to {
+        told += &format!(", the calibration in {}", to.name().display());
+        to.write(simulation.calibration().as_bytes())?;
+    }
+    say(&told);
     Ok(DONE)
 }

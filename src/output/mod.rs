@@ -73,6 +73,12 @@ impl OutputPath {
         &self.name
     }
 
+    /// Whether it is a file, or will be: something can lie beside that, and not beside a pipe or a device.
+    #[must_use]
+    pub fn is_file(&self) -> bool {
+        matches!(self.place, Place::Nothing(_) | Place::File(_))
+    }
+
     /// Writes `bytes`: whole, or not at all.
     ///
     /// # Errors

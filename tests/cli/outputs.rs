@@ -300,6 +300,19 @@ fn two_outputs_are_two_files() {
 }
 
 #[test]
+fn what_is_put_beside_an_output_is_an_output() {
+    for beside in ["touch.truth.csv", "touch.calibration.toml"] {
+        let folder = workplace();
+        std::fs::write(folder.path().join(beside), SIMULATION).unwrap();
+        let simulate = |from: &str| ["simulate", from, "-o", "touch.x"].map(str::to_owned);
+        let why = refused(folder.path(), 2, &simulate(beside), &["--force"]);
+        assert!(why.contains(&format!("{beside}: this is the input {beside}")), "{why}");
+        let why = refused(folder.path(), 1, &simulate("sim.toml"), &[]);
+        assert!(why.contains(&format!("{beside}: it is there already")), "{why}");
+    }
+}
+
+#[test]
 fn keys_of_a_scene_are_held_to_the_same() {
     for input in ["scene.toml", "hand.glb", "touch.csv", "cal.toml"] {
         let folder = workplace();
@@ -364,6 +377,11 @@ fn pipes_and_devices_are_written_as_they_are() {
     );
     assert_eq!(said("simulate sim.toml -o /dev/stdout --truth /dev/null").lines().count(), 6);
     assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+    // Nothing is put beside a device.
+    assert!(!Path::new("/dev/stdout.calibration.toml").exists() && !Path::new("/dev/stdout.truth.csv").exists());
+    assert!(
+        refused(folder.path(), 2, &words("simulate sim.toml -o /dev/stdout"), &[]).contains("name the --truth too")
+    );
 
     // A named pipe, and what a shell hands over as /dev/fd/63.
     let program = env!("CARGO_BIN_EXE_somatic");
