@@ -418,6 +418,15 @@ impl Asked {
             Some(path) => Some(load(path)?),
             None => self.own_calibration()?.map(parse).transpose()?,
         };
+        if let (Some(calibration), [source]) = (&calibration, &self.sources[..])
+            && source.starts_with("sim:")
+        {
+            calibration.check_body(&body.name).map_err(|_| {
+                let what =
+                    format!("it is on another body than `{}`; leave --body out, or change its key `body`", body.name);
+                Error::usage(what).at(source)
+            })?;
+        }
         Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
     }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{done, file, output, stderr, text_of};
+use super::{done, fails, file, output, stderr, text_of};
 
 const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
 
@@ -37,14 +37,15 @@ fn a_source_for_another_body_is_said_once() {
     assert!(text.matches(about).count() == 1 && text.contains("lack over half of theirs, such as mat"), "{text}");
     assert!(text.contains("is it the right body?") && text.lines().count() == 1, "{text}");
     assert_eq!(said(&["--body", "mat", "--source", TOUCH, "--quiet"]), "");
-    // The same from an MCAP that somebody else's body is given for, and from a simulation.
+    // The same from an MCAP that somebody else's body is given for. A simulation knows its body.
     let folder = tempfile::tempdir().unwrap();
     let mcap = folder.path().join("touch.mcap");
     done(&["convert", TOUCH, text_of(&mcap), "--body", "hand"]);
     assert!(said(&["--body", "mat", "--source", text_of(&mcap)]).contains("touch.mcap has 40 of the 2048 taxels"));
     assert_eq!(said(&["--source", text_of(&mcap)]), "");
     let rod = concat!("sim:", env!("CARGO_MANIFEST_DIR"), "/examples/simulations/rod.toml");
-    assert!(said(&["--body", "mat", "--source", rod]).contains("rod.toml has 40 of the 2048 taxels of mat"));
+    let refused = fails(2, &["run", "--body", "mat", "--source", rod]);
+    assert!(refused.contains("rod.toml: it is on another body than `mat`; leave --body out"), "{refused}");
     assert!(!said(&["--source", rod]).contains("right body"));
 }
 
