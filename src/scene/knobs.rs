@@ -129,8 +129,6 @@ words! {"coverage",
         All = "all",
         /// Those that changed, always behind a gate.
         Touched = "touched",
-        /// Those whose parents are touched, from the top of the hierarchy down.
-        CoarseToFine = "coarse-to-fine",
     }
 }
 
@@ -227,7 +225,7 @@ mod tests {
         let says = |error: Error| error.to_string();
         assert!(says("onepass".parse::<Arithmetic>().unwrap_err()).contains("did you mean `one-pass`?"));
         let wrong = says("quantum".parse::<Coverage>().unwrap_err());
-        assert!(wrong.contains("choose auto, all, touched or coarse-to-fine"), "{wrong}");
+        assert!(wrong.contains("choose auto, all or touched"), "{wrong}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -92,8 +92,6 @@ pub(crate) struct PlanField {
     pub(crate) charted: bool,
     /// Whether another field of the plan has it as its parent.
     pub(crate) divided: bool,
-    /// The nearest field above it in the plan, in the same letter.
-    pub(crate) above: Option<usize>,
     pub(crate) area_known: bool,
     /// Whether every member's weight is 1.
     pub(crate) unweighted: bool,
@@ -196,15 +194,11 @@ impl Plan {
         let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
-        let mut first_of = BTreeMap::new();
         let (mut plan_fields, mut members) = (Vec::<PlanField>::with_capacity(chosen.len()), Vec::new());
         for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
-            let above = std::iter::successors(field.parent, |&above| fields.fields[above].parent);
-            let above: Option<usize> = above.into_iter().find_map(|above| first_of.get(&above).copied());
             let (count, unit_m) = (field.members.len(), unit_of(field.radius_m()));
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             let first = plan_fields.len();
-            first_of.insert(index, first);
             let still = layout::Still::new(plan.sums(count), count, field.radius_m() / f64::from(unit_m));
             plan_fields.push(PlanField {
                 name: field.name.clone(),
@@ -215,7 +209,6 @@ impl Plan {
                 count,
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
-                above: None,
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 weights: weights(field),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
@@ -238,7 +231,6 @@ impl Plan {
             for (letter, &first_slot) in first_slots.iter().enumerate() {
                 let in_letter = &mut plan_fields[first + letter];
                 in_letter.first = members.len();
-                in_letter.above = above.map(|above| above + letter);
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),

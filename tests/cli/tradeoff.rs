@@ -102,7 +102,7 @@ fn contradictions_are_found_where_they_stand() {
         ("[accuracy]\ncentroid = \"0.5 mm\"\narithmetic = \"compensated\"\n", "line 3, column 1", "one or the other"),
         ("backend = \"gpu\"\n[accuracy]\narithmetic = \"double\"\n", "line 3, column 1", "no double precision"),
         ("backend = \"reference\"\n[accuracy]\narithmetic = \"one-pass\"", "line 3, column 1", "always double"),
-        ("backend = \"gpu\"\n[accuracy]\n  coverage = \"coarse-to-fine\"", "line 3, column 3", "only backend `cpu`"),
+        ("backend = \"gpu\"\n[accuracy]\n  coverage = \"touched\"", "line 3, column 3", "only backend `cpu`"),
         ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "neither is asked for"),
         ("[accuracy]\ncentroid = \"0.5\"", "line 2, column 12", "is no length"),
         ("[accuracy]\ncharts = \"geodesik\"", "line 2, column 10", "did you mean `geodesic`?"),

@@ -30,7 +30,7 @@ pub fn ways() -> Vec<(BackendKind, Knobs)> {
         };
         // A gate stands only before the CPU's live frames; the cadence is everybody's.
         let coverages: &[Coverage] = match backend {
-            BackendKind::Cpu => &[Coverage::All, Coverage::Touched, Coverage::CoarseToFine],
+            BackendKind::Cpu => &[Coverage::All, Coverage::Touched],
             _ => &[Coverage::Auto],
         };
         for arithmetic in arithmetics {

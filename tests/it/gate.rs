@@ -44,7 +44,6 @@ proptest! {
         let calibration = calibrated.then_some(text);
         let mut whole = engine(Coverage::All, calibration);
         let mut gated = engine(Coverage::Touched, calibration);
-        let mut coarse = engine(Coverage::CoarseToFine, calibration);
         let mut frame = whole.frame(0.0);
         frame.values.fill(RawValue::new(0.0));
         for (turn, (from, count, value)) in steps.into_iter().enumerate() {
@@ -55,7 +54,6 @@ proptest! {
             }
             let right = bits(&mut whole, &frame);
             prop_assert_eq!(&right, &bits(&mut gated, &frame));
-            prop_assert_eq!(&right, &bits(&mut coarse, &frame));
         }
     }
 }
@@ -63,7 +61,7 @@ proptest! {
 #[test]
 fn a_gate_that_steps_aside_and_comes_back_changes_nothing() {
     // Wholly touched for long enough that it steps aside, then idle, then touched in one place.
-    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched, Coverage::CoarseToFine].map(large);
+    let mut engines = [Coverage::All, Coverage::Auto, Coverage::Touched].map(large);
     let mut frame = engines[0].frame(0.0);
     for turn in 0..200_usize {
         frame.t_s = turn as f64 * 0.01;

@@ -132,11 +132,6 @@ impl<'a> Coming<'a> {
         };
     }
 
-    /// `members` themselves, so many at a time: a whole number of lines.
-    pub(super) fn members(members: &'a [Member], at_a_time: usize) -> Self {
-        Self { members, pressures: None, at_a_time }
-    }
-
     /// Has the next few fetched.
     #[inline(always)]
     pub(super) fn step(&mut self) {

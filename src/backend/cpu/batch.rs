@@ -12,12 +12,11 @@ use super::columns::{Announcement, Place};
 use super::in_view::InView;
 use super::lines::Lines;
 use super::lot::{Between, Wanted, calls, touch};
-use super::sections::Found;
 use super::simd::{F, LANES, Row, U, load, load_u, splat, with_widest};
 use super::sixteen::ManyAbreast;
 use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
-use super::window::{Stretch, Window};
+use super::window::Stretch;
 use super::{calibrate, change, columns};
 use crate::percept::CellsMut;
 use crate::scene::{Plan, PlanField};
@@ -29,8 +28,6 @@ pub(super) struct Scratch {
     /// Sixteen fields' answers, a lane a frame.
     cells: Box<[Cells; LANES]>,
     between: Box<[Between; LANES]>,
-    /// Answers of the fields that are gone over in sections.
-    pub(super) found: Vec<Box<Found>>,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
     /// Answers on their way past the caches, if any were.
@@ -46,7 +43,6 @@ impl Scratch {
             in_view: InView::new(tables.window.slots()),
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
-            found: tables.window.in_sections().iter().map(|_| Found::new()).collect(),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
             staged: None,
             faults: false,
@@ -77,13 +73,6 @@ pub(super) struct OverFrames<'a, const WEIGHTED: bool> {
     field: usize,
 }
 
-impl<'a> OverFrames<'a, true> {
-    /// Those of field `field`.
-    pub(super) fn of(skin: &'a Skin<'a>, tables: &'a Tables, field: usize) -> Self {
-        Self { skin, seen: &tables.seen[tables.briefs[field].members()], field }
-    }
-}
-
 /// What blocks have to know of every field: little, and side by side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Brief {
@@ -101,22 +90,16 @@ enum Way {
         weighted: bool,
     },
     Wide,
-    /// Wide, and with this place among those that are gone over in sections.
-    InSections(usize),
 }
 
 impl Brief {
     /// Of all fields of `plan`.
-    pub(super) fn all(plan: &Plan, window: &Window) -> Vec<Self> {
+    pub(super) fn all(plan: &Plan) -> Vec<Self> {
         let of = |field: &PlanField| {
             let way = if field.is_wide() { Way::Wide } else { Way::Narrow { weighted: !field.unweighted } };
             Self { first: field.first, count: field.count, way, kind: OneKind::new(field) }
         };
-        let mut all: Vec<Self> = plan.fields.iter().map(of).collect();
-        for (place, far) in window.in_sections().iter().enumerate() {
-            all[far.field].way = Way::InSections(place);
-        }
-        all
+        plan.fields.iter().map(of).collect()
     }
 
     pub(super) fn members(&self) -> Range<usize> {
@@ -244,10 +227,10 @@ pub(super) fn stretch(
         },
         Answers::OnTheirWay,
     );
-    let Scratch { in_view, cells: of_fields, between, found, faults, .. } = scratch;
+    let Scratch { in_view, cells: of_fields, between, faults, .. } = scratch;
     let skin = Skin::new(plan, in_view);
     let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::of(tables, &in_view.pressures) };
-    let may_rest = in_view.any_rests || found.iter().any(|found| found.rests);
+    let may_rest = in_view.any_rests;
     for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
         let fields = &plan.fields[first_field..stretch.fields.end.min(first_field + LANES)];
         let steps = fields.len() * calls(plan.stages());
@@ -261,10 +244,7 @@ pub(super) fn stretch(
         let mut rests = [false; LANES];
         let ask = if may_rest { &mut rests[..fields.len()] } else { &mut [] };
         for (field, rests) in (first_field..).zip(ask) {
-            *rests = match tables.briefs[field].way {
-                Way::InSections(place) => found[place].rests,
-                _ => tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests),
-            };
+            *rests = tables.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests);
         }
         let rests = &rests[..fields.len()];
         if rests.iter().all(|&rests| rests) {
@@ -272,7 +252,7 @@ pub(super) fn stretch(
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, found, *faults, &mut meanwhile, between, of_fields));
+        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, *faults, &mut meanwhile, between, of_fields));
         with_widest!(level, simd => columns::write(simd, of_fields, place, plan.outputs, cells));
     }
 }
@@ -314,7 +294,6 @@ fn answer<S: Simd>(
     first: usize,
     rests: &[bool],
     skin: &Skin<'_>,
-    found: &[Box<Found>],
     faults: bool,
     meanwhile: &mut Meanwhile<'_, '_, '_, '_>,
     between: &mut [Between; LANES],
@@ -359,7 +338,6 @@ fn answer<S: Simd>(
                     *cells = Cells::at_rest(&brief.kind);
                 }
             }
-            Way::InSections(place) => answers.fill(found[place].cells),
             Way::Wide => answer!(ManyAbreast, true),
             Way::Narrow { weighted: false } => answer!(Abreast, false),
             Way::Narrow { weighted: true } => answer!(Abreast, true),

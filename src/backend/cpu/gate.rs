@@ -50,7 +50,7 @@ impl Gate {
     pub(super) fn new(plan: &Plan, units: usize, reads: impl Fn(usize) -> Vec<u32>) -> Option<Self> {
         let Knobs { coverage, cadence, .. } = plan.knobs();
         let wanted = match coverage {
-            Coverage::All | Coverage::CoarseToFine => false,
+            Coverage::All => false,
             Coverage::Auto => plan.slots() >= WORTH_IT || cadence == Cadence::OnChange,
             Coverage::Touched => true,
         };

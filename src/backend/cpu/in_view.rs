@@ -12,7 +12,6 @@ use super::lines::{Aligned, Lines};
 use super::pick::{OneFrame, SomeFrames, Values};
 use super::simd::{LANES, Row, reads_rows_abreast, with_widest};
 use super::transpose::transpose;
-use super::window::Window;
 use super::{Tables, ahead, calibrate};
 use crate::scene::Plan;
 
@@ -53,11 +52,6 @@ impl InView {
             tiles: vec![TileInView { rests: true, faulty: false }; slots / LANES],
             any_rests: false,
         }
-    }
-
-    /// Whether `tiles`, all of which are kept, have nothing but rest.
-    pub(super) fn rests(&self, window: &Window, mut tiles: Range<usize>) -> bool {
-        tiles.all(|tile| self.tiles[((tile * LANES) & window.mask()) / LANES].rests)
     }
 
     /// Reads and calibrates some tiles of up to sixteen frames. Whether any value is anything but a plain number.

@@ -5,7 +5,6 @@ use fearless_simd::prelude::*;
 
 use super::super::Rows;
 use super::as_delivered::AsDelivered;
-use super::descent::{Descent, depth};
 use super::gate::Gate;
 use super::groups::{InFrame, Narrow, PlaceRow};
 use super::lines::Lines;
@@ -18,7 +17,7 @@ use super::touch::{Abreast, Cells, OneKind};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
 use crate::percept::CellsMut;
-use crate::scene::{Coverage, Plan};
+use crate::scene::Plan;
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
@@ -73,7 +72,6 @@ pub(super) struct Live {
     /// Of the other threads that take part, where a frame is shared.
     others: Vec<Gathered>,
     gate: Option<Gate>,
-    descent: Option<Descent>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
     /// Whether members' pressures are brought side by side by way of registers.
@@ -87,9 +85,6 @@ impl Live {
             (0..plan.fields.len()).partition(|&field| plan.fields[field].is_wide());
         // Fields of one size stay in their order.
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
-        if plan.knobs().coverage == Coverage::CoarseToFine {
-            narrow.sort_by_key(|&field| (depth(plan, field), plan.fields[field].above));
-        }
         let room = if tiles * LANES < NEAR { NEAR / LANES } else { tiles + 1 };
         let unpressed = (room - 1) * LANES;
         let groups = narrow.chunks(LANES).enumerate();
@@ -110,11 +105,8 @@ impl Live {
             None => slots_of(wide[unit]).collect(),
             Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
         });
-        let alone = wide.iter().map(std::slice::from_ref);
-        let units: Vec<&[usize]> = alone.chain(narrow.iter().map(|group| &group.fields[..])).collect();
         let threads = rayon::current_num_threads();
         Self {
-            descent: Descent::new(plan, &units),
             gate,
             everything: vec![true; wide.len() + narrow.len()],
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
@@ -199,29 +191,24 @@ impl Live {
             faults,
             inserts: self.inserts,
         };
-        for pass in 0..self.descent.as_ref().map_or(1, Descent::passes) {
-            let stale = match (&mut self.descent, &gate) {
-                (Some(descent), _) => descent.stale(pass, &mut self.answers),
-                (None, gate) => gate.as_ref().map_or(&self.everything[..], |gate| gate.stale()),
-            };
-            let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
-            let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
-            let together = self.together;
-            // What little is left behind a gate is done before others are awake.
-            let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
-            if is_shared && share * plan.memberships() as f64 >= SHARED as f64 {
-                let fields = (&self.wide[..], &self.narrow[..], together);
-                let gathered = (&mut self.gathered, &mut self.others[..]);
-                frame.shared(fields, (wide, narrow), (stale_wide, stale_narrow), gathered);
-            } else {
-                let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
-                for (table, ((field, answer), _)) in wide {
-                    frame.wide(table, field, &mut self.gathered, answer);
-                }
-                let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
-                for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
-                    frame.stale(groups, stale, &mut self.gathered, answers);
-                }
+        let stale = gate.as_ref().map_or(&self.everything[..], |gate| gate.stale());
+        let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
+        let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
+        let together = self.together;
+        // What little is left behind a gate is done before others are awake.
+        let share = stale.iter().filter(|&&stale| stale).count() as f64 / stale.len().max(1) as f64;
+        if is_shared && share * plan.memberships() as f64 >= SHARED as f64 {
+            let fields = (&self.wide[..], &self.narrow[..], together);
+            let gathered = (&mut self.gathered, &mut self.others[..]);
+            frame.shared(fields, (wide, narrow), (stale_wide, stale_narrow), gathered);
+        } else {
+            let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+            for (table, ((field, answer), _)) in wide {
+                frame.wide(table, field, &mut self.gathered, answer);
+            }
+            let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
+            for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
+                frame.stale(groups, stale, &mut self.gathered, answers);
             }
         }
         if !cells.pressures.is_empty() {

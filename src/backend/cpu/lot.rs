@@ -245,7 +245,7 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
 
 /// What is known of touches in charts after the centroid, if there are any of `LEAST` taxels and more.
 #[inline(always)]
-pub(super) fn so_far<S: Simd, const LEAST: u32>(
+fn so_far<S: Simd, const LEAST: u32>(
     simd: S,
     kind: &impl Kind<S>,
     at: usize,

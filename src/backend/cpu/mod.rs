@@ -15,7 +15,6 @@ mod change;
 mod columns;
 mod compensated;
 mod contact;
-mod descent;
 mod gate;
 mod groups;
 mod hysteresis;
@@ -28,7 +27,6 @@ mod orientation;
 mod pick;
 mod put;
 mod rest;
-mod sections;
 #[cfg(feature = "gpu")]
 pub(super) mod side_by_side;
 mod simd;
@@ -106,7 +104,7 @@ impl Cpu {
         let seen = window.members(plan);
         Self {
             tables: Tables {
-                briefs: batch::Brief::all(plan, &window),
+                briefs: batch::Brief::all(plan),
                 rest: rest::Rest::new(&plan.fields, &seen),
                 seen,
                 window,
@@ -157,8 +155,6 @@ impl Cpu {
         let steps = |fields: usize| fields * lot::calls(plan.stages());
         let mut block = |at: usize, cells: &mut CellsMut<'_>, mut outgoing: Option<&mut stream::Outgoing<'_>>| {
             let before = the_one_before(raw.rows, at, &self.before);
-            let (frames, batch::Scratch { in_view, found, .. }) = (at..at + cells.frames(), &mut scratch);
-            sections::go_over(self.level, plan, tables, raw.rows, frames, in_view, found);
             for (index, stretch) in stretches.iter().enumerate() {
                 let (next, frames) = match stretches.get(index + 1) {
                     Some(next) => (next, at..at + LANES),

@@ -1,7 +1,5 @@
 //! orientation in lanes; see [`crate::stage::orientation`].
 
-use std::ops::Range;
-
 use fearless_simd::prelude::*;
 
 use super::angle::of_line;
@@ -23,92 +21,38 @@ pub(super) struct Apart<S: Simd> {
 }
 
 /// Finds the two farthest points.
+///
+/// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
+/// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
 #[inline(always)]
 pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
-    Search::new(simd).over(simd, members, 0..members.count(), at, touch).far
+    if touch.scale.simd_eq(splat(simd, 1.0)).all_true() {
+        search::<S, P, false>(simd, members, at, touch)
+    } else {
+        search::<S, P, true>(simd, members, at, touch)
+    }
 }
 
-/// The two farthest points of those that were seen, in the members' order.
-#[derive(Clone, Copy)]
-pub(super) struct Search<S: Simd> {
-    pub(super) far: Apart<S>,
-    /// The farthest one.
-    x: F<S>,
-    y: F<S>,
-}
-
-/// The [`Search::numbers`] of none.
-pub(super) const UNSEEN: [f32; 7] = [-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, 0.0];
-
-impl<S: Simd> Search<S> {
-    /// Of none.
-    #[inline(always)]
-    fn new(simd: S) -> Self {
-        // Without a loop, which would go through memory.
-        let [r1, r2, r3, far_x, far_y, x, y] = UNSEEN;
-        let (far_x, far_y) = (splat(simd, far_x), splat(simd, far_y));
-        let r = [splat(simd, r1), splat(simd, r2), splat(simd, r3)];
-        Self { far: Apart { r, x: far_x, y: far_y }, x: splat(simd, x), y: splat(simd, y) }
+/// The same; not `SCALED` where every scale is 1, which saves a twentieth of the work.
+#[inline(always)]
+fn search<S: Simd, P: Members<S>, const SCALED: bool>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
+    let (unseen, none): (F<S>, F<S>) = (splat(simd, -1.0), splat(simd, 0.0));
+    let mut far: Apart<S> = Apart { r: [unseen; 3], x: none, y: none };
+    let (mut far_x, mut far_y): (F<S>, F<S>) = (none, none);
+    for member in 0..members.count() {
+        // Strictly larger, so that the lower id stays.
+        let (r, x, y) = point::<S, P, SCALED>(simd, members, member, at, touch);
+        let (first, second) = (r.simd_gt(far.r[0]), r.simd_gt(far.r[1]));
+        far.r[2] = far.r[2].max(far.r[1].min(r));
+        far.r[1] = far.r[1].max(far.r[0].min(r));
+        far.r[0] = far.r[0].max(r);
+        // Whether it is the farthest now or the second, the other one is what was the farthest before.
+        far.x = second.select(x - far_x, far.x);
+        far.y = second.select(y - far_y, far.y);
+        far_x = first.select(x, far_x);
+        far_y = first.select(y, far_y);
     }
-
-    /// As numbers, to go on with later.
-    #[inline(always)]
-    pub(super) fn numbers(self) -> [F<S>; 7] {
-        let Apart { r: [r1, r2, r3], x, y } = self.far;
-        [r1, r2, r3, x, y, self.x, self.y]
-    }
-
-    #[inline(always)]
-    pub(super) fn of_numbers([r1, r2, r3, far_x, far_y, x, y]: [F<S>; 7]) -> Self {
-        Self { far: Apart { r: [r1, r2, r3], x: far_x, y: far_y }, x, y }
-    }
-
-    /// With some more `seen` members.
-    ///
-    /// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
-    /// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
-    #[inline(always)]
-    pub(super) fn over<P: Members<S>>(
-        self,
-        simd: S,
-        members: P,
-        seen: Range<usize>,
-        at: usize,
-        touch: &Touch<S>,
-    ) -> Self {
-        if touch.scale.simd_eq(splat(simd, 1.0)).all_true() {
-            self.go::<P, false>(simd, members, seen, at, touch)
-        } else {
-            self.go::<P, true>(simd, members, seen, at, touch)
-        }
-    }
-
-    /// The same; not `SCALED` where every scale is 1, which saves a twentieth of the work.
-    #[inline(always)]
-    fn go<P: Members<S>, const SCALED: bool>(
-        mut self,
-        simd: S,
-        members: P,
-        seen: Range<usize>,
-        at: usize,
-        touch: &Touch<S>,
-    ) -> Self {
-        for member in seen {
-            // Strictly larger, so that the lower id stays.
-            let (r, x, y) = point::<S, P, SCALED>(simd, members, member, at, touch);
-            let far = &mut self.far;
-            let (first, second) = (r.simd_gt(far.r[0]), r.simd_gt(far.r[1]));
-            far.r[2] = far.r[2].max(far.r[1].min(r));
-            far.r[1] = far.r[1].max(far.r[0].min(r));
-            far.r[0] = far.r[0].max(r);
-            // Whether it is the farthest now or the second, the other one is what was the farthest before.
-            far.x = second.select(x - self.x, far.x);
-            far.y = second.select(y - self.y, far.y);
-            self.x = first.select(x, self.x);
-            self.y = first.select(y, self.y);
-        }
-        self
-    }
+    far
 }
 
 /// A member's point e − c, and its squared distance.

@@ -1,7 +1,5 @@
 //! A wide field over sixteen frames: sixteen sums of everything, a lane a frame; see [`super::wide`].
 
-use std::ops::Range;
-
 use fearless_simd::prelude::*;
 
 use super::axis::{self, Moments};
@@ -25,35 +23,11 @@ pub(super) fn in_sixteen<S: Simd, const K: usize>(
     add: impl Fn(usize, &mut [F<S>; K]),
 ) -> [F<S>; K] {
     let mut sums = [[splat(simd, 0.0); K]; LANES];
-    add_in_sixteen::<S, K>(
-        0..count,
-        &mut sums,
-        add,
-        #[inline(always)]
-        || {},
-    );
-    as_a_tree::<S, K>(sums)
-}
-
-/// How often [`add_in_sixteen`] calls `meanwhile` for so many members.
-pub(super) fn calls(members: usize) -> usize {
-    LANES * members.div_ceil(BLOCK)
-}
-
-/// Adds the parts of `members`, of which the first one's number is a multiple of sixteen, to the sixteen `sums` of each.
-#[inline(always)]
-pub(super) fn add_in_sixteen<S: Simd, const K: usize>(
-    members: Range<usize>,
-    sums: &mut [[F<S>; K]; LANES],
-    add: impl Fn(usize, &mut [F<S>; K]),
-    mut meanwhile: impl FnMut(),
-) {
-    let mut start = members.start;
-    while start < members.end {
-        let end = members.end.min(start + BLOCK);
+    let mut start = 0;
+    while start < count {
+        let end = count.min(start + BLOCK);
         let mut lane = 0;
         while lane < LANES {
-            meanwhile();
             let mut sum = sums[lane];
             let mut member = start + lane;
             while member < end {
@@ -65,11 +39,6 @@ pub(super) fn add_in_sixteen<S: Simd, const K: usize>(
         }
         start = end;
     }
-}
-
-/// Sixteen sums of each as one.
-#[inline(always)]
-pub(super) fn as_a_tree<S: Simd, const K: usize>(mut sums: [[F<S>; K]; LANES]) -> [F<S>; K] {
     let mut half = LANES / 2;
     while half > 0 {
         let mut lane = 0;
@@ -87,40 +56,6 @@ pub(super) fn as_a_tree<S: Simd, const K: usize>(mut sums: [[F<S>; K]; LANES]) -
     sums[0]
 }
 
-/// Adds a member's part to S, how many are pressed, and the centroid's numerators where `centroid` says so.
-#[inline(always)]
-pub(super) fn add_touch<S: Simd, P: Members<S>>(
-    simd: S,
-    members: P,
-    member: usize,
-    at: usize,
-    centroid: bool,
-    [total, active, u, v]: &mut [F<S>; 4],
-) {
-    let part = members.part(simd, member, at);
-    *total += part.pull;
-    *active += part.pressure.simd_gt(splat(simd, 0.0)).select(splat(simd, 1.0), splat(simd, 0.0));
-    if centroid {
-        *u += part.pull * part.u;
-        *v += part.pull * part.v;
-    }
-}
-
-/// Adds the area of a member that is pressed.
-#[inline(always)]
-pub(super) fn add_area<S: Simd, P: Members<S>>(simd: S, members: P, member: usize, at: usize, [area]: &mut [F<S>; 1]) {
-    let none = splat(simd, 0.0);
-    let pressed = members.part(simd, member, at).pressure.simd_gt(none);
-    *area += pressed.select(members.area(simd, member, at), none);
-}
-
-/// Adds a member's part to the third coordinate's numerator.
-#[inline(always)]
-pub(super) fn add_depth<S: Simd, P: Members<S>>(simd: S, members: P, member: usize, at: usize, [sum]: &mut [F<S>; 1]) {
-    let part = members.part(simd, member, at);
-    *sum += part.pull * members.depth(simd, member, at);
-}
-
 impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
     #[inline(always)]
     fn sums(self, simd: S, at: usize, centroid: bool) -> Sums<S> {
@@ -128,7 +63,15 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
             simd,
             self.0.count(),
             #[inline(always)]
-            |member, sums| add_touch(simd, self.0, member, at, centroid, sums),
+            |member, [total, active, u, v]| {
+                let part = self.0.part(simd, member, at);
+                *total += part.pull;
+                *active += part.pressure.simd_gt(splat(simd, 0.0)).select(splat(simd, 1.0), splat(simd, 0.0));
+                if centroid {
+                    *u += part.pull * part.u;
+                    *v += part.pull * part.v;
+                }
+            },
         );
         Sums { total, active: active.to_int::<U<S>>(), u, v }
     }
@@ -140,7 +83,11 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
             simd,
             self.0.count(),
             #[inline(always)]
-            |member, area| add_area(simd, self.0, member, at, area),
+            |member, [area]| {
+                let none = splat(simd, 0.0);
+                let pressed = self.0.part(simd, member, at).pressure.simd_gt(none);
+                *area += pressed.select(self.0.area(simd, member, at), none);
+            },
         );
         (peak, area)
     }
@@ -156,7 +103,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
             simd,
             self.0.count(),
             #[inline(always)]
-            |member, sum| add_depth(simd, self.0, member, at, sum),
+            |member, [sum]| *sum += self.0.part(simd, member, at).pull * self.0.depth(simd, member, at),
         );
         sum
     }

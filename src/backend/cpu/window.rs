@@ -3,15 +3,13 @@
 //! Sixteen frames of a million taxels are 64 MB of pressures. Written by calibration and read again by fields, they would
 //! go to memory and back. Where fields that follow each other have taxels that do, it is enough to keep some thousands of
 //! them: fields are gone through in order, a stretch of them at a time, and the window on their taxels slides along. What comes
-//! into it next is known, and fetched meanwhile. Fields that are wider than any window are gone over before, section by
-//! section.
+//! into it next is known, and fetched meanwhile.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::sections::InSections;
 use super::simd::LANES;
-use crate::scene::{Plan, PlanField};
+use crate::scene::Plan;
 use crate::stage::layout::Member;
 
 /// Slots that a skin may have before it is looked at through a window.
@@ -21,10 +19,6 @@ const FAR: usize = 1 << 13;
 /// Slots that a window has, the first that does: 256 KiB of pressures and more.
 const SIZES: [usize; 3] = [1 << 12, 1 << 13, 1 << 14];
 
-/// Slots from which on it takes less time to read a field's raw values twice than to keep its pressures: those are 16 MiB.
-/// Tests have fewer.
-const VAST: usize = if cfg!(test) { 1 << 14 } else { 1 << 18 };
-
 /// Which fields are computed together, what is read before, and how many slots are kept.
 #[derive(Clone, Debug)]
 pub(super) struct Window {
@@ -33,7 +27,6 @@ pub(super) struct Window {
     slots: usize,
     /// What a slot's number is cut to for its place among those that are kept.
     mask: usize,
-    in_sections: Vec<InSections>,
 }
 
 /// Fields that follow each other.
@@ -60,45 +53,32 @@ impl Stretch {
 
 impl Window {
     pub(super) fn new(plan: &Plan) -> Self {
-        let ([.., widest], all) = (SIZES, plan.slots().next_multiple_of(LANES));
-        let may_be = all > VAST && !plan.is_compensated();
-        let is_far = |field: &PlanField| field.is_wide() && tiles_of(plan.members_of(field)).len() > widest / LANES;
-        let far: Vec<usize> = (0..plan.fields.len()).filter(|&field| may_be && is_far(&plan.fields[field])).collect();
-        let mut needs = Vec::new();
-        for (chunk, fields) in plan.fields.chunks(LANES).enumerate() {
-            let near = (chunk * LANES..).zip(fields).filter(|(index, _)| far.binary_search(index).is_err());
-            let needed = near.map(|(_, field)| tiles_of(plan.members_of(field)));
-            needs.push(needed.reduce(|one, other| around(&one, &other)).unwrap_or_default());
-        }
+        let all = plan.slots().next_multiple_of(LANES);
+        let needs = plan.fields.chunks(LANES).map(|fields| {
+            let needed = fields.iter().map(|field| tiles_of(plan.members_of(field)));
+            needed.reduce(|one, other| around(&one, &other)).unwrap_or_default()
+        });
+        let needs: Vec<Range<usize>> = needs.collect();
         // Changes and whoever wants all pressures go through all slots.
         if all > SMALL && !needs.is_empty() && !plan.has_changes() && plan.kept_pressures() == 0 {
             for slots in SIZES {
                 let Some(stretches) = cut(&needs, slots / LANES, plan.fields.len()) else { continue };
                 let reads =
                     stretches.iter().flat_map(|stretch| &stretch.reads).map(ExactSizeIterator::len).sum::<usize>();
-                let in_sections = far.iter().map(|&field| InSections::new(plan, field)).collect::<Option<Vec<_>>>();
-                let Some(in_sections) = in_sections else { break };
-                let more = in_sections.iter().map(InSections::tiles).sum::<usize>();
-                // Reading a little twice is better than keeping all; reading all for each of many fields that lie over each
-                // other is not.
+                // Reading a little twice is better than keeping all.
                 let tiles = all / LANES;
-                if reads <= tiles + tiles / 4 && more <= 2 * tiles {
-                    return Self { stretches, slots, mask: slots - 1, in_sections };
+                if reads <= tiles + tiles / 4 {
+                    return Self { stretches, slots, mask: slots - 1 };
                 }
             }
         }
         let stretch = Stretch { fields: 0..plan.fields.len(), reads: [0..plan.calibrated().div_ceil(LANES), 0..0] };
-        Self { stretches: vec![stretch], slots: all, mask: usize::MAX, in_sections: Vec::new() }
+        Self { stretches: vec![stretch], slots: all, mask: usize::MAX }
     }
 
     /// All fields, in order.
     pub(super) fn stretches(&self) -> &[Stretch] {
         &self.stretches
-    }
-
-    /// The fields that are gone over before, section by section.
-    pub(super) fn in_sections(&self) -> &[InSections] {
-        &self.in_sections
     }
 
     /// Slots that are kept.
@@ -157,14 +137,14 @@ fn cut(needs: &[Range<usize>], room: usize, fields: usize) -> Option<Vec<Stretch
 }
 
 /// From the first to the last tile in which `members` have their taxels.
-pub(super) fn tiles_of(members: &[Member]) -> Range<usize> {
+fn tiles_of(members: &[Member]) -> Range<usize> {
     let slots = members.iter().map(|member| member.slot as usize);
     let (low, high) = slots.fold((usize::MAX, 0), |(low, high), slot| (low.min(slot), high.max(slot + 1)));
     low.min(high) / LANES..high.div_ceil(LANES)
 }
 
 /// All that is in either, and between them.
-pub(super) fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     match (one.is_empty(), other.is_empty()) {
         (true, _) => other.clone(),
         (_, true) => one.clone(),

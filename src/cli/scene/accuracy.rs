@@ -64,8 +64,8 @@ pub(in crate::cli) struct Accuracy {
     #[schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS))]
     pub(in crate::cli) orientation_by: Option<OrientationBy>,
 
-    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), those under touched ones
-    /// (coarse-to-fine), or what pays (auto). Percepts are the same [default: auto].
+    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), or what pays (auto).
+    /// Percepts are the same [default: auto].
     #[arg(long, value_name = "WHICH", value_parser = PossibleValuesParser::new(Coverage::WORDS)
         .try_map(|name| name.parse::<Coverage>()))]
     #[serde(deserialize_with = "word")]
