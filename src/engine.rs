@@ -5,14 +5,16 @@ mod check;
 mod host;
 mod ids;
 mod kept_up;
+mod place;
 
 use std::ops::Range;
 
 use self::cadence::{OnChange, step};
 use self::check::Check;
-use self::host::{Host, Links, Side, flag_stale};
+use self::host::{Host, Side, flag_stale};
 use self::ids::ranges;
 use self::kept_up::KeptUp;
+use self::place::Links;
 use crate::backend::agreement::{Agreement, compare};
 use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
 use crate::body::Body;

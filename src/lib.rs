@@ -63,6 +63,7 @@ mod ink;
 pub mod keys;
 mod length;
 pub mod output;
+mod parallel;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 
 pub use batch::Percepts;
 pub(crate) use batch::{Columns, Values};
-pub(crate) use cells::CellsMut;
+pub(crate) use cells::{CellsMut, PlaceCells};
 
 bitflags! {
     /// Why a quantity is absent or in doubt, and what was wrong with the input.

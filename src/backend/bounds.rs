@@ -9,7 +9,7 @@ use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
-use crate::stage::{Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, position, touches};
+use crate::stage::{Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches};
 
 /// How far a single-precision percept may be off in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -223,9 +223,9 @@ impl Reference {
         let c_bound = centroid::bound(&pressed, how);
         doubt.place = c_bound.truncate().length();
         bound.centroid = Limit::Within([c_bound.x * unit, c_bound.y * unit]);
-        match &field.lift {
-            Some(lift) => {
-                let (position, normal) = position::bound(lift, doubt.place * unit);
+        match &field.surface {
+            Some(surface) => {
+                let (position, normal) = surface.bound(doubt.place * unit);
                 (bound.position, bound.normal) = (Limit::Within(position), Limit::Within(normal));
             }
             None => bound.position = Limit::Within(c_bound.length() * unit + U * U * field.origin_in_anchor.length()),
@@ -301,8 +301,8 @@ impl Reference {
         let limit = touches::bound(lost);
         let place = limit.place * f64::from(field.unit_m);
         // A place has two coordinates on a chart, and three without one.
-        let position = match &field.lift {
-            Some(lift) => position::bound(lift, 2.0_f64.sqrt() * place).0,
+        let position = match &field.surface {
+            Some(surface) => surface.bound(2.0_f64.sqrt() * place).0,
             None => 3.0_f64.sqrt() * place + U * U * field.origin_in_anchor.length(),
         };
         bound.touch = Limit::Within(TouchBound { place, position, ..limit });

@@ -48,6 +48,7 @@ impl Check {
         side: &mut Side,
     ) -> Result<()> {
         backend.run(raw, percepts)?;
+        host.place(frames, raw.first, percepts);
         let first = self.bounds.len();
         for (offset, frame) in frames.iter().enumerate() {
             // Before the host keeps any percept in its stead.
@@ -55,6 +56,7 @@ impl Check {
             host.frame(offset, frame, raw, percepts, side);
             let advances = |field| host.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
             let bounds = self.reference.checked(raw, offset, &mut self.right, advances);
+            host.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
             host.frame(offset, frame, raw, &mut self.right, &mut self.side);
             for (field, bound) in bounds.iter().enumerate() {
                 self.resume(field, bound, left[field], side);

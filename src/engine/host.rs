@@ -1,26 +1,16 @@
 //! What the host does for every backend alike: places on the surface and in the world, separate touches, filtered motion.
 
-use std::collections::HashMap;
-
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
+use super::place::{self, Links};
 use crate::backend::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
 use crate::stage::layout::Member;
-use crate::stage::{filter, motion, position, touches};
-
-/// What poses are applied to: the body's links and how they hang together at rest.
-pub(super) struct Links {
-    /// Whether poses are heeded.
-    pub(super) posed: bool,
-    pub(super) index_of: HashMap<String, usize>,
-    pub(super) parent: Vec<Option<usize>>,
-    pub(super) world_from_link: Vec<DAffine3>,
-}
+use crate::stage::{filter, motion, touches};
 
 /// What the host's stages remember of a field.
 #[derive(Clone, Debug, Default)]
@@ -82,6 +72,7 @@ impl Host<'_> {
         side: &mut Side,
     ) -> Result<()> {
         backend.run(raw, percepts)?;
+        self.place(frames, raw.first, percepts);
         for (offset, frame) in frames.iter().enumerate() {
             self.frame(offset, frame, raw, percepts, side);
         }
@@ -89,7 +80,14 @@ impl Host<'_> {
         Ok(())
     }
 
-    /// The host's part of frame `offset` of `raw`, which is `frame`.
+    /// Puts the centroids of `frames`, which stand in `percepts` from frame `first` on, on the skin, where that is wanted.
+    pub(super) fn place(&self, frames: &[Frame], first: usize, percepts: &mut Percepts) {
+        if self.plan.stages().position {
+            place::all_frames(self.plan, self.links, frames, first, percepts);
+        }
+    }
+
+    /// The host's part of frame `offset` of `raw`, which is `frame`, beside positions and normals.
     pub(super) fn frame(
         &self,
         offset: usize,
@@ -101,7 +99,7 @@ impl Host<'_> {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         let Side { memories, held, last } = side;
         percepts.t_s[index] = frame.t_s;
-        if !(stages.position || stages.filter || self.cadence.is_some()) {
+        if !(stages.touches || stages.filter || self.cadence.is_some()) {
             return;
         }
         for (number, field) in self.plan.fields.iter().enumerate() {
@@ -124,12 +122,8 @@ impl Host<'_> {
                 continue;
             }
             held[number] = contact;
-            let posed = contact && stages.position;
-            let world = if posed { field.anchor.and_then(|anchor| self.links.world_from(anchor, frame)) } else { None };
-            if posed {
-                self.place(field, world.as_ref(), cell, percepts);
-            }
             if stages.touches {
+                let world = self.links.world_from_anchor(field, frame);
                 self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number].touches);
             }
             if stages.filter && field.charted {
@@ -157,31 +151,6 @@ impl Host<'_> {
         if self.plan.stages().touches {
             let touches = percepts.kept_touches(of, from, field);
             percepts.push_touches(touches);
-        }
-    }
-
-    /// The point of the skin at `place` (m, in the field's chart or from its origin), and the normal there.
-    fn on_skin(field: &PlanField, world: Option<&DAffine3>, place: DVec3) -> (DVec3, DVec3) {
-        let (position, normal) = match (&field.chart, &field.lift) {
-            (Some(chart), Some(lift)) => position::on_surface(chart, lift, field.origin_in_anchor, place.truncate()),
-            _ => (field.origin_in_anchor + place, DVec3::ZERO),
-        };
-        match world {
-            Some(world) => (world.transform_point3(position), world.transform_vector3(normal)),
-            None => (position, normal),
-        }
-    }
-
-    /// Puts a cell's centroid on the surface, and into the world where the frame says where that is.
-    fn place(&self, field: &PlanField, world: Option<&DAffine3>, cell: usize, percepts: &mut Percepts) {
-        let place = centroid(percepts, cell);
-        let (position, normal) = Self::on_skin(field, world, place);
-        percepts.in_world[cell] = world.is_some();
-        if self.plan.outputs.contains(Outputs::POSITION) {
-            percepts.position[cell] = position.to_array();
-        }
-        if self.plan.outputs.contains(Outputs::NORMAL) {
-            percepts.normal[cell] = normal.to_array();
         }
     }
 
@@ -240,6 +209,10 @@ impl Host<'_> {
         let unit_m = f64::from(field.unit_m);
         let found = memory.follow(&field.skin(), &pulls);
         let several = found.len() > 1;
+        let on_skin = |place: DVec3| {
+            let (position, normal) = place::on_skin(field, place);
+            world.map_or(position, |world| place::in_world(world, position, normal).0)
+        };
         percepts.push_touches(found.iter().map(|touch| {
             let place = touch.place * unit_m;
             Touch {
@@ -247,7 +220,7 @@ impl Host<'_> {
                 total: touch.total,
                 active: touch.active,
                 centroid: field.charted.then(|| place.truncate().to_array()),
-                position: Self::on_skin(field, world, place).0.to_array(),
+                position: on_skin(place).to_array(),
             }
         }));
         percepts.present[cell] |= Outputs::TOUCHES;
@@ -262,26 +235,5 @@ fn centroid(percepts: &Percepts, cell: usize) -> DVec3 {
     match &percepts.values {
         Values::F32(columns) => DVec3::from_array(columns.centroid(cell)),
         Values::F64(columns) => DVec3::from_array(columns.centroid(cell)),
-    }
-}
-
-impl Links {
-    /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from
-    /// there on. `None` where the frame poses neither.
-    fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
-        if frame.pose.is_empty() || !self.posed {
-            return None;
-        }
-        let mut at = Some(link);
-        while let Some(ancestor) = at {
-            let posed = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&ancestor));
-            if let Some((_, pose)) = posed {
-                let world_from_ancestor = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
-                let ancestor_from_link = self.world_from_link[ancestor].inverse() * self.world_from_link[link];
-                return Some(world_from_ancestor * ancestor_from_link);
-            }
-            at = self.parent[ancestor];
-        }
-        None
     }
 }

@@ -20,13 +20,19 @@ const MOST_NODES: f64 = 96.0;
 /// The surface over a field's chart.
 #[derive(Clone, Debug)]
 pub struct Lift {
-    corner: DVec2,
-    cell_m: DVec2,
-    columns: usize,
-    rows: usize,
-    /// What the surface's point is in chart axes beyond (u, v, 0), m, and the normal in chart axes; row by row.
-    nodes: Vec<(DVec3, DVec3)>,
+    grid: Grid,
     steepest: (f64, f64),
+}
+
+/// Nodes over a chart, at least two a side.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid {
+    pub(crate) corner: DVec2,
+    pub(crate) cell_m: DVec2,
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    /// What the surface's point is in chart axes beyond (u, v, 0), m, and the normal in chart axes; row by row.
+    pub(crate) nodes: Vec<(DVec3, DVec3)>,
 }
 
 impl Lift {
@@ -76,19 +82,24 @@ impl Lift {
                 uvs.map(|uv| sampler.at(uv)).map(|(depth, normal)| (DVec3::Z * depth, normal)).collect()
             }
         };
-        let mut lift = Self { corner: low, cell_m, columns, rows, nodes, steepest: (0.0, 0.0) };
-        lift.steepest = match chart.kind {
-            ChartKind::Geodesic => lift.steepest_anywhere(),
-            ChartKind::Plane | ChartKind::None => lift.steepest_over_plane(),
+        let grid = Grid { corner: low, cell_m, columns, rows, nodes };
+        let steepest = match chart.kind {
+            ChartKind::Geodesic => grid.steepest_anywhere(),
+            ChartKind::Plane | ChartKind::None => grid.steepest_over_plane(),
         };
-        Some(lift)
+        Some(Self { grid, steepest })
+    }
+
+    pub(crate) fn grid(&self) -> &Grid {
+        &self.grid
     }
 
     /// Whether the members' box, and a cell around it, holds (u, v): elsewhere nothing is known of the surface.
     #[must_use]
     pub fn covers(&self, uv: DVec2) -> bool {
-        let last = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64);
-        let at = (uv - self.corner) / self.cell_m;
+        let Grid { corner, cell_m, columns, rows, .. } = self.grid;
+        let last = DVec2::new((columns - 1) as f64, (rows - 1) as f64);
+        let at = (uv - corner) / cell_m;
         at.cmpge(DVec2::NEG_ONE).all() && at.cmple(last + DVec2::ONE).all()
     }
 
@@ -96,14 +107,13 @@ impl Lift {
     /// the grid, those of its rim.
     #[must_use]
     pub fn at(&self, uv: DVec2) -> (DVec3, DVec3) {
-        let last = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64);
-        let at = ((uv - self.corner) / self.cell_m).clamp(DVec2::ZERO, last);
-        let low = at.floor().min(last - DVec2::ONE).max(DVec2::ZERO);
+        let Grid { corner, cell_m, columns, rows, ref nodes } = self.grid;
+        let last = DVec2::new((columns - 1) as f64, (rows - 1) as f64);
+        let at = ((uv - corner) / cell_m).clamp(DVec2::ZERO, last);
+        let low = at.floor().min(last - DVec2::ONE);
         let part = at - low;
         let (column, row) = (low.x as usize, low.y as usize);
-        let node = |dx: usize, dy: usize| {
-            self.nodes[(row + dy).min(self.rows - 1) * self.columns + (column + dx).min(self.columns - 1)]
-        };
+        let node = |dx: usize, dy: usize| nodes[(row + dy) * columns + column + dx];
         let mix = |a: (DVec3, DVec3), b: (DVec3, DVec3), t: f64| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
         let (beyond, normal) = mix(mix(node(0, 0), node(1, 0), part.x), mix(node(0, 1), node(1, 1), part.x), part.y);
         (uv.extend(0.0) + beyond, normal.normalize_or(DVec3::Z))
@@ -120,7 +130,9 @@ impl Lift {
     pub fn lipschitz(&self) -> (f64, f64) {
         self.steepest
     }
+}
 
+impl Grid {
     fn steepest_over_plane(&self) -> (f64, f64) {
         let (depth, normal) = self.slopes(|beyond, _| beyond);
         ((1.0 + depth.length_squared()).sqrt(), normal.length() * 2.0 / 0.258_8)

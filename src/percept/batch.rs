@@ -25,7 +25,7 @@ pub(crate) struct Columns<T> {
 }
 
 impl<T: Clone + Default> Columns<T> {
-    /// Makes room for `cells` cells of each wanted column. Those that every cell is written into keep what they held.
+    /// Makes room for `cells` cells of each wanted column, which keep what they held: backends write every cell.
     fn resize(&mut self, wanted: Outputs, cells: usize) {
         let fit = |column: &mut Vec<T>, output| {
             column.resize(if wanted.intersects(output) { cells } else { 0 }, T::default());
@@ -41,17 +41,12 @@ impl<T: Clone + Default> Columns<T> {
         fit(&mut self.orientation, Outputs::ORIENTATION);
         fit(&mut self.axis, Outputs::AXIS);
         fit(&mut self.anisotropy, Outputs::ANISOTROPY);
-        let clear = |column: &mut Vec<T>, output| {
-            column.clear();
-            column.resize(if wanted.contains(output) { cells } else { 0 }, T::default());
-        };
-        self.displacement.clear();
         self.displacement.resize(if wanted.contains(Outputs::DISPLACEMENT) { cells } else { 0 }, Default::default());
-        clear(&mut self.direction, Outputs::DIRECTION);
-        clear(&mut self.distance, Outputs::DISTANCE);
-        clear(&mut self.radial_distance, Outputs::RADIAL_DISTANCE);
-        clear(&mut self.speed, Outputs::SPEED);
-        clear(&mut self.radial_speed, Outputs::RADIAL_SPEED);
+        fit(&mut self.direction, Outputs::DIRECTION);
+        fit(&mut self.distance, Outputs::DISTANCE);
+        fit(&mut self.radial_distance, Outputs::RADIAL_DISTANCE);
+        fit(&mut self.speed, Outputs::SPEED);
+        fit(&mut self.radial_speed, Outputs::RADIAL_SPEED);
     }
 }
 
@@ -145,12 +140,12 @@ impl Percepts {
         let cells = frames * self.fields;
         let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
         refill(&mut self.t_s, frames, 0.0);
-        refill(&mut self.in_world, cells, false);
+        self.in_world.resize(cells, false);
         self.flags.resize(cells, Flags::empty());
         self.present.resize(cells, Outputs::empty());
         self.active.resize(if self.columns.contains(Outputs::ACTIVE) { cells } else { 0 }, 0);
-        refill(&mut self.position, when(Outputs::POSITION, cells), [0.0; 3]);
-        refill(&mut self.normal, when(Outputs::NORMAL, cells), [0.0; 3]);
+        self.position.resize(when(Outputs::POSITION, cells), [0.0; 3]);
+        self.normal.resize(when(Outputs::NORMAL, cells), [0.0; 3]);
         refill(&mut self.filtered_displacement, when(Outputs::FILTERED_DISPLACEMENT, cells), [0.0; 2]);
         refill(&mut self.filtered_direction, when(Outputs::FILTERED_DIRECTION, cells), 0.0);
         refill(&mut self.filtered_speed, when(Outputs::FILTERED_SPEED, cells), 0.0);

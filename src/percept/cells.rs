@@ -1,5 +1,9 @@
 //! The columns of a batch, to be written by a backend in single precision.
 
+use std::ops::Range;
+
+use glam::DVec3;
+
 use super::batch::Values;
 use super::{Flags, Outputs, Percepts};
 
@@ -138,5 +142,106 @@ impl CellsMut<'_> {
     pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
         self.flags[cell] = Flags::from_bits_truncate(flags);
         self.present[cell] = Outputs::from_bits_truncate(present);
+    }
+}
+
+/// Cells whose centroids are put on the skin, with the columns that this fills; those that nobody asked for are empty.
+pub(crate) struct PlaceCells<'a> {
+    pub(crate) flags: &'a [Flags],
+    centroids: Centroids<'a>,
+    in_world: &'a mut [bool],
+    position: &'a mut [[f64; 3]],
+    normal: &'a mut [[f64; 3]],
+}
+
+/// u, v and depth in the precision of the backend; depth may be empty.
+enum Centroids<'a> {
+    F32([&'a [f32]; 3]),
+    F64([&'a [f64]; 3]),
+}
+
+impl Percepts {
+    /// The cells of `frames` frames from frame `first` on.
+    pub(crate) fn place_cells(&mut self, first: usize, frames: usize) -> PlaceCells<'_> {
+        fn part<T>(column: &mut [T], cells: Range<usize>) -> &mut [T] {
+            if column.is_empty() { column } else { &mut column[cells] }
+        }
+        fn parts<'a, T>(columns: [&'a [T]; 3], cells: &Range<usize>) -> [&'a [T]; 3] {
+            columns.map(|column| if column.is_empty() { column } else { &column[cells.clone()] })
+        }
+        let cells = first * self.fields..(first + frames) * self.fields;
+        let centroids = match &self.values {
+            Values::F32(c) => Centroids::F32(parts([&c.centroid_u, &c.centroid_v, &c.centroid_depth], &cells)),
+            Values::F64(c) => Centroids::F64(parts([&c.centroid_u, &c.centroid_v, &c.centroid_depth], &cells)),
+        };
+        PlaceCells {
+            flags: &self.flags[cells.clone()],
+            centroids,
+            in_world: &mut self.in_world[cells.clone()],
+            position: part(&mut self.position, cells.clone()),
+            normal: part(&mut self.normal, cells),
+        }
+    }
+}
+
+impl PlaceCells<'_> {
+    /// The first `cells` cells, and the rest.
+    pub(crate) fn split_at(self, cells: usize) -> (Self, Self) {
+        fn split<T>(columns: [&[T]; 3], cells: usize) -> ([&[T]; 3], [&[T]; 3]) {
+            let at = |column: &[T]| cells.min(column.len());
+            (columns.map(|column| &column[..at(column)]), columns.map(|column| &column[at(column)..]))
+        }
+        fn split_mut<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
+            column.split_at_mut(cells.min(column.len()))
+        }
+        let (flags, later_flags) = self.flags.split_at(cells);
+        let (centroids, later_centroids) = match self.centroids {
+            Centroids::F32(columns) => {
+                let (first, later) = split(columns, cells);
+                (Centroids::F32(first), Centroids::F32(later))
+            }
+            Centroids::F64(columns) => {
+                let (first, later) = split(columns, cells);
+                (Centroids::F64(first), Centroids::F64(later))
+            }
+        };
+        let (in_world, later_in_world) = split_mut(self.in_world, cells);
+        let (position, later_position) = split_mut(self.position, cells);
+        let (normal, later_normal) = split_mut(self.normal, cells);
+        (
+            Self { flags, centroids, in_world, position, normal },
+            Self {
+                flags: later_flags,
+                centroids: later_centroids,
+                in_world: later_in_world,
+                position: later_position,
+                normal: later_normal,
+            },
+        )
+    }
+
+    /// A cell's (u, v, depth), m; depth is 0 where it is not kept.
+    #[inline(always)]
+    pub(crate) fn centroid(&self, cell: usize) -> DVec3 {
+        #[inline(always)]
+        fn of<T: Copy + Default + Into<f64>>([u, v, depth]: &[&[T]; 3], cell: usize) -> DVec3 {
+            DVec3::new(u[cell].into(), v[cell].into(), depth.get(cell).copied().unwrap_or_default().into())
+        }
+        match &self.centroids {
+            Centroids::F32(columns) => of(columns, cell),
+            Centroids::F64(columns) => of(columns, cell),
+        }
+    }
+
+    /// Puts a cell's position (m) and normal where they are wanted.
+    #[inline(always)]
+    pub(crate) fn put(&mut self, cell: usize, position: DVec3, normal: DVec3, in_world: bool) {
+        self.in_world[cell] = in_world;
+        if let Some(to) = self.position.get_mut(cell) {
+            *to = position.to_array();
+        }
+        if let Some(to) = self.normal.get_mut(cell) {
+            *to = normal.to_array();
+        }
     }
 }

@@ -1,8 +1,10 @@
 //! What a plan makes of a field: its members' weights and neighbours, its thresholds, its unit.
 
-use crate::field::Field;
+use crate::body::Nearest;
+use crate::field::{Field, Lift};
 use crate::signal::{Calibration, ContactThresholds, Receptor};
 use crate::stage::hysteresis::Thresholds;
+use crate::stage::position::Surface;
 
 /// Per member of `field`, the members beside it; `around` has each taxel's neighbours.
 pub(super) fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
@@ -30,4 +32,10 @@ pub(super) fn thresholds(calibration: &Calibration, field: &str, receptor: Recep
 pub(super) fn unit_of(radius_m: f64) -> f32 {
     let exponent = if radius_m > 0.0 { radius_m.log2().ceil().clamp(-60.0, 60.0) } else { 0.0 };
     exponent.exp2() as f32
+}
+
+/// The surface over `field`'s chart, if it has one.
+pub(super) fn surface(nearest: &Nearest<'_>, field: &Field) -> Option<Surface> {
+    let (chart, lift) = (field.chart.as_ref().ok()?, Lift::on(nearest, field)?);
+    Some(Surface::new(chart, &lift, field.origin_in_anchor))
 }

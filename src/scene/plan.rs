@@ -7,15 +7,16 @@ use glam::DVec3;
 use globset::{GlobBuilder, GlobSetBuilder};
 
 use super::curves::Curves;
-use super::members::{beside, thresholds, unit_of, weights};
+use super::members::{beside, surface, thresholds, unit_of, weights};
 use super::{Arithmetic, Knobs, Scene};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
-use crate::field::{Chart, FieldSet, Lift, WORLD, neighbours};
+use crate::field::{Chart, FieldSet, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::calibrate::Table;
 use crate::stage::hysteresis::Thresholds;
+use crate::stage::position::Surface;
 use crate::stage::{Sums, filter, layout, touches};
 
 /// Which stages run beside calibrate and contact, which every percept needs.
@@ -116,7 +117,7 @@ pub(crate) struct PlanField {
     pub(crate) origin_in_anchor: DVec3,
     pub(crate) chart: Option<Chart>,
     /// The surface over the chart, where positions are wanted.
-    pub(crate) lift: Option<Lift>,
+    pub(crate) surface: Option<Surface>,
 }
 
 impl PlanField {
@@ -219,7 +220,7 @@ impl Plan {
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
-                lift: plan.stages().position.then(|| Lift::on(&nearest, field)).flatten(),
+                surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,

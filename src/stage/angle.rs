@@ -40,6 +40,7 @@ pub(crate) const ATAN: [f32; 9] = [
 ];
 
 /// atan2(y, x) for y ≥ 0, in [0, π].
+#[cfg(test)]
 pub(crate) fn atan2_f32(y: f32, x: f32) -> f32 {
     let (wide, tall) = (x.abs(), y);
     let (low, high) = if tall > wide { (wide, tall) } else { (tall, wide) };
@@ -55,7 +56,8 @@ pub(crate) fn atan2_f32(y: f32, x: f32) -> f32 {
     if x < 0.0 { std::f32::consts::PI - quadrant } else { quadrant }
 }
 
-/// atan2(y, x), in (−π, π].
+/// atan2(y, x), in (−π, π], as lanes have it.
+#[cfg(test)]
 pub(crate) fn full_f32(x: f32, y: f32) -> f32 {
     // The largest single-precision number under π: f32's own π is above it.
     let size = atan2_f32(y.abs(), x).min(3.141_592_5);

@@ -72,7 +72,8 @@ impl Still {
         rounding.max(f64::from(self.least))
     }
 
-    /// The same in single precision.
+    /// The same in single precision, as lanes and shaders have it.
+    #[cfg(test)]
     pub(crate) fn within_f32(&self, pressed: u32) -> f32 {
         (self.rounding + self.per_taxel * pressed as f32).max(self.least)
     }

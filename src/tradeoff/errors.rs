@@ -11,7 +11,7 @@ use crate::percept::{Flags, Outputs, Percept};
 use crate::scene::{Charts, Knobs, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Letter};
 use crate::source::Truth;
-use crate::stage::{angle, position};
+use crate::stage::angle;
 
 /// What is said of many errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -86,8 +86,8 @@ impl Ruler {
     /// The point of the skin at `uv`, in the field's anchor, m.
     fn point(&self, field: usize, uv: DVec2) -> Option<DVec3> {
         let field = self.field(field);
-        let (chart, lift) = (field.chart.as_ref()?, field.lift.as_ref()?);
-        Some(position::on_surface(chart, lift, field.origin_in_anchor, uv).0)
+        let surface = field.surface.as_ref()?;
+        Some(surface.at(uv).0)
     }
 
     /// The direction over the skin in which a line at `angle` leads from `uv`.

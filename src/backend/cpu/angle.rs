@@ -31,19 +31,30 @@ fn up_to_pi<S: Simd>(simd: S, x: F<S>, y: F<S>) -> F<S> {
     leans_left.select(splat(simd, PI) - quadrant, quadrant)
 }
 
+/// The direction of (x, y), in (−π, π]; not a number where both are 0.
+#[inline(always)]
+pub(super) fn of_direction<S: Simd>(simd: S, x: F<S>, y: F<S>) -> F<S> {
+    // Above the axis a direction is a line. The largest number under π: f32's own π is above it.
+    let size = up_to_pi(simd, x, y.abs()).min(splat(simd, 3.141_592_5));
+    y.simd_lt(splat(simd, 0.0)).select(-size, size)
+}
+
 #[cfg(test)]
 mod tests {
     use fearless_simd::Level;
 
     use super::super::simd::{LANES, Row, load, store, width, with_widest};
     use super::*;
-    use crate::stage::angle::of_line_f32;
+    use crate::stage::angle::{full_f32, of_line_f32};
 
+    /// Angles of lines, and directions.
     #[inline(always)]
-    fn row<S: Simd>(simd: S, x: &Row<f32>, y: &Row<f32>) -> Row<f32> {
-        let mut angles = [0.0; LANES];
+    fn rows<S: Simd>(simd: S, x: &Row<f32>, y: &Row<f32>) -> [Row<f32>; 2] {
+        let mut angles = [[0.0; LANES]; 2];
         for at in (0..LANES).step_by(width::<S>()) {
-            store(simd, of_line(simd, load(simd, x, at), load(simd, y, at)), &mut angles, at);
+            let (x, y) = (load(simd, x, at), load(simd, y, at));
+            store(simd, of_line(simd, x, y), &mut angles[0], at);
+            store(simd, of_direction(simd, x, y), &mut angles[1], at);
         }
         angles
     }
@@ -64,9 +75,11 @@ mod tests {
                     (x[lane], y[lane]) = seam;
                 }
             }
-            let angles = with_widest!(Level::new(), simd => row(simd, &x, &y));
+            let [lines, directions] = with_widest!(Level::new(), simd => rows(simd, &x, &y));
             for lane in 0..LANES {
-                assert_eq!(angles[lane].to_bits(), of_line_f32(x[lane], y[lane]).to_bits(), "{} {}", x[lane], y[lane]);
+                let (x, y) = (x[lane], y[lane]);
+                assert_eq!(lines[lane].to_bits(), of_line_f32(x, y).to_bits(), "{x} {y}");
+                assert_eq!(directions[lane].to_bits(), full_f32(x, y).to_bits(), "{x} {y}");
             }
         }
     }

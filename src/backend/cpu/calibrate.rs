@@ -11,7 +11,7 @@ use super::Tables;
 use super::lines::Aligned;
 use super::pick::{OneFrame, Values};
 use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
-use super::together::{Tasks, on_threads};
+use crate::parallel::{self, Tasks, on_threads};
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::stage::calibrate::{HUGE_BITS, SIZE_BITS, TINY_BITS, UNUSABLE};
@@ -264,7 +264,7 @@ pub(super) fn shared_frame(
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    let (count, threads) = (tables.tiles.all.len(), rayon::current_num_threads());
+    let (count, threads) = (tables.tiles.all.len(), parallel::threads());
     // A few parts a thread, as none knows what else its core does; and no more than a word has bits.
     let part = count.div_ceil((4 * threads).min(u64::BITS as usize)).max(1).next_multiple_of(TOGETHER);
     let faulty = AtomicU64::new(0);

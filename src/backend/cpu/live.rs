@@ -12,10 +12,10 @@ use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
 use super::simd::{LANES, Row, soon_needed, with_widest};
 use super::slots::{NEAR, Slots, inserting_pays};
-use super::together::{Tasks, on_threads};
 use super::touch::{Abreast, Cells, OneKind};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
+use crate::parallel::{Tasks, on_threads};
 use crate::percept::CellsMut;
 use crate::scene::Plan;
 
@@ -105,7 +105,7 @@ impl Live {
             None => slots_of(wide[unit]).collect(),
             Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
         });
-        let threads = rayon::current_num_threads();
+        let threads = crate::parallel::threads();
         Self {
             gate,
             everything: vec![true; wide.len() + narrow.len()],

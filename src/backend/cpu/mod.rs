@@ -35,7 +35,6 @@ mod slots;
 mod stream;
 #[cfg(test)]
 mod tests;
-mod together;
 mod touch;
 mod transpose;
 mod wide;
@@ -43,12 +42,14 @@ mod window;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use fearless_simd::Level;
+pub(crate) use fearless_simd::Level;
 
 use self::ahead::Ahead;
 use self::simd::LANES;
+pub(crate) use self::simd::with_widest;
 use super::{Backend, RawBatch, Rows, Step};
 use crate::error::Result;
+use crate::parallel;
 use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
 use crate::signal::RawValue;
@@ -69,8 +70,8 @@ pub(crate) struct Cpu {
     before: Vec<RawValue>,
     /// Per field, whether the frame before was in contact.
     touched: Vec<bool>,
-    /// Per field, its centroid in the frame before, if that was in contact.
-    last: Vec<Option<motion::Centroid>>,
+    /// The frame before, as motion looks at it.
+    last: motion::Before,
 }
 
 /// The plan as lanes read it.
@@ -82,6 +83,7 @@ struct Tables {
     /// By field.
     briefs: Vec<batch::Brief>,
     rest: rest::Rest,
+    motion: motion::Fields,
     /// The members of the fields that have many.
     wide: Vec<wide::Table>,
 }
@@ -106,6 +108,7 @@ impl Cpu {
             tables: Tables {
                 briefs: batch::Brief::all(plan),
                 rest: rest::Rest::new(&plan.fields, &seen),
+                motion: motion::Fields::new(plan),
                 seen,
                 window,
                 tiles: calibrate::Tiles::new(plan),
@@ -116,7 +119,7 @@ impl Cpu {
             scratches: Mutex::new(Vec::new()),
             before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],
-            last: vec![None; plan.fields.len()],
+            last: motion::Before::none(plan.fields.len()),
             plan: plan.clone(),
         }
     }
@@ -126,7 +129,7 @@ impl Cpu {
     fn batch(&self, raw: &RawBatch<'_>, mut cells: CellsMut<'_>) {
         let streams = stream::is_worth(&self.plan, &mut cells);
         let least = (TASK / self.plan.memberships().max(1)).max(1).next_multiple_of(LANES);
-        let threads = rayon::current_num_threads().min(cells.frames().div_ceil(least));
+        let threads = parallel::threads().min(cells.frames().div_ceil(least));
         let rest = Mutex::new((0, Some(cells)));
         let take = || {
             let (first, rest) = &mut *rest.lock().unwrap_or_else(PoisonError::into_inner);
@@ -142,7 +145,7 @@ impl Cpu {
                 self.part(raw, first, streams, part);
             }
         };
-        together::on_threads(threads, work);
+        parallel::on_threads(threads, work);
     }
 
     /// Runs the frames from `first` on, sixteen after the other; `streams` says whether answers are written past the caches.
@@ -231,7 +234,7 @@ pub(crate) fn describe() -> String {
 }
 
 fn describe_with(level: Level) -> String {
-    format!("single precision, {}, {} threads", instructions(level), rayon::current_num_threads())
+    format!("single precision, {}, {} threads", instructions(level), parallel::threads())
 }
 
 impl Backend for Cpu {
@@ -245,7 +248,7 @@ impl Backend for Cpu {
 
     fn restart(&mut self) {
         self.touched.fill(false);
-        self.last.fill(None);
+        self.last = motion::Before::none(self.plan.fields.len());
     }
 
     fn recalibrate(&mut self, plan: &Plan) {
@@ -289,7 +292,8 @@ impl Backend for Cpu {
             hysteresis::scan(&self.plan, raw.frames, &mut cells, &mut self.touched);
         }
         if stages.motion {
-            motion::scan(&self.plan, raw.steps, &mut cells, &mut self.last);
+            let fields = &self.tables.motion;
+            motion::all_frames(self.level, self.plan.outputs, fields, raw.steps, cells, &mut self.last);
         }
         Ok(())
     }

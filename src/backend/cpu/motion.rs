@@ -1,74 +1,300 @@
-//! motion in f32; see [`crate::stage::motion`].
+//! motion in lanes, sixteen fields of a frame abreast; see [`crate::stage::motion`].
+//!
+//! A cell's motion needs the cell of the same field in the frame before, and nothing else: runs of frames are computed on
+//! all cores, each from the last frame of the run before it.
+
+use bytemuck::{cast_slice, cast_slice_mut};
+use fearless_simd::Level;
+use fearless_simd::prelude::*;
 
 use super::super::Step;
+use super::angle::of_direction;
+use super::simd::{F, I, LANES, Row, U, bits_where, splat, splat_u, width, with_widest};
+use crate::parallel;
 use crate::percept::{CellsMut, Flags, Outputs};
-use crate::scene::{Plan, PlanField};
-use crate::stage::angle::full_f32;
+use crate::scene::Plan;
 
-/// What the next frame asks of a field's centroid.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Centroid {
-    /// In the field's unit.
-    place: [f32; 2],
-    /// How many taxels are pressed.
-    pressed: u32,
+/// Cells that a thread takes at least: some ten microseconds' worth.
+const CELLS_A_TASK: usize = 1 << 12;
+
+/// What motion has to know of every field, field by field.
+#[derive(Clone, Debug)]
+pub(super) struct Fields {
+    /// 1/unit, 1/m; a power of two, so that it loses nothing.
+    per_unit: Vec<f32>,
+    unit_m: Vec<f32>,
+    /// [`Still`](crate::stage::layout::Still), part by part.
+    least: Vec<f32>,
+    rounding: Vec<f32>,
+    per_taxel: Vec<f32>,
 }
 
-/// Goes through all frames in order; `last` is each field's centroid in the frame before, if it was in contact then, and
-/// becomes the last frame's.
-pub(super) fn scan(plan: &Plan, steps: &[Step], cells: &mut CellsMut<'_>, last: &mut [Option<Centroid>]) {
-    let fields = plan.fields.len();
-    for (frame, step) in steps.iter().enumerate() {
-        for (index, (field, last)) in plan.fields.iter().zip(last.iter_mut()).enumerate() {
-            let cell = frame * fields + index;
-            if cells.flags[cell].intersects(Flags::NO_CONTACT | Flags::NO_CHART) {
-                *last = None;
-                continue;
-            }
-            let place = [cells.centroid_u[cell], cells.centroid_v[cell]].map(|metres| metres / field.unit_m);
-            let now = Centroid { place, pressed: cells.active[cell] };
-            match last.replace(now) {
-                None => cells.flags[cell] |= Flags::NO_PREVIOUS,
-                Some(_) if !step.flags.is_empty() => cells.flags[cell] |= step.flags,
-                Some(before) => one(plan.outputs, field, cells, cell, now, before, step),
-            }
+impl Fields {
+    pub(super) fn new(plan: &Plan) -> Self {
+        Self {
+            per_unit: plan.fields.iter().map(|field| 1.0 / field.unit_m).collect(),
+            unit_m: plan.fields.iter().map(|field| field.unit_m).collect(),
+            least: plan.fields.iter().map(|field| field.still.least).collect(),
+            rounding: plan.fields.iter().map(|field| field.still.rounding).collect(),
+            per_taxel: plan.fields.iter().map(|field| field.still.per_taxel).collect(),
         }
     }
 }
 
-/// A cell's motion from `before` to `now`.
-fn one(
+/// A frame's contacts, pressed taxels and centroids, field by field: what the motion of the next frame starts from.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Before {
+    flags: Vec<u32>,
+    pressed: Vec<u32>,
+    u: Vec<f32>,
+    v: Vec<f32>,
+}
+
+impl Before {
+    /// Of `fields` fields, none of which is in contact.
+    pub(super) fn none(fields: usize) -> Self {
+        Self {
+            flags: vec![Flags::NO_CONTACT.bits(); fields],
+            pressed: vec![0; fields],
+            u: vec![0.0; fields],
+            v: vec![0.0; fields],
+        }
+    }
+
+    /// Takes over frame `frame` of `cells`.
+    fn copy(&mut self, cells: &CellsMut<'_>, frame: usize) {
+        let row = frame * self.flags.len()..(frame + 1) * self.flags.len();
+        self.flags.copy_from_slice(cast_slice(&cells.flags[row.clone()]));
+        self.pressed.copy_from_slice(&cells.active[row.clone()]);
+        self.u.copy_from_slice(&cells.centroid_u[row.clone()]);
+        self.v.copy_from_slice(&cells.centroid_v[row]);
+    }
+
+    fn row(&self) -> From<'_> {
+        From { flags: &self.flags, pressed: &self.pressed, u: &self.u, v: &self.v }
+    }
+}
+
+/// [`Before`], wherever it lies.
+#[derive(Clone, Copy)]
+struct From<'a> {
+    flags: &'a [u32],
+    pressed: &'a [u32],
+    u: &'a [f32],
+    v: &'a [f32],
+}
+
+/// The motion of all of `cells`, which start after frame `before` and leave it their last one.
+pub(super) fn all_frames(
+    level: Level,
     outputs: Outputs,
-    field: &PlanField,
-    cells: &mut CellsMut<'_>,
-    cell: usize,
-    now: Centroid,
-    before: Centroid,
-    step: &Step,
+    fields: &Fields,
+    steps: &[Step],
+    mut cells: CellsMut<'_>,
+    before: &mut Before,
 ) {
-    let ([u, v], [u0, v0], unit_m) = (now.place, before.place, field.unit_m);
-    let dt_s = step.dt_s as f32;
-    let (du, dv) = (u - u0, v - v0);
-    let distance = (du * du + dv * dv).sqrt();
-    let radial = (u * u + v * v).sqrt() - (u0 * u0 + v0 * v0).sqrt();
-    let mut found = Outputs::MOTION;
-    if distance <= field.still.within_f32(now.pressed + before.pressed) {
-        cells.flags[cell] |= Flags::STILL;
-        found -= Outputs::DIRECTION;
-    } else if let Some(direction) = cells.direction.get_mut(cell) {
-        *direction = full_f32(du, dv);
+    let (count, frames) = (cells.fields(), cells.frames());
+    if count == 0 || frames == 0 {
+        return;
     }
-    let write = |column: &mut [f32], value: f32| {
-        if let Some(place) = column.get_mut(cell) {
-            *place = value;
+    let threads = parallel::threads().min((count * frames).div_ceil(CELLS_A_TASK));
+    if threads < 2 {
+        run_of_frames(level, outputs, fields, steps, &mut cells, before);
+        before.copy(&cells, frames - 1);
+        return;
+    }
+    let a_run = frames.div_ceil(4 * threads).max(CELLS_A_TASK.div_ceil(count));
+    let mut runs = Vec::new();
+    let (mut rest, mut from) = (cells, std::mem::take(before));
+    for steps in steps.chunks(a_run) {
+        let mut next = from.clone();
+        next.copy(&rest, steps.len() - 1);
+        let (run, later) = rest.split_at(steps.len());
+        runs.push((run, steps, std::mem::replace(&mut from, next)));
+        rest = later;
+    }
+    parallel::for_each(threads, runs, |(mut run, steps, from)| {
+        run_of_frames(level, outputs, fields, steps, &mut run, &from);
+    });
+    *before = from;
+}
+
+/// The motion of frames that follow each other, from frame `before` on.
+fn run_of_frames(
+    level: Level,
+    outputs: Outputs,
+    fields: &Fields,
+    steps: &[Step],
+    cells: &mut CellsMut<'_>,
+    before: &Before,
+) {
+    let count = cells.fields();
+    with_widest!(level, simd => {
+        for (frame, step) in steps.iter().enumerate() {
+            let (start, flags) = (frame * count, cast_slice_mut::<Flags, u32>(cells.flags));
+            let (earlier, now) = flags.split_at_mut(start);
+            let from = match frame.checked_sub(1) {
+                None => before.row(),
+                Some(last) => From {
+                    flags: &earlier[last * count..],
+                    pressed: &cells.active[last * count..start],
+                    u: &cells.centroid_u[last * count..start],
+                    v: &cells.centroid_v[last * count..start],
+                },
+            };
+            let now_row = start..start + count;
+            let touched = (
+                &cells.active[now_row.clone()],
+                &cells.centroid_u[now_row.clone()],
+                &cells.centroid_v[now_row],
+            );
+            let mut to = To {
+                flags: &mut now[..count],
+                present: cast_slice_mut(&mut cells.present[start..start + count]),
+                displacement: optional(cells.displacement, start, count).as_flattened_mut(),
+                direction: optional(cells.direction, start, count),
+                distance: optional(cells.distance, start, count),
+                radial_distance: optional(cells.radial_distance, start, count),
+                speed: optional(cells.speed, start, count),
+                radial_speed: optional(cells.radial_speed, start, count),
+            };
+            for first in (0..count).step_by(LANES) {
+                sixteen_fields(simd, outputs, fields, step, from, touched, &mut to, first);
+            }
         }
-    };
-    write(cells.distance, distance * unit_m);
-    write(cells.radial_distance, radial * unit_m);
-    write(cells.speed, distance / dt_s * unit_m);
-    write(cells.radial_speed, radial / dt_s * unit_m);
-    if let Some(displacement) = cells.displacement.get_mut(cell) {
-        *displacement = [du * unit_m, dv * unit_m];
+    });
+}
+
+/// The cells from `start` on of a column that may be empty.
+fn optional<T>(column: &mut [T], start: usize, count: usize) -> &mut [T] {
+    if column.is_empty() { column } else { &mut column[start..start + count] }
+}
+
+/// Where a frame's motion goes, field by field; columns that nobody asked for are empty.
+struct To<'a> {
+    flags: &'a mut [u32],
+    present: &'a mut [u32],
+    displacement: &'a mut [f32],
+    direction: &'a mut [f32],
+    distance: &'a mut [f32],
+    radial_distance: &'a mut [f32],
+    speed: &'a mut [f32],
+    radial_speed: &'a mut [f32],
+}
+
+/// The motion of the fields from `first` on, at most sixteen.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "a frame, the one before it, and which fields of them")]
+fn sixteen_fields<S: Simd>(
+    simd: S,
+    outputs: Outputs,
+    fields: &Fields,
+    step: &Step,
+    from: From<'_>,
+    (pressed, u, v): (&[u32], &[f32], &[f32]),
+    to: &mut To<'_>,
+    first: usize,
+) {
+    let count = (u.len() - first).min(LANES);
+    let mut found = Found::default();
+    let lanes = |column: &[f32]| -> Row<f32> { row(column, first, count, 0.0) };
+    let bits = |column: &[u32], rest: u32| -> Row<u32> { row(column, first, count, rest) };
+    let (u, v, u0, v0) = (lanes(u), lanes(v), lanes(from.u), lanes(from.v));
+    let nobody = (Flags::NO_CONTACT | Flags::NO_CHART).bits();
+    let (now, before) = (bits(to.flags, nobody), bits(from.flags, nobody));
+    let (per_unit, unit) = (lanes(&fields.per_unit), lanes(&fields.unit_m));
+    let (pressed, pressed_before) = (bits(pressed, 0), bits(from.pressed, 0));
+    let (least, rounding, per_taxel) = (lanes(&fields.least), lanes(&fields.rounding), lanes(&fields.per_taxel));
+    let dt = splat(simd, step.dt_s as f32);
+    let none = splat(simd, 0.0);
+    let mut at = 0;
+    while at < LANES {
+        let load = |row: &Row<f32>| F::<S>::from_slice(simd, &row[at..at + width::<S>()]);
+        let is_away = |row: &Row<u32>| {
+            let flags = U::<S>::from_slice(simd, &row[at..at + width::<S>()]);
+            (flags & nobody).simd_gt(splat_u(simd, 0))
+        };
+        let (touched, had_previous) = (!is_away(&now), !is_away(&before));
+        let no_previous = touched & !had_previous;
+        let bad_step = if step.flags.is_empty() { no_previous & !no_previous } else { touched & had_previous };
+        let moved = touched & had_previous & !bad_step;
+        let (per_unit, unit) = (load(&per_unit), load(&unit));
+        let (u, v, u0, v0) = (load(&u) * per_unit, load(&v) * per_unit, load(&u0) * per_unit, load(&v0) * per_unit);
+        let (du, dv) = (u - u0, v - v0);
+        let distance = (du * du + dv * dv).sqrt();
+        let radial = (u * u + v * v).sqrt() - (u0 * u0 + v0 * v0).sqrt();
+        let count = |row: &Row<u32>| U::<S>::from_slice(simd, &row[at..at + width::<S>()]);
+        let pressed = (count(&pressed) + count(&pressed_before)).bitcast::<I<S>>().to_float::<F<S>>();
+        let still = (load(&rounding) + load(&per_taxel) * pressed).max(load(&least));
+        let is_still = moved & distance.simd_le(still);
+        let directed = moved & !is_still;
+        let where_moved = |value: F<S>| moved.select(value, none);
+        let put = |value: F<S>, row: &mut Row<f32>| value.store_slice(&mut row[at..at + width::<S>()]);
+        put(where_moved(du * unit), &mut found.du);
+        put(where_moved(dv * unit), &mut found.dv);
+        put(where_moved(distance * unit), &mut found.distance);
+        put(where_moved(radial * unit), &mut found.radial_distance);
+        put(where_moved(distance / dt * unit), &mut found.speed);
+        put(where_moved(radial / dt * unit), &mut found.radial_speed);
+        if outputs.contains(Outputs::DIRECTION) {
+            put(directed.select(of_direction(simd, du, dv), none), &mut found.direction);
+        }
+        let flags = bits_where(simd, no_previous, Flags::NO_PREVIOUS.bits())
+            | bits_where(simd, bad_step, step.flags.bits())
+            | bits_where(simd, is_still, Flags::STILL.bits());
+        flags.store_slice(&mut found.flags[at..at + width::<S>()]);
+        let motion = (Outputs::MOTION - Outputs::DIRECTION) & outputs;
+        let present =
+            bits_where(simd, moved, motion.bits()) | bits_where(simd, directed, (Outputs::DIRECTION & outputs).bits());
+        present.store_slice(&mut found.present[at..at + width::<S>()]);
+        at += width::<S>();
     }
-    cells.present[cell] |= found & outputs;
+    let range = first..first + count;
+    for (to, found) in [(&mut to.flags, &found.flags), (&mut to.present, &found.present)] {
+        to[range.clone()].iter_mut().zip(found).for_each(|(to, found)| *to |= found);
+    }
+    for (column, found) in [
+        (&mut to.direction, &found.direction),
+        (&mut to.distance, &found.distance),
+        (&mut to.radial_distance, &found.radial_distance),
+        (&mut to.speed, &found.speed),
+        (&mut to.radial_speed, &found.radial_speed),
+    ] {
+        if !column.is_empty() {
+            column[range.clone()].copy_from_slice(&found[..count]);
+        }
+    }
+    if !to.displacement.is_empty() {
+        let to = to.displacement[2 * range.start..2 * range.end].chunks_exact_mut(2);
+        for (to, (&du, &dv)) in to.zip(found.du.iter().zip(&found.dv)) {
+            to.copy_from_slice(&[du, dv]);
+        }
+    }
+}
+
+/// What was found of sixteen fields; 0 where there is nothing.
+#[derive(Default)]
+struct Found {
+    flags: Row<u32>,
+    present: Row<u32>,
+    du: Row<f32>,
+    dv: Row<f32>,
+    direction: Row<f32>,
+    distance: Row<f32>,
+    radial_distance: Row<f32>,
+    speed: Row<f32>,
+    radial_speed: Row<f32>,
+}
+
+/// `count` values of a column from `first` on, and `rest` in the lanes beyond them.
+#[inline(always)]
+fn row<T: Copy>(column: &[T], first: usize, count: usize, rest: T) -> Row<T> {
+    match column[first..].first_chunk() {
+        Some(row) if count == LANES => *row,
+        _ => {
+            let mut row = [rest; LANES];
+            row[..count].copy_from_slice(&column[first..first + count]);
+            row
+        }
+    }
 }

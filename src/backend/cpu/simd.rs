@@ -30,7 +30,7 @@ macro_rules! with_widest {
         fearless_simd::dispatch!($level, $simd => $run)
     }};
 }
-pub(super) use with_widest;
+pub(crate) use with_widest;
 
 /// Whether a machine with the instructions of `level` keeps values coming where rows of sixteen frames are read side by side,
 /// each in another page. Of two machines that were measured the one with AVX-512 does: recordings of 12,000 and of 10⁵ taxels
