@@ -198,8 +198,8 @@ impl Engine {
         Ok(())
     }
 
-    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`Flags::STALE`] beside
-    /// [`Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
+    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`crate::Flags::STALE`] beside
+    /// [`crate::Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
     pub fn heed_stale(&mut self) {
         self.intake.heed_stale();
         self.pick();

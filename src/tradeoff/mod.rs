@@ -318,7 +318,7 @@ mod tests {
         let live = Combination::all(&scene, Way::Live, &[BackendKind::Cpu, BackendKind::Gpu]);
         let count = |backend| live.iter().filter(|c| c.backend == backend).count();
         // Arithmetics, charts, ways to orientation, coverages, cadences.
-        assert_eq!(count(BackendKind::Cpu), 2 * 3 * 2 * 3 * 2);
+        assert_eq!(count(BackendKind::Cpu), 2 * 3 * 2 * 2 * 2);
         assert_eq!(count(BackendKind::Gpu), 2 * 3 * 2 * 2);
         assert_eq!(count(BackendKind::Reference), 3 * 2 * 2);
         let batch = Combination::all(&scene, Way::Batch, &[BackendKind::Cpu]);
