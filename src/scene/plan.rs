@@ -115,6 +115,7 @@ pub(crate) struct PlanField {
     /// Members' third coordinate in the unit.
     pub(crate) depths: Vec<f32>,
     pub(crate) origin_in_anchor: DVec3,
+    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "only a trade compares charts"))]
     pub(crate) chart: Option<Chart>,
     /// The surface over the chart, where positions are wanted.
     pub(crate) surface: Option<Surface>,
