@@ -97,10 +97,16 @@ impl Store {
         let path = self.file(body, options);
         let Ok(text) = std::fs::read_to_string(&path) else { return Found::Nothing };
         let useless = |why: &str| Found::Useless(format!("{}: kept measurements {why}", path.display()));
-        let Ok(stored) = serde_json::from_str::<Stored>(&text) else { return useless("are damaged") };
         let now = Key::new(body, options, driver);
+        // Another version may hold other things.
+        let version =
+            serde_json::from_str::<serde_json::Value>(&text).ok().and_then(|all| all["key"]["version"].as_u64());
+        if version.is_some_and(|version| version != u64::from(now.version)) {
+            return useless("are of another version");
+        }
+        let Ok(stored) = serde_json::from_str::<Stored>(&text) else { return useless("are damaged") };
         let differs = [
-            (stored.key.version != now.version || stored.key.program != now.program, "are of another version"),
+            (stored.key.program != now.program, "are of another version"),
             (stored.key.machine != now.machine, "are of another machine"),
             (stored.key.driver != now.driver, "are with other GPU drivers"),
             (stored.key.body != now.body, "are of the body before it changed"),
@@ -267,7 +273,8 @@ mod tests {
         assert!(matches!(find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
         let path = store.file(&body, &options);
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 0")).unwrap();
+        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 1").replace("\"recording\"", "\"other\""))
+            .unwrap();
         assert!(why(find(&body, &options, "a")).contains("another version"));
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();
         assert!(why(find(&body, &options, "a")).contains("damaged"));

@@ -70,14 +70,14 @@ impl Before {
         self.v.copy_from_slice(&cells.centroid_v[row]);
     }
 
-    fn row(&self) -> From<'_> {
-        From { flags: &self.flags, pressed: &self.pressed, u: &self.u, v: &self.v }
+    fn row(&self) -> RowBefore<'_> {
+        RowBefore { flags: &self.flags, pressed: &self.pressed, u: &self.u, v: &self.v }
     }
 }
 
 /// [`Before`], wherever it lies.
 #[derive(Clone, Copy)]
-struct From<'a> {
+struct RowBefore<'a> {
     flags: &'a [u32],
     pressed: &'a [u32],
     u: &'a [f32],
@@ -135,7 +135,7 @@ fn run_of_frames(
             let (earlier, now) = flags.split_at_mut(start);
             let from = match frame.checked_sub(1) {
                 None => before.row(),
-                Some(last) => From {
+                Some(last) => RowBefore {
                     flags: &earlier[last * count..],
                     pressed: &cells.active[last * count..start],
                     u: &cells.centroid_u[last * count..start],
@@ -148,7 +148,7 @@ fn run_of_frames(
                 &cells.centroid_u[now_row.clone()],
                 &cells.centroid_v[now_row],
             );
-            let mut to = To {
+            let mut to = MotionRow {
                 flags: &mut now[..count],
                 present: cast_slice_mut(&mut cells.present[start..start + count]),
                 displacement: optional(cells.displacement, start, count).as_flattened_mut(),
@@ -171,7 +171,7 @@ fn optional<T>(column: &mut [T], start: usize, count: usize) -> &mut [T] {
 }
 
 /// Where a frame's motion goes, field by field; columns that nobody asked for are empty.
-struct To<'a> {
+struct MotionRow<'a> {
     flags: &'a mut [u32],
     present: &'a mut [u32],
     displacement: &'a mut [f32],
@@ -190,9 +190,9 @@ fn sixteen_fields<S: Simd>(
     outputs: Outputs,
     fields: &Fields,
     step: &Step,
-    from: From<'_>,
+    from: RowBefore<'_>,
     (pressed, u, v): (&[u32], &[f32], &[f32]),
-    to: &mut To<'_>,
+    to: &mut MotionRow<'_>,
     first: usize,
 ) {
     let count = (u.len() - first).min(LANES);

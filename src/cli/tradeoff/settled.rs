@@ -49,7 +49,9 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
             (Some(stored.report), when)
         }
         Found::Useless(why) => {
-            say(&format!("{why}; measured anew"));
+            if !asked.quiet {
+                say(&format!("{why}; measured anew"));
+            }
             (None, String::new())
         }
         Found::Nothing => (None, String::new()),
