@@ -3,8 +3,6 @@
 // Invocations of a group that takes fields.
 const FIELDS_GROUP = GROUP;
 
-alias Texels = texture_storage_2d<rgba32uint, read>;
-
 fn store(column: u32, index: u32, quad: u32, values: Words) {
     if column == NOWHERE {
         return;

@@ -3,8 +3,6 @@
 // More than elsewhere: what a group costs by itself is a part of a live call.
 const FIELDS_GROUP = 128u;
 
-alias Texels = texture_storage_2d<r32uint, read>;
-
 fn store(column: u32, index: u32, quad: u32, value: Words) {
     if column != NOWHERE {
         results[column * batch.fields + index] = value;

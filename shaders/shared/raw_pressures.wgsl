@@ -1,6 +1,12 @@
 // Where every taxel's pressure is its raw value, fields read those as they came, a taxel's frames side by side. What
 // shaders/calibrate.wgsl does with them is done on the way, with the same results.
 
+@group(0) @binding(5) var<storage, read> raw: array<Words>;
+
+fn bits_at(here: u32) -> Words {
+    return raw[here];
+}
+
 // What is tiny, infinite, no number, missing, or negative presses nothing.
 fn pressure_of(bits: Words) -> Numbers {
     let fine = bits - Words(TINY_BITS) <= Words(HUGE_BITS - TINY_BITS);

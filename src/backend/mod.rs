@@ -9,7 +9,6 @@ pub(crate) mod reference;
 
 use std::ops::Range;
 use std::str::FromStr;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
@@ -92,36 +91,16 @@ pub(crate) struct RawBatch<'a> {
 /// Tiles of sixteen values that are looked at together.
 pub(crate) const BLOCK: usize = 16;
 
-/// Where in a frame a few cache lines begin.
-pub(crate) type FewLines = [u32; 4];
-
-/// `lines` in ascending order, each once but for what fills up the last few.
-fn few_at_a_time(mut lines: Vec<u32>) -> Vec<FewLines> {
-    lines.sort_unstable();
-    lines.dedup();
-    let last = lines.last().copied().unwrap_or_default();
-    lines.resize(lines.len().next_multiple_of(4), last);
-    lines.as_chunks().0.to_vec()
-}
-
 /// Where in a frame a plan finds its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Picks {
-    /// No others but copies have the same.
-    pub(crate) number: u64,
     /// Per slot that is calibrated, which are the channels once for every signal.
     pub(crate) places: Vec<u32>,
     pub(crate) channels: usize,
-    /// Values of a frame.
-    pub(crate) width: usize,
     /// Per sixteen slots.
     pub(crate) near: Vec<Near>,
-    /// The lowest and the highest of their places.
-    pub(crate) spans: Vec<[u32; 2]>,
     /// Per [`BLOCK`] tiles of sixteen whose values lie one after the other: where they start.
     pub(crate) blocks: Vec<Option<usize>>,
-    /// The first of each sixteen values of a frame that hold any that is wanted.
-    pub(crate) lines: Vec<FewLines>,
     /// What [`Near::Shuffled`] refers to.
     pub(crate) shuffles: Vec<Shuffle>,
 }
@@ -222,15 +201,7 @@ impl Picks {
             tiles.iter().enumerate().all(follows).then_some(from as usize)
         };
         let blocks = near.chunks(BLOCK).map(block).collect();
-        let spans = places.chunks(16).map(|places| {
-            let (low, high) = (places.iter().min(), places.iter().max());
-            [low, high].map(|place| place.copied().unwrap_or_default())
-        });
-        let spans: Vec<[u32; 2]> = spans.collect();
-        let lines = few_at_a_time(places.iter().map(|place| place / 16 * 16).collect());
-        static NUMBER: AtomicU64 = AtomicU64::new(0);
-        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        Self { number, near, spans, blocks, lines, shuffles, channels: channels.len(), width, places }
+        Self { near, blocks, shuffles, channels: channels.len(), places }
     }
 }
 
@@ -443,6 +414,8 @@ fn least_times<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
     use super::*;
     use crate::body::Body;
     use crate::field::FieldSet;

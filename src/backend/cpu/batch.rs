@@ -7,14 +7,12 @@ use fearless_simd::prelude::*;
 
 use super::super::{RawBatch, Rows};
 use super::Tables;
-use super::ahead::{Ahead, Coming};
-use super::columns::{Announcement, Place};
+use super::columns::Place;
 use super::in_view::InView;
 use super::lines::Lines;
-use super::lot::{Between, Wanted, calls, touch};
+use super::lot::{Between, Wanted, touch};
 use super::simd::{F, LANES, Row, U, load, load_u, splat, with_widest};
 use super::sixteen::ManyAbreast;
-use super::stream::{Outgoing, Staged};
 use super::touch::{Abreast, Cells, Members, OneKind, Part};
 use super::window::Stretch;
 use super::{calibrate, change, columns};
@@ -30,8 +28,6 @@ pub(super) struct Scratch {
     between: Box<[Between; LANES]>,
     /// Pressures and statuses of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
-    /// Answers on their way past the caches, if any were.
-    pub(super) staged: Option<[Staged; 2]>,
     /// Whether any value of these frames so far is anything but a plain number.
     faults: bool,
 }
@@ -44,7 +40,6 @@ impl Scratch {
             cells: Box::new([Cells::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
             before: (Lines::new(before, 0.0), Lines::new(before, 0)),
-            staged: None,
             faults: false,
         }
     }
@@ -105,10 +100,6 @@ impl Brief {
     pub(super) fn members(&self) -> Range<usize> {
         self.first..self.first + self.count
     }
-
-    pub(super) fn is_wide(&self) -> bool {
-        !matches!(self.way, Way::Narrow { .. })
-    }
 }
 
 impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
@@ -147,35 +138,27 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
     }
 }
 
-/// Where a stretch's frames are, and what is done beside computing them.
-pub(super) struct Job<'a, 'b> {
-    pub(super) raw: &'b RawBatch<'a>,
+/// Where a stretch's frames are.
+pub(super) struct Job<'a> {
+    pub(super) raw: &'a RawBatch<'a>,
     /// The first of up to sixteen frames.
     pub(super) first: usize,
     /// The one before them.
-    pub(super) before: (Rows<'b>, usize),
-    /// What is fetched for the next one.
-    pub(super) ahead: Ahead<'a>,
-    /// Whether nobody has had the rows fetched that are written first, as it is a task's first.
-    pub(super) is_unannounced: bool,
-    /// Among the cells from `first` on, the first one that the next one writes.
-    pub(super) next_cell: usize,
+    pub(super) before: (Rows<'a>, usize),
 }
 
 /// All stages for the fields of `stretch`, in as many frames as `cells` has, which is at most sixteen. Those before have their
 /// answers by then.
-#[expect(clippy::too_many_arguments, reason = "what a plan is run with, and where")]
 pub(super) fn stretch(
     level: Level,
     plan: &Plan,
     tables: &Tables,
-    job: Job<'_, '_>,
+    job: &Job<'_>,
     stretch: &Stretch,
     scratch: &mut Scratch,
     cells: &mut CellsMut<'_>,
-    outgoing: Option<&mut Outgoing<'_>>,
 ) {
-    let Job { raw, first, before, ahead, .. } = job;
+    let &Job { raw, first, before } = job;
     let frames = cells.frames();
     let is_first = stretch.fields.start == 0;
     if is_first {
@@ -213,34 +196,15 @@ pub(super) fn stretch(
             }
         }
     }
-    // The last first, as what is written of it may reach into the first ones of the next frame. Few at a time: what is
-    // written finds its way to memory while the next ones are computed.
+    // The last first, as what is written of it may reach into the first ones of the next frame.
     let last = stretch.start_of_last_sixteen();
-    let answers = outgoing.map_or_else(
-        || {
-            let mut announced = Announcement::of(cells);
-            if job.is_unannounced {
-                announced.turn_to(last, frames, 1);
-                announced.step();
-            }
-            Answers::ToBeWritten(announced)
-        },
-        Answers::OnTheirWay,
-    );
     let Scratch { in_view, cells: of_fields, between, faults, .. } = scratch;
     let skin = Skin::new(plan, in_view);
-    let mut meanwhile = Meanwhile { ahead, answers, coming: Coming::of(tables, &in_view.pressures) };
     let may_rest = in_view.any_rests;
     for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
         let fields = &plan.fields[first_field..stretch.fields.end.min(first_field + LANES)];
-        let steps = fields.len() * calls(plan.stages());
         // Of later stretches the next frame's first fields have their answers.
         let place = Place::new(cells, first_field, fields.len(), is_first);
-        let next = if first_field == last { stretch.fields.start } else { first_field + LANES };
-        meanwhile.coming.turn_to(tables, next..last, steps);
-        if let Answers::ToBeWritten(announced) = &mut meanwhile.answers {
-            announced.turn_to(if next == last { job.next_cell } else { next }, frames, steps);
-        }
         let mut rests = [false; LANES];
         let ask = if may_rest { &mut rests[..fields.len()] } else { &mut [] };
         for (field, rests) in (first_field..).zip(ask) {
@@ -248,39 +212,11 @@ pub(super) fn stretch(
         }
         let rests = &rests[..fields.len()];
         if rests.iter().all(|&rests| rests) {
-            (0..steps).for_each(|_| meanwhile.step());
             columns::write_at_rest(fields, place, plan.outputs, cells);
             continue;
         }
-        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, *faults, &mut meanwhile, between, of_fields));
+        with_widest!(level, simd => answer(simd, plan, tables, first_field, rests, &skin, *faults, between, of_fields));
         with_widest!(level, simd => columns::write(simd, of_fields, place, plan.outputs, cells));
-    }
-}
-
-/// What a core does beside computing, a little at a time.
-struct Meanwhile<'a, 'b, 'c, 'd> {
-    ahead: Ahead<'a>,
-    answers: Answers<'b, 'c>,
-    coming: Coming<'d>,
-}
-
-/// What answers ask for.
-enum Answers<'b, 'c> {
-    /// The next ones are written where the cache does not have it yet.
-    ToBeWritten(Announcement),
-    /// The last block's are on their way past the caches.
-    OnTheirWay(&'b mut Outgoing<'c>),
-}
-
-impl Meanwhile<'_, '_, '_, '_> {
-    #[inline(always)]
-    fn step(&mut self) {
-        self.ahead.step();
-        self.coming.step();
-        match &mut self.answers {
-            Answers::ToBeWritten(announced) => announced.step(),
-            Answers::OnTheirWay(outgoing) => outgoing.step(),
-        }
     }
 }
 
@@ -295,7 +231,6 @@ fn answer<S: Simd>(
     rests: &[bool],
     skin: &Skin<'_>,
     faults: bool,
-    meanwhile: &mut Meanwhile<'_, '_, '_, '_>,
     between: &mut [Between; LANES],
     answers: &mut [Cells; LANES],
 ) {
@@ -325,8 +260,6 @@ fn answer<S: Simd>(
                     },
                     LANES,
                     wanted,
-                    #[inline(always)]
-                    || meanwhile.step(),
                     between,
                     answers,
                 );

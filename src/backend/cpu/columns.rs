@@ -4,7 +4,7 @@ use bytemuck::{cast_ref, cast_slice_mut};
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
-use super::simd::{self, LANES, Row};
+use super::simd::{LANES, Row};
 use super::touch::{Cells, OneKind};
 use super::transpose::{Columns, transpose};
 use crate::percept::{CellsMut, Flags, Outputs};
@@ -88,53 +88,6 @@ pub(super) fn all<'a>(cells: &'a mut CellsMut<'_>) -> [&'a mut [u32]; 12] {
     ]
 }
 
-/// Memory that is soon written, fetched a few lines at a time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Announcement {
-    /// The columns that there are, and how many.
-    columns: [*const u32; 12],
-    count: usize,
-    /// Where the next row ends, and in which of them.
-    at: usize,
-    column: usize,
-    /// From a row to the next frame's.
-    stride: usize,
-    rows: usize,
-    at_a_time: usize,
-}
-
-impl Announcement {
-    pub(super) fn of(cells: &mut CellsMut<'_>) -> Self {
-        let (mut columns, mut count) = ([std::ptr::null(); 12], 0);
-        for column in all(cells).into_iter().filter(|column| !column.is_empty()) {
-            columns[count] = column.as_ptr();
-            count += 1;
-        }
-        Self { columns, count, at: 0, column: 0, stride: cells.fields(), rows: 0, at_a_time: 0 }
-    }
-
-    /// Now the rows of sixteen cells from cell `first` on, and of the same fields in all `frames`, in so many `steps`. Of a row
-    /// where it ends: it begins in the line where the one that was written before ended.
-    pub(super) fn turn_to(&mut self, first: usize, frames: usize, steps: usize) {
-        let (rows, last) = (self.count * frames, first + LANES - 1);
-        (self.at, self.column, self.rows, self.at_a_time) = (last, 0, rows, rows.div_ceil(steps.max(1)));
-    }
-
-    /// Has the next few rows fetched.
-    #[inline(always)]
-    pub(super) fn step(&mut self) {
-        let rows = self.at_a_time.min(self.rows);
-        self.rows -= rows;
-        for _ in 0..rows {
-            simd::soon_needed(self.columns[self.column].wrapping_add(self.at));
-            self.column += 1;
-            if self.column == self.count {
-                (self.column, self.at) = (0, self.at + self.stride);
-            }
-        }
-    }
-}
-
 /// A column, and where in it answers go.
 struct Target<'a> {
     column: &'a mut [u32],
@@ -170,9 +123,9 @@ pub(super) fn write<S: Simd>(
     floats(simd, answers, place, cells.anisotropy, |cells| &cells.anisotropy);
     let to = |column, mask| Target { column, place, mask };
     turn(simd, answers, |cells| &cells.active, to(&mut *cells.active, u32::MAX));
-    turn_or_fill(simd, answers, |cells| &cells.flags, to(cast_slice_mut::<Flags, u32>(cells.flags), u32::MAX));
+    turn(simd, answers, |cells| &cells.flags, to(cast_slice_mut::<Flags, u32>(cells.flags), u32::MAX));
     let present = cast_slice_mut::<Outputs, u32>(cells.present);
-    turn_or_fill(simd, answers, |cells| &cells.present, to(present, outputs.bits()));
+    turn(simd, answers, |cells| &cells.present, to(present, outputs.bits()));
 }
 
 #[inline(always)]
@@ -192,22 +145,6 @@ fn floats<S: Simd>(
 fn turn<S: Simd>(simd: S, answers: &[Cells; LANES], of: impl Fn(&Cells) -> &Row<u32>, mut to: Target<'_>) {
     if !to.column.is_empty() {
         transpose(simd, |field| of(&answers[field]), &mut to);
-    }
-}
-
-/// [`turn`] for what is often the same in all fields and frames.
-#[inline(always)]
-fn turn_or_fill<S: Simd>(simd: S, answers: &[Cells; LANES], of: impl Fn(&Cells) -> &Row<u32>, to: Target<'_>) {
-    let first = u32x16::splat(simd, of(&answers[0])[0]);
-    let mut others = u32x16::splat(simd, 0);
-    for answer in &answers[..to.place.count] {
-        others |= u32x16::from_slice(simd, of(answer)) ^ first;
-    }
-    if others.simd_gt(u32x16::splat(simd, 0)).any_true() {
-        turn(simd, answers, of, to);
-    } else {
-        let row = first & to.mask;
-        (0..to.place.frames).for_each(|frame| to.place.put(frame, row, to.column));
     }
 }
 

@@ -4,7 +4,6 @@ use fearless_simd::prelude::*;
 
 use super::lines::Lines;
 use super::simd::{F, LANES, Row, U, load, load_u};
-use super::slots::Slots;
 use super::touch::{Kinds, Members, Part};
 use crate::scene::Plan;
 
@@ -16,8 +15,8 @@ pub(super) struct Narrow {
     /// Where they are, if one stands after the other.
     pub(super) together: Option<usize>,
     pub(super) kinds: Kinds,
-    /// Its number.
-    pub(super) index: usize,
+    /// By member, where it has its value.
+    slots: Lines<u32>,
     pub(super) places: Vec<PlaceRow>,
     /// Rows of the groups before it.
     pub(super) first_row: usize,
@@ -36,17 +35,15 @@ pub(super) struct PlaceRow {
 }
 
 impl Narrow {
-    /// The group number `index`, of `fields`; and by member, where these have their values: lanes that have no more go on with
-    /// slot `unpressed`.
-    pub(super) fn new(plan: &Plan, index: usize, fields: &[usize], unpressed: usize) -> (Self, Slots) {
+    /// The group of `fields`, whose lanes go on with slot `unpressed` where they have no more members.
+    pub(super) fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
         let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
         let blank = Lines::new(rows, 0.0);
-        let mut slots = Lines::new(rows, unpressed as u32);
         let mut group = Self {
             fields: fields.to_vec(),
             together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
             kinds: Kinds::EMPTY,
-            index,
+            slots: Lines::new(rows, unpressed as u32),
             places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
             first_row: 0,
             weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
@@ -56,7 +53,7 @@ impl Narrow {
         for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
             group.kinds.set(lane, field);
             for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
-                slots[row][lane] = member.slot;
+                group.slots[row][lane] = member.slot;
                 if let Some(weights) = &mut group.weights {
                     weights[row][lane] = member.weight;
                 }
@@ -66,7 +63,16 @@ impl Narrow {
                 group.areas[row][lane] = plan.taxels[member.slot as usize].area;
             }
         }
-        (group, Slots::new(slots, unpressed))
+        group
+    }
+
+    /// Brings its members' values side by side.
+    pub(super) fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
+        for (row, slots) in rows.iter_mut().zip(&self.slots[..]) {
+            for (value, &slot) in row.iter_mut().zip(slots) {
+                *value = values[slot as usize];
+            }
+        }
     }
 
     pub(super) fn is_weighted(&self) -> bool {

@@ -3,15 +3,12 @@
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
-use super::super::Rows;
-use super::as_delivered::AsDelivered;
 use super::gate::Gate;
-use super::groups::{InFrame, Narrow, PlaceRow};
+use super::groups::{InFrame, Narrow};
 use super::lines::Lines;
 use super::lot::{Between, Wanted, touch};
 use super::put::{Run, Sixteen, write};
-use super::simd::{LANES, Row, soon_needed, with_widest};
-use super::slots::{NEAR, Slots, inserting_pays};
+use super::simd::{LANES, Row, with_widest};
 use super::touch::{Abreast, Cells, OneKind};
 use super::wide::{self, Table, Values, Wide};
 use super::{Moment, Tables, calibrate, change};
@@ -34,9 +31,6 @@ pub(super) fn is_shared(plan: &Plan, threads: usize) -> bool {
     plan.memberships() >= SHARED && threads > 1
 }
 
-/// Bytes of places that stay in a core's nearest cache beside all else: in many it has 32 KiB.
-const NEAREST_CACHE: usize = 16 << 10;
-
 /// About how many rows are gathered before anything is computed of them: what was stored piece by piece can be loaded as
 /// a whole only once it has reached the cache. With their weights and places they are to stay in the nearest one.
 const GATHERED_ROWS: usize = 64;
@@ -55,41 +49,33 @@ struct Gathered {
 pub(super) struct Live {
     wide: Vec<Alone>,
     narrow: Vec<Narrow>,
-    /// By group of narrow ones, where their members have their values.
-    slots: Vec<Slots>,
     /// How many of the narrow are computed together.
     together: usize,
     /// Per wide field, then per group of narrow ones.
     answers: Vec<Cells>,
-    /// By slot, of the plan or of a frame as it came, and a last row of taxels that nothing presses, which none of them has.
+    /// By slot, and a last row of taxels that nothing presses, which is nobody's.
     pressures: Lines<f32>,
     statuses: Lines<u32>,
     /// Those of the frame before, where there are changes.
     before: (Lines<f32>, Lines<u32>),
-    /// What is read where it lies, for frames of the picks of that number.
-    as_delivered: Option<(u64, Option<AsDelivered>)>,
     gathered: Gathered,
     /// Of the other threads that take part, where a frame is shared.
     others: Vec<Gathered>,
     gate: Option<Gate>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
-    /// Whether members' pressures are brought side by side by way of registers.
-    inserts: bool,
 }
 
 impl Live {
-    pub(super) fn new(level: Level, plan: &Plan) -> Self {
+    pub(super) fn new(plan: &Plan) -> Self {
         let tiles = plan.slots().div_ceil(LANES);
         let (wide, mut narrow): (Vec<usize>, Vec<usize>) =
             (0..plan.fields.len()).partition(|&field| plan.fields[field].is_wide());
         // Fields of one size stay in their order.
         narrow.sort_by_key(|&field| std::cmp::Reverse(plan.fields[field].count));
-        let room = if tiles * LANES < NEAR { NEAR / LANES } else { tiles + 1 };
-        let unpressed = (room - 1) * LANES;
-        let groups = narrow.chunks(LANES).enumerate();
-        let (mut narrow, slots): (Vec<Narrow>, Vec<Slots>) =
-            groups.map(|(index, fields)| Narrow::new(plan, index, fields, unpressed)).unzip();
+        let unpressed = tiles * LANES;
+        let groups = narrow.chunks(LANES);
+        let mut narrow: Vec<Narrow> = groups.map(|fields| Narrow::new(plan, fields, unpressed)).collect();
         let mut first_row = 0;
         for group in &mut narrow {
             group.first_row = first_row;
@@ -112,11 +98,9 @@ impl Live {
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
             wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
             narrow,
-            slots,
             together,
-            as_delivered: None,
-            pressures: Lines::new(room, 0.0),
-            statuses: Lines::new(room, 0),
+            pressures: Lines::new(tiles + 1, 0.0),
+            statuses: Lines::new(tiles + 1, 0),
             before: if plan.has_changes() {
                 (Lines::new(tiles, 0.0), Lines::new(tiles, 0))
             } else {
@@ -124,13 +108,7 @@ impl Live {
             },
             gathered: Gathered::default(),
             others: vec![Gathered::default(); if is_shared(plan, threads) { threads - 1 } else { 0 }],
-            inserts: inserting_pays(level),
         }
-    }
-
-    #[cfg(test)]
-    pub(super) fn slots(&self) -> &[Slots] {
-        &self.slots
     }
 
     /// Computes everything anew in the next frame.
@@ -138,7 +116,6 @@ impl Live {
         if let Some(gate) = &mut self.gate {
             gate.forget();
         }
-        self.as_delivered = None;
     }
 
     /// All stages for one frame, into `cells`, which is one frame.
@@ -153,26 +130,10 @@ impl Live {
         let Self { pressures, statuses, before: (was, said), gate, .. } = self;
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
         let is_shared = !self.others.is_empty();
-        let as_delivered = match moment.now.0 {
-            Rows::Picked { picks, .. } if !is_shared => {
-                // At once, though a gate may stand before it: when that steps aside, nothing is made any more.
-                if self.as_delivered.as_ref().is_none_or(|(of, _)| *of != picks.number) {
-                    self.as_delivered =
-                        Some((picks.number, AsDelivered::new(plan, &self.slots, picks, pressures.len() * LANES)));
-                }
-                self.as_delivered.as_ref().and_then(|(_, as_delivered)| as_delivered.as_ref())
-            }
-            _ => None,
-        };
-        let mut slots = &self.slots[..];
-        let mut faults = match (&mut gate, as_delivered) {
-            (Some(gate), _) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
-            (None, Some(as_delivered)) => {
-                slots = &as_delivered.slots;
-                as_delivered.frame(level, plan, moment.now, pressures, statuses)
-            }
-            (None, None) if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
-            (None, None) => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
+        let mut faults = match &mut gate {
+            Some(gate) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
+            None if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
+            None => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
         };
         if plan.has_changes() {
             calibrate::frame(level, plan, tables, moment.before, was, said);
@@ -187,9 +148,7 @@ impl Live {
             tables,
             pressures: self.pressures.as_flattened(),
             statuses: self.statuses.as_flattened(),
-            slots,
             faults,
-            inserts: self.inserts,
         };
         let stale = gate.as_ref().map_or(&self.everything[..], |gate| gate.stale());
         let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
@@ -238,10 +197,7 @@ struct Frame<'a> {
     tables: &'a Tables,
     pressures: &'a [f32],
     statuses: &'a [u32],
-    /// By group, where its members have their values.
-    slots: &'a [Slots],
     faults: bool,
-    inserts: bool,
 }
 
 impl Frame<'_> {
@@ -304,21 +260,12 @@ impl Frame<'_> {
             gathered.statuses = Lines::new(rows, 0);
             gathered.between.resize(groups.len(), Between::EMPTY);
         }
-        let are_far = rows * size_of::<PlaceRow>() > NEAREST_CACHE;
         let mut first = 0;
         for group in groups {
             let rows = first..first + group.places.len();
-            if are_far {
-                // What is brought side by side comes late: its places are fetched meanwhile.
-                group.places.iter().for_each(|place| {
-                    soon_needed(&place.u);
-                    soon_needed(&place.v);
-                });
-            }
-            let slots = &self.slots[group.index];
-            slots.gather_pressures(self.level, self.inserts, self.pressures, &mut gathered.pressures[rows.clone()]);
+            group.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
             if self.faults {
-                slots.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
+                group.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
                 self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
             }
             first = rows.end;
@@ -361,7 +308,6 @@ impl Frame<'_> {
             },
             LANES,
             wanted,
-            || {},
             &mut between[..groups.len()],
             answers,
         );

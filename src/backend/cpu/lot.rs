@@ -42,27 +42,20 @@ impl Between {
         Self { active: [0; LANES], u: [0.0; LANES], v: [0.0; LANES], found: [[0.0; LANES]; 5] };
 }
 
-/// How often [`touch`] calls `meanwhile` for each set of cells.
-pub(super) fn calls(stages: Stages) -> usize {
-    1 + 2 * usize::from(stages.orientation) + 2 * usize::from(stages.axis)
-}
-
 /// All stages for as many sets of cells as `cells` and `between` have, up to lane `lanes` of each; `lot` says where a
-/// set finds its members, and what its fields are like. `meanwhile` is called beside each, as often as [`calls`] says.
+/// set finds its members, and what its fields are like.
 #[inline(always)]
 pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     simd: S,
     lot: impl Fn(usize) -> (P, K),
     lanes: usize,
     wanted: Wanted,
-    mut meanwhile: impl FnMut(),
     between: &mut [Between],
     cells: &mut [Cells],
 ) {
     let Wanted { stages, care, .. } = wanted;
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
-        meanwhile();
         let mut at = 0;
         while at < lanes {
             let next = at + width::<S>();
@@ -96,7 +89,6 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     if stages.orientation {
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
-            meanwhile();
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 2>(simd, &kind, at, between, cells) {
@@ -108,7 +100,6 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
-            meanwhile();
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
@@ -124,7 +115,6 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     if stages.axis {
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (members, kind) = lot(index);
-            meanwhile();
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
@@ -140,7 +130,6 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         }
         for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
             let (_, kind) = lot(index);
-            meanwhile();
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {

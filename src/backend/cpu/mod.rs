@@ -4,9 +4,7 @@
 //! is written once ([`touch`] and the stages). Every lane does the operations of its cell in one fixed order, never
 //! fused, so that percepts have the same bits however a recording is cut and whatever instructions there are.
 
-mod ahead;
 mod angle;
-mod as_delivered;
 mod axis;
 mod batch;
 mod calibrate;
@@ -31,8 +29,6 @@ mod rest;
 pub(super) mod side_by_side;
 mod simd;
 mod sixteen;
-mod slots;
-mod stream;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -44,7 +40,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 pub(crate) use fearless_simd::Level;
 
-use self::ahead::Ahead;
 use self::simd::LANES;
 pub(crate) use self::simd::with_widest;
 use super::{Backend, RawBatch, Rows, Step};
@@ -115,7 +110,7 @@ impl Cpu {
                 wide: wide.collect(),
             },
             level,
-            live: live::Live::new(level, plan),
+            live: live::Live::new(plan),
             scratches: Mutex::new(Vec::new()),
             before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],
@@ -126,8 +121,7 @@ impl Cpu {
 
     /// Runs a batch on all threads, this one among them: each takes a part of what is left, ever smaller ones, so that none
     /// waits long for the others and frames that follow each other mostly stay together.
-    fn batch(&self, raw: &RawBatch<'_>, mut cells: CellsMut<'_>) {
-        let streams = stream::is_worth(&self.plan, &mut cells);
+    fn batch(&self, raw: &RawBatch<'_>, cells: CellsMut<'_>) {
         let least = (TASK / self.plan.memberships().max(1)).max(1).next_multiple_of(LANES);
         let threads = parallel::threads().min(cells.frames().div_ceil(least));
         let rest = Mutex::new((0, Some(cells)));
@@ -142,59 +136,27 @@ impl Cpu {
         };
         let work = || {
             while let Some((first, part)) = take() {
-                self.part(raw, first, streams, part);
+                self.part(raw, first, part);
             }
         };
         parallel::on_threads(threads, work);
     }
 
-    /// Runs the frames from `first` on, sixteen after the other; `streams` says whether answers are written past the caches.
-    fn part(&self, raw: &RawBatch<'_>, first: usize, streams: bool, cells: CellsMut<'_>) {
+    /// Runs the frames from `first` on, sixteen after the other.
+    fn part(&self, raw: &RawBatch<'_>, first: usize, cells: CellsMut<'_>) {
         let frames = cells.frames();
         let free = self.scratches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = free.unwrap_or_else(|| batch::Scratch::new(&self.plan, &self.tables));
-        let (plan, tables, stretches) = (&self.plan, &self.tables, self.tables.window.stretches());
-        let mut staged = streams.then(|| scratch.staged.take().unwrap_or_else(|| stream::Staged::pair(plan)));
-        let steps = |fields: usize| fields * lot::calls(plan.stages());
-        let mut block = |at: usize, cells: &mut CellsMut<'_>, mut outgoing: Option<&mut stream::Outgoing<'_>>| {
-            let before = the_one_before(raw.rows, at, &self.before);
-            for (index, stretch) in stretches.iter().enumerate() {
-                let (next, frames) = match stretches.get(index + 1) {
-                    Some(next) => (next, at..at + LANES),
-                    None => (&stretches[0], at + LANES..at + 2 * LANES),
-                };
-                let next_cell = (frames.start - at) * plan.fields.len() + next.start_of_last_sixteen();
-                let ahead = Ahead::new(raw.rows, frames, next.most_read(), steps(stretch.fields.len()));
-                let is_unannounced = at == first && index == 0;
-                let job = batch::Job { raw, first: at, before, ahead, is_unannounced, next_cell };
-                batch::stretch(self.level, plan, tables, job, stretch, &mut scratch, cells, outgoing.as_deref_mut());
-            }
-        };
-        // What the block before has left to be written.
-        let mut last: Option<CellsMut<'_>> = None;
         let (mut rest, mut done) = (cells, 0);
         while done < frames {
             let (mut cells, later) = rest.split_at(LANES.min(frames - done));
-            if let Some([now, earlier]) = &mut staged {
-                stream::announce(&mut cells);
-                let mut earlier_cells = last.as_ref().map(|last| earlier.cells(last.frames()));
-                let mut outgoing = match earlier_cells.as_mut().zip(last.as_mut()) {
-                    Some((from, to)) => stream::Outgoing::new(from, to, steps(plan.fields.len())),
-                    None => stream::Outgoing::default(),
-                };
-                block(first + done, &mut now.cells(cells.frames()), Some(&mut outgoing));
-                outgoing.finish();
-                std::mem::swap(now, earlier);
-                last = Some(cells);
-            } else {
-                block(first + done, &mut cells, None);
+            let job =
+                batch::Job { raw, first: first + done, before: the_one_before(raw.rows, first + done, &self.before) };
+            for stretch in self.tables.window.stretches() {
+                batch::stretch(self.level, &self.plan, &self.tables, &job, stretch, &mut scratch, &mut cells);
             }
             (rest, done) = (later, done + LANES);
         }
-        if let (Some([_, earlier]), Some(mut last)) = (&mut staged, last) {
-            stream::Outgoing::new(&mut earlier.cells(last.frames()), &mut last, steps(plan.fields.len())).finish();
-        }
-        scratch.staged = staged.or(scratch.staged);
         self.scratches.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
 }
@@ -264,19 +226,12 @@ impl Backend for Cpu {
         } else {
             all.split_at(raw.first).1.split_at(raw.frames).0
         };
-        if raw.frames == 1 {
-            self.live.frame(self.level, &self.plan, &self.tables, &Moment::new(raw, 0, &self.before), &mut cells);
-        } else if raw.frames < LANES {
+        if raw.frames < LANES {
             let mut rest = cells.reborrow();
             for frame in 0..raw.frames {
                 let (mut first, later) = rest.split_at(1);
-                self.live.frame(
-                    self.level,
-                    &self.plan,
-                    &self.tables,
-                    &Moment::new(raw, frame, &self.before),
-                    &mut first,
-                );
+                let moment = Moment::new(raw, frame, &self.before);
+                self.live.frame(self.level, &self.plan, &self.tables, &moment, &mut first);
                 rest = later;
             }
         } else {

@@ -137,7 +137,7 @@ pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, f
     let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
     let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
     let between = std::slice::from_mut(&mut between);
-    with_widest!(level, simd => touch(simd, |_| (field, kind), 1, wanted, || {}, between, cells));
+    with_widest!(level, simd => touch(simd, |_| (field, kind), 1, wanted, between, cells));
 }
 
 /// The sum of all lanes, as a tree.

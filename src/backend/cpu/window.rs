@@ -14,8 +14,6 @@ use crate::stage::layout::Member;
 
 /// Slots that a skin may have before it is looked at through a window.
 const SMALL: usize = 1 << 12;
-/// Slots from which on those that are kept are more than a cache has room for.
-const FAR: usize = 1 << 13;
 /// Slots that a window has, the first that does: 256 KiB of pressures and more.
 const SIZES: [usize; 3] = [1 << 12, 1 << 13, 1 << 14];
 
@@ -39,12 +37,6 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// The larger part of [`Self::reads`]; the other is nearly always nothing.
-    pub(super) fn most_read(&self) -> Range<usize> {
-        let [below, above] = &self.reads;
-        if below.len() > above.len() { below.clone() } else { above.clone() }
-    }
-
     /// The first of the last sixteen fields, or of as many as there are.
     pub(super) fn start_of_last_sixteen(&self) -> usize {
         self.fields.start + self.fields.len().saturating_sub(1) / LANES * LANES
@@ -93,11 +85,6 @@ impl Window {
     /// Whether all slots are kept.
     fn is_whole(&self) -> bool {
         self.mask == usize::MAX
-    }
-
-    /// Whether what is kept is more than a cache has room for.
-    pub(super) fn is_far(&self) -> bool {
-        self.is_whole() && self.slots > FAR
     }
 
     /// The plan's members, each with its slot's place among those that are kept.

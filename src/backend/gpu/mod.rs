@@ -77,8 +77,6 @@ pub(crate) struct Gpu {
     careful: (usize, Vec<Stage>),
     /// How raw values go up.
     form: Form,
-    /// Where those go, if not into `raw`.
-    texture: Option<wgpu::Texture>,
     columns: Columns,
     results: wgpu::Buffer,
     /// Per taxel and frame, where they are read back.
@@ -148,7 +146,6 @@ impl Gpu {
         let up = [Form::Rows, form].map(|form| form.bytes(plan.channels(), capacity));
         let up = up[0].max(up[1]) as u64;
         let raw = working("raw", up);
-        let texture = (direct && is_processor(&device)).then(|| pack::texture(&device, "raw", up, form.texel()));
         let taxels = table(&device, "taxels", &plan.taxels);
         let quads = layout::padded_quads(capacity) as u64;
         let pressures = working("pressures", quads * slots * 16);
@@ -187,11 +184,9 @@ impl Gpu {
         }
         let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
         let over_fields = |direct: bool| {
-            let texels = texture.as_ref().filter(|_| direct).map(|texture| texture.create_view(&Default::default()));
-            let (values, at) = match &texels {
-                Some(texels) => (Values::RawTexture, (wgpu::BindingResource::TextureView(texels), None)),
-                None if direct => (Values::Raw, (raw.as_entire_binding(), None)),
-                None => (Values::Pressures, (pressures.as_entire_binding(), Some(statuses.as_entire_binding()))),
+            let (values, at) = match direct {
+                true => (Values::Raw, (raw.as_entire_binding(), None)),
+                false => (Values::Pressures, (pressures.as_entire_binding(), Some(statuses.as_entire_binding()))),
             };
             let (batch, taxels, results) = (&batch, &taxels, &results);
             tables.stages(&device, &Bound { batch, taxels, results, values, at })
@@ -242,7 +237,6 @@ impl Gpu {
             stages,
             careful,
             form,
-            texture,
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
@@ -270,7 +264,8 @@ impl Gpu {
         if self.plan.stages().motion || self.plan.has_changes() {
             encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
         }
-        self.send_up(&mut encoder, upload, pack::values_at(raw.frames), raw.frames);
+        let bytes = self.raw_bytes(raw.frames) as u64;
+        encoder.copy_buffer_to_buffer(upload, pack::values_at(raw.frames), &self.raw, 0, bytes);
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
             let mut pass = encoder.begin_compute_pass(&descriptor);
@@ -334,7 +329,6 @@ impl Backend for Gpu {
             let (replaced, careful) = std::mem::take(&mut self.careful);
             self.stages.splice(..replaced, careful);
             self.form = Form::Rows;
-            self.texture = None;
         }
     }
 
@@ -365,7 +359,7 @@ impl Gpu {
     }
 }
 
-/// Whether a processor stands in for a GPU: it reads textures in place of buffers.
+/// Whether a processor stands in for a GPU.
 fn is_processor(device: &Device) -> bool {
     device.info.device_type == wgpu::DeviceType::Cpu
 }

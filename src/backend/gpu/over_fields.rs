@@ -6,7 +6,6 @@ use super::adapter::Device;
 use super::columns::Columns;
 use super::is_processor;
 use super::members::MemberTable;
-use super::pack::TEXELS;
 use super::shaders::{self, Abreast, Shader, Values};
 use super::shares::{Share, Shares};
 use super::stage::{Over, Stage, table};
@@ -53,9 +52,7 @@ pub(super) struct Bound<'a> {
 
 /// Members that one table on `device` holds.
 pub(super) fn most_members(device: &Device) -> usize {
-    let limits = device.device.limits();
-    let bound = limits.max_storage_buffer_binding_size as usize / size_of::<layout::Member>();
-    bound.min(TEXELS * limits.max_texture_dimension_2d as usize)
+    device.device.limits().max_storage_buffer_binding_size as usize / size_of::<layout::Member>()
 }
 
 /// Members of a wide field's part on `device`, at most unless it has very many, however many frames a call has, as sums depend on it: many parts keep a GPU's

@@ -3,16 +3,12 @@
 
 use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
-use super::adapter::Device;
 use super::{Gpu, HEADER, STEP};
 use crate::backend::cpu::side_by_side;
 use crate::backend::{RawBatch, Rows};
 use crate::error::Result;
 use crate::signal::RawValue;
 use crate::stage::layout;
-
-/// Texels of a row of a texture, as many as `shaders/shared/texels.wgsl` says.
-pub(super) const TEXELS: usize = 1024;
 
 /// How raw values go up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,22 +22,13 @@ pub(super) enum Form {
 }
 
 impl Form {
-    /// Bytes of `frames` frames of `channels` values: where a texture may take them, whole rows of one.
+    /// Bytes of `frames` frames of `channels` values.
     pub(super) fn bytes(self, channels: usize, frames: usize) -> usize {
         match self {
             Self::Rows => frames * layout::padded_channels(channels) * 4,
-            Self::Quads => (layout::padded_quads(frames) * channels * self.texel()).next_multiple_of(self.row()),
-            Self::One => (channels * self.texel()).next_multiple_of(self.row()),
+            Self::Quads => layout::padded_quads(frames) * channels * 16,
+            Self::One => channels * 4,
         }
-    }
-
-    /// Bytes of a texel.
-    pub(super) fn texel(self) -> usize {
-        if self == Self::One { 4 } else { 16 }
-    }
-
-    fn row(self) -> usize {
-        TEXELS * self.texel()
     }
 }
 
@@ -49,24 +36,6 @@ impl Gpu {
     /// Bytes that the raw values of `frames` frames go up in.
     pub(super) fn raw_bytes(&self, frames: usize) -> usize {
         self.form.bytes(self.plan.channels(), frames)
-    }
-
-    /// Has the raw values of `frames` frames copied to where the programs read them, from byte `at` of `upload` on.
-    pub(super) fn send_up(&self, encoder: &mut wgpu::CommandEncoder, upload: &wgpu::Buffer, at: u64, frames: usize) {
-        let Some(texture) = &self.texture else {
-            encoder.copy_buffer_to_buffer(upload, at, &self.raw, 0, self.raw_bytes(frames) as u64);
-            return;
-        };
-        let from = wgpu::TexelCopyBufferInfo {
-            buffer: upload,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: at,
-                bytes_per_row: Some(self.form.row() as u32),
-                rows_per_image: None,
-            },
-        };
-        let height = self.raw_bytes(frames) / self.form.row();
-        encoder.copy_buffer_to_texture(from, texture.as_image_copy(), rows(height as u32));
     }
 
     /// Fills a set's upload buffer.
@@ -93,25 +62,6 @@ impl Gpu {
 /// Where in the upload buffer the raw values of `frames` frames begin: where a texel may.
 pub(super) fn values_at(frames: usize) -> u64 {
     (HEADER + frames as u64 * STEP).next_multiple_of(16)
-}
-
-/// A texture for `bytes` in texels of so many, of which a program reads whole words.
-pub(super) fn texture(device: &Device, name: &str, bytes: u64, texel: usize) -> wgpu::Texture {
-    let height = bytes.div_ceil((TEXELS * texel) as u64).max(1);
-    device.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(name),
-        size: rows(height as u32),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: if texel == 4 { wgpu::TextureFormat::R32Uint } else { wgpu::TextureFormat::Rgba32Uint },
-        usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::STORAGE_BINDING,
-        view_formats: &[],
-    })
-}
-
-fn rows(height: u32) -> wgpu::Extent3d {
-    wgpu::Extent3d { width: TEXELS as u32, height, depth_or_array_layers: 1 }
 }
 
 fn pack_rows(raw: &RawBatch<'_>, channels: usize, row: &mut Vec<RawValue>, mut mapped: wgpu::WriteOnly<'_, [u8]>) {

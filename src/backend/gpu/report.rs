@@ -178,7 +178,6 @@ pub struct EmptyCall {
     gpu: Gpu,
     pipeline: wgpu::ComputePipeline,
     groups: [u32; 3],
-    frames: usize,
     values: Vec<u8>,
     bytes_down: u64,
 }
@@ -207,7 +206,7 @@ impl EmptyCall {
         let groups = gpu.stages.iter().map(|stage| stage.over.groups(&batch));
         let groups = groups.max_by_key(|groups| groups.iter().product::<u32>()).unwrap_or([1, 1, 1]);
         let bytes_down = (frames * plan.fields.len() * 4 * gpu.columns.read().len()) as u64;
-        Ok(Self { pipeline, groups, frames, values: vec![0; gpu.raw_bytes(frames)], bytes_down, gpu })
+        Ok(Self { pipeline, groups, values: vec![0; gpu.raw_bytes(frames)], bytes_down, gpu })
     }
 
     /// From the host's first byte to its last.
@@ -223,7 +222,8 @@ impl EmptyCall {
         }
         set.upload.unmap();
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.gpu.send_up(&mut encoder, &set.upload, 0, self.frames);
+        let bytes = self.values.len() as u64;
+        encoder.copy_buffer_to_buffer(&set.upload, 0, &self.gpu.raw, 0, bytes);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);

@@ -54,8 +54,6 @@ pub(crate) enum Values {
     Pressures,
     /// Raw values that are pressures, as they went up.
     Raw,
-    /// The same, on a processor that stands in for a GPU.
-    RawTexture,
 }
 
 /// Where it reads members.
@@ -64,8 +62,6 @@ pub(crate) enum Members {
     Many,
     /// At most [`crate::stage::layout::FEW`] memberships.
     Few,
-    /// However many, on a processor that stands in for a GPU.
-    Texture,
 }
 
 /// Contact, centroid, orientation and axis, over fields that are not wide.
@@ -85,15 +81,13 @@ fn over_fields(name: &'static str, fields: &str, abreast: Abreast, values: Value
     };
     let values = match values {
         Values::Pressures => shared!("marks", "pressures"),
-        Values::Raw => shared!("raw_buffer", "raw_pressures"),
-        Values::RawTexture => shared!("raw_texture", "raw_pressures"),
+        Values::Raw => shared!("raw_pressures"),
     };
     let members = match members {
         Members::Many => shared!("members"),
         Members::Few => shared!("few_members"),
-        Members::Texture => shared!("member_texture"),
     };
-    const SHARED: &str = shared!("texels", "angle", "scale", "over_fields", "compensated");
+    const SHARED: &str = shared!("angle", "scale", "over_fields", "compensated");
     const STAGES: &str = concat!(
         include_str!("../../../shaders/contact.wgsl"),
         include_str!("../../../shaders/centroid.wgsl"),
@@ -112,8 +106,8 @@ fn over_fields(name: &'static str, fields: &str, abreast: Abreast, values: Value
 pub(crate) fn all() -> Vec<Shader> {
     let mut all = vec![CALIBRATE, CHANGE];
     for abreast in [Abreast::Four, Abreast::One] {
-        for values in [Values::Pressures, Values::Raw, Values::RawTexture] {
-            for members in [Members::Many, Members::Few, Members::Texture] {
+        for values in [Values::Pressures, Values::Raw] {
+            for members in [Members::Many, Members::Few] {
                 all.push(narrow_fields(abreast, values, members));
                 all.push(wide_fields(abreast, values, members));
             }

@@ -103,8 +103,6 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&module, "TURNS"), Some(super::stage::TURNS));
     assert_eq!(constant(&module, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&module, "TINY_BITS"), Some(calibrate::TINY_BITS));
-    let textures = parse(&narrow_fields(Abreast::One, Values::RawTexture, Members::Texture));
-    assert_eq!(constant(&textures, "ROW_LOG2"), Some(super::pack::TEXELS.ilog2()));
     let change = parse(&CHANGE);
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
@@ -261,7 +259,7 @@ pub(super) fn percepts_of(gpu: &mut Gpu, values: &[RawValue]) -> Percepts {
 }
 
 #[test]
-fn raw_values_are_read_alike_from_buffers_from_textures_and_through_calibration() {
+fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
     let Ok(device) = adapter::shared() else { return skip("GPU", "no adapter answers") };
     let body = Body::from_bytes("hand", include_bytes!("../../../bodies/hand.glb")).unwrap();
     let calibration = Calibration::identity(body.taxels.len());
@@ -271,21 +269,15 @@ fn raw_values_are_read_alike_from_buffers_from_textures_and_through_calibration(
     let mut careful = plan.clone();
     careful.taxels[0].dead_band = 1e-30;
     for frames in [1, 7, 70, 300] {
-        let [from_buffer, from_texture] = [wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu].map(|device_type| {
-            let mut device = device.clone();
-            device.info.device_type = device_type;
-            let mut gpu = Gpu::on(device, &plan, frames).unwrap();
-            assert!(gpu.form != Form::Rows && gpu.texture.is_some() == (device_type == wgpu::DeviceType::Cpu));
-            let percepts = percepts_of_odd_values(&mut gpu, frames);
-            gpu.restart();
-            gpu.recalibrate(&careful);
-            assert!(gpu.form == Form::Rows);
-            assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames, {device_type:?}");
-            percepts
-        });
-        assert!(from_buffer == from_texture, "{frames} frames");
+        let mut gpu = Gpu::on(device.clone(), &plan, frames).unwrap();
+        assert!(gpu.form != Form::Rows);
+        let percepts = percepts_of_odd_values(&mut gpu, frames);
+        gpu.restart();
+        gpu.recalibrate(&careful);
+        assert!(gpu.form == Form::Rows);
+        assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames");
         let faulty = (0..frames)
-            .flat_map(|frame| from_buffer.frame(frame))
+            .flat_map(|frame| percepts.frame(frame))
             .filter(|percept| percept.flags.contains(Flags::FAULTY_INPUT | Flags::INCOMPLETE));
         assert!(frames < 70 || faulty.count() > 0);
     }
