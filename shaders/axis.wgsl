@@ -1,5 +1,8 @@
 // axis: principal axis of the second moments (src/stage/axis.rs).
 
+override AXIS_AT: u32 = NOWHERE;
+override ANISOTROPY_AT: u32 = NOWHERE;
+
 const TOGETHER = 9.313225746154785e-10f;
 const ISOTROPIC_UNDER = 1e-3f;
 
@@ -51,4 +54,9 @@ fn axis_of(moments: Moments, scaled: Numbers, lined: Truths) -> Axis {
         select(anisotropy, nothing, together | !lined),
         select(Words(), select(status, Words(COINCIDENT), together), lined),
     );
+}
+
+fn store_axis(index: u32, quad: u32, axis: Axis) {
+    store_numbers(AXIS_AT, index, quad, axis.angle);
+    store_numbers(ANISOTROPY_AT, index, quad, axis.anisotropy);
 }

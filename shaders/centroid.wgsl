@@ -1,5 +1,9 @@
 // centroid: the pressure-weighted mean place (src/stage/centroid.rs).
 
+// u; v is the next.
+override CENTROID_AT: u32 = NOWHERE;
+override DEPTH_AT: u32 = NOWHERE;
+
 // Sums of wPx, then the means.
 struct Place {
     u: Numbers,
@@ -39,4 +43,12 @@ fn mean_place(sum: Place, total: Numbers, touched: Truths) -> Place {
 fn present_places(field: Field, touched: Truths) -> Words {
     let present = select(POSITION, CENTROID | POSITION | NORMAL, is_charted(field)) << PRESENT;
     return select(Words(), Words(present), touched);
+}
+
+fn store_centroid(index: u32, quad: u32, place: Place) {
+    if CENTROID_AT != NOWHERE {
+        store_numbers(CENTROID_AT, index, quad, place.u);
+        store_numbers(CENTROID_AT + 1u, index, quad, place.v);
+    }
+    store_numbers(DEPTH_AT, index, quad, place.depth);
 }

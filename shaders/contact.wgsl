@@ -1,5 +1,10 @@
 // contact: sums over a field (src/stage/contact.rs).
 
+override TOTAL_AT: u32 = NOWHERE;
+override PEAK_AT: u32 = NOWHERE;
+override ACTIVE_AT: u32 = NOWHERE;
+override AREA_AT: u32 = NOWHERE;
+
 struct Sums {
     total: Numbers,
     peak: Numbers,
@@ -49,4 +54,11 @@ fn status_of(sums: Sums, field: Field) -> Words {
         | select(Words(NO_CONTACT), Words(), pressed)
         | Words(select(NO_CHART, 0u, is_charted(field)))
         | select(Words(), Words(present << PRESENT), usable);
+}
+
+fn store_contact(index: u32, quad: u32, sums: Sums) {
+    store_numbers(TOTAL_AT, index, quad, sums.total);
+    store_numbers(PEAK_AT, index, quad, sums.peak);
+    store_numbers(AREA_AT, index, quad, sums.area);
+    store(ACTIVE_AT, index, quad, sums.pressed);
 }

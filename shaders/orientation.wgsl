@@ -1,5 +1,7 @@
 // orientation: the line through the two farthest points (src/stage/orientation.rs).
 
+override ORIENTATION_AT: u32 = NOWHERE;
+
 const NEAR = 6.103515625e-5f;
 const NOBODY = 0xffffffffu;
 
@@ -81,4 +83,8 @@ fn orientation_of(far: Farthest, lined: Truths) -> Line {
     let status = select(Words(), Words(TIE), tie) | Words(ORIENTATION << PRESENT);
     let angle = select(line_angle(along_u, along_v), Numbers(), together | !lined);
     return Line(angle, select(Words(), select(status, Words(COINCIDENT), together), lined));
+}
+
+fn store_orientation(index: u32, quad: u32, line: Line) {
+    store_numbers(ORIENTATION_AT, index, quad, line.angle);
 }

@@ -90,20 +90,9 @@ const NO_PREVIOUS = 1u << 11u;
 const BAD_DT = 1u << 12u;
 const FLAGS = 0x7fffu;
 
-// A cell's status holds its flags below and, from this bit on, which quantities are present.
+// A cell's status holds its flags below and, from this bit on, which outputs are present, whose bits are put before this
+// file (TOTAL, PEAK and so on).
 const PRESENT = 16u;
-const TOTAL = 1u << 0u;
-const PEAK = 1u << 1u;
-const ACTIVE = 1u << 2u;
-const AREA = 1u << 3u;
-const CENTROID = 1u << 4u;
-const POSITION = 1u << 5u;
-const NORMAL = 1u << 6u;
-const ORIENTATION = 1u << 7u;
-const AXIS = 1u << 8u;
-const ANISOTROPY = 1u << 9u;
-const DISPLACEMENT = 1u << 10u;
-const DIRECTION = 1u << 11u;
 
 const CHARTED = 1u << 0u;
 const AREA_KNOWN = 1u << 1u;

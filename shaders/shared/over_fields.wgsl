@@ -11,18 +11,8 @@
 // Column by column, each frame by frame, each field by field. The first column are the cells' statuses.
 @group(0) @binding(7) var<storage, read_write> results: array<u32>;
 
-// Which column has what; what nobody wants is nowhere, and not computed.
+// A column that nobody wants is nowhere, and not computed. Each stage's file has those of its outputs.
 const NOWHERE = 0xffffffffu;
-override TOTAL_AT: u32 = NOWHERE;
-override PEAK_AT: u32 = NOWHERE;
-override ACTIVE_AT: u32 = NOWHERE;
-override AREA_AT: u32 = NOWHERE;
-// u; v is the next.
-override CENTROID_AT: u32 = NOWHERE;
-override DEPTH_AT: u32 = NOWHERE;
-override ORIENTATION_AT: u32 = NOWHERE;
-override AXIS_AT: u32 = NOWHERE;
-override ANISOTROPY_AT: u32 = NOWHERE;
 // Whether stages run: a later one may need what is not kept.
 override CENTRED: bool = false;
 override ORIENTED: bool = false;
@@ -87,15 +77,8 @@ fn found_of(field: Field, sums: Sums, place_sum: Place) -> Found {
 }
 
 fn store_sums(index: u32, quad: u32, sums: Sums, place: Place) {
-    store_numbers(TOTAL_AT, index, quad, sums.total);
-    store_numbers(PEAK_AT, index, quad, sums.peak);
-    store_numbers(AREA_AT, index, quad, sums.area);
-    store(ACTIVE_AT, index, quad, sums.pressed);
-    if CENTROID_AT != NOWHERE {
-        store_numbers(CENTROID_AT, index, quad, place.u);
-        store_numbers(CENTROID_AT + 1u, index, quad, place.v);
-    }
-    store_numbers(DEPTH_AT, index, quad, place.depth);
+    store_contact(index, quad, sums);
+    store_centroid(index, quad, place);
 }
 
 // Stores lines, and the cells' statuses.
@@ -104,13 +87,12 @@ fn finish_lines(index: u32, quad: u32, found: Found, far: Farthest, moments: Mom
     if ORIENTED {
         let line = orientation_of(far, found.lined);
         status |= line.status;
-        store_numbers(ORIENTATION_AT, index, quad, line.angle);
+        store_orientation(index, quad, line);
     }
     if AXED {
         let axis = axis_of(moments, found.total * found.scale, found.lined);
         status |= axis.status;
-        store_numbers(AXIS_AT, index, quad, axis.angle);
-        store_numbers(ANISOTROPY_AT, index, quad, axis.anisotropy);
+        store_axis(index, quad, axis);
     }
     store(0u, index, quad, status);
 }

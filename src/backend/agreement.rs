@@ -6,7 +6,7 @@ use std::fmt;
 use glam::{DVec2, DVec3};
 
 use super::bounds::CellBound;
-use crate::percept::{Flags, Outputs, Percept, Percepts, Touch};
+use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Percepts, Touch};
 use crate::stage::angle::{between_directions, between_lines};
 use crate::stage::limit::Limit;
 
@@ -182,30 +182,35 @@ impl Cell<'_> {
 
     fn compare(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
         self.compare_flags(right, bound, got);
-        self.number(Outputs::TOTAL, right.total, got.total, bound.total);
-        self.number(Outputs::PEAK, right.peak, got.peak, bound.peak);
-        self.number(Outputs::ACTIVE, right.active.map(f64::from), got.active.map(f64::from), bound.active);
-        self.number(Outputs::AREA, right.area, got.area, bound.area);
-        self.centroid(&name(Outputs::CENTROID), right.centroid, got.centroid, bound.centroid);
+        for column in COLUMNS {
+            let (of_right, of_got) = (right.value(column), got.value(column));
+            let limit = bound.limit(column.output);
+            if column.measure == Measure::Place {
+                let pair = |value: Option<[f64; 3]>| value.map(|[u, v, _]| [u, v]);
+                self.place(column.name, pair(of_right), pair(of_got), bound.centroid);
+                continue;
+            }
+            if column.output == Outputs::POSITION {
+                self.position(column, (of_right, of_got), limit, right.in_world != got.in_world);
+            } else {
+                self.column(column, (of_right, of_got), limit);
+            }
+        }
         self.centroid_is_apart(right, bound, got);
-        self.place(right, bound, got);
-        self.quantity(&name(Outputs::NORMAL), right.normal, got.normal, bound.normal, apart_in_space);
-        let line = |a: &f64, b: &f64| between_lines(*a, *b);
-        self.quantity(&name(Outputs::ORIENTATION), right.orientation, got.orientation, bound.orientation, line);
-        self.number(Outputs::ANISOTROPY, right.anisotropy, got.anisotropy, bound.anisotropy);
-        self.quantity(&name(Outputs::AXIS), right.axis, got.axis, bound.axis, line);
-        self.quantity(&name(Outputs::DISPLACEMENT), right.displacement, got.displacement, bound.displacement, apart);
-        let way = |a: &f64, b: &f64| between_directions(*a, *b);
-        self.quantity(&name(Outputs::DIRECTION), right.direction, got.direction, bound.direction, way);
-        self.number(Outputs::DISTANCE, right.distance, got.distance, bound.distance);
-        self.number(Outputs::RADIAL_DISTANCE, right.radial_distance, got.radial_distance, bound.radial_distance);
-        self.number(Outputs::SPEED, right.speed, got.speed, bound.speed);
-        self.number(Outputs::RADIAL_SPEED, right.radial_speed, got.radial_speed, bound.radial_speed);
-        let (right_step, got_step) = (right.filtered_displacement, got.filtered_displacement);
-        self.quantity(&name(Outputs::FILTERED_DISPLACEMENT), right_step, got_step, bound.filtered_displacement, apart);
-        let (right_way, got_way) = (right.filtered_direction, got.filtered_direction);
-        self.quantity(&name(Outputs::FILTERED_DIRECTION), right_way, got_way, bound.filtered_direction, way);
-        self.number(Outputs::FILTERED_SPEED, right.filtered_speed, got.filtered_speed, bound.filtered_speed);
+    }
+
+    /// Values of `column`, by its measure.
+    fn column(&mut self, column: &Column, (right, got): (Option<[f64; 3]>, Option<[f64; 3]>), limit: Limit) {
+        let scalar = |value: Option<[f64; 3]>| value.map(|[value, ..]| value);
+        let between: fn(&f64, &f64) -> f64 = match column.measure {
+            Measure::Line => |a, b| between_lines(*a, *b),
+            Measure::Direction => |a, b| between_directions(*a, *b),
+            _ => distance,
+        };
+        match column.components {
+            1 => self.quantity(column.name, scalar(right), scalar(got), limit, between),
+            _ => self.quantity(column.name, right, got, limit, apart_in_space),
+        }
     }
 
     fn compare_flags(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
@@ -225,12 +230,16 @@ impl Cell<'_> {
         }
     }
 
-    fn place(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
-        let limit = far(bound.position, right.position);
-        // A place in another frame of coordinates is another place, wherever that is.
-        let elsewhere = right.in_world != got.in_world;
+    /// Positions; one in another frame of coordinates is another place, wherever that is.
+    fn position(
+        &mut self,
+        column: &Column,
+        (right, got): (Option<[f64; 3]>, Option<[f64; 3]>),
+        limit: Limit,
+        elsewhere: bool,
+    ) {
         let between = |a: &[f64; 3], b: &[f64; 3]| if elsewhere { f64::INFINITY } else { apart_in_space(a, b) };
-        self.quantity(&name(Outputs::POSITION), right.position, got.position, limit, between);
+        self.quantity(column.name, right, got, far(limit, right), between);
     }
 
     /// Coordinates are held to a bound each; what a centroid is off by is the distance, up to √2 times as much.
@@ -261,7 +270,7 @@ impl Cell<'_> {
             let of = |touch: &Touch| touch.total;
             self.quantity(&format!("{touches}.total"), right.map(of), got.map(of), total, distance);
             let of = |touch: &Touch| touch.centroid;
-            self.centroid(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
+            self.place(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
             let of = |touch: &Touch| touch.position;
             let limit = far(position, right.map(of));
             self.quantity(&format!("{touches}.position"), right.map(of), got.map(of), limit, apart_in_space);
@@ -281,12 +290,8 @@ impl Cell<'_> {
         }
     }
 
-    fn number(&mut self, output: Outputs, right: Option<f64>, got: Option<f64>, limit: Limit) {
-        self.quantity(&name(output), right, got, limit, distance);
-    }
-
     /// A place on a chart, each coordinate by its own bound.
-    fn centroid(&mut self, name: &str, right: Option<[f64; 2]>, got: Option<[f64; 2]>, limit: Limit<[f64; 2]>) {
+    fn place(&mut self, name: &str, right: Option<[f64; 2]>, got: Option<[f64; 2]>, limit: Limit<[f64; 2]>) {
         // The coordinate that takes more of its bound stands for both.
         let (mut axis, mut most) = (0, f64::NEG_INFINITY);
         if let (Some(right), Some(got), Limit::Within(bounds)) = (right, got, limit) {
@@ -366,68 +371,52 @@ fn name(output: Outputs) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::percept::{Precision, Values};
+    use crate::percept::{Component, Components, Host, Precision, Values};
     use crate::stage::touches::TouchBound;
 
     const NAMES: [&str; 1] = ["field"];
 
     /// One field in one frame, in double precision, changed by `change`.
-    fn percepts(change: impl Fn(&mut Percepts, &mut crate::percept::Columns<f64>)) -> Percepts {
+    fn percepts(change: impl Fn(&mut Percepts, &mut Components<f64>)) -> Percepts {
         let mut percepts = Percepts::new(Outputs::all(), 1, Precision::F64);
         percepts.reset(1);
         percepts.present[0] = Outputs::all();
         percepts.active[0] = 3;
         let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
-        (columns.total[0], columns.peak[0], columns.area[0]) = (10.0, 5.0, 1.0);
-        columns.set_centroid(0, [0.1, 0.2, 0.0]);
-        (columns.orientation[0], columns.axis[0], columns.anisotropy[0]) = (0.001, 1.0, 0.5);
-        columns.direction[0] = 3.139;
+        (columns[Component::Total][0], columns[Component::Peak][0], columns[Component::Area][0]) = (10.0, 5.0, 1.0);
+        (columns[Component::CentroidU][0], columns[Component::CentroidV][0]) = (0.1, 0.2);
+        (columns[Component::Orientation][0], columns[Component::Axis][0], columns[Component::Anisotropy][0]) =
+            (0.001, 1.0, 0.5);
+        columns[Component::Direction][0] = 3.139;
         change(&mut percepts, &mut columns);
         percepts.values = Values::F64(columns);
         percepts
     }
 
     fn bound() -> CellBound {
-        let near = Limit::Within(0.01);
-        CellBound {
-            total: near,
-            peak: near,
-            area: near,
-            centroid: Limit::Within([0.01; 2]),
-            position: near,
-            normal: near,
-            orientation: near,
-            axis: near,
-            anisotropy: near,
-            displacement: near,
-            direction: near,
-            distance: near,
-            radial_distance: near,
-            speed: near,
-            radial_speed: near,
-            filtered_displacement: near,
-            filtered_direction: near,
-            filtered_speed: near,
-            ..CellBound::default()
-        }
+        let mut bound = CellBound { centroid: Limit::Within([0.01; 2]), ..CellBound::default() };
+        bound.set(Outputs::all().iter().map(|output| (output, Limit::Within(0.01))));
+        bound.set([(Outputs::ACTIVE, Limit::Within(0.0))]);
+        bound
     }
 
-    fn against(bound: CellBound, change: impl Fn(&mut Percepts, &mut crate::percept::Columns<f64>)) -> Agreement {
+    fn against(bound: CellBound, change: impl Fn(&mut Percepts, &mut Components<f64>)) -> Agreement {
         compare(&percepts(|_, _| {}), &[bound], &percepts(change), &NAMES)
     }
 
     #[test]
     fn the_same_agrees_and_so_does_what_is_within_bounds() {
         assert!(against(bound(), |_, _| {}).holds());
-        assert!(against(bound(), |_, c| c.total[0] += 0.009).holds());
+        assert!(against(bound(), |_, c| c[Component::Total][0] += 0.009).holds());
         // Either side of the seam is near.
-        assert!(against(bound(), |_, c| c.orientation[0] = std::f64::consts::PI - 0.001).holds());
-        assert!(against(bound(), |_, c| c.direction[0] = -3.139).holds());
+        assert!(against(bound(), |_, c| c[Component::Orientation][0] = std::f64::consts::PI - 0.001).holds());
+        assert!(against(bound(), |_, c| c[Component::Direction][0] = -3.139).holds());
     }
 
     #[test]
     fn a_centroid_is_off_by_the_distance() {
-        let agreement = against(bound(), |_, c| (c.centroid_u[0], c.centroid_v[0]) = (0.103, 0.196));
+        let agreement =
+            against(bound(), |_, c| (c[Component::CentroidU][0], c[Component::CentroidV][0]) = (0.103, 0.196));
         let centroid = agreement.quantities["centroid"];
         assert!(
             (centroid.worst_error - 0.005).abs() < 1e-9 && (centroid.worst_share - 0.4).abs() < 1e-6,
@@ -437,27 +426,27 @@ mod tests {
 
     #[test]
     fn every_quantity_beyond_its_bound_fails() {
-        type Change = fn(&mut Percepts, &mut crate::percept::Columns<f64>);
+        type Change = fn(&mut Percepts, &mut Components<f64>);
         let changes: [(&str, Change); 24] = [
-            ("total", |_, c| c.total[0] += 0.011),
-            ("peak", |_, c| c.peak[0] -= 0.011),
-            ("area", |_, c| c.area[0] = f64::NAN),
-            ("centroid", |_, c| c.centroid_u[0] += 0.011),
-            ("centroid", |_, c| c.centroid_v[0] -= 0.011),
-            ("position", |p, _| p.position[0][2] += 0.011),
-            ("normal", |p, _| p.normal[0][0] += 0.011),
-            ("orientation", |_, c| c.orientation[0] += 0.011),
-            ("axis", |_, c| c.axis[0] += 1.5),
-            ("anisotropy", |_, c| c.anisotropy[0] = 0.6),
-            ("displacement", |_, c| c.displacement[0] = [0.008, 0.008]),
-            ("direction", |_, c| c.direction[0] = -3.12),
-            ("distance", |_, c| c.distance[0] = 0.011),
-            ("radial_distance", |_, c| c.radial_distance[0] = -0.011),
-            ("speed", |_, c| c.speed[0] = f64::INFINITY),
-            ("radial_speed", |_, c| c.radial_speed[0] = 0.011),
-            ("filtered_displacement", |p, _| p.filtered_displacement[0] = [0.008, -0.008]),
-            ("filtered_direction", |p, _| p.filtered_direction[0] = -0.011),
-            ("filtered_speed", |p, _| p.filtered_speed[0] = 0.011),
+            ("total", |_, c| c[Component::Total][0] += 0.011),
+            ("peak", |_, c| c[Component::Peak][0] -= 0.011),
+            ("area", |_, c| c[Component::Area][0] = f64::NAN),
+            ("centroid", |_, c| c[Component::CentroidU][0] += 0.011),
+            ("centroid", |_, c| c[Component::CentroidV][0] -= 0.011),
+            ("position", |p, _| p.set_host(Host::Position, 0, &[0.0, 0.0, 0.011])),
+            ("normal", |p, _| p.set_host(Host::Normal, 0, &[0.011, 0.0, 0.0])),
+            ("orientation", |_, c| c[Component::Orientation][0] += 0.011),
+            ("axis", |_, c| c[Component::Axis][0] += 1.5),
+            ("anisotropy", |_, c| c[Component::Anisotropy][0] = 0.6),
+            ("displacement", |_, c| (c[Component::DisplacementU][0], c[Component::DisplacementV][0]) = (0.008, 0.008)),
+            ("direction", |_, c| c[Component::Direction][0] = -3.12),
+            ("distance", |_, c| c[Component::Distance][0] = 0.011),
+            ("radial_distance", |_, c| c[Component::RadialDistance][0] = -0.011),
+            ("speed", |_, c| c[Component::Speed][0] = f64::INFINITY),
+            ("radial_speed", |_, c| c[Component::RadialSpeed][0] = 0.011),
+            ("filtered_displacement", |p, _| p.set_host(Host::FilteredDisplacement, 0, &[0.008, -0.008])),
+            ("filtered_direction", |p, _| p.set_host(Host::FilteredDirection, 0, &[-0.011])),
+            ("filtered_speed", |p, _| p.set_host(Host::FilteredSpeed, 0, &[0.011])),
             ("filtered_speed", |p, _| p.present[0] -= Outputs::FILTERED_SPEED),
             ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
             ("active", |p, _| p.active[0] = 2),
@@ -497,9 +486,10 @@ mod tests {
 
     #[test]
     fn what_is_too_close_to_call_is_counted_and_not_compared() {
-        let loose = CellBound { orientation: Limit::TooClose, in_doubt: Flags::TIE, ..bound() };
+        let mut loose = CellBound { in_doubt: Flags::TIE, ..bound() };
+        loose.set([(Outputs::ORIENTATION, Limit::TooClose)]);
         let agreement = against(loose, |p, c| {
-            c.orientation[0] = 1.5;
+            c[Component::Orientation][0] = 1.5;
             p.flags[0] |= Flags::TIE;
         });
         assert!(agreement.holds());
@@ -514,7 +504,8 @@ mod tests {
             // One side has it, the other, both, neither.
             for (right, got) in [(true, true), (true, false), (false, true), (false, false)] {
                 let with = |has: bool| percepts(|p, _| p.present[0].set(Outputs::SPEED, has));
-                let bound = CellBound { speed: limit, ..bound() };
+                let mut bound = bound();
+                bound.set([(Outputs::SPEED, limit)]);
                 let agreement = compare(&with(right), &[bound], &with(got), &NAMES);
                 let speed = agreement.quantities.get("speed").copied().unwrap_or_default();
                 assert_eq!(speed.values(), u64::from(right || got));
@@ -526,7 +517,7 @@ mod tests {
 
     #[test]
     fn the_verdict_says_in_its_first_line_what_could_not_be_compared() {
-        let first = |bound: CellBound, change: fn(&mut Percepts, &mut crate::percept::Columns<f64>)| {
+        let first = |bound: CellBound, change: fn(&mut Percepts, &mut Components<f64>)| {
             against(bound, change).to_string().lines().next().unwrap().to_owned()
         };
         assert_eq!(
@@ -534,13 +525,14 @@ mod tests {
             "agrees with the reference: of 21 values in 1 percept, 21 agreeing, 0 different, 0 too close to call, \
              0 not compared"
         );
-        let loose = CellBound { axis: Limit::TooClose, speed: Limit::Unread, ..bound() };
+        let mut loose = bound();
+        loose.set([(Outputs::AXIS, Limit::TooClose), (Outputs::SPEED, Limit::Unread)]);
         assert_eq!(
-            first(loose, |_, c| c.speed[0] = 9.0),
+            first(loose, |_, c| c[Component::Speed][0] = 9.0),
             "agrees with the reference: of 21 values in 1 percept, 19 agreeing, 0 different, 1 too close to call, \
              1 not compared, as motion hangs on a centroid before that was too close to call"
         );
-        assert!(first(loose, |_, c| c.total[0] = 9.0).starts_with(
+        assert!(first(loose, |_, c| c[Component::Total][0] = 9.0).starts_with(
             "DISAGREES with the reference: of 21 values in 1 percept, 18 agreeing, 1 different, 1 too close to call, 1 not"
         ));
         let nothing = Agreement::default().to_string();

@@ -9,38 +9,19 @@ use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
-use crate::stage::{Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches};
+use crate::stage::{GivenLimit, Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches};
 
 /// How far a single-precision percept may be off in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct CellBound {
     /// Flags that may differ.
     pub(crate) in_doubt: Flags,
-    pub(crate) total: Limit,
-    pub(crate) peak: Limit,
-    pub(crate) active: Limit,
-    pub(crate) area: Limit,
+    /// By output, as its bit counts; of vectors as distances.
+    limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
     /// Per coordinate, m.
     pub(crate) centroid: Limit<[f64; 2]>,
-    /// As a distance, m.
-    pub(crate) position: Limit,
-    pub(crate) normal: Limit,
-    pub(crate) orientation: Limit,
-    pub(crate) axis: Limit,
-    pub(crate) anisotropy: Limit,
-    /// As a distance, m.
-    pub(crate) displacement: Limit,
-    pub(crate) direction: Limit,
-    pub(crate) distance: Limit,
-    pub(crate) radial_distance: Limit,
-    pub(crate) speed: Limit,
-    pub(crate) radial_speed: Limit,
     /// Each touch's; lengths in m.
     pub(crate) touch: Limit<TouchBound>,
-    /// As a distance, m.
-    pub(crate) filtered_displacement: Limit,
-    pub(crate) filtered_direction: Limit,
-    pub(crate) filtered_speed: Limit,
     /// What the other may remember otherwise from now on.
     pub(crate) may_remember: MayRemember,
 }
@@ -59,36 +40,23 @@ pub(crate) struct MayRemember {
 impl CellBound {
     /// Of a cell of which not even contact is certain, nor are the flags `flags`.
     fn of_contact(flags: Flags) -> Self {
-        let near = Limit::TooClose;
         Self {
             in_doubt: (Flags::all() - INPUT) | flags,
-            total: near,
-            peak: near,
-            active: near,
-            area: near,
+            limits: [Limit::TooClose; _],
             centroid: Limit::TooClose,
-            position: near,
-            normal: near,
-            orientation: near,
-            axis: near,
-            anisotropy: near,
-            displacement: near,
-            direction: near,
-            distance: near,
-            radial_distance: near,
-            speed: near,
-            radial_speed: near,
             touch: Limit::TooClose,
-            filtered_displacement: near,
-            filtered_direction: near,
-            filtered_speed: near,
             may_remember: MayRemember { contact: true, touches: true, filter: true },
         }
     }
 
-    fn set_motion(&mut self, limit: Limit) {
-        (self.displacement, self.direction, self.distance) = (limit, limit, limit);
-        (self.radial_distance, self.speed, self.radial_speed) = (limit, limit, limit);
+    /// That of one output but the centroid and touches.
+    pub(crate) fn limit(&self, output: Outputs) -> Limit {
+        self.limits[output.bits().ilog2() as usize]
+    }
+
+    /// Sets them.
+    pub(crate) fn set(&mut self, limits: impl IntoIterator<Item = GivenLimit>) {
+        limits.into_iter().for_each(|(output, limit)| self.limits[output.bits().ilog2() as usize] = limit);
     }
 }
 
@@ -196,18 +164,14 @@ impl Reference {
         let pressed = self.pressed(field, pressures);
         let how = plan.sums(field.count);
         let sums = contact::bound(&pressed, how);
-        let mut bound = CellBound {
-            in_doubt: flags,
-            total: Limit::Within(sums.total),
-            peak: Limit::Within(sums.peak),
-            area: Limit::Within(sums.area),
-            ..CellBound::default()
-        };
+        let mut bound = CellBound { in_doubt: flags, ..CellBound::default() };
+        bound.set(sums.limits());
         let total = contact::reference(&pressed).total;
         if hysteresis::in_doubt(total, sums.total, field.thresholds, cell.before.contact) {
             // Whether there is a touch at all is in doubt, and with it all that a touch has; the sums are not.
-            let CellBound { total, peak, active, area, .. } = bound;
-            return CellBound { total, peak, active, area, ..CellBound::of_contact(flags) };
+            let mut unsure = CellBound::of_contact(flags);
+            unsure.set(Outputs::of_stage("contact").iter().map(|output| (output, bound.limit(output))));
+            return unsure;
         }
         let before = std::mem::replace(&mut doubt.place, 0.0);
         let unread = std::mem::take(&mut doubt.unread);
@@ -226,9 +190,12 @@ impl Reference {
         match &field.surface {
             Some(surface) => {
                 let (position, normal) = surface.bound(doubt.place * unit);
-                (bound.position, bound.normal) = (Limit::Within(position), Limit::Within(normal));
+                bound.set([(Outputs::POSITION, Limit::Within(position)), (Outputs::NORMAL, Limit::Within(normal))]);
             }
-            None => bound.position = Limit::Within(c_bound.length() * unit + U * U * field.origin_in_anchor.length()),
+            None => {
+                let position = c_bound.length() * unit + U * U * field.origin_in_anchor.length();
+                bound.set([(Outputs::POSITION, Limit::Within(position))]);
+            }
         }
         if field.charted {
             self.lines(&mut bound, &pressed, cell, [c.truncate(), c_bound.truncate()]);
@@ -236,7 +203,7 @@ impl Reference {
         let touched = motion::Centroid { place: c.truncate(), pressed: pressed.len() as u32 };
         if field.charted && plan.stages().motion {
             if unread {
-                bound.set_motion(Limit::Unread);
+                bound.set(Outputs::MOTION.iter().map(|output| (output, Limit::Unread)));
                 bound.in_doubt |= Flags::NO_PREVIOUS | Flags::BAD_DT | Flags::STILL;
             } else {
                 moved(&mut bound, field, cell, (touched, doubt.place), before);
@@ -250,9 +217,7 @@ impl Reference {
             let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
             let limit = doubt.filter.follow(&field.filter, clock, in_metres, doubt.place * unit);
             bound.in_doubt |= limit.in_doubt;
-            bound.filtered_displacement = limit.displacement;
-            bound.filtered_direction = limit.direction;
-            bound.filtered_speed = limit.speed;
+            bound.set(limit.limits());
             bound.may_remember.filter = limit.may_remember;
         }
         bound
@@ -260,20 +225,15 @@ impl Reference {
 
     /// Adds the bounds of orientation and axis about a centroid, which comes with its bound.
     fn lines(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, [c, c_bound]: [DVec2; 2]) {
-        let limit = |value, output, in_doubt| Limit::of(value, cell.present.contains(output), in_doubt);
         if self.plan.stages().orientation {
             let line = orientation::bound(pressed, c, c_bound);
-            let in_doubt = line.in_doubt.contains(Flags::COINCIDENT);
-            bound.orientation = limit(line.angle, Outputs::ORIENTATION, in_doubt);
+            bound.set(line.limits(cell.present));
             bound.in_doubt |= line.in_doubt;
         }
         if self.plan.stages().axis {
             let how = self.plan.sums(self.plan.fields[cell.index].count);
             let axis = axis::bound(pressed, how, c, c_bound);
-            let together = axis.line.in_doubt.contains(Flags::COINCIDENT);
-            let in_doubt = together || axis.line.in_doubt.contains(Flags::ISOTROPIC);
-            bound.axis = limit(axis.line.angle, Outputs::AXIS, in_doubt);
-            bound.anisotropy = limit(axis.anisotropy, Outputs::ANISOTROPY, together);
+            bound.set(axis.limits(cell.present));
             bound.in_doubt |= axis.line.in_doubt;
         }
     }
@@ -318,13 +278,7 @@ fn moved(bound: &mut CellBound, field: &PlanField, cell: &Cell<'_>, now: (motion
     let (unit, dt_s) = (f64::from(field.unit_m), cell.step.dt_s);
     let right = motion::reference(now.0, then, &field.still);
     let limit = motion::bound(now.0, then, &field.still, now.1, before);
-    let rate = |right, bound| Limit::Within(motion::rate_bound(right, bound, dt_s) * unit);
-    bound.displacement = Limit::Within(limit.displacement * unit);
-    bound.direction = Limit::of(limit.direction, right.direction.is_some(), limit.still_in_doubt);
-    bound.distance = Limit::Within(limit.distance * unit);
-    bound.radial_distance = Limit::Within(limit.radial_distance * unit);
-    bound.speed = rate(right.distance, limit.distance);
-    bound.radial_speed = rate(right.radial_distance, limit.radial_distance);
+    bound.set(limit.limits(&right, unit, dt_s));
     if limit.still_in_doubt {
         bound.in_doubt |= Flags::STILL;
     }

@@ -3,12 +3,12 @@
 use super::bounds::{self, CellBound, Doubt};
 use super::{Backend, RawBatch, Step};
 use crate::error::Result;
-use crate::percept::{Columns, Flags, Outputs, Percepts, Values};
+use crate::percept::{Component, Components, Flags, Outputs, Percepts, Store, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::RawValue;
 use crate::stage::calibrate::{Pressure, UNUSABLE};
 use crate::stage::change::Heard;
-use crate::stage::{Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation};
+use crate::stage::{Given, Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation};
 
 /// The backend.
 pub(crate) struct Reference {
@@ -113,129 +113,116 @@ impl Reference {
         let mut present = Vec::with_capacity(fields);
         for index in 0..fields {
             let cell = (raw.first + frame) * fields + index;
-            let Values::F64(columns) = &mut percepts.values else {
+            let Values::F64(parts) = &mut percepts.values else {
                 unreachable!("the engine made percepts of this precision")
             };
-            let (done, after) = self.cell(index, &pressures, step, columns, cell);
-            self.before[index] = after;
-            percepts.flags[cell] = done.flags;
-            percepts.present[cell] = done.present & self.plan.outputs;
-            if let Some(active) = percepts.active.get_mut(cell) {
-                *active = done.active;
+            let mut made = Cell { parts, at: cell, active: 0, flags: Flags::empty(), present: Outputs::empty() };
+            self.before[index] = self.cell(index, &pressures, step, &mut made);
+            let Cell { active, flags, present: has, .. } = made;
+            percepts.flags[cell] = flags;
+            percepts.present[cell] = has & self.plan.outputs;
+            if let Some(to) = percepts.active.get_mut(cell) {
+                *to = active;
             }
-            present.push(done.present);
+            present.push(has);
         }
         (pressures, present)
     }
 
-    fn cell(
-        &self,
-        index: usize,
-        pressures: &[Pressure],
-        step: &Step,
-        columns: &mut Columns<f64>,
-        cell: usize,
-    ) -> (Cell, Before) {
+    /// Makes a cell; what the field's next one hangs on.
+    fn cell(&self, index: usize, pressures: &[Pressure], step: &Step, made: &mut Cell<'_>) -> Before {
         let (field, before) = (&self.plan.fields[index], self.before[index]);
         let statuses = self.plan.members_of(field).iter().map(|member| pressures[member.slot as usize].status);
         let (any, all) = statuses.fold((0, u32::MAX), |(any, all), status| (any | status, all & status));
-        let mut flags = Flags::from_bits_truncate(any & !UNUSABLE);
-        let mut present = Outputs::empty();
-        if !field.charted {
-            flags |= Flags::NO_CHART;
-        }
+        made.flags = Flags::from_bits_truncate(any & !UNUSABLE);
+        made.flags.set(Flags::NO_CHART, !field.charted);
         let pressed = self.pressed(field, pressures);
         let sums = contact::reference(&pressed);
-        let outputs = self.plan.columns;
-        let write = |output, column: &mut Vec<f64>, value| {
-            if outputs.contains(output) {
-                column[cell] = value;
-            }
-        };
+        made.active = sums.active;
         if all & UNUSABLE == 0 {
-            present |= Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
-            if field.area_known {
-                present |= Outputs::AREA;
-            }
-            write(Outputs::TOTAL, &mut columns.total, sums.total);
-            write(Outputs::PEAK, &mut columns.peak, sums.peak);
-            write(Outputs::AREA, &mut columns.area, sums.area);
+            made.give(&sums.outputs(field.area_known));
         }
         let contact = hysteresis::reference(sums.total, field.thresholds, before.contact);
         let mut after = Before { contact, centroid: None };
         if !contact {
-            flags |= Flags::NO_CONTACT;
-            return (Cell { flags, present, active: sums.active }, after);
+            made.flags |= Flags::NO_CONTACT;
+            return after;
         }
-        let stages = self.plan.stages();
+        let (stages, unit_m) = (self.plan.stages(), f64::from(field.unit_m));
         let c = centroid::reference(&pressed);
         if stages.centroid {
             let place = if field.charted { c.truncate().extend(0.0) } else { c };
-            // The stages that stand on it may be wanted without it.
-            if !columns.centroid_u.is_empty() {
-                columns.set_centroid(cell, (place * f64::from(field.unit_m)).to_array());
-            }
-            present |= Outputs::POSITION;
+            made.put_centroid((place * unit_m).to_array());
+            made.present |= Outputs::POSITION;
             if field.charted {
-                present |= Outputs::CENTROID | Outputs::NORMAL;
+                made.present |= Outputs::CENTROID | Outputs::NORMAL;
             }
         }
-        if field.charted && stages.orientation {
+        if !field.charted {
+            return after;
+        }
+        if stages.orientation {
             let line = orientation::reference(&pressed, c.truncate());
-            flags |= line.flags;
-            if let Some(angle) = line.angle {
-                write(Outputs::ORIENTATION, &mut columns.orientation, angle);
-                present |= Outputs::ORIENTATION;
-            }
+            made.flags |= line.flags;
+            made.give(&line.outputs());
         }
-        if field.charted && stages.axis {
+        if stages.axis {
             let axis = axis::reference(&pressed, c.truncate());
-            flags |= axis.line.flags;
-            if let Some(anisotropy) = axis.anisotropy {
-                write(Outputs::ANISOTROPY, &mut columns.anisotropy, anisotropy);
-                present |= Outputs::ANISOTROPY;
-            }
-            if let Some(angle) = axis.line.angle {
-                write(Outputs::AXIS, &mut columns.axis, angle);
-                present |= Outputs::AXIS;
-            }
+            made.flags |= axis.line.flags;
+            made.give(&axis.outputs());
         }
-        if field.charted && stages.motion {
+        if stages.motion {
             let now = motion::Centroid { place: c.truncate(), pressed: sums.active };
             after.centroid = Some(now);
             match before.centroid {
-                None => flags |= Flags::NO_PREVIOUS,
-                Some(_) if !step.flags.is_empty() => flags |= step.flags,
+                None => made.flags |= Flags::NO_PREVIOUS,
+                Some(_) if !step.flags.is_empty() => made.flags |= step.flags,
                 Some(then) => {
                     let moved = motion::reference(now, then, &field.still);
-                    present |= Outputs::MOTION;
-                    let unit = f64::from(field.unit_m);
-                    write(Outputs::DISTANCE, &mut columns.distance, moved.distance * unit);
-                    write(Outputs::RADIAL_DISTANCE, &mut columns.radial_distance, moved.radial_distance * unit);
-                    write(Outputs::SPEED, &mut columns.speed, moved.distance * unit / step.dt_s);
-                    write(Outputs::RADIAL_SPEED, &mut columns.radial_speed, moved.radial_distance * unit / step.dt_s);
-                    if let Some(displacement) = columns.displacement.get_mut(cell) {
-                        *displacement = (moved.displacement * unit).to_array();
-                    }
-                    match moved.direction {
-                        Some(direction) => write(Outputs::DIRECTION, &mut columns.direction, direction),
-                        None => {
-                            flags |= Flags::STILL;
-                            present -= Outputs::DIRECTION;
-                        }
-                    }
+                    made.flags.set(Flags::STILL, moved.direction.is_none());
+                    made.give(&moved.outputs(unit_m, step.dt_s));
                 }
             }
         }
-        (Cell { flags, present, active: sums.active }, after)
+        after
     }
 }
 
-/// What a cell holds beside its columns.
-struct Cell {
+/// A cell that is made.
+struct Cell<'a> {
+    parts: &'a mut Components<f64>,
+    at: usize,
+    active: u32,
     flags: Flags,
     present: Outputs,
-    active: u32,
+}
+
+impl Cell<'_> {
+    /// Takes what a stage gives, where that is kept; it is present in any case, as later stages may stand on it.
+    fn give(&mut self, outputs: &[Given]) {
+        for &(output, components) in outputs {
+            let Some(components) = components else { continue };
+            self.present |= output;
+            for column in output.columns() {
+                let Store::Backend(parts) = column.store else { continue };
+                for (&part, component) in parts.iter().zip(components) {
+                    self.put(part, component);
+                }
+            }
+        }
+    }
+
+    fn put(&mut self, part: Component, value: f64) {
+        if let Some(to) = self.parts[part].get_mut(self.at) {
+            *to = value;
+        }
+    }
+
+    /// (u, v, depth), m.
+    fn put_centroid(&mut self, place: [f64; 3]) {
+        let parts = [Component::CentroidU, Component::CentroidV, Component::CentroidDepth];
+        parts.into_iter().zip(place).for_each(|(part, value)| self.put(part, value));
+    }
 }
 
 impl Backend for Reference {

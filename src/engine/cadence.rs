@@ -102,8 +102,8 @@ impl OnChange {
                     let Some(times) = times(&steps[frame], &since) else { continue };
                     let bound = &mut bounds[cell];
                     // One rounding more, where a rate's bound has six.
-                    for rate in [&mut bound.speed, &mut bound.radial_speed] {
-                        *rate = rate.times(times * 7.0 / 6.0);
+                    for rate in [Outputs::SPEED, Outputs::RADIAL_SPEED] {
+                        bound.set([(rate, bound.limit(rate).times(times * 7.0 / 6.0))]);
                     }
                 }
             }

@@ -96,10 +96,11 @@ mod tests {
     use crate::backend::agreement::{Agreement, compare};
     use crate::body::Body;
     use crate::engine::{Engine, Options};
-    use crate::percept::{Columns, Flags, Outputs, Percept, Touch, Values};
+    use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Store, Touch, Values};
     use crate::scene::Scene;
     use crate::signal::RawValue;
     use crate::stage::limit::Limit;
+    use crate::stage::touches::TouchBound;
 
     /// What a backend said of some frames, and what is right.
     struct Compared {
@@ -137,8 +138,12 @@ mod tests {
             compare(&self.check.right, &self.check.bounds, percepts, &names)
         }
 
-        /// The first percept for which `right` and `limit` give a value and a bound over 0.
-        fn find(&self, right: Right, limit: Bound) -> (usize, f64, f64) {
+        /// The last percept for which `right` and `limit` give a value and a bound over 0.
+        fn find(
+            &self,
+            right: impl Fn(&Percept, Option<&Touch>) -> Option<f64>,
+            limit: impl Fn(&CellBound, &(Percept, Option<Touch>)) -> Limit,
+        ) -> (usize, f64, f64) {
             let right_of = |cell: usize| self.right(cell).and_then(|(percept, touch)| right(&percept, touch.as_ref()));
             let mut cells = (0..self.check.bounds.len()).rev();
             let found = cells.find_map(|cell| match limit(&self.check.bounds[cell], &self.right(cell)?) {
@@ -154,22 +159,27 @@ mod tests {
         }
     }
 
-    type Right = fn(&Percept, Option<&Touch>) -> Option<f64>;
-    type Bound = fn(&CellBound, &(Percept, Option<Touch>)) -> Limit;
-    type Put = fn(&mut Percepts, usize, f64);
     type Change = fn(&mut Percepts);
-    /// Its name, what is right, how far off it may be, how to put another, and whether that is kept in single precision.
-    type Quantity = (&'static str, Right, Bound, Put, bool);
+    /// Its name, what is right, how far off it may be, and how to put another.
+    type OfTouch = (&'static str, fn(&Touch) -> Option<f64>, fn(TouchBound, &Touch) -> f64, fn(&mut Touch, f64));
 
-    /// Puts `value` into a column of single precision.
-    fn put(percepts: &mut Percepts, cell: usize, value: f64, column: impl Fn(&mut Columns<f32>) -> &mut Vec<f32>) {
-        let Values::F32(columns) = &mut percepts.values else { unreachable!("the reference is not held to itself") };
-        column(columns)[cell] = value as f32;
-    }
-
-    fn put_step(percepts: &mut Percepts, cell: usize, value: f64) {
-        let Values::F32(columns) = &mut percepts.values else { unreachable!("the reference is not held to itself") };
-        columns.displacement[cell][0] = value as f32;
+    /// Puts `value` into component `component` of `column`; whether that is kept in single precision.
+    fn put(percepts: &mut Percepts, cell: usize, column: &Column, component: usize, value: f64) -> bool {
+        match column.store {
+            Store::Backend(parts) => {
+                let Values::F32(kept) = &mut percepts.values else { unreachable!("this is not the reference") };
+                kept[parts[component]][cell] = value as f32;
+                true
+            }
+            Store::Host(host) => {
+                let (frame, field) = (cell / percepts.fields(), cell % percepts.fields());
+                let mut components = percepts.get(frame, field).value(column).unwrap();
+                components[component] = value;
+                percepts.set_host(host, cell, &components[..column.components]);
+                false
+            }
+            Store::Active => unreachable!("it has no bound"),
+        }
     }
 
     /// The numbers next to each other that are within `bound` of `right` and beyond it, in what the column holds.
@@ -185,141 +195,73 @@ mod tests {
 
     #[test]
     fn an_error_just_over_the_bound_is_a_disagreement_and_one_just_under_it_is_not() {
-        macro_rules! column {
-            ($output:literal, $name:ident) => {
-                (
-                    $output,
-                    |p, _| p.$name,
-                    |b, _| b.$name,
-                    |p, cell, value| put(p, cell, value, |columns| &mut columns.$name),
-                    true,
-                )
-            };
-        }
-        fn touched(percepts: &mut Percepts, cell: usize, change: impl Fn(&mut Touch)) {
-            percepts.change_first_touch(cell, change);
-        }
-        let quantities: [Quantity; 22] = [
-            column!("total", total),
-            column!("peak", peak),
-            column!("area", area),
-            column!("orientation", orientation),
-            column!("axis", axis),
-            column!("anisotropy", anisotropy),
-            column!("direction", direction),
-            column!("distance", distance),
-            column!("radial_distance", radial_distance),
-            column!("speed", speed),
-            column!("radial_speed", radial_speed),
-            (
-                "centroid",
-                |p, _| p.centroid.map(|c| c[0]),
-                |b, _| match b.centroid {
-                    Limit::Within(bounds) => Limit::Within(bounds[0]),
-                    _ => Limit::TooClose,
-                },
-                |p, cell, value| put(p, cell, value, |columns| &mut columns.centroid_u),
-                true,
-            ),
-            (
-                "centroid",
-                |p, _| p.centroid.map(|c| c[1]),
-                |b, _| match b.centroid {
-                    Limit::Within(bounds) => Limit::Within(bounds[1]),
-                    _ => Limit::TooClose,
-                },
-                |p, cell, value| put(p, cell, value, |columns| &mut columns.centroid_v),
-                true,
-            ),
-            ("displacement", |p, _| p.displacement.map(|d| d[0]), |b, _| b.displacement, put_step, true),
-            (
-                "position",
-                |p, _| p.position.map(|x| x[1]),
-                |b, _| b.position,
-                |p, cell, value| p.position[cell][1] = value,
-                false,
-            ),
-            (
-                "normal",
-                |p, _| p.normal.map(|x| x[2]),
-                |b, _| b.normal,
-                |p, cell, value| p.normal[cell][2] = value,
-                false,
-            ),
-            (
-                "filtered_displacement",
-                |p, _| p.filtered_displacement.map(|x| x[1]),
-                |b, _| b.filtered_displacement,
-                |p, cell, value| p.filtered_displacement[cell][1] = value,
-                false,
-            ),
-            (
-                "filtered_direction",
-                |p, _| p.filtered_direction,
-                |b, _| b.filtered_direction,
-                |p, cell, value| p.filtered_direction[cell] = value,
-                false,
-            ),
-            (
-                "filtered_speed",
-                |p, _| p.filtered_speed,
-                |b, _| b.filtered_speed,
-                |p, cell, value| p.filtered_speed[cell] = value,
-                false,
-            ),
+        let of_touches: [OfTouch; 3] = [
             (
                 "touches.total",
-                |_, touch| Some(touch?.total),
-                |b, (_, touch)| match (b.touch, touch) {
-                    (Limit::Within(limit), Some(touch)) => Limit::Within(limit.total * touch.total),
-                    _ => Limit::TooClose,
-                },
-                |p, cell, value| touched(p, cell, |touch| touch.total = value),
-                false,
+                |touch| Some(touch.total),
+                |bound, touch| bound.total * touch.total,
+                |touch, value| touch.total = value,
             ),
             (
                 "touches.centroid",
-                |_, touch| Some(touch?.centroid?[1]),
-                |b, _| match b.touch {
-                    Limit::Within(limit) => Limit::Within(limit.place),
-                    _ => Limit::TooClose,
-                },
-                |p, cell, value| touched(p, cell, |touch| touch.centroid = touch.centroid.map(|[u, _]| [u, value])),
-                false,
+                |touch| Some(touch.centroid?[1]),
+                |bound, _| bound.place,
+                |touch, value| touch.centroid = touch.centroid.map(|[u, _]| [u, value]),
             ),
             (
                 "touches.position",
-                |_, touch| Some(touch?.position[0]),
-                |b, _| match b.touch {
-                    Limit::Within(limit) => Limit::Within(limit.position),
-                    _ => Limit::TooClose,
-                },
-                |p, cell, value| touched(p, cell, |touch| touch.position[0] = value),
-                false,
+                |touch| Some(touch.position[0]),
+                |bound, _| bound.position,
+                |touch, value| touch.position[0] = value,
             ),
         ];
         let mut backends = 0;
         for backend in [BackendKind::Cpu, BackendKind::Gpu] {
             let Some(compared) = Compared::on(backend) else { continue };
             backends += 1;
-            for (name, right, limit, put, single) in quantities {
-                let (cell, right, bound) = compared.find(right, limit);
-                let [under, over] = around(right, bound, single);
+            let hold = |name: &str, [under, over]: [f64; 2], put: &dyn Fn(&mut Percepts, f64)| {
                 let with = |value: f64| {
                     let mut percepts = compared.engine.percepts.clone();
-                    put(&mut percepts, cell, value);
+                    put(&mut percepts, value);
                     compared.with(&percepts)
                 };
-                // Of a vector the other parts are off by something of their own.
-                let vector = ["displacement", "position", "normal", "filtered_displacement", "touches.position"];
-                let under = if vector.contains(&name) { right + 0.5 * bound } else { under };
                 let agreement = with(under);
-                assert!(agreement.holds(), "{backend:?}, {name} under its bound {bound:e}: {agreement}");
+                assert!(agreement.holds(), "{backend:?}, {name} under its bound: {agreement}");
                 let agreement = with(over);
-                assert!(!agreement.holds(), "{backend:?}, {name} over its bound {bound:e}: {agreement}");
+                assert!(!agreement.holds(), "{backend:?}, {name} over its bound: {agreement}");
                 assert!(agreement.failures[0].contains(&format!(": {name} is")), "{name}: {agreement}");
                 let of = agreement.quantities[name];
                 assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
+            };
+            for column in COLUMNS.iter().filter(|column| column.store != Store::Active) {
+                for component in 0..column.components {
+                    let limit = |bound: &CellBound| match (column.measure, bound.centroid) {
+                        (Measure::Place, Limit::Within(bounds)) => Limit::Within(bounds[component]),
+                        (Measure::Place, _) => Limit::TooClose,
+                        _ => bound.limit(column.output),
+                    };
+                    let (cell, right, bound) =
+                        compared.find(|percept, _| Some(percept.value(column)?[component]), |bound, _| limit(bound));
+                    let single = matches!(column.store, Store::Backend(_));
+                    let [under, over] = around(right, bound, single);
+                    // Of a vector the other parts are off by something of their own.
+                    let under = if column.measure == Measure::Vector { right + 0.5 * bound } else { under };
+                    hold(column.name, [under, over], &|percepts, value| {
+                        assert_eq!(put(percepts, cell, column, component, value), single);
+                    });
+                }
+            }
+            for (name, right, limit, put) in of_touches {
+                let of = |bound: &CellBound, (_, touch): &(Percept, Option<Touch>)| match (bound.touch, touch) {
+                    (Limit::Within(bound), Some(touch)) => Limit::Within(limit(bound, touch)),
+                    _ => Limit::TooClose,
+                };
+                let (cell, right, bound) = compared.find(|_, touch| right(touch?), of);
+                let [under, over] = around(right, bound, false);
+                let under = if name == "touches.position" { right + 0.5 * bound } else { under };
+                hold(name, [under, over], &|percepts, value| {
+                    percepts.change_first_touch(cell, |touch| put(touch, value));
+                });
             }
             // What has no bound differs by the least that it can.
             let choices: [(&str, Change); 5] = [

@@ -172,14 +172,8 @@ impl Host<'_> {
         let found = memory.follow(&field.filter, clock, touched);
         percepts.flags[cell] |= found.flags;
         percepts.present[cell] |= found.present & self.plan.outputs;
-        if let Some(displacement) = percepts.filtered_displacement.get_mut(cell) {
-            *displacement = found.displacement.to_array();
-        }
-        if let Some(direction) = percepts.filtered_direction.get_mut(cell) {
-            *direction = found.direction;
-        }
-        if let Some(speed) = percepts.filtered_speed.get_mut(cell) {
-            *speed = found.speed;
+        for (host, components) in found.outputs() {
+            percepts.set_host(host, cell, &components[..host.column().components]);
         }
     }
 

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::npy;
-use super::shape::{Shape, width};
+use super::shape::Shape;
 use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
@@ -114,22 +114,19 @@ impl Dump<'_> {
     fn output(&mut self, percepts: &Percepts) -> Result<()> {
         let cells = [percepts.frames(), percepts.fields()];
         let all = || (0..cells[0]).flat_map(|frame| percepts.frame(frame));
-        for output in percepts.outputs().iter() {
-            let (name, unit, width) = (name_of(output), unit_of(output), width(output));
+        for column in percepts.outputs().columns() {
+            let width = column.components;
             let shape = if width == 1 { cells.to_vec() } else { vec![cells[0], cells[1], width] };
-            let numbers =
-                all().flat_map(|percept| numbers(&percept, output).unwrap_or_default().into_iter().take(width));
-            let single = percepts.precision() == Precision::F32
-                && (Outputs::POSITION | Outputs::NORMAL) & output == Outputs::empty();
-            if single {
-                self.put(&name, unit, &shape, numbers.map(|number| number as f32))?;
+            let numbers = all().flat_map(|percept| percept.value(column).unwrap_or_default().into_iter().take(width));
+            if percepts.precision() == Precision::F32 && !column.is_double() {
+                self.put(column.name, column.unit.symbol(), &shape, numbers.map(|number| number as f32))?;
             } else {
-                self.put(&name, unit, &shape, numbers)?;
+                self.put(column.name, column.unit.symbol(), &shape, numbers)?;
             }
         }
         let is_present = |percept: &Percept| {
-            let there = percepts.outputs().iter().filter(|&output| numbers(percept, output).is_some());
-            there.fold(Outputs::empty(), |sum, output| sum | output).bits()
+            let there = percepts.outputs().columns().filter(|column| percept.value(column).is_some());
+            there.fold(Outputs::empty(), |sum, column| sum | column.output).bits()
         };
         self.put("present", "bits", &cells, all().map(|percept| is_present(&percept)))?;
         self.put("flags", "bits", &cells, all().map(|percept| percept.flags.bits()))
@@ -138,45 +135,6 @@ impl Dump<'_> {
 
 fn name_of(output: Outputs) -> String {
     output.names().collect()
-}
-
-/// The percept's `output`, filled up with 0.
-fn numbers(percept: &Percept, output: Outputs) -> Option<[f64; 3]> {
-    let one = |number: Option<f64>| number.map(|number| [number, 0.0, 0.0]);
-    let two = |pair: Option<[f64; 2]>| pair.map(|[a, b]| [a, b, 0.0]);
-    match output {
-        Outputs::TOTAL => one(percept.total),
-        Outputs::PEAK => one(percept.peak),
-        Outputs::ACTIVE => one(percept.active.map(f64::from)),
-        Outputs::AREA => one(percept.area),
-        Outputs::CENTROID => two(percept.centroid),
-        Outputs::POSITION => percept.position,
-        Outputs::NORMAL => percept.normal,
-        Outputs::ORIENTATION => one(percept.orientation),
-        Outputs::AXIS => one(percept.axis),
-        Outputs::ANISOTROPY => one(percept.anisotropy),
-        Outputs::DISPLACEMENT => two(percept.displacement),
-        Outputs::DIRECTION => one(percept.direction),
-        Outputs::DISTANCE => one(percept.distance),
-        Outputs::RADIAL_DISTANCE => one(percept.radial_distance),
-        Outputs::SPEED => one(percept.speed),
-        Outputs::RADIAL_SPEED => one(percept.radial_speed),
-        Outputs::FILTERED_DISPLACEMENT => two(percept.filtered_displacement),
-        Outputs::FILTERED_DIRECTION => one(percept.filtered_direction),
-        Outputs::FILTERED_SPEED => one(percept.filtered_speed),
-        _ => None,
-    }
-}
-
-fn unit_of(output: Outputs) -> &'static str {
-    match output {
-        Outputs::TOTAL | Outputs::PEAK => "P",
-        Outputs::AREA => "m²",
-        Outputs::ACTIVE | Outputs::NORMAL | Outputs::ANISOTROPY => "1",
-        Outputs::ORIENTATION | Outputs::AXIS | Outputs::DIRECTION | Outputs::FILTERED_DIRECTION => "rad",
-        Outputs::SPEED | Outputs::RADIAL_SPEED | Outputs::FILTERED_SPEED => "m/s",
-        _ => "m",
-    }
 }
 
 #[cfg(test)]
@@ -196,9 +154,10 @@ mod tests {
         percept.filtered_displacement = percept.displacement;
         percept.filtered_direction = percept.direction;
         percept.filtered_speed = percept.speed;
-        for output in outputs.iter() {
-            let numbers = numbers(&percept, output).unwrap_or_else(|| panic!("{output:?}"));
-            assert_eq!(numbers[width(output)..].iter().sum::<f64>(), 0.0, "{output:?} has more than is written");
+        assert_eq!(outputs.columns().count(), outputs.iter().count());
+        for column in outputs.columns() {
+            let numbers = percept.value(column).unwrap_or_else(|| panic!("{}", column.name));
+            assert_eq!(numbers[column.components..].iter().sum::<f64>(), 0.0, "{} has more", column.name);
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::backend::BackendKind;
 use crate::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Taxel};
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result};
-use crate::percept::Outputs;
+use crate::percept::{Column, Outputs};
 use crate::scene::{Coverage, Knobs, Scene};
 use crate::signal::{Frame, RawValue};
 
@@ -195,18 +195,10 @@ impl Shape {
     }
 }
 
-/// Numbers of one percept's `output`.
-pub(super) fn width(output: Outputs) -> usize {
-    match output {
-        Outputs::CENTROID | Outputs::DISPLACEMENT | Outputs::FILTERED_DISPLACEMENT => 2,
-        Outputs::POSITION | Outputs::NORMAL => 3,
-        _ => 1,
-    }
-}
-
+/// Bytes of an output's array in a cell, with single-precision numbers but for the host's.
 fn bytes_a_cell(output: Outputs) -> u128 {
-    let number = if (Outputs::POSITION | Outputs::NORMAL).contains(output) { 8 } else { 4 };
-    number * width(output) as u128
+    let bytes = |column: &Column| column.components * if column.is_double() { 8 } else { 4 };
+    output.columns().map(bytes).sum::<usize>() as u128
 }
 
 #[cfg(test)]

@@ -1,60 +1,56 @@
 //! A batch of percepts, in columns.
 
+use std::ops::{Index, IndexMut};
+
+use super::columns::{Column, Component, Host, Store};
 use super::{Flags, Outputs, Percept, Precision, Touch};
 
-/// One precision's columns, a value per cell; a cell is `frame · fields + field`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Columns<T> {
-    pub(crate) total: Vec<T>,
-    pub(crate) peak: Vec<T>,
-    pub(crate) area: Vec<T>,
-    /// (u, v, depth) in the chart; of a field without one, along its anchor's axes from the field's origin.
-    pub(crate) centroid_u: Vec<T>,
-    pub(crate) centroid_v: Vec<T>,
-    /// Kept only where positions are wanted.
-    pub(crate) centroid_depth: Vec<T>,
-    pub(crate) orientation: Vec<T>,
-    pub(crate) axis: Vec<T>,
-    pub(crate) anisotropy: Vec<T>,
-    pub(crate) displacement: Vec<[T; 2]>,
-    pub(crate) direction: Vec<T>,
-    pub(crate) distance: Vec<T>,
-    pub(crate) radial_distance: Vec<T>,
-    pub(crate) speed: Vec<T>,
-    pub(crate) radial_speed: Vec<T>,
+/// Backends' numbers in one precision, part by part, each a value per cell; a cell is `frame · fields + field`.
+///
+/// A centroid is (u, v, depth) in the chart; of a field without one, along its anchor's axes from the field's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Components<T>([Vec<T>; Component::COUNT]);
+
+impl<T> Default for Components<T> {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| Vec::new()))
+    }
 }
 
-impl<T: Clone + Default> Columns<T> {
-    /// Makes room for `cells` cells of each wanted column, which keep what they held: backends write every cell.
+impl<T> Index<Component> for Components<T> {
+    type Output = Vec<T>;
+
+    fn index(&self, part: Component) -> &Vec<T> {
+        &self.0[part as usize]
+    }
+}
+
+impl<T> IndexMut<Component> for Components<T> {
+    fn index_mut(&mut self, part: Component) -> &mut Vec<T> {
+        &mut self.0[part as usize]
+    }
+}
+
+impl<T> Components<T> {
+    pub(super) fn each_mut(&mut self) -> [&mut Vec<T>; Component::COUNT] {
+        self.0.each_mut()
+    }
+}
+
+impl<T: Clone + Default> Components<T> {
+    /// Makes room for `cells` cells of each part that is wanted, which keep what they held: backends write every cell.
     fn resize(&mut self, wanted: Outputs, cells: usize) {
-        let fit = |column: &mut Vec<T>, output| {
-            column.resize(if wanted.intersects(output) { cells } else { 0 }, T::default());
-        };
-        // Motion is made from the centroids' columns.
-        let place = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::MOTION;
-        fit(&mut self.total, Outputs::TOTAL);
-        fit(&mut self.peak, Outputs::PEAK);
-        fit(&mut self.area, Outputs::AREA);
-        fit(&mut self.centroid_u, place);
-        fit(&mut self.centroid_v, place);
-        fit(&mut self.centroid_depth, Outputs::POSITION | Outputs::NORMAL);
-        fit(&mut self.orientation, Outputs::ORIENTATION);
-        fit(&mut self.axis, Outputs::AXIS);
-        fit(&mut self.anisotropy, Outputs::ANISOTROPY);
-        self.displacement.resize(if wanted.contains(Outputs::DISPLACEMENT) { cells } else { 0 }, Default::default());
-        fit(&mut self.direction, Outputs::DIRECTION);
-        fit(&mut self.distance, Outputs::DISTANCE);
-        fit(&mut self.radial_distance, Outputs::RADIAL_DISTANCE);
-        fit(&mut self.speed, Outputs::SPEED);
-        fit(&mut self.radial_speed, Outputs::RADIAL_SPEED);
+        for (&part, column) in Component::ALL.iter().zip(&mut self.0) {
+            column.resize(if wanted.intersects(part.kept_for()) { cells } else { 0 }, T::default());
+        }
     }
 }
 
 /// The columns in the precision of the backend that made them.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
-    F32(Columns<f32>),
-    F64(Columns<f64>),
+    F32(Components<f32>),
+    F64(Components<f64>),
 }
 
 /// The percepts of a batch: `frames × fields` cells, only the outputs that were asked for.
@@ -75,11 +71,8 @@ pub struct Percepts {
     pub(crate) present: Vec<Outputs>,
     pub(crate) active: Vec<u32>,
     pub(crate) values: Values,
-    pub(crate) position: Vec<[f64; 3]>,
-    pub(crate) normal: Vec<[f64; 3]>,
-    pub(crate) filtered_displacement: Vec<[f64; 2]>,
-    pub(crate) filtered_direction: Vec<f64>,
-    pub(crate) filtered_speed: Vec<f64>,
+    /// By [`Host`], each cell's components side by side.
+    pub(super) host: [Vec<f64>; Host::COUNT],
     /// P, frame by frame, each taxel by taxel.
     pub(crate) pressures: Vec<f64>,
     touches: Vec<Touch>,
@@ -104,14 +97,10 @@ impl Percepts {
             present: Vec::new(),
             active: Vec::new(),
             values: match precision {
-                Precision::F32 => Values::F32(Columns::default()),
-                Precision::F64 => Values::F64(Columns::default()),
+                Precision::F32 => Values::F32(Components::default()),
+                Precision::F64 => Values::F64(Components::default()),
             },
-            position: Vec::new(),
-            normal: Vec::new(),
-            filtered_displacement: Vec::new(),
-            filtered_direction: Vec::new(),
-            filtered_speed: Vec::new(),
+            host: std::array::from_fn(|_| Vec::new()),
             pressures: Vec::new(),
             touches: Vec::new(),
             touch_ends: Vec::new(),
@@ -138,17 +127,21 @@ impl Percepts {
             column.resize(length, value);
         }
         let cells = frames * self.fields;
-        let when = |output, cells| if self.outputs.contains(output) { cells } else { 0 };
         refill(&mut self.t_s, frames, 0.0);
         self.in_world.resize(cells, false);
         self.flags.resize(cells, Flags::empty());
         self.present.resize(cells, Outputs::empty());
         self.active.resize(if self.columns.contains(Outputs::ACTIVE) { cells } else { 0 }, 0);
-        self.position.resize(when(Outputs::POSITION, cells), [0.0; 3]);
-        self.normal.resize(when(Outputs::NORMAL, cells), [0.0; 3]);
-        refill(&mut self.filtered_displacement, when(Outputs::FILTERED_DISPLACEMENT, cells), [0.0; 2]);
-        refill(&mut self.filtered_direction, when(Outputs::FILTERED_DIRECTION, cells), 0.0);
-        refill(&mut self.filtered_speed, when(Outputs::FILTERED_SPEED, cells), 0.0);
+        for (host, column) in Host::ALL.iter().zip(&mut self.host) {
+            let of = host.column();
+            let numbers = if self.outputs.contains(of.output) { cells * of.components } else { 0 };
+            // What the stage *position* gives it gives in every cell.
+            if of.stage == "position" {
+                column.resize(numbers, 0.0);
+            } else {
+                refill(column, numbers, 0.0);
+            }
+        }
         refill(&mut self.pressures, frames * self.slots, 0.0);
         self.touches.clear();
         self.touch_ends.clear();
@@ -205,40 +198,47 @@ impl Percepts {
     #[must_use]
     pub fn get(&self, frame: usize, field: usize) -> Percept {
         let cell = frame * self.fields + field;
-        let flags = self.flags[cell];
-        let present = self.present[cell];
-        let has = |output| present.contains(output);
-        let mut percept = Percept {
-            field,
-            letter: field % self.letters,
-            contact: !flags.contains(Flags::NO_CONTACT),
-            flags,
-            total: None,
-            peak: None,
-            active: has(Outputs::ACTIVE).then(|| self.active[cell]),
-            area: None,
-            centroid: None,
-            position: has(Outputs::POSITION).then(|| self.position[cell]),
-            normal: has(Outputs::NORMAL).then(|| self.normal[cell]),
-            orientation: None,
-            axis: None,
-            anisotropy: None,
-            displacement: None,
-            direction: None,
-            distance: None,
-            radial_distance: None,
-            speed: None,
-            radial_speed: None,
-            filtered_displacement: has(Outputs::FILTERED_DISPLACEMENT).then(|| self.filtered_displacement[cell]),
-            filtered_direction: has(Outputs::FILTERED_DIRECTION).then(|| self.filtered_direction[cell]),
-            filtered_speed: has(Outputs::FILTERED_SPEED).then(|| self.filtered_speed[cell]),
-            in_world: self.in_world[cell],
-        };
-        match &self.values {
-            Values::F32(columns) => columns.fill(&mut percept, present, cell),
-            Values::F64(columns) => columns.fill(&mut percept, present, cell),
+        Percept::with((field, field % self.letters), self.flags[cell], self.in_world[cell], |column| {
+            self.present[cell].contains(column.output).then(|| self.components(column, cell))
+        })
+    }
+
+    /// The components of `column` in a cell, then zeros.
+    fn components(&self, column: &Column, cell: usize) -> [f64; 3] {
+        fn of<T: Copy + Into<f64>>(parts: &Components<T>, which: &[Component], cell: usize) -> [f64; 3] {
+            let mut components = [0.0; 3];
+            components.iter_mut().zip(which).for_each(|(component, &part)| *component = parts[part][cell].into());
+            components
         }
-        percept
+        match (column.store, &self.values) {
+            (Store::Active, _) => [self.active[cell].into(), 0.0, 0.0],
+            (Store::Backend(which), Values::F32(parts)) => of(parts, which, cell),
+            (Store::Backend(which), Values::F64(parts)) => of(parts, which, cell),
+            (Store::Host(host), _) => {
+                let mut components = [0.0; 3];
+                components[..column.components].copy_from_slice(self.host(host, cell));
+                components
+            }
+        }
+    }
+
+    /// A cell's components of what the host makes.
+    pub(super) fn host(&self, host: Host, cell: usize) -> &[f64] {
+        let count = host.column().components;
+        &self.host[host as usize][cell * count..][..count]
+    }
+
+    /// Whether `host` is asked for.
+    pub(super) fn has_host(&self, host: Host) -> bool {
+        !self.host[host as usize].is_empty()
+    }
+
+    /// Sets them, if the output is asked for.
+    pub(crate) fn set_host(&mut self, host: Host, cell: usize, components: &[f64]) {
+        let column = &mut self.host[host as usize];
+        if !column.is_empty() {
+            column[cell * components.len()..][..components.len()].copy_from_slice(components);
+        }
     }
 
     /// The separate touches of field `field` in the batch's frame `frame`, the oldest first; none unless
@@ -280,37 +280,10 @@ impl Percepts {
     }
 }
 
-impl<T: Copy + Default + Into<f64>> Columns<T> {
+impl<T: Copy + Default + Into<f64>> Components<T> {
     /// A cell's centroid, (u, v, depth), m; depth is 0 where it is not kept.
     pub(crate) fn centroid(&self, cell: usize) -> [f64; 3] {
-        let depth = self.centroid_depth.get(cell).copied().unwrap_or_default();
-        [self.centroid_u[cell], self.centroid_v[cell], depth].map(Into::into)
-    }
-
-    /// Sets a cell's centroid, (u, v, depth), m, in the columns that are kept.
-    pub(crate) fn set_centroid(&mut self, cell: usize, [u, v, depth]: [T; 3]) {
-        self.centroid_u[cell] = u;
-        self.centroid_v[cell] = v;
-        if let Some(kept) = self.centroid_depth.get_mut(cell) {
-            *kept = depth;
-        }
-    }
-
-    fn fill(&self, percept: &mut Percept, present: Outputs, cell: usize) {
-        let scalar = |output, column: &[T]| present.contains(output).then(|| column[cell].into());
-        percept.total = scalar(Outputs::TOTAL, &self.total);
-        percept.peak = scalar(Outputs::PEAK, &self.peak);
-        percept.area = scalar(Outputs::AREA, &self.area);
-        percept.orientation = scalar(Outputs::ORIENTATION, &self.orientation);
-        percept.axis = scalar(Outputs::AXIS, &self.axis);
-        percept.anisotropy = scalar(Outputs::ANISOTROPY, &self.anisotropy);
-        percept.direction = scalar(Outputs::DIRECTION, &self.direction);
-        percept.distance = scalar(Outputs::DISTANCE, &self.distance);
-        percept.radial_distance = scalar(Outputs::RADIAL_DISTANCE, &self.radial_distance);
-        percept.speed = scalar(Outputs::SPEED, &self.speed);
-        percept.radial_speed = scalar(Outputs::RADIAL_SPEED, &self.radial_speed);
-        percept.displacement = present.contains(Outputs::DISPLACEMENT).then(|| self.displacement[cell].map(Into::into));
-        percept.centroid =
-            present.contains(Outputs::CENTROID).then(|| [self.centroid_u[cell].into(), self.centroid_v[cell].into()]);
+        let depth = self[Component::CentroidDepth].get(cell).copied().unwrap_or_default();
+        [self[Component::CentroidU][cell], self[Component::CentroidV][cell], depth].map(Into::into)
     }
 }

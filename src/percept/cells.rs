@@ -1,10 +1,11 @@
 //! The columns of a batch, to be written by a backend in single precision.
 
-use std::ops::Range;
+use std::ops::{Index, IndexMut, Range};
 
 use glam::DVec3;
 
 use super::batch::Values;
+use super::columns::{Component, Host};
 use super::{Flags, Outputs, Percepts};
 
 /// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
@@ -16,27 +17,13 @@ pub(crate) struct CellsMut<'a> {
     pub(crate) flags: &'a mut [Flags],
     pub(crate) present: &'a mut [Outputs],
     pub(crate) active: &'a mut [u32],
-    pub(crate) total: &'a mut [f32],
-    pub(crate) peak: &'a mut [f32],
-    pub(crate) area: &'a mut [f32],
-    pub(crate) centroid_u: &'a mut [f32],
-    pub(crate) centroid_v: &'a mut [f32],
-    pub(crate) centroid_depth: &'a mut [f32],
-    pub(crate) orientation: &'a mut [f32],
-    pub(crate) axis: &'a mut [f32],
-    pub(crate) anisotropy: &'a mut [f32],
-    pub(crate) displacement: &'a mut [[f32; 2]],
-    pub(crate) direction: &'a mut [f32],
-    pub(crate) distance: &'a mut [f32],
-    pub(crate) radial_distance: &'a mut [f32],
-    pub(crate) speed: &'a mut [f32],
-    pub(crate) radial_speed: &'a mut [f32],
+    pub(crate) parts: [&'a mut [f32]; Component::COUNT],
 }
 
 impl Percepts {
     /// All cells of single-precision percepts; `None` for double precision.
     pub(crate) fn cells_f32(&mut self) -> Option<CellsMut<'_>> {
-        let Values::F32(columns) = &mut self.values else { return None };
+        let Values::F32(parts) = &mut self.values else { return None };
         Some(CellsMut {
             fields: self.fields,
             slots: self.slots,
@@ -44,22 +31,23 @@ impl Percepts {
             flags: &mut self.flags,
             present: &mut self.present,
             active: &mut self.active,
-            total: &mut columns.total,
-            peak: &mut columns.peak,
-            area: &mut columns.area,
-            centroid_u: &mut columns.centroid_u,
-            centroid_v: &mut columns.centroid_v,
-            centroid_depth: &mut columns.centroid_depth,
-            orientation: &mut columns.orientation,
-            axis: &mut columns.axis,
-            anisotropy: &mut columns.anisotropy,
-            displacement: &mut columns.displacement,
-            direction: &mut columns.direction,
-            distance: &mut columns.distance,
-            radial_distance: &mut columns.radial_distance,
-            speed: &mut columns.speed,
-            radial_speed: &mut columns.radial_speed,
+            parts: parts.each_mut().map(Vec::as_mut_slice),
         })
+    }
+}
+
+/// A part of all cells.
+impl Index<Component> for CellsMut<'_> {
+    type Output = [f32];
+
+    fn index(&self, part: Component) -> &[f32] {
+        self.parts[part as usize]
+    }
+}
+
+impl IndexMut<Component> for CellsMut<'_> {
+    fn index_mut(&mut self, part: Component) -> &mut [f32] {
+        self.parts[part as usize]
     }
 }
 
@@ -79,35 +67,27 @@ impl CellsMut<'_> {
         }
         let cells = frames * self.fields;
         let (pressures, later_pressures) = split(self.pressures, frames * self.slots);
-        macro_rules! split_all {
-            ($($column:ident => $later:ident),* $(,)?) => {{
-                $(let ($column, $later) = split(self.$column, cells);)*
-                (
-                    Self { fields: self.fields, slots: self.slots, pressures, $($column),* },
-                    Self { fields: self.fields, slots: self.slots, pressures: later_pressures, $($column: $later),* },
-                )
-            }};
+        let (flags, later_flags) = split(self.flags, cells);
+        let (present, later_present) = split(self.present, cells);
+        let (active, later_active) = split(self.active, cells);
+        let mut later_parts: [&mut [f32]; Component::COUNT] = Default::default();
+        let mut parts: [&mut [f32]; Component::COUNT] = Default::default();
+        for (part, (first, later)) in self.parts.into_iter().zip(parts.iter_mut().zip(&mut later_parts)) {
+            (*first, *later) = split(part, cells);
         }
-        split_all! {
-            flags => later_flags,
-            present => later_present,
-            active => later_active,
-            total => later_total,
-            peak => later_peak,
-            area => later_area,
-            centroid_u => later_centroid_u,
-            centroid_v => later_centroid_v,
-            centroid_depth => later_centroid_depth,
-            orientation => later_orientation,
-            axis => later_axis,
-            anisotropy => later_anisotropy,
-            displacement => later_displacement,
-            direction => later_direction,
-            distance => later_distance,
-            radial_distance => later_radial_distance,
-            speed => later_speed,
-            radial_speed => later_radial_speed,
-        }
+        let Self { fields, slots, .. } = self;
+        (
+            Self { fields, slots, pressures, flags, present, active, parts },
+            Self {
+                fields,
+                slots,
+                pressures: later_pressures,
+                flags: later_flags,
+                present: later_present,
+                active: later_active,
+                parts: later_parts,
+            },
+        )
     }
 
     /// The same cells again, for a shorter while.
@@ -119,21 +99,7 @@ impl CellsMut<'_> {
             flags: self.flags,
             present: self.present,
             active: self.active,
-            total: self.total,
-            peak: self.peak,
-            area: self.area,
-            centroid_u: self.centroid_u,
-            centroid_v: self.centroid_v,
-            centroid_depth: self.centroid_depth,
-            orientation: self.orientation,
-            axis: self.axis,
-            anisotropy: self.anisotropy,
-            displacement: self.displacement,
-            direction: self.direction,
-            distance: self.distance,
-            radial_distance: self.radial_distance,
-            speed: self.speed,
-            radial_speed: self.radial_speed,
+            parts: self.parts.each_mut().map(|part| &mut **part),
         }
     }
 
@@ -170,16 +136,19 @@ impl Percepts {
             columns.map(|column| if column.is_empty() { column } else { &column[cells.clone()] })
         }
         let cells = first * self.fields..(first + frames) * self.fields;
+        const CENTROID: [Component; 3] = [Component::CentroidU, Component::CentroidV, Component::CentroidDepth];
         let centroids = match &self.values {
-            Values::F32(c) => Centroids::F32(parts([&c.centroid_u, &c.centroid_v, &c.centroid_depth], &cells)),
-            Values::F64(c) => Centroids::F64(parts([&c.centroid_u, &c.centroid_v, &c.centroid_depth], &cells)),
+            Values::F32(columns) => Centroids::F32(parts(CENTROID.map(|part| &columns[part][..]), &cells)),
+            Values::F64(columns) => Centroids::F64(parts(CENTROID.map(|part| &columns[part][..]), &cells)),
         };
+        let [position, normal, ..] = &mut self.host;
+        debug_assert_eq!((Host::Position as usize, Host::Normal as usize), (0, 1));
         PlaceCells {
             flags: &self.flags[cells.clone()],
             centroids,
             in_world: &mut self.in_world[cells.clone()],
-            position: part(&mut self.position, cells.clone()),
-            normal: part(&mut self.normal, cells),
+            position: part(position.as_chunks_mut().0, cells.clone()),
+            normal: part(normal.as_chunks_mut().0, cells),
         }
     }
 }

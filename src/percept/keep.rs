@@ -1,6 +1,7 @@
 //! Percepts that stay what they were.
 
-use super::batch::{Columns, Values};
+use super::batch::{Components, Values};
+use super::columns::{Component, Host};
 use super::{Percepts, Touch};
 
 impl Percepts {
@@ -16,17 +17,15 @@ impl Percepts {
                 })*
             };
         }
-        keep!(
-            in_world,
-            flags,
-            present,
-            active,
-            position,
-            normal,
-            filtered_displacement,
-            filtered_direction,
-            filtered_speed
-        );
+        keep!(in_world, flags, present, active);
+        for &host in Host::ALL {
+            let components = host.column().components;
+            if self.has_host(host) {
+                let mut kept = [0.0; 3];
+                kept[..components].copy_from_slice(of.unwrap_or(self).host(host, from_cell));
+                self.set_host(host, cell, &kept[..components]);
+            }
+        }
         match (&mut self.values, of.map(|of| &of.values)) {
             (Values::F32(columns), Some(Values::F32(of))) => columns.keep(Some(of), from_cell, cell),
             (Values::F64(columns), Some(Values::F64(of))) => columns.keep(Some(of), from_cell, cell),
@@ -48,50 +47,26 @@ impl Percepts {
 
     /// Multiplies a cell's speeds.
     pub(crate) fn scale_speeds(&mut self, cell: usize, by: f64) {
+        fn scale<T: Copy + Into<f64>>(parts: &mut Components<T>, cell: usize, scaled: impl Fn(f64) -> T) {
+            for part in [Component::Speed, Component::RadialSpeed] {
+                if let Some(speed) = parts[part].get_mut(cell) {
+                    *speed = scaled((*speed).into());
+                }
+            }
+        }
         match &mut self.values {
-            Values::F32(columns) => {
-                for column in [&mut columns.speed, &mut columns.radial_speed] {
-                    if let Some(speed) = column.get_mut(cell) {
-                        *speed = (f64::from(*speed) * by) as f32;
-                    }
-                }
-            }
-            Values::F64(columns) => {
-                for column in [&mut columns.speed, &mut columns.radial_speed] {
-                    if let Some(speed) = column.get_mut(cell) {
-                        *speed *= by;
-                    }
-                }
-            }
+            Values::F32(parts) => scale(parts, cell, |speed| (speed * by) as f32),
+            Values::F64(parts) => scale(parts, cell, |speed| speed * by),
         }
     }
 }
 
-impl<T: Copy> Columns<T> {
+impl<T: Copy> Components<T> {
     fn keep(&mut self, of: Option<&Self>, from: usize, to: usize) {
-        macro_rules! keep {
-            ($($column:ident),* $(,)?) => {
-                $(if to < self.$column.len() {
-                    self.$column[to] = of.map_or_else(|| self.$column[from], |of| of.$column[from]);
-                })*
-            };
+        for &part in Component::ALL {
+            if to < self[part].len() {
+                self[part][to] = of.unwrap_or(self)[part][from];
+            }
         }
-        keep!(
-            total,
-            peak,
-            area,
-            centroid_u,
-            centroid_v,
-            centroid_depth,
-            orientation,
-            axis,
-            anisotropy,
-            displacement,
-            direction,
-            distance,
-            radial_distance,
-            speed,
-            radial_speed,
-        );
     }
 }

@@ -1,7 +1,7 @@
 //! What a plan does and does not do, and why: what `EXPLAIN` is to a query.
 
 use super::{Plan, PlanField};
-use crate::percept::Outputs;
+use crate::percept::{Component, Outputs};
 
 /// A stage of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,46 +39,44 @@ impl Plan {
                 (fields + 1, memberships + field.count, wide + if field.is_wide() { field.count } else { 0 })
             })
         };
-        let place = Outputs::POSITION | Outputs::NORMAL;
-        let sums = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE | Outputs::AREA;
         let slots = (self.calibrated(), 0, 0);
         let found = (of(&all).0, 0, 0);
         let found_charted = (of(&charted).0, 0, 0);
-        // What each stage gives, whether it runs, what it goes over, and why it might not.
+        // Of each stage whether it runs, what it goes over, and why it might not.
         let rows = [
-            ("calibrate", Outputs::empty(), true, slots, ""),
-            ("change", Outputs::empty(), self.has_changes(), (self.slots() - slots.0, 0, 0), "no letter is `change`"),
-            ("contact", sums, true, of(&all), ""),
-            ("centroid", Outputs::CENTROID, stages.centroid, of(&all), ""),
-            ("orientation", Outputs::ORIENTATION, stages.orientation, of(&charted), ""),
-            ("axis", Outputs::AXIS | Outputs::ANISOTROPY, stages.axis, of(&charted), ""),
-            ("hysteresis", Outputs::empty(), stages.hysteresis, found, "the calibration has no thresholds"),
-            ("motion", Outputs::MOTION, stages.motion, found_charted, ""),
-            ("position", place, stages.position, found, ""),
-            ("touches", Outputs::TOUCHES, stages.touches, of(&all), ""),
-            ("filter", Outputs::FILTERED, stages.filter, found_charted, ""),
+            ("calibrate", true, slots, ""),
+            ("change", self.has_changes(), (self.slots() - slots.0, 0, 0), "no letter is `change`"),
+            ("contact", true, of(&all), ""),
+            ("centroid", stages.centroid, of(&all), ""),
+            ("orientation", stages.orientation, of(&charted), ""),
+            ("axis", stages.axis, of(&charted), ""),
+            ("hysteresis", stages.hysteresis, found, "the calibration has no thresholds"),
+            ("motion", stages.motion, found_charted, ""),
+            ("position", stages.position, found, ""),
+            ("touches", stages.touches, of(&all), ""),
+            ("filter", stages.filter, found_charted, ""),
         ];
-        let row =
-            |&(name, gives, runs, (over, memberships, wide), idle): &(&'static str, Outputs, bool, (_, _, _), &str)| {
-                let asked: Vec<String> = (self.outputs() & gives).names().collect();
-                let why = match (runs, asked.is_empty(), idle.is_empty()) {
-                    (true, false, _) => format!("asked for: {}", asked.join(", ")),
-                    (true, true, _) => self.needed_by(name).to_owned(),
-                    (false, _, false) => idle.to_owned(),
-                    (false, _, true) => "no output needs it".to_owned(),
-                };
-                PlannedStage {
-                    name,
-                    runs,
-                    on_host: ["position", "touches", "filter"].contains(&name),
-                    why,
-                    gives,
-                    over: if runs { over } else { 0 },
-                    memberships: if runs { memberships } else { 0 },
-                    wide: if runs { wide } else { 0 },
-                    bytes: [if name == "calibrate" { self.bytes_up() } else { 0 }, self.bytes_from(name)],
-                }
+        let row = |&(name, runs, (over, memberships, wide), idle): &(&'static str, bool, (_, _, _), &str)| {
+            let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
+            let asked: Vec<String> = (self.outputs() & gives).names().collect();
+            let why = match (runs, asked.is_empty(), idle.is_empty()) {
+                (true, false, _) => format!("asked for: {}", asked.join(", ")),
+                (true, true, _) => self.needed_by(name).to_owned(),
+                (false, _, false) => idle.to_owned(),
+                (false, _, true) => "no output needs it".to_owned(),
             };
+            PlannedStage {
+                name,
+                runs,
+                on_host: ["position", "touches", "filter"].contains(&name),
+                why,
+                gives,
+                over: if runs { over } else { 0 },
+                memberships: if runs { memberships } else { 0 },
+                wide: if runs { wide } else { 0 },
+                bytes: [if name == "calibrate" { self.bytes_up() } else { 0 }, self.bytes_from(name)],
+            }
+        };
         rows.iter().map(row).collect()
     }
 
@@ -104,47 +102,30 @@ impl Plan {
     /// Bytes of results that a frame brings back from a device: a status, and the numbers of the outputs, a field.
     #[must_use]
     pub fn bytes_down(&self) -> usize {
-        let numbers: usize = NUMBERS.iter().map(|(_, some, numbers)| self.numbers(*some, *numbers)).sum();
+        let numbers = numbers().filter(|(_, wanted_for)| self.outputs().intersects(*wanted_for)).count();
         self.fields.len() * (1 + numbers) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
     }
 
     /// What of [`Plan::bytes_down`] is there for the sake of `stage`.
     fn bytes_from(&self, stage: &str) -> usize {
-        let own = NUMBERS.iter().filter(|(by, ..)| *by == stage);
-        let numbers: usize = own.map(|(_, some, numbers)| self.numbers(*some, *numbers)).sum();
+        let own = numbers().filter(|(by, wanted_for)| *by == stage && self.outputs().intersects(*wanted_for));
+        let numbers = own.count();
         let status = usize::from(stage == "contact");
         let kept = if stage == "touches" { self.kept_pressures() } else { 0 };
         (self.fields.len() * (status + numbers) + kept) * size_of::<f32>()
     }
-
-    /// `numbers` if any of `some` is wanted.
-    fn numbers(&self, some: Outputs, numbers: usize) -> usize {
-        if self.outputs().intersects(some) { numbers } else { 0 }
-    }
 }
 
-const PLACE: Outputs = Outputs::POSITION.union(Outputs::NORMAL);
-
-/// Numbers that a field's percept takes on the way back from a device: of which stage, for which outputs, how many.
-const NUMBERS: [(&str, Outputs, usize); 16] = [
-    ("contact", Outputs::TOTAL, 1),
-    ("contact", Outputs::PEAK, 1),
-    ("contact", Outputs::ACTIVE.union(Outputs::FILTERED), 1),
-    ("contact", Outputs::AREA, 1),
-    ("centroid", PLACE.union(Outputs::CENTROID).union(Outputs::FILTERED), 2),
-    ("position", PLACE, 1),
-    ("orientation", Outputs::ORIENTATION, 1),
-    ("axis", Outputs::AXIS, 1),
-    ("axis", Outputs::ANISOTROPY, 1),
-    // What motion says, and then its numbers.
-    ("motion", Outputs::MOTION, 1),
-    ("motion", Outputs::DISPLACEMENT, 2),
-    ("motion", Outputs::DIRECTION, 1),
-    ("motion", Outputs::DISTANCE, 1),
-    ("motion", Outputs::RADIAL_DISTANCE, 1),
-    ("motion", Outputs::SPEED, 1),
-    ("motion", Outputs::RADIAL_SPEED, 1),
-];
+/// The numbers that a field's percept takes on the way back from a device: of which stage, and for which outputs.
+fn numbers() -> impl Iterator<Item = (&'static str, Outputs)> {
+    let of_parts = Component::ALL.iter().map(|part| match part {
+        Component::CentroidU | Component::CentroidV => ("centroid", part.wanted_for() | Outputs::FILTERED),
+        Component::CentroidDepth => ("position", part.wanted_for()),
+        _ => (part.column().map_or("", |column| column.stage), part.wanted_for()),
+    });
+    // Motion says which of its outputs are present; the filter counts pressed taxels.
+    of_parts.chain([("contact", Outputs::ACTIVE | Outputs::FILTERED), ("motion", Outputs::MOTION)])
+}
 
 #[cfg(test)]
 mod tests {

@@ -35,14 +35,11 @@ pub(crate) struct Stages {
 impl Stages {
     /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
     fn of(outputs: Outputs) -> Self {
-        let wants = |some| outputs.intersects(some);
-        let touches = wants(Outputs::TOUCHES);
-        let position = wants(Outputs::POSITION | Outputs::NORMAL) || touches;
-        let orientation = wants(Outputs::ORIENTATION);
-        let axis = wants(Outputs::AXIS | Outputs::ANISOTROPY);
-        let motion = wants(Outputs::MOTION);
-        let filter = wants(Outputs::FILTERED);
-        let centroid = wants(Outputs::CENTROID) || position || orientation || axis || motion || filter;
+        let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
+        let touches = outputs.contains(Outputs::TOUCHES);
+        let position = wants("position") || touches;
+        let [orientation, axis, motion, filter] = ["orientation", "axis", "motion", "filter"].map(wants);
+        let centroid = wants("centroid") || position || orientation || axis || motion || filter;
         Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter }
     }
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
+use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch};
 
 /// Composes lines for fields of some names.
 pub(super) struct Composer {
@@ -91,55 +91,25 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         Precision::F32 => print(line, &(value as f32)),
         Precision::F64 => print(line, &value),
     };
-    let named = |line: &mut Vec<u8>, name: &str, value: Option<f64>| {
-        if let Some(value) = value {
-            key(line, name);
-            scalar(line, value);
-        }
-    };
-    named(line, "total", percept.total);
-    named(line, "peak", percept.peak);
-    if let Some(active) = percept.active {
-        key(line, "active");
-        print(line, &active);
-    }
-    named(line, "area", percept.area);
-    let pair = |line: &mut Vec<u8>, name: &str, value: Option<[f64; 2]>| {
-        if let Some([u, v]) = value {
-            key(line, name);
-            line.push(b'[');
-            scalar(line, u);
-            line.push(b',');
-            scalar(line, v);
-            line.push(b']');
-        }
-    };
-    pair(line, "centroid", percept.centroid);
-    for (name, vector) in [("position", percept.position), ("normal", percept.normal)] {
-        if let Some(vector) = vector {
-            key(line, name);
-            print(line, &vector);
-        }
-    }
-    named(line, "orientation", percept.orientation);
-    named(line, "axis", percept.axis);
-    named(line, "anisotropy", percept.anisotropy);
-    pair(line, "displacement", percept.displacement);
-    named(line, "direction", percept.direction);
-    named(line, "distance", percept.distance);
-    named(line, "radial_distance", percept.radial_distance);
-    named(line, "speed", percept.speed);
-    named(line, "radial_speed", percept.radial_speed);
-    // Made by the host, in double precision whatever the backend.
-    if let Some(displacement) = percept.filtered_displacement {
-        key(line, "filtered_displacement");
-        print(line, &displacement);
-    }
-    let filtered = [("filtered_direction", percept.filtered_direction), ("filtered_speed", percept.filtered_speed)];
-    for (name, value) in filtered {
-        if let Some(value) = value {
-            key(line, name);
-            print(line, &value);
+    for column in COLUMNS {
+        let Some(components) = percept.value(column) else { continue };
+        key(line, column.name);
+        match column.store {
+            Store::Active => print(line, &(components[0] as u32)),
+            // In double precision whatever the backend.
+            Store::Host(_) if column.components == 1 => print(line, &components[0]),
+            Store::Host(_) => print(line, &&components[..column.components]),
+            Store::Backend([_]) => scalar(line, components[0]),
+            Store::Backend(_) => {
+                line.push(b'[');
+                for (index, &component) in components[..column.components].iter().enumerate() {
+                    if index > 0 {
+                        line.push(b',');
+                    }
+                    scalar(line, component);
+                }
+                line.push(b']');
+            }
         }
     }
 }

@@ -127,7 +127,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::percept::{Flags, Outputs, Precision, Values};
+    use crate::percept::{Component, Flags, Host, Outputs, Precision, Values};
 
     fn names() -> Vec<FieldNames> {
         [("hand/palm", "hand"), ("say \"hi\"", "arm")]
@@ -150,18 +150,25 @@ mod tests {
             Outputs::empty(),
         ];
         percepts.active[0] = 3;
-        percepts.position = vec![[0.1, -0.2, 1e-9]; 4];
-        percepts.normal = vec![[0.0, 0.0, 1.0]; 4];
+        for cell in 0..4 {
+            percepts.set_host(Host::Position, cell, &[0.1, -0.2, 1e-9]);
+            percepts.set_host(Host::Normal, cell, &[0.0, 0.0, 1.0]);
+        }
         macro_rules! fill {
             ($columns:expr) => {{
-                $columns.total = vec![0.1, 0.0, 12.0, 0.0];
-                $columns.peak[0] = 1e-30;
-                $columns.area[0] = 2.5e-5;
-                $columns.set_centroid(0, [0.3, -0.7, 9.0]);
-                $columns.orientation[0] = 1.5;
-                $columns.axis[0] = 0.0;
-                $columns.anisotropy[0] = 1.0;
-                $columns.displacement[0] = [-0.5, 0.1];
+                $columns[Component::Total].copy_from_slice(&[0.1, 0.0, 12.0, 0.0]);
+                let first = [
+                    (Component::Peak, 1e-30),
+                    (Component::Area, 2.5e-5),
+                    (Component::CentroidU, 0.3),
+                    (Component::CentroidV, -0.7),
+                    (Component::Orientation, 1.5),
+                    (Component::Axis, 0.0),
+                    (Component::Anisotropy, 1.0),
+                    (Component::DisplacementU, -0.5),
+                    (Component::DisplacementV, 0.1),
+                ];
+                first.into_iter().for_each(|(part, value)| $columns[part][0] = value);
             }};
         }
         match &mut percepts.values {

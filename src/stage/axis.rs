@@ -17,9 +17,10 @@
 use glam::DVec2;
 
 use super::angle::{ATAN2_ERROR, of_line};
+use super::limit::Limit;
 use super::orientation::{Line, LineBound};
-use super::{Pressed, SLACK, Sums, U};
-use crate::percept::Flags;
+use super::{Given, GivenLimit, Pressed, SLACK, Sums, U, scalar};
+use crate::percept::{Flags, Outputs};
 
 /// 2⁻³⁰.
 const TOGETHER: f64 = 1.0 / 1_073_741_824.0;
@@ -38,6 +39,23 @@ pub(crate) struct Axis {
 pub(crate) struct AxisBound {
     pub(crate) line: LineBound,
     pub(crate) anisotropy: Option<f64>,
+}
+
+impl Axis {
+    /// The outputs.
+    pub(crate) fn outputs(&self) -> [Given; 2] {
+        [self.line.given(Outputs::AXIS), (Outputs::ANISOTROPY, self.anisotropy.map(scalar))]
+    }
+}
+
+impl AxisBound {
+    /// The outputs' limits; `present` says which the reference has.
+    pub(crate) fn limits(&self, present: Outputs) -> [GivenLimit; 2] {
+        let together = self.line.in_doubt.contains(Flags::COINCIDENT);
+        let in_doubt = together || self.line.in_doubt.contains(Flags::ISOTROPIC);
+        let limit = |output, bound, in_doubt| (output, Limit::of(bound, present.contains(output), in_doubt));
+        [limit(Outputs::AXIS, self.line.angle, in_doubt), limit(Outputs::ANISOTROPY, self.anisotropy, together)]
+    }
 }
 
 /// a, b, d of M.

@@ -8,7 +8,9 @@
 //! To this comes what the pressures are off by more than 2u, ε each: Σ wε for S, the largest ε for the peak.
 //! The peak carries its pressure's error alone; n areas, rounded to f32 and summed in one pass: |δA| ≤ n·u·A.
 
-use super::{Pressed, SLACK, Sums, U};
+use super::limit::Limit;
+use super::{Given, GivenLimit, Pressed, SLACK, Sums, U, scalar};
+use crate::percept::Outputs;
 
 /// A field's sums in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,6 +19,27 @@ pub(crate) struct Contact {
     pub(crate) peak: f64,
     pub(crate) active: u32,
     pub(crate) area: f64,
+}
+
+impl Contact {
+    /// The outputs; without the area where a taxel's is unknown.
+    pub(crate) fn outputs(&self, area_known: bool) -> [Given; 4] {
+        [
+            (Outputs::TOTAL, Some(scalar(self.total))),
+            (Outputs::PEAK, Some(scalar(self.peak))),
+            (Outputs::ACTIVE, Some(scalar(self.active.into()))),
+            (Outputs::AREA, area_known.then_some(scalar(self.area))),
+        ]
+    }
+
+    /// The same of bounds.
+    pub(crate) fn limits(&self) -> [GivenLimit; 3] {
+        [
+            (Outputs::TOTAL, Limit::Within(self.total)),
+            (Outputs::PEAK, Limit::Within(self.peak)),
+            (Outputs::AREA, Limit::Within(self.area)),
+        ]
+    }
 }
 
 /// What is right, in f64.

@@ -33,8 +33,8 @@ use glam::DVec2;
 use super::layout::Still;
 use super::limit::Limit;
 use super::motion::{Centroid, SHORTEST_STEP_S};
-use super::{SLACK, U};
-use crate::percept::{Flags, Outputs};
+use super::{GivenLimit, SLACK, U, scalar};
+use crate::percept::{Flags, Host, Outputs};
 
 /// The length under which an average of unit vectors has no direction, as steps cancel out.
 pub(crate) const LEAST_HEADING: f64 = 1e-3;
@@ -140,6 +140,28 @@ pub(crate) struct Filtered {
     pub(crate) direction: f64,
     /// m/s.
     pub(crate) speed: f64,
+}
+
+impl Filtered {
+    /// The outputs, those that are not present with what stands for them.
+    pub(crate) fn outputs(&self) -> [(Host, [f64; 2]); 3] {
+        [
+            (Host::FilteredDisplacement, self.displacement.to_array()),
+            (Host::FilteredDirection, scalar(self.direction)),
+            (Host::FilteredSpeed, scalar(self.speed)),
+        ]
+    }
+}
+
+impl FilterBound {
+    /// The outputs' limits.
+    pub(crate) fn limits(&self) -> [GivenLimit; 3] {
+        [
+            (Outputs::FILTERED_DISPLACEMENT, self.displacement),
+            (Outputs::FILTERED_DIRECTION, self.direction),
+            (Outputs::FILTERED_SPEED, self.speed),
+        ]
+    }
 }
 
 impl Memory {

@@ -26,6 +26,9 @@ pub(crate) mod touches;
 
 use glam::DVec3;
 
+use self::limit::Limit;
+use crate::percept::Outputs;
+
 /// Unit roundoff of binary32.
 pub(crate) const U: f64 = 1.0 / 16_777_216.0;
 
@@ -34,6 +37,17 @@ pub(crate) const DIVISION: f64 = 5.0 * U;
 
 /// Room for the terms of second and higher order that the bounds leave out: n·u stays under 0.1 for 10⁶ members.
 pub(crate) const SLACK: f64 = 1.1;
+
+/// What a stage gives for a field: an output, and its components if it has a value, a scalar first.
+pub(crate) type Given = (Outputs, Option<[f64; 2]>);
+
+/// How far single precision may be off there.
+pub(crate) type GivenLimit = (Outputs, Limit);
+
+/// A scalar as components.
+pub(crate) fn scalar(value: f64) -> [f64; 2] {
+    [value, 0.0]
+}
 
 /// How a sum is made in single precision.
 ///

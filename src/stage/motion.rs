@@ -22,7 +22,9 @@ use glam::DVec2;
 
 use super::angle::ATAN2_ERROR;
 use super::layout::Still;
-use super::{SLACK, Sums, U};
+use super::limit::Limit;
+use super::{Given, GivenLimit, SLACK, Sums, U, scalar};
+use crate::percept::Outputs;
 
 /// Speeds over shorter steps could pass what single precision holds, s.
 pub(crate) const SHORTEST_STEP_S: f64 = 1e-12;
@@ -54,6 +56,38 @@ pub(crate) struct MotionBound {
     pub(crate) radial_distance: f64,
     /// Whether `still` may differ.
     pub(crate) still_in_doubt: bool,
+}
+
+impl Motion {
+    /// The outputs, over a step of `dt_s`; lengths in units of `unit_m`.
+    pub(crate) fn outputs(&self, unit_m: f64, dt_s: f64) -> [Given; 6] {
+        let [distance, radial] = [self.distance, self.radial_distance].map(|length| length * unit_m);
+        let given = |output, value| (output, Some(scalar(value)));
+        [
+            (Outputs::DISPLACEMENT, Some((self.displacement * unit_m).to_array())),
+            (Outputs::DIRECTION, self.direction.map(scalar)),
+            given(Outputs::DISTANCE, distance),
+            given(Outputs::RADIAL_DISTANCE, radial),
+            given(Outputs::SPEED, distance / dt_s),
+            given(Outputs::RADIAL_SPEED, radial / dt_s),
+        ]
+    }
+}
+
+impl MotionBound {
+    /// The outputs' limits where the reference has `right`, as [`Motion::outputs`] counts them.
+    pub(crate) fn limits(&self, right: &Motion, unit_m: f64, dt_s: f64) -> [GivenLimit; 6] {
+        let length = |output, bound: f64| (output, Limit::Within(bound * unit_m));
+        let rate = |output, right, bound| (output, Limit::Within(rate_bound(right, bound, dt_s) * unit_m));
+        [
+            length(Outputs::DISPLACEMENT, self.displacement),
+            (Outputs::DIRECTION, Limit::of(self.direction, right.direction.is_some(), self.still_in_doubt)),
+            length(Outputs::DISTANCE, self.distance),
+            length(Outputs::RADIAL_DISTANCE, self.radial_distance),
+            rate(Outputs::SPEED, right.distance, self.distance),
+            rate(Outputs::RADIAL_SPEED, right.radial_distance, self.radial_distance),
+        ]
+    }
 }
 
 impl Still {
@@ -113,7 +147,7 @@ pub(crate) fn bound(now: Centroid, before: Centroid, still: &Still, now_bound: f
 }
 
 /// How far `length / dt` may be off when `length` may be off by `bound`.
-pub(crate) fn rate_bound(length: f64, bound: f64, dt_s: f64) -> f64 {
+fn rate_bound(length: f64, bound: f64, dt_s: f64) -> f64 {
     (bound + 6.0 * U * length.abs()) / dt_s
 }
 

@@ -19,8 +19,9 @@
 use glam::DVec2;
 
 use super::angle::{ATAN2_ERROR, of_line};
-use super::{Pressed, SLACK, U};
-use crate::percept::Flags;
+use super::limit::Limit;
+use super::{Given, GivenLimit, Pressed, SLACK, U, scalar};
+use crate::percept::{Flags, Outputs};
 
 /// 2⁻¹⁴: points nearer than this part of R₁ fall together, distances nearer than this are a tie.
 const NEAR: f64 = 1.0 / 16_384.0;
@@ -39,6 +40,26 @@ pub(crate) struct LineBound {
     pub(crate) angle: Option<f64>,
     /// Flags that may differ for the same reason.
     pub(crate) in_doubt: Flags,
+}
+
+impl Line {
+    /// The angle as output `output`.
+    pub(crate) fn given(&self, output: Outputs) -> Given {
+        (output, self.angle.map(scalar))
+    }
+
+    /// The outputs.
+    pub(crate) fn outputs(&self) -> [Given; 1] {
+        [self.given(Outputs::ORIENTATION)]
+    }
+}
+
+impl LineBound {
+    /// The outputs' limits; `present` says which the reference has.
+    pub(crate) fn limits(&self, present: Outputs) -> [GivenLimit; 1] {
+        let in_doubt = self.in_doubt.contains(Flags::COINCIDENT);
+        [(Outputs::ORIENTATION, Limit::of(self.angle, present.contains(Outputs::ORIENTATION), in_doubt))]
+    }
 }
 
 /// e − c of every pressed taxel, farthest first, equal ones in order of id; with the taxel's index.

@@ -189,7 +189,9 @@ fn both_signals_in_one_run_are_what_each_is_alone() {
         for (index, letter) in Letter::all_of(&BOTH, &signals).into_iter().enumerate() {
             let alone = run(&skin(), kind, calibration, &[letter], &frames);
             for (all, alone) in all.iter().zip(&alone) {
-                assert_eq!(Percept { field: 0, letter: 0, ..all[index] }, alone[0], "{kind:?} {letter:?}");
+                let mut one = all[index];
+                (one.field, one.letter) = (0, 0);
+                assert_eq!(one, alone[0], "{kind:?} {letter:?}");
             }
         }
         assert!(all[5].windows(2).all(|pair| pair[0].total != pair[1].total));

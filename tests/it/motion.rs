@@ -56,6 +56,11 @@ fn near(a: Option<f64>, b: f64) -> bool {
     a.is_some_and(|a| (a - b).abs() < 1e-5)
 }
 
+fn without_active(mut percept: Percept) -> Percept {
+    percept.active = None;
+    percept
+}
+
 #[test]
 fn a_touch_that_moves_has_a_direction_and_a_speed() {
     let frames = [
@@ -219,7 +224,7 @@ fn a_ball_that_rolls_on_a_large_plate_has_a_direction() {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();
                 assert!(agreement.holds(), "{backend:?}: {agreement}");
                 assert_eq!(percepts.get(0, 0).active.is_some(), outputs.contains(Outputs::ACTIVE));
-                run.extend((0..part.len()).map(|frame| Percept { active: None, ..percepts.get(frame, 0) }));
+                run.extend((0..part.len()).map(|frame| without_active(percepts.get(frame, 0))));
             }
             for percept in &run[1..] {
                 assert!(percept.flags.is_empty(), "{backend:?}: {percept:?}");
@@ -282,7 +287,7 @@ fn what_counts_as_still_grows_with_the_pressed_taxels_of_both_frames() {
             for part in frames.chunks(cut) {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();
                 assert!(agreement.holds(), "{backend:?} {knobs:?}: {agreement}");
-                run.extend((0..part.len()).map(|frame| Percept { active: None, ..percepts.get(frame, 0) }));
+                run.extend((0..part.len()).map(|frame| without_active(percepts.get(frame, 0))));
             }
             seen.push(run);
         }

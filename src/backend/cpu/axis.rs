@@ -2,56 +2,51 @@
 
 use fearless_simd::prelude::*;
 
-use super::angle::of_line;
-use super::simd::{F, bits_where, splat, splat_u};
-use super::touch::{Line, Members, Touch};
-use crate::percept::{Flags, Outputs};
+use super::lanes::{F, bits_where, of_line, splat, splat_u};
+use super::members::{Cells, Members, Sum, Touch};
+use crate::percept::{Component, Flags, Outputs};
+
+/// What this stage fills.
+pub(super) const PARTS: [Component; 2] = [Component::Axis, Component::Anisotropy];
 
 /// 2⁻³⁰.
 const TOGETHER: f32 = 1.0 / 1_073_741_824.0;
 const ISOTROPIC_UNDER: f32 = 1e-3;
 
 /// a, b and d of the second moments.
-pub(super) struct Moments<S: Simd> {
-    pub(super) a: F<S>,
-    pub(super) b: F<S>,
-    pub(super) d: F<S>,
-}
-
-/// Sums them up.
 #[inline(always)]
-pub(super) fn moments<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Moments<S> {
-    let mut sums = [splat(simd, 0.0); 3];
+pub(super) fn moments<S: Simd, A: Sum<S>, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> [A; 3] {
+    let mut sums = [A::zero(simd); 3];
     for member in 0..members.count() {
         add(simd, members, member, at, touch, &mut sums);
     }
-    let [a, b, d] = sums;
-    Moments { a, b, d }
+    sums
 }
 
 /// Adds a member's part to a, b and d.
 #[inline(always)]
-pub(super) fn add<S: Simd, P: Members<S>>(
+pub(super) fn add<S: Simd, A: Sum<S>, P: Members<S>>(
     simd: S,
     members: P,
     member: usize,
     at: usize,
     touch: &Touch<S>,
-    [a, b, d]: &mut [F<S>; 3],
+    [a, b, d]: &mut [A; 3],
 ) {
-    let part = members.part(simd, member, at);
-    let q = part.pull * touch.scale;
-    let x = part.u - touch.u;
-    let y = part.v - touch.v;
+    let sample = members.sample(simd, member, at);
+    let counts = sample.pull.simd_gt(splat(simd, 0.0));
+    let q = sample.pull * touch.scale;
+    let x = sample.u - touch.u;
+    let y = sample.v - touch.v;
     let qx = q * x;
-    *a += qx * x;
-    *b += qx * y;
-    *d += (q * y) * y;
+    a.add(qx * x, counts);
+    b.add(qx * y, counts);
+    d.add((q * y) * y, counts);
 }
 
-/// The principal axis where there is one, and the anisotropy.
+/// Puts the principal axis, where there is one, and the anisotropy into `cells`, with their flags.
 #[inline(always)]
-pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Moments { a, b, d }: &Moments<S>) -> (Line<S>, F<S>) {
+pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, [a, b, d]: [F<S>; 3], at: usize, cells: &mut Cells) {
     let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
     let single = touch.touched & touch.active.simd_le(splat_u(simd, 1));
     let several = touch.touched & touch.active.simd_gt(splat_u(simd, 1));
@@ -66,12 +61,11 @@ pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Moments { a, b, d }: &Mo
     // Of the two equal forms of the bisector, the one that adds numbers of one sign.
     let right = x.simd_ge(none);
     let angle = of_line(simd, right.select(h + x, y), right.select(y, h - x));
-    let line = Line {
-        angle: found.select(angle, none),
-        flags: bits_where(simd, single, Flags::ONE_TAXEL.bits())
-            | bits_where(simd, coincident, Flags::COINCIDENT.bits())
-            | bits_where(simd, isotropic, Flags::ISOTROPIC.bits()),
-        present: bits_where(simd, spread, Outputs::ANISOTROPY.bits()) | bits_where(simd, found, Outputs::AXIS.bits()),
-    };
-    (line, anisotropy)
+    cells.put(simd, Component::Axis, found.select(angle, none), at);
+    cells.put(simd, Component::Anisotropy, anisotropy, at);
+    let flags = bits_where(simd, single, Flags::ONE_TAXEL.bits())
+        | bits_where(simd, coincident, Flags::COINCIDENT.bits())
+        | bits_where(simd, isotropic, Flags::ISOTROPIC.bits());
+    let present = bits_where(simd, spread, Outputs::ANISOTROPY.bits()) | bits_where(simd, found, Outputs::AXIS.bits());
+    cells.say(simd, (flags, present), at);
 }

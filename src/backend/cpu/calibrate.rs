@@ -7,10 +7,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, i32x16, u32x16};
 
 use super::super::Rows;
-use super::Tables;
-use super::lines::Aligned;
-use super::pick::{OneFrame, Values};
-use super::simd::{F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::lanes::{Aligned, F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::read::{OneFrame, Values};
 use crate::parallel::{self, Tasks, on_threads};
 use crate::percept::Flags;
 use crate::scene::Plan;
@@ -232,13 +230,13 @@ impl<S: Simd> Sizes<S> {
 pub(super) fn frame(
     level: Level,
     plan: &Plan,
-    tables: &Tables,
+    tiles: &Tiles,
     raw: (Rows<'_>, usize),
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
     let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
-    all_tiles(level, plan, &tables.tiles, values, pressures, statuses)
+    all_tiles(level, plan, tiles, values, pressures, statuses)
 }
 
 /// The same for any `values` of taxels in as many `tiles`, in whatever order these have them.
@@ -259,12 +257,12 @@ pub(super) fn all_tiles(
 pub(super) fn shared_frame(
     level: Level,
     plan: &Plan,
-    tables: &Tables,
+    tiles: &Tiles,
     raw: (Rows<'_>, usize),
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
 ) -> bool {
-    let (count, threads) = (tables.tiles.all.len(), parallel::threads());
+    let (count, threads) = (tiles.all.len(), parallel::threads());
     // A few parts a thread, as none knows what else its core does; and no more than a word has bits.
     let part = count.div_ceil((4 * threads).min(u64::BITS as usize)).max(1).next_multiple_of(TOGETHER);
     let faulty = AtomicU64::new(0);
@@ -274,7 +272,6 @@ pub(super) fn shared_frame(
     on_threads(threads, || {
         while let Some((index, (pressures, statuses))) = parts.take() {
             let range = index * part..index * part + pressures.len();
-            let tiles = &tables.tiles;
             if with_widest!(level, simd => some_tiles(simd, plan, tiles, values, range.clone(), pressures, statuses)) {
                 faulty.fetch_or(1 << index, Ordering::Relaxed);
             }
@@ -363,7 +360,7 @@ fn plain_tiles<S: Simd>(
 
 /// Where a number is 0 or neither tiny nor unbelievable.
 #[inline(always)]
-fn fine<S: Simd>(simd: S, bits: U<S>) -> super::simd::M<S> {
+fn fine<S: Simd>(simd: S, bits: U<S>) -> super::lanes::M<S> {
     let size = bits & SIZE_BITS;
     (size - splat_u(simd, TINY_BITS)).simd_le(splat_u(simd, HUGE_BITS - TINY_BITS)) | size.simd_eq(splat_u(simd, 0))
 }

@@ -8,11 +8,9 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::{BLOCK, Rows};
-use super::Tables;
-use super::calibrate::{self, Tile};
-use super::lines::{Aligned, Lines};
-use super::pick::{OneFrame, Values};
-use super::simd::{LANES, Row, load, load_u, width, with_widest};
+use super::calibrate::{self, Tile, Tiles};
+use super::lanes::{Aligned, LANES, Lines, Row, load, load_u, width, with_widest};
+use super::read::{OneFrame, Values};
 use crate::scene::{Cadence, Coverage, Knobs, Plan};
 
 /// A plan of fewer values than this is computed before a gate has looked at it.
@@ -109,7 +107,7 @@ impl Gate {
         &mut self,
         level: Level,
         plan: &Plan,
-        tables: &Tables,
+        tiles: &Tiles,
         raw: (Rows<'_>, usize),
         pressures: &mut [Row<f32>],
         statuses: &mut [Row<u32>],
@@ -119,7 +117,7 @@ impl Gate {
             self.faults = 0;
         }
         self.stale.fill(!self.known);
-        with_widest!(level, simd => self.tiles(simd, plan, tables, raw, pressures, statuses));
+        with_widest!(level, simd => self.all_tiles(simd, plan, tiles, raw, pressures, statuses));
         self.known = true;
         self.open =
             if 2 * self.stale.iter().filter(|&&stale| stale).count() > self.stale.len() { self.open + 1 } else { 0 };
@@ -130,17 +128,17 @@ impl Gate {
     }
 
     #[inline(always)]
-    fn tiles<S: Simd>(
+    fn all_tiles<S: Simd>(
         &mut self,
         simd: S,
         plan: &Plan,
-        tables: &Tables,
+        tiles: &Tiles,
         (raw, frame): (Rows<'_>, usize),
         pressures: &mut [Row<f32>],
         statuses: &mut [Row<u32>],
     ) {
         let mut index = 0;
-        while let Some(tile) = tables.tiles.all.get(index) {
+        while let Some(tile) = tiles.all.get(index) {
             // Many at once, while they are the same.
             if self.known
                 && index % BLOCK == 0

@@ -3,18 +3,35 @@
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
+use super::super::{RawBatch, Rows, Step};
+use super::calibrate::Tiles;
 use super::gate::Gate;
-use super::groups::{InFrame, Narrow};
-use super::lines::Lines;
-use super::lot::{Between, Wanted, touch};
-use super::put::{Run, Sixteen, write};
-use super::simd::{LANES, Row, with_widest};
-use super::touch::{Abreast, Cells, OneKind};
+use super::lanes::{F, LANES, Lines, Row, U, load, load_u, with_widest};
+use super::members::{Cells, Kinds, Members, OneKind, Sample};
+use super::pipeline::{Abreast, Between, Wanted, touch};
+use super::recording::the_one_before;
 use super::wide::{self, Table, Values, Wide};
-use super::{Moment, Tables, calibrate, change};
+use super::write::{Columned, Run, Sixteen};
+use super::{calibrate, change};
 use crate::parallel::{Tasks, on_threads};
 use crate::percept::CellsMut;
 use crate::scene::Plan;
+use crate::signal::RawValue;
+use crate::stage::calibrate::UNUSABLE;
+
+/// A frame, the one before it, and the time between them.
+pub(super) struct Moment<'a> {
+    now: (Rows<'a>, usize),
+    before: (Rows<'a>, usize),
+    step: &'a Step,
+}
+
+impl<'a> Moment<'a> {
+    /// Frame `frame` of `raw`; `before` has the values of the frame before the first.
+    pub(super) fn new(raw: &RawBatch<'a>, frame: usize, before: &'a [RawValue]) -> Self {
+        Self { now: (raw.rows, frame), before: the_one_before(raw.rows, frame, before), step: &raw.steps[frame] }
+    }
+}
 
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
@@ -64,6 +81,9 @@ pub(super) struct Live {
     gate: Option<Gate>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
+    /// Members of the wide fields.
+    tables: Vec<Table>,
+    columned: Columned,
 }
 
 impl Live {
@@ -92,7 +112,17 @@ impl Live {
             Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
         });
         let threads = crate::parallel::threads();
+        let tables = wide.iter().map(|&field| {
+            let field = &plan.fields[field];
+            let members = plan.members_of(field).iter().zip(&field.depths);
+            Table::new(members.map(|(member, &depth)| {
+                let area = plan.taxels[member.slot as usize].area;
+                (member.slot, [member.weight, member.u, member.v, depth, area])
+            }))
+        });
         Self {
+            tables: tables.collect(),
+            columned: Columned::new(plan),
             gate,
             everything: vec![true; wide.len() + narrow.len()],
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
@@ -123,7 +153,7 @@ impl Live {
         &mut self,
         level: Level,
         plan: &Plan,
-        tables: &Tables,
+        tiles: &Tiles,
         moment: &Moment<'_>,
         cells: &mut CellsMut<'_>,
     ) {
@@ -131,12 +161,12 @@ impl Live {
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
         let is_shared = !self.others.is_empty();
         let mut faults = match &mut gate {
-            Some(gate) => gate.pass(level, plan, tables, moment.now, pressures, statuses),
-            None if is_shared => calibrate::shared_frame(level, plan, tables, moment.now, pressures, statuses),
-            None => calibrate::frame(level, plan, tables, moment.now, pressures, statuses),
+            Some(gate) => gate.pass(level, plan, tiles, moment.now, pressures, statuses),
+            None if is_shared => calibrate::shared_frame(level, plan, tiles, moment.now, pressures, statuses),
+            None => calibrate::frame(level, plan, tiles, moment.now, pressures, statuses),
         };
         if plan.has_changes() {
-            calibrate::frame(level, plan, tables, moment.before, was, said);
+            calibrate::frame(level, plan, tiles, moment.before, was, said);
             let before = (was.as_flattened(), said.as_flattened());
             let (pressures, statuses) = (pressures.as_flattened_mut(), statuses.as_flattened_mut());
             let (pressures, statuses) = (pressures.as_chunks_mut::<1>().0, statuses.as_chunks_mut::<1>().0);
@@ -145,7 +175,7 @@ impl Live {
         let frame = Frame {
             level,
             plan,
-            tables,
+            tables: &self.tables,
             pressures: self.pressures.as_flattened(),
             statuses: self.statuses.as_flattened(),
             faults,
@@ -177,13 +207,16 @@ impl Live {
         }
         let (wide, narrow) = self.answers.split_at(self.wide.len());
         for (of, answer) in self.wide.iter().zip(wide) {
-            write(&Run { first: of.field, count: 1 }, answer, plan.outputs, cells);
+            self.columned.write_frame(&Run { first: of.field, count: 1 }, answer, cells);
         }
         for (group, answer) in self.narrow.iter().zip(narrow) {
             match group.together {
-                Some(first) if group.fields.len() == LANES => write(&Sixteen(first), answer, plan.outputs, cells),
-                Some(first) => write(&Run { first, count: group.fields.len() }, answer, plan.outputs, cells),
-                None => write(&group.fields, answer, plan.outputs, cells),
+                Some(first) if group.fields.len() == LANES => self.columned.write_frame(&Sixteen(first), answer, cells),
+                Some(first) => {
+                    let run = Run { first, count: group.fields.len() };
+                    self.columned.write_frame(&run, answer, cells);
+                }
+                None => self.columned.write_frame(&group.fields, answer, cells),
             }
         }
     }
@@ -194,7 +227,7 @@ impl Live {
 struct Frame<'a> {
     level: Level,
     plan: &'a Plan,
-    tables: &'a Tables,
+    tables: &'a [Table],
     pressures: &'a [f32],
     statuses: &'a [u32],
     faults: bool,
@@ -234,7 +267,7 @@ impl Frame<'_> {
 
     /// A field alone.
     fn wide(&self, table: usize, field: &Alone, gathered: &mut Gathered, answer: &mut Cells) {
-        let (table, values): (&Table, _) = (&self.tables.wide[table], &mut gathered.values);
+        let (table, values): (&Table, _) = (&self.tables[table], &mut gathered.values);
         values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
         wide::cell(self.level, self.plan, Wide { table, values }, &field.kind, self.faults, answer);
     }
@@ -285,12 +318,7 @@ impl Frame<'_> {
         gathered: &mut Gathered,
         answers: &mut [Cells],
     ) {
-        let wanted = Wanted {
-            stages: self.plan.stages(),
-            outputs: self.plan.columns,
-            faults: self.faults,
-            care: self.plan.is_compensated(),
-        };
+        let wanted = Wanted::new(self.plan, self.faults);
         let Gathered { pressures, statuses, between, .. } = gathered;
         touch(
             simd,
@@ -317,8 +345,130 @@ impl Frame<'_> {
     fn leave_out_what_is_not_there(&self, group: &Narrow, statuses: &mut [Row<u32>]) {
         for (lane, &field) in group.fields.iter().enumerate() {
             for row in &mut statuses[self.plan.fields[field].count..group.places.len()] {
-                row[lane] = crate::stage::calibrate::UNUSABLE;
+                row[lane] = UNUSABLE;
             }
         }
+    }
+}
+
+/// Sixteen narrow fields of about as many members, a lane each.
+#[derive(Clone, Debug)]
+struct Narrow {
+    /// Per lane, which field; fewer at the end.
+    fields: Vec<usize>,
+    /// Where they are, if one stands after the other.
+    together: Option<usize>,
+    kinds: Kinds,
+    /// By member, where it has its value.
+    slots: Lines<u32>,
+    places: Vec<PlaceRow>,
+    /// Rows of the groups before it.
+    first_row: usize,
+    /// None where all are 1.
+    weights: Option<Lines<f32>>,
+    depths: Lines<f32>,
+    areas: Lines<f32>,
+}
+
+/// Where a member of each field of a group is.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct PlaceRow {
+    u: Row<f32>,
+    v: Row<f32>,
+}
+
+impl Narrow {
+    /// The group of `fields`, whose lanes go on with slot `unpressed` where they have no more members.
+    fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
+        let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
+        let blank = Lines::new(rows, 0.0);
+        let mut group = Self {
+            fields: fields.to_vec(),
+            together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
+            kinds: Kinds::EMPTY,
+            slots: Lines::new(rows, unpressed as u32),
+            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            first_row: 0,
+            weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
+            depths: blank.clone(),
+            areas: blank,
+        };
+        for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
+            group.kinds.set(lane, field);
+            for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
+                group.slots[row][lane] = member.slot;
+                if let Some(weights) = &mut group.weights {
+                    weights[row][lane] = member.weight;
+                }
+                group.places[row].u[lane] = member.u;
+                group.places[row].v[lane] = member.v;
+                group.depths[row][lane] = *depth;
+                group.areas[row][lane] = plan.taxels[member.slot as usize].area;
+            }
+        }
+        group
+    }
+
+    /// Brings its members' values side by side.
+    fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
+        for (row, slots) in rows.iter_mut().zip(&self.slots[..]) {
+            for (value, &slot) in row.iter_mut().zip(slots) {
+                *value = values[slot as usize];
+            }
+        }
+    }
+
+    fn is_weighted(&self) -> bool {
+        self.weights.is_some()
+    }
+
+    /// Has weights from now on, of 1 if it had none.
+    fn weigh(&mut self) {
+        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
+    }
+}
+
+/// A group's values in this frame; `WEIGHTED` where weights are not all 1.
+#[derive(Clone, Copy)]
+struct InFrame<'a, const WEIGHTED: bool> {
+    group: &'a Narrow,
+    /// Empty if not `WEIGHTED`.
+    weights: &'a [Row<f32>],
+    pressures: &'a [Row<f32>],
+    statuses: &'a [Row<u32>],
+}
+
+impl<S: Simd, const WEIGHTED: bool> Members<S> for InFrame<'_, WEIGHTED> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.group.places.len()
+    }
+
+    #[inline(always)]
+    fn sample(self, simd: S, member: usize, at: usize) -> Sample<S> {
+        let PlaceRow { u, v } = &self.group.places[member];
+        let pressure = load(simd, &self.pressures[member], at);
+        Sample {
+            pressure,
+            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
+            u: load(simd, u, at),
+            v: load(simd, v, at),
+        }
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.depths[member], at)
+    }
+
+    #[inline(always)]
+    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.group.areas[member], at)
+    }
+
+    #[inline(always)]
+    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
+        load_u(simd, &self.statuses[member], at)
     }
 }

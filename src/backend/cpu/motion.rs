@@ -8,11 +8,21 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::Step;
-use super::angle::of_direction;
-use super::simd::{F, I, LANES, Row, U, bits_where, splat, splat_u, width, with_widest};
+use super::lanes::{F, I, LANES, Row, U, bits_where, of_direction, splat, splat_u, store, width, with_widest};
 use crate::parallel;
-use crate::percept::{CellsMut, Flags, Outputs};
+use crate::percept::{CellsMut, Component, Flags, Outputs};
 use crate::scene::Plan;
+
+/// What this stage fills.
+const PARTS: [Component; 7] = [
+    Component::DisplacementU,
+    Component::DisplacementV,
+    Component::Direction,
+    Component::Distance,
+    Component::RadialDistance,
+    Component::Speed,
+    Component::RadialSpeed,
+];
 
 /// Cells that a thread takes at least: some ten microseconds' worth.
 const CELLS_A_TASK: usize = 1 << 12;
@@ -66,8 +76,8 @@ impl Before {
         let row = frame * self.flags.len()..(frame + 1) * self.flags.len();
         self.flags.copy_from_slice(cast_slice(&cells.flags[row.clone()]));
         self.pressed.copy_from_slice(&cells.active[row.clone()]);
-        self.u.copy_from_slice(&cells.centroid_u[row.clone()]);
-        self.v.copy_from_slice(&cells.centroid_v[row]);
+        self.u.copy_from_slice(&cells[Component::CentroidU][row.clone()]);
+        self.v.copy_from_slice(&cells[Component::CentroidV][row]);
     }
 
     fn row(&self) -> RowBefore<'_> {
@@ -129,34 +139,32 @@ fn run_of_frames(
     before: &Before,
 ) {
     let count = cells.fields();
+    let CellsMut { flags, present, active, parts, .. } = cells;
+    let (flags, present) = (cast_slice_mut::<Flags, u32>(flags), cast_slice_mut::<Outputs, u32>(present));
+    let mut written = PARTS.map(|part| std::mem::take(&mut parts[part as usize]));
+    let (u, v) = (&parts[Component::CentroidU as usize], &parts[Component::CentroidV as usize]);
     with_widest!(level, simd => {
         for (frame, step) in steps.iter().enumerate() {
-            let (start, flags) = (frame * count, cast_slice_mut::<Flags, u32>(cells.flags));
+            let start = frame * count;
             let (earlier, now) = flags.split_at_mut(start);
             let from = match frame.checked_sub(1) {
                 None => before.row(),
-                Some(last) => RowBefore {
-                    flags: &earlier[last * count..],
-                    pressed: &cells.active[last * count..start],
-                    u: &cells.centroid_u[last * count..start],
-                    v: &cells.centroid_v[last * count..start],
-                },
+                Some(last) => {
+                    let row = last * count..start;
+                    RowBefore {
+                        flags: &earlier[row.clone()],
+                        pressed: &active[row.clone()],
+                        u: &u[row.clone()],
+                        v: &v[row],
+                    }
+                }
             };
-            let now_row = start..start + count;
-            let touched = (
-                &cells.active[now_row.clone()],
-                &cells.centroid_u[now_row.clone()],
-                &cells.centroid_v[now_row],
-            );
+            let row = start..start + count;
+            let touched = (&active[row.clone()], &u[row.clone()], &v[row.clone()]);
             let mut to = MotionRow {
                 flags: &mut now[..count],
-                present: cast_slice_mut(&mut cells.present[start..start + count]),
-                displacement: optional(cells.displacement, start, count).as_flattened_mut(),
-                direction: optional(cells.direction, start, count),
-                distance: optional(cells.distance, start, count),
-                radial_distance: optional(cells.radial_distance, start, count),
-                speed: optional(cells.speed, start, count),
-                radial_speed: optional(cells.radial_speed, start, count),
+                present: &mut present[row.clone()],
+                parts: written.each_mut().map(|part| if part.is_empty() { &mut [] } else { &mut part[row.clone()] }),
             };
             for first in (0..count).step_by(LANES) {
                 sixteen_fields(simd, outputs, fields, step, from, touched, &mut to, first);
@@ -165,21 +173,12 @@ fn run_of_frames(
     });
 }
 
-/// The cells from `start` on of a column that may be empty.
-fn optional<T>(column: &mut [T], start: usize, count: usize) -> &mut [T] {
-    if column.is_empty() { column } else { &mut column[start..start + count] }
-}
-
-/// Where a frame's motion goes, field by field; columns that nobody asked for are empty.
+/// Where a frame's motion goes, field by field; parts that nobody asked for are empty.
 struct MotionRow<'a> {
     flags: &'a mut [u32],
     present: &'a mut [u32],
-    displacement: &'a mut [f32],
-    direction: &'a mut [f32],
-    distance: &'a mut [f32],
-    radial_distance: &'a mut [f32],
-    speed: &'a mut [f32],
-    radial_speed: &'a mut [f32],
+    /// As [`PARTS`] counts.
+    parts: [&'a mut [f32]; PARTS.len()],
 }
 
 /// The motion of the fields from `first` on, at most sixteen.
@@ -229,15 +228,23 @@ fn sixteen_fields<S: Simd>(
         let is_still = moved & distance.simd_le(still);
         let directed = moved & !is_still;
         let where_moved = |value: F<S>| moved.select(value, none);
-        let put = |value: F<S>, row: &mut Row<f32>| value.store_slice(&mut row[at..at + width::<S>()]);
-        put(where_moved(du * unit), &mut found.du);
-        put(where_moved(dv * unit), &mut found.dv);
-        put(where_moved(distance * unit), &mut found.distance);
-        put(where_moved(radial * unit), &mut found.radial_distance);
-        put(where_moved(distance / dt * unit), &mut found.speed);
-        put(where_moved(radial / dt * unit), &mut found.radial_speed);
+        let mut direction = none;
         if outputs.contains(Outputs::DIRECTION) {
-            put(directed.select(of_direction(simd, du, dv), none), &mut found.direction);
+            direction = directed.select(of_direction(simd, du, dv), none);
+        }
+        let parts = [
+            where_moved(du * unit),
+            where_moved(dv * unit),
+            direction,
+            where_moved(distance * unit),
+            where_moved(radial * unit),
+            where_moved(distance / dt * unit),
+            where_moved(radial / dt * unit),
+        ];
+        let mut i = 0;
+        while i < PARTS.len() {
+            store(simd, parts[i], &mut found.parts[i], at);
+            i += 1;
         }
         let flags = bits_where(simd, no_previous, Flags::NO_PREVIOUS.bits())
             | bits_where(simd, bad_step, step.flags.bits())
@@ -253,21 +260,9 @@ fn sixteen_fields<S: Simd>(
     for (to, found) in [(&mut to.flags, &found.flags), (&mut to.present, &found.present)] {
         to[range.clone()].iter_mut().zip(found).for_each(|(to, found)| *to |= found);
     }
-    for (column, found) in [
-        (&mut to.direction, &found.direction),
-        (&mut to.distance, &found.distance),
-        (&mut to.radial_distance, &found.radial_distance),
-        (&mut to.speed, &found.speed),
-        (&mut to.radial_speed, &found.radial_speed),
-    ] {
+    for (column, found) in to.parts.iter_mut().zip(&found.parts) {
         if !column.is_empty() {
             column[range.clone()].copy_from_slice(&found[..count]);
-        }
-    }
-    if !to.displacement.is_empty() {
-        let to = to.displacement[2 * range.start..2 * range.end].chunks_exact_mut(2);
-        for (to, (&du, &dv)) in to.zip(found.du.iter().zip(&found.dv)) {
-            to.copy_from_slice(&[du, dv]);
         }
     }
 }
@@ -277,13 +272,7 @@ fn sixteen_fields<S: Simd>(
 struct Found {
     flags: Row<u32>,
     present: Row<u32>,
-    du: Row<f32>,
-    dv: Row<f32>,
-    direction: Row<f32>,
-    distance: Row<f32>,
-    radial_distance: Row<f32>,
-    speed: Row<f32>,
-    radial_speed: Row<f32>,
+    parts: [Row<f32>; PARTS.len()],
 }
 
 /// `count` values of a column from `first` on, and `rest` in the lanes beyond them.

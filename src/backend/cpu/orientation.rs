@@ -2,10 +2,12 @@
 
 use fearless_simd::prelude::*;
 
-use super::angle::of_line;
-use super::simd::{F, bits_where, splat, splat_u};
-use super::touch::{Line, Members, Touch};
-use crate::percept::{Flags, Outputs};
+use super::lanes::{F, U, bits_where, of_line, splat, splat_u};
+use super::members::{Cells, Members, Touch};
+use crate::percept::{Component, Flags, Outputs};
+
+/// What this stage fills.
+pub(super) const PARTS: [Component; 1] = [Component::Orientation];
 
 /// 2⁻¹⁴.
 const NEAR: f32 = 1.0 / 16_384.0;
@@ -64,21 +66,30 @@ pub(super) fn point<S: Simd, P: Members<S>, const SCALED: bool>(
     at: usize,
     touch: &Touch<S>,
 ) -> (F<S>, F<S>, F<S>) {
-    let part = members.part(simd, member, at);
-    let q = if SCALED { part.pull * touch.scale } else { part.pull };
-    let x = (part.u - touch.u) * q;
-    let y = (part.v - touch.v) * q;
+    let sample = members.sample(simd, member, at);
+    let q = if SCALED { sample.pull * touch.scale } else { sample.pull };
+    let x = (sample.u - touch.u) * q;
+    let y = (sample.v - touch.v) * q;
     (x * x + y * y, x, y)
 }
 
-/// The line through the two farthest points, where there is one. Where no lane has one, what was found is not looked at.
+/// Puts the line through the two farthest points into `cells`, with its flags.
 #[inline(always)]
-pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> Line<S> {
+pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, apart: &Apart<S>, at: usize, cells: &mut Cells) {
+    let (angle, flags, present) = line(simd, touch, apart);
+    cells.put(simd, Component::Orientation, angle, at);
+    cells.say(simd, (flags, present), at);
+}
+
+/// The angle of the line through the two farthest points, where there is one; flags; and what is present. Where no lane has
+/// one, what was found is not looked at.
+#[inline(always)]
+fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> (F<S>, U<S>, U<S>) {
     let (none, one, two) = (splat(simd, 0.0), splat_u(simd, 1), splat_u(simd, 2));
     let single = bits_where(simd, touch.touched & touch.active.simd_le(one), Flags::ONE_TAXEL.bits());
     let several = touch.touched & touch.active.simd_gt(one);
     if !several.any_true() {
-        return Line { angle: none, flags: single, present: splat_u(simd, 0) };
+        return (none, single, splat_u(simd, 0));
     }
     // Distances are compared by their squares, as roots are dear.
     let apart = x * x + y * y;
@@ -96,13 +107,12 @@ pub(super) fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apar
         (coincident, several & !coincident & is_third & r[1].simd_le(limit * limit))
     };
     let found = several & !coincident;
-    Line {
-        angle: found.select(of_line(simd, x, y), none),
-        flags: single
-            | bits_where(simd, coincident, Flags::COINCIDENT.bits())
-            | bits_where(simd, tie, Flags::TIE.bits()),
-        present: bits_where(simd, found, Outputs::ORIENTATION.bits()),
-    }
+    let coincident = bits_where(simd, coincident, Flags::COINCIDENT.bits());
+    (
+        found.select(of_line(simd, x, y), none),
+        single | coincident | bits_where(simd, tie, Flags::TIE.bits()),
+        bits_where(simd, found, Outputs::ORIENTATION.bits()),
+    )
 }
 
 #[cfg(test)]
@@ -110,7 +120,7 @@ mod tests {
     use fearless_simd::Level;
     use proptest::prelude::*;
 
-    use super::super::simd::{LANES, Row, load, load_u, store_u, with_widest};
+    use super::super::lanes::{LANES, Row, load, load_u, store_u, with_widest};
     use super::*;
 
     /// Flags of a lane, with the roots of both distances.
@@ -155,7 +165,7 @@ mod tests {
                     v: all(0.0),
                 };
                 let apart = Apart { r: [all(first), all(second), all(third)], x: all(x), y: all(y) };
-                store_u(simd, line(simd, &touch, &apart).flags, &mut flags, 0);
+                store_u(simd, line(simd, &touch, &apart).1, &mut flags, 0);
             });
             prop_assert_eq!(Flags::from_bits_retain(flags[0]), with_roots(active, [first, second, third], x, y));
         }

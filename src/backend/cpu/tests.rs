@@ -3,8 +3,9 @@
 use fearless_simd::Level;
 use glam::{DAffine3, DVec3};
 
+use super::lanes::{LANES, levels};
 use super::*;
-use crate::backend::{Near, Picks, Step};
+use crate::backend::{Near, Picks, Rows, Step};
 use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
@@ -14,18 +15,8 @@ use crate::signal::{Calibration, Frame, Letter, Receptor};
 const HAND: &[u8] = include_bytes!("../../../bodies/hand.glb");
 const HUMANOID: &[u8] = include_bytes!("../../../bodies/humanoid.glb");
 
-/// Every set of instructions that this machine has and that anything is compiled for.
-pub(super) fn levels() -> Vec<Level> {
-    let widest = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    let narrower = [widest.as_avx2().map(Level::Avx2), widest.as_sse2().map(Level::Sse2)];
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    let narrower: [Option<Level>; 0] = [];
-    std::iter::once(widest).chain(narrower.into_iter().flatten()).collect()
-}
-
 /// `frames` frames for `plan`: pressed here and there, with everything in between that a value can be.
-pub(super) fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
+fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
     let mut state = 7_u64;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -46,7 +37,7 @@ pub(super) fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {
 
 /// The same where most of the skin rests: every twenty frames another ninth of it is touched, and elsewhere a value is
 /// missing now and then.
-pub(super) fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
+fn mostly_at_rest(mut raw: Vec<RawValue>, channels: usize) -> Vec<RawValue> {
     for (index, value) in raw.iter_mut().enumerate() {
         let (frame, channel) = (index / channels, index % channels);
         let is_touched = channel * 9 / channels == frame / 20 % 9;
@@ -122,7 +113,7 @@ fn much_of_a_skin_rests_and_has_the_same_bits() {
     let raw = mostly_at_rest(values(&plan, FRAMES), plan.channels());
     let right = run(&plan, Level::new(), &raw, FRAMES, 1);
     assert!(right == run(&plan, Level::new(), &raw, FRAMES, FRAMES));
-    let rest = rest::Rest::new(&plan.fields, &plan.members);
+    let rest = window::Rest::new(&plan.fields, &plan.members);
     let rests = |block: usize| {
         let pressed = |tile: usize| {
             let channels = tile * LANES..plan.channels().min((tile + 1) * LANES);
@@ -140,7 +131,7 @@ fn much_of_a_skin_rests_and_has_the_same_bits() {
 const FOLD: u32 = 20_000;
 
 /// Rows of taxels on a sheet, and fields of sixteen that follow each other, each over half of the one before.
-pub(super) fn sheet(taxels: u32) -> Body {
+fn sheet(taxels: u32) -> Body {
     const COLUMNS: u32 = 100;
     let taxel = |id| Taxel {
         id,
@@ -172,7 +163,7 @@ pub(super) fn sheet(taxels: u32) -> Body {
 }
 
 /// `raw` in frames of `width` values as a source would deliver them, each channel's at the place in `channels`.
-pub(super) fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
+fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
     raw.chunks(channels.len())
         .map(|values| {
             let mut frame = Frame::missing(0.0, width);

@@ -1,20 +1,18 @@
 //! A field of many members: sixteen of them abreast, so that one large field costs no more a member than small ones.
 //!
 //! Every sum is sixteen sums, one for every sixteenth member, added up in a fixed tree; a choice between equals still goes
-//! to the lower id. [`Wide`] does that for one frame, a sum a lane; [`super::sixteen::ManyAbreast`] has sixteen frames
-//! abreast, and keeps sixteen sums of each.
+//! to the lower id. [`Wide`] does that for one frame, a sum a lane; [`ManyAbreast`] has sixteen frames abreast, and keeps
+//! sixteen sums of each.
 
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
-use super::axis::{self, Moments};
-use super::centroid;
+use super::axis;
 use super::contact::{self, Sums};
-use super::lines::Lines;
-use super::lot::{Between, Wanted, touch};
+use super::lanes::{F, I, LANES, Lines, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
+use super::members::{Cells, Members, OneKind, OnePass, Sample, Sum, Touch};
 use super::orientation::{Apart, point};
-use super::simd::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
-use super::touch::{Cells, Members, OneKind, Part, Sweep, Touch};
+use super::pipeline::{Abreast, Between, Sweep, Wanted, touch};
 use crate::scene::Plan;
 use crate::stage::calibrate::UNUSABLE;
 
@@ -105,9 +103,9 @@ impl<S: Simd> Members<S> for Wide<'_> {
     }
 
     #[inline(always)]
-    fn part(self, simd: S, member: usize, at: usize) -> Part<S> {
+    fn sample(self, simd: S, member: usize, at: usize) -> Sample<S> {
         let pressure = load(simd, &self.values.pressures[member], at);
-        Part {
+        Sample {
             pressure,
             pull: load(simd, &self.table.weights[member], at) * pressure,
             u: load(simd, &self.table.u[member], at),
@@ -134,7 +132,7 @@ impl<S: Simd> Members<S> for Wide<'_> {
 /// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
 #[inline(never)]
 pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, faults: bool, cells: &mut Cells) {
-    let wanted = Wanted { stages: plan.stages(), outputs: plan.columns, faults, care: plan.is_compensated() };
+    let wanted = Wanted::new(plan, faults);
     let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
     let between = std::slice::from_mut(&mut between);
     with_widest!(level, simd => touch(simd, |_| (field, kind), 1, wanted, between, cells));
@@ -142,7 +140,7 @@ pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, f
 
 /// The sum of all lanes, as a tree.
 #[inline(always)]
-pub(super) fn add_up(mut row: Row<f32>) -> f32 {
+fn add_up(mut row: Row<f32>) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {
@@ -153,22 +151,48 @@ pub(super) fn add_up(mut row: Row<f32>) -> f32 {
     row[0]
 }
 
+/// Sums of all lanes, in all lanes of the result; `sums` has `K` sums of the lanes from a place on.
+#[inline(always)]
+fn all_lanes<S: Simd, A: Sum<S>, const K: usize>(simd: S, sums: impl Fn(usize) -> [A; K]) -> [F<S>; K] {
+    // A sum has two vectors at most.
+    let mut rows = [[[0.0; LANES]; 2]; K];
+    let mut at = 0;
+    while at < LANES {
+        for (rows, sum) in rows.iter_mut().zip(sums(at)) {
+            let mut index = 0;
+            while index < A::VECTORS {
+                store(simd, sum.vector(index), &mut rows[index], at);
+                index += 1;
+            }
+        }
+        at += width::<S>();
+    }
+    rows.map(
+        #[inline(always)]
+        |rows| {
+            A::value(
+                #[inline(always)]
+                |index| splat(simd, add_up(rows[index])),
+            )
+        },
+    )
+}
+
 impl<S: Simd> Sweep<S> for Wide<'_> {
     #[inline(always)]
-    fn sums(self, simd: S, _: usize, centroid: bool) -> Sums<S> {
-        let (mut rows, mut active) = ([[0.0; LANES]; 3], [0; LANES]);
-        let mut at = 0;
-        while at < LANES {
-            let [sums] = contact::sums(simd, self, at, centroid);
-            store(simd, sums.total, &mut rows[0], at);
-            store_u(simd, sums.active, &mut active, at);
-            store(simd, sums.u, &mut rows[1], at);
-            store(simd, sums.v, &mut rows[2], at);
-            at += width::<S>();
-        }
-        let all = |row: Row<f32>| splat(simd, add_up(row));
-        let active = splat_u(simd, active.iter().sum());
-        Sums { total: all(rows[0]), active, u: all(rows[1]), v: all(rows[2]) }
+    fn sums<A: Sum<S>>(self, simd: S, _: usize, centroid: bool) -> Sums<S, F<S>> {
+        let (none, sums) = (splat(simd, 0.0), contact::sums::<S, A, Self, 1>);
+        let [total, active, u, v] = all_lanes(
+            simd,
+            #[inline(always)]
+            |at| {
+                let [Sums { total, active, u, v }] = sums(simd, self, at, centroid);
+                let mut count = A::zero(simd);
+                count.add(active.bitcast::<I<S>>().to_float::<F<S>>(), none.simd_ge(none));
+                [total, count, u, v]
+            },
+        );
+        Sums { total, active: active.to_int::<U<S>>(), u, v }
     }
 
     #[inline(always)]
@@ -201,14 +225,13 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
     }
 
     #[inline(always)]
-    fn depth(self, simd: S, _: usize) -> F<S> {
-        let mut row = [0.0; LANES];
-        let mut at = 0;
-        while at < LANES {
-            store(simd, centroid::depth(simd, self, at), &mut row, at);
-            at += width::<S>();
-        }
-        splat(simd, add_up(row))
+    fn depth<A: Sum<S>>(self, simd: S, _: usize) -> F<S> {
+        let [depth] = all_lanes(
+            simd,
+            #[inline(always)]
+            |at| [contact::depth::<S, A, Self>(simd, self, at)],
+        );
+        depth
     }
 
     #[inline(always)]
@@ -255,18 +278,12 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
     }
 
     #[inline(always)]
-    fn moments(self, simd: S, _: usize, touch: &Touch<S>) -> Moments<S> {
-        let mut rows = [[0.0; LANES]; 3];
-        let mut at = 0;
-        while at < LANES {
-            let sums = axis::moments(simd, self, at, touch);
-            store(simd, sums.a, &mut rows[0], at);
-            store(simd, sums.b, &mut rows[1], at);
-            store(simd, sums.d, &mut rows[2], at);
-            at += width::<S>();
-        }
-        let all = |row: Row<f32>| splat(simd, add_up(row));
-        Moments { a: all(rows[0]), b: all(rows[1]), d: all(rows[2]) }
+    fn moments<A: Sum<S>>(self, simd: S, _: usize, touch: &Touch<S>) -> [F<S>; 3] {
+        all_lanes(
+            simd,
+            #[inline(always)]
+            |at| axis::moments::<S, A, Self>(simd, self, at, touch),
+        )
     }
 }
 
@@ -300,4 +317,121 @@ fn two_farthest(candidates: &[Candidate], third: &mut f32) -> [Candidate; 2] {
         *third = third.max(out.r);
     }
     [first, second]
+}
+
+/// A wide field over sixteen frames: what [`Abreast`] is for others.
+#[derive(Clone, Copy)]
+pub(super) struct ManyAbreast<P>(pub(super) P);
+
+/// Members whose values stay in the nearest cache while sixteen sums go over them in turn; a multiple of [`LANES`].
+const MEMBERS_IN_TURN: usize = 256;
+
+/// `K` sums over all members to which `add` adds one's part, each as sixteen that are then added up as a tree.
+#[inline(always)]
+fn in_sixteen<S: Simd, A: Sum<S>, const K: usize>(
+    simd: S,
+    count: usize,
+    add: impl Fn(usize, &mut [A; K]),
+) -> [F<S>; K] {
+    let mut sums = [[A::zero(simd); K]; LANES];
+    let mut start = 0;
+    while start < count {
+        let end = count.min(start + MEMBERS_IN_TURN);
+        let mut lane = 0;
+        while lane < LANES {
+            let mut sum = sums[lane];
+            let mut member = start + lane;
+            while member < end {
+                add(member, &mut sum);
+                member += LANES;
+            }
+            sums[lane] = sum;
+            lane += 1;
+        }
+        start = end;
+    }
+    let mut half = LANES / 2;
+    while half > 0 {
+        let mut lane = 0;
+        while lane < half {
+            let mut k = 0;
+            while k < K {
+                sums[lane][k] = sums[lane][k].join(sums[lane + half][k]);
+                k += 1;
+            }
+            lane += 1;
+        }
+        half /= 2;
+    }
+    sums[0].map(
+        #[inline(always)]
+        |sum| sum.total(),
+    )
+}
+
+impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
+    #[inline(always)]
+    fn sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> Sums<S, F<S>> {
+        let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let [total, active, u, v] = in_sixteen(
+            simd,
+            self.0.count(),
+            #[inline(always)]
+            |member, [total, active, u, v]: &mut [A; 4]| {
+                let sample = self.0.sample(simd, member, at);
+                let pressed = sample.pressure.simd_gt(none);
+                active.add(pressed.select(one, none), pressed);
+                contact::add(simd, &sample, centroid, [total, u, v]);
+            },
+        );
+        Sums { total, active: active.to_int::<U<S>>(), u, v }
+    }
+
+    #[inline(always)]
+    fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>) {
+        let (peak, _) = contact::peak_and_area(simd, self.0, at);
+        let none = splat(simd, 0.0);
+        let [area] = in_sixteen(
+            simd,
+            self.0.count(),
+            #[inline(always)]
+            |member, [area]: &mut [OnePass<S>; 1]| {
+                let pressed = self.0.sample(simd, member, at).pressure.simd_gt(none);
+                area.add(pressed.select(self.0.area(simd, member, at), none), pressed);
+            },
+        );
+        (peak, area)
+    }
+
+    #[inline(always)]
+    fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>) {
+        Abreast(self.0).statuses(simd, at)
+    }
+
+    #[inline(always)]
+    fn depth<A: Sum<S>>(self, simd: S, at: usize) -> F<S> {
+        let [sum] = in_sixteen(
+            simd,
+            self.0.count(),
+            #[inline(always)]
+            |member, [sum]: &mut [A; 1]| contact::add_depth(simd, self.0, member, at, sum),
+        );
+        sum
+    }
+
+    #[inline(always)]
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
+        // In the members' order, which is that of the ids.
+        Abreast(self.0).farthest(simd, at, touch)
+    }
+
+    #[inline(always)]
+    fn moments<A: Sum<S>>(self, simd: S, at: usize, touch: &Touch<S>) -> [F<S>; 3] {
+        in_sixteen(
+            simd,
+            self.0.count(),
+            #[inline(always)]
+            |member, sums: &mut [A; 3]| axis::add(simd, self.0, member, at, touch, sums),
+        )
+    }
 }

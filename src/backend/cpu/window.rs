@@ -8,8 +8,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::simd::LANES;
-use crate::scene::Plan;
+use super::lanes::LANES;
+use crate::scene::{Plan, PlanField};
 use crate::stage::layout::Member;
 
 /// Slots that a skin may have before it is looked at through a window.
@@ -94,6 +94,47 @@ impl Window {
         }
         let placed = |&member: &Member| Member { slot: (member.slot as usize & self.mask) as u32, ..member };
         plan.members.iter().map(placed).collect()
+    }
+}
+
+/// In which tiles fields have their taxels: a field all of whose taxels lie in tiles that nothing presses needs no sum. Most
+/// of a skin is so, most of the time; a tile is sixteen taxels, which a block reads in any case.
+#[derive(Clone, Debug)]
+pub(super) struct Rest {
+    /// By field, where its tiles begin; and where the last one's end.
+    starts: Vec<u32>,
+    /// Among those that are kept.
+    tiles: Vec<u32>,
+}
+
+impl Rest {
+    /// Of `fields`, whose members are `seen` by place in the window.
+    pub(super) fn new(fields: &[PlanField], seen: &[Member]) -> Self {
+        let (mut starts, mut tiles) = (vec![0], Vec::new());
+        for field in fields {
+            let members = &seen[field.first..field.first + field.count];
+            let first = tiles.len();
+            tiles.extend(members.iter().map(|member| member.slot / LANES as u32));
+            tiles[first..].sort_unstable();
+            let mut kept = first;
+            for index in first..tiles.len() {
+                if index == first || tiles[index] != tiles[kept - 1] {
+                    tiles[kept] = tiles[index];
+                    kept += 1;
+                }
+            }
+            tiles.truncate(kept);
+            starts.push(tiles.len() as u32);
+        }
+        tiles.shrink_to_fit();
+        Self { starts, tiles }
+    }
+
+    /// Whether field `field` rests, given which tiles do.
+    pub(super) fn has_at_rest(&self, field: usize, rests: impl Fn(usize) -> bool) -> bool {
+        self.tiles[self.starts[field] as usize..self.starts[field + 1] as usize]
+            .iter()
+            .all(|&tile| rests(tile as usize))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which numbers a plan has the device write, and in which column of its results.
 
 use super::stage::Constants;
-use crate::percept::Outputs;
+use crate::percept::{COLUMNS, Component, Outputs, Store};
 use crate::scene::Plan;
 
 /// A column of the results: a number for each frame and field.
@@ -9,25 +9,10 @@ use crate::scene::Plan;
 pub(super) enum Column {
     /// A cell's flags and what is present; always the first.
     Status,
-    Total,
-    Peak,
     Active,
-    Area,
-    U,
-    V,
-    Depth,
-    Orientation,
-    Axis,
-    Anisotropy,
     /// Flags and quantities present that motion adds to the cell's.
     Motion,
-    DisplacementU,
-    DisplacementV,
-    Direction,
-    Distance,
-    RadialDistance,
-    Speed,
-    RadialSpeed,
+    Component(Component),
 }
 
 /// The columns that a plan needs, those first that are read back.
@@ -39,37 +24,24 @@ pub(super) struct Columns {
 impl Columns {
     pub(super) fn new(plan: &Plan) -> Self {
         let (outputs, stages) = (plan.outputs, plan.stages());
-        let place = Outputs::POSITION | Outputs::NORMAL;
-        let centroid = place | Outputs::CENTROID | Outputs::FILTERED;
-        let wanted = [
-            (Column::Total, Outputs::TOTAL),
-            (Column::Peak, Outputs::PEAK),
-            (Column::Active, Outputs::ACTIVE | Outputs::FILTERED),
-            (Column::Area, Outputs::AREA),
-            (Column::U, centroid),
-            (Column::V, centroid),
-            (Column::Depth, place),
-            (Column::Orientation, Outputs::ORIENTATION),
-            (Column::Axis, Outputs::AXIS),
-            (Column::Anisotropy, Outputs::ANISOTROPY),
-            (Column::Motion, Outputs::MOTION),
-            (Column::DisplacementU, Outputs::DISPLACEMENT),
-            (Column::DisplacementV, Outputs::DISPLACEMENT),
-            (Column::Direction, Outputs::DIRECTION),
-            (Column::Distance, Outputs::DISTANCE),
-            (Column::RadialDistance, Outputs::RADIAL_DISTANCE),
-            (Column::Speed, Outputs::SPEED),
-            (Column::RadialSpeed, Outputs::RADIAL_SPEED),
-        ];
         let mut all = vec![Column::Status];
-        all.extend(wanted.iter().filter(|(_, some)| outputs.intersects(*some)).map(|(column, _)| *column));
+        let own = [(Column::Active, Outputs::ACTIVE | Outputs::FILTERED), (Column::Motion, Outputs::MOTION)];
+        let parts = Component::ALL.iter().map(|&part| match part {
+            Component::CentroidU | Component::CentroidV => {
+                (Column::Component(part), part.wanted_for() | Outputs::FILTERED)
+            }
+            _ => (Column::Component(part), part.wanted_for()),
+        });
+        all.extend(
+            own.into_iter().chain(parts).filter(|(_, some)| outputs.intersects(*some)).map(|(column, _)| column),
+        );
         let read = all.len();
         // What only later stages read.
         let needed = [
-            (Column::Total, stages.hysteresis),
+            (Column::Component(Component::Total), stages.hysteresis),
             (Column::Active, stages.motion),
-            (Column::U, stages.motion),
-            (Column::V, stages.motion),
+            (Column::Component(Component::CentroidU), stages.motion),
+            (Column::Component(Component::CentroidV), stages.motion),
         ];
         for (column, _) in needed.iter().filter(|(_, needed)| *needed) {
             if !all.contains(column) {
@@ -94,24 +66,22 @@ impl Columns {
         self.all.iter().position(|other| *other == column).map_or(u32::MAX.into(), |at| at as f64)
     }
 
-    /// The overrides of `names`, which are columns.
-    fn overrides<'a>(&self, names: &[(&'a str, Column)]) -> Vec<(&'a str, f64)> {
-        names.iter().map(|&(name, column)| (name, self.at(column))).collect()
+    /// The overrides that say where the outputs of `stages` stand.
+    fn overrides(&self, stages: &[&str]) -> Vec<(&'static str, f64)> {
+        let of_stages = COLUMNS.iter().filter(|column| stages.contains(&column.stage));
+        of_stages
+            .filter_map(|column| match column.store {
+                Store::Active => Some((column.shader_override, self.at(Column::Active))),
+                Store::Backend(parts) => Some((column.shader_override, self.at(Column::Component(*parts.first()?)))),
+                Store::Host(_) => None,
+            })
+            .collect()
     }
 
     /// What the program over fields is told.
     pub(super) fn of_fields(&self, plan: &Plan) -> Vec<(&'static str, f64)> {
-        let mut overrides = self.overrides(&[
-            ("TOTAL_AT", Column::Total),
-            ("PEAK_AT", Column::Peak),
-            ("ACTIVE_AT", Column::Active),
-            ("AREA_AT", Column::Area),
-            ("CENTROID_AT", Column::U),
-            ("DEPTH_AT", Column::Depth),
-            ("ORIENTATION_AT", Column::Orientation),
-            ("AXIS_AT", Column::Axis),
-            ("ANISOTROPY_AT", Column::Anisotropy),
-        ]);
+        let mut overrides = self.overrides(&["contact", "centroid", "orientation", "axis"]);
+        overrides.push(("DEPTH_AT", self.at(Column::Component(Component::CentroidDepth))));
         let stages = plan.stages();
         let said = [
             ("CENTRED", stages.centroid),
@@ -126,22 +96,18 @@ impl Columns {
 
     /// What hysteresis is told.
     pub(super) fn of_hysteresis(&self) -> Vec<(&'static str, f64)> {
-        self.overrides(&[("TOTAL_AT", Column::Total)])
+        vec![("TOTAL_AT", self.at(Column::Component(Component::Total)))]
     }
 
     /// What motion is told.
     pub(super) fn of_motion(&self) -> Vec<(&'static str, f64)> {
-        self.overrides(&[
-            ("ACTIVE_AT", Column::Active),
-            ("CENTROID_AT", Column::U),
-            ("MOTION_AT", Column::Motion),
-            ("DISPLACEMENT_AT", Column::DisplacementU),
-            ("DIRECTION_AT", Column::Direction),
-            ("DISTANCE_AT", Column::Distance),
-            ("RADIAL_DISTANCE_AT", Column::RadialDistance),
-            ("SPEED_AT", Column::Speed),
-            ("RADIAL_SPEED_AT", Column::RadialSpeed),
-        ])
+        let mut overrides = self.overrides(&["motion"]);
+        overrides.extend([
+            ("ACTIVE_AT", self.at(Column::Active)),
+            ("CENTROID_AT", self.at(Column::Component(Component::CentroidU))),
+            ("MOTION_AT", self.at(Column::Motion)),
+        ]);
+        overrides
     }
 }
 

@@ -4,7 +4,7 @@
 use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
 use super::{Gpu, HEADER, STEP};
-use crate::backend::cpu::side_by_side;
+use crate::backend::cpu::read;
 use crate::backend::{RawBatch, Rows};
 use crate::error::Result;
 use crate::signal::RawValue;
@@ -87,9 +87,9 @@ fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, 
     scratch.resize(block * channels, RawValue::new(0.0));
     for (index, start) in (0..raw.frames).step_by(block).enumerate() {
         let end = raw.frames.min(start + block);
-        for first in (start..end).step_by(side_by_side::FRAMES) {
-            let frames = first..end.min(first + side_by_side::FRAMES);
-            side_by_side::write(raw.rows, frames, channels, cast_slice_mut(scratch), first - start);
+        for first in (start..end).step_by(read::FRAMES) {
+            let frames = first..end.min(first + read::FRAMES);
+            read::side_by_side(raw.rows, frames, channels, cast_slice_mut(scratch), first - start);
         }
         let bytes = block * channels * 4;
         mapped.slice(index * bytes..(index + 1) * bytes).copy_from_slice(cast_slice(scratch));

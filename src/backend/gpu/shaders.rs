@@ -3,6 +3,9 @@
 
 use std::borrow::Cow;
 
+use super::unpack::PRESENT;
+use crate::percept::COLUMNS;
+
 /// A program's name, the stages that it computes, and its whole WGSL.
 pub(crate) struct Shader {
     /// For people who look at the device's own log.
@@ -10,8 +13,19 @@ pub(crate) struct Shader {
     /// The stages, as everywhere.
     #[cfg_attr(not(test), expect(dead_code, reason = "tests hold the files of the stages to it"))]
     pub(crate) stages: &'static [&'static str],
-    /// WGSL, ready to compile.
-    pub(crate) source: Cow<'static, str>,
+    /// Its files one after the other.
+    source: Cow<'static, str>,
+}
+
+impl Shader {
+    /// WGSL, ready to compile: the outputs' bits come first.
+    pub(crate) fn wgsl(&self) -> String {
+        // Those that a cell's status has room for.
+        let bits = COLUMNS.iter().map(|column| (column.shader_constant(), column.output.bits().ilog2()));
+        let bits = bits.filter(|(_, bit)| *bit < u32::BITS - PRESENT);
+        let bits: String = bits.map(|(name, bit)| format!("const {name} = 1u << {bit}u;\n")).collect();
+        bits + &self.source
+    }
 }
 
 /// The text of some files that are shared.

@@ -130,7 +130,7 @@ pub(super) fn pipeline(
 ) -> wgpu::ComputePipeline {
     let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(shader.name),
-        source: wgpu::ShaderSource::Wgsl(shader.source.clone()),
+        source: wgpu::ShaderSource::Wgsl(shader.wgsl().into()),
     });
     device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(shader.name),

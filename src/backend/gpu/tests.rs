@@ -21,8 +21,8 @@ use crate::signal::{Calibration, RawValue};
 use crate::stage::{calibrate, layout};
 
 fn parse(shader: &Shader) -> Module {
-    naga::front::wgsl::parse_str(&shader.source)
-        .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(&shader.source)))
+    let text = shader.wgsl();
+    naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(&text)))
 }
 
 /// (name, offset) of every member of the WGSL struct `name`, and its size.
@@ -158,7 +158,7 @@ fn pipelines_build_without_any_driver() {
 
 #[test]
 fn a_shader_that_is_wrong_is_caught() {
-    let sound = narrow_fields(Abreast::Four, Values::Pressures, Members::Many).source;
+    let sound = narrow_fields(Abreast::Four, Values::Pressures, Members::Many).wgsl();
     let broken = sound.replace("sums.total += pull;", "sums.total += Words(status);");
     assert!(broken != sound);
     assert!(

@@ -25,22 +25,6 @@ impl Gpu {
     }
 
     fn unpack_column(&self, column: Column, bytes: &[u8], cells: &mut CellsMut<'_>) {
-        let numbers = |to: &mut [f32]| to.copy_from_slice(cast_slice(bytes));
-        let lengths = |to: &mut [f32]| {
-            let from: &[f32] = cast_slice(bytes);
-            let fields = self.units_m.len();
-            for (to, from) in to.chunks_exact_mut(fields).zip(from.chunks_exact(fields)) {
-                for ((to, from), unit_m) in to.iter_mut().zip(from).zip(&self.units_m) {
-                    *to = from * unit_m;
-                }
-            }
-        };
-        let displaced = |to: &mut [[f32; 2]], part: usize| {
-            let from: &[f32] = cast_slice(bytes);
-            for ((to, from), unit_m) in to.iter_mut().zip(from).zip(self.units_m.iter().cycle()) {
-                to[part] = from * unit_m;
-            }
-        };
         let statuses: &[u32] = cast_slice(bytes);
         match column {
             Column::Status => {
@@ -56,22 +40,15 @@ impl Gpu {
                 }
             }
             Column::Active => cells.active.copy_from_slice(statuses),
-            Column::Total => numbers(cells.total),
-            Column::Peak => numbers(cells.peak),
-            Column::Area => numbers(cells.area),
-            Column::U => lengths(cells.centroid_u),
-            Column::V => lengths(cells.centroid_v),
-            Column::Depth => lengths(cells.centroid_depth),
-            Column::Orientation => numbers(cells.orientation),
-            Column::Axis => numbers(cells.axis),
-            Column::Anisotropy => numbers(cells.anisotropy),
-            Column::DisplacementU => displaced(cells.displacement, 0),
-            Column::DisplacementV => displaced(cells.displacement, 1),
-            Column::Direction => numbers(cells.direction),
-            Column::Distance => lengths(cells.distance),
-            Column::RadialDistance => lengths(cells.radial_distance),
-            Column::Speed => lengths(cells.speed),
-            Column::RadialSpeed => lengths(cells.radial_speed),
+            Column::Component(part) => {
+                let (from, to): (&[f32], _) = (cast_slice(bytes), &mut cells[part]);
+                if part.is_length() {
+                    let units_m = self.units_m.iter().cycle();
+                    to.iter_mut().zip(from).zip(units_m).for_each(|((to, from), unit_m)| *to = from * unit_m);
+                } else {
+                    to.copy_from_slice(from);
+                }
+            }
         }
     }
 

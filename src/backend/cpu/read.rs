@@ -3,12 +3,14 @@
 //! Those that do not lie in a plan's order, but near each other, are picked by shuffles of whole lanes: sixteen of 32 with
 //! AVX-512, twice eight of sixteen with AVX2. They take a third and a quarter of the instructions of shuffling bytes.
 
+use std::ops::Range;
+
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
 use super::super::{ELSEWHERE, Near, Picks, Rows, Shuffle};
-use super::lines::Aligned;
-use super::simd::{LANES, Row};
+use super::lanes::{Aligned, Columns, LANES, Row, store_first, transpose, with_widest};
 
 /// A frame's raw values, tile by tile.
 pub(super) trait Values: Copy {
@@ -92,6 +94,10 @@ impl<'a> SomeFrames<'a> {
             });
         }
         Self { raw, first, frames, values }
+    }
+
+    pub(super) fn frames(&self) -> usize {
+        self.frames
     }
 
     /// Where the values from slot 16 · `tile` on lie.
@@ -277,4 +283,86 @@ mod x86 {
             _mm256_castps_si256(_mm256_blendv_ps(low, high, which)).simd_into(token)
         }
     );
+}
+
+/// Frames that [`side_by_side`] takes at once.
+pub(crate) const FRAMES: usize = LANES;
+
+/// Where a tile's values go.
+struct ByChannel<'a> {
+    /// By channel, so many words each.
+    words: &'a mut [u32],
+    words_a_channel: usize,
+    /// The first of the frames.
+    at: usize,
+}
+
+impl Columns for ByChannel<'_> {
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, _: S, channel: usize, lanes: u32x16<S>) {
+        let start = channel * self.words_a_channel;
+        // The last tile has fewer channels.
+        let Some(words) = self.words.get_mut(start..start + self.words_a_channel) else { return };
+        match words.get_mut(self.at..self.at + LANES) {
+            Some(words) => lanes.store_slice(words),
+            // There are not as many frames.
+            None => store_first(lanes, &mut words[self.at..]),
+        }
+    }
+}
+
+/// Writes the bits of `frames`, up to [`FRAMES`], from word `at` on of what each of `channels` channels has in `words`. Where
+/// there is room for more frames, they are the last one.
+pub(crate) fn side_by_side(raw: Rows<'_>, frames: Range<usize>, channels: usize, words: &mut [u32], at: usize) {
+    let (words_a_channel, count) = (words.len() / channels, frames.len());
+    let some = SomeFrames::new(raw, frames.start, count);
+    with_widest!(Level::new(), simd => {
+        let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
+        for (tile, words) in words.chunks_mut(LANES * words_a_channel).enumerate() {
+            some.read(simd, tile, channels, bits);
+            let last = bits[count - 1];
+            bits[count..].fill(last);
+            transpose(simd, |frame| &bits[frame], &mut ByChannel { words, words_a_channel, at });
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Frame, RawValue};
+
+    #[test]
+    fn every_value_finds_its_place() {
+        for (channels, frames) in [(1, 1), (40, 3), (41, 16), (100, 21)] {
+            let value = |frame: usize, place: usize| RawValue::new((1000 * frame + place) as f64);
+            let packed: Vec<RawValue> =
+                (0..frames).flat_map(|frame| (0..channels).map(move |c| value(frame, c))).collect();
+            let picked: Vec<Frame> = (0..frames)
+                .map(|frame| Frame {
+                    t_s: 0.0,
+                    values: (0..channels + 9).map(|place| value(frame, place)).collect(),
+                    pose: Vec::new(),
+                })
+                .collect();
+            let backwards: Vec<u32> = (0..channels as u32).rev().collect();
+            let picks = Picks::new(&backwards, channels, channels + 9);
+            let words_a_channel = frames.next_multiple_of(4);
+            for (raw, place) in [
+                (Rows::Packed { values: &packed, channels }, (|c, _| c) as fn(usize, usize) -> usize),
+                (Rows::Picked { frames: &picked, picks: &picks }, |c, channels| channels - 1 - c),
+            ] {
+                let mut words = vec![0; channels * words_a_channel];
+                for at in (0..frames).step_by(FRAMES) {
+                    side_by_side(raw, at..frames.min(at + FRAMES), channels, &mut words, at);
+                }
+                for (channel, words) in words.chunks(words_a_channel).enumerate() {
+                    for (frame, &word) in words.iter().enumerate() {
+                        let right = value(frame.min(frames - 1), place(channel, channels));
+                        assert_eq!(word, right.to_bits(), "channel {channel} of {channels}, frame {frame} of {frames}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -1,17 +1,85 @@
-//! All stages for a lot of cells, one stage after the other.
+//! The stages from contact to axis, in their order, over as many cells as there are lanes.
 //!
-//! A cell's stages wait for each other: the distances for the centroid's quotient, the angle for roots and another
-//! quotient. Taken stage by stage, a core goes on with the next cells' members while one waits.
+//! Whether the lanes are frames of one field or fields of one frame, each does the operations of its own cell in one
+//! fixed order, never fused: percepts have the same bits either way, and on every instruction set. A cell's stages wait for
+//! each other: the distances for the centroid's quotient, the angle for roots and another quotient. Taken stage by stage for
+//! some sets of cells, a core goes on with the next set's members while one waits.
 
 use fearless_simd::prelude::*;
 
-use super::contact::Sums;
+use super::axis;
+use super::contact::{self, Sums};
+use super::lanes::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
+use super::members::{Cells, Compensated, Kind, Members, OnePass, Sum, Touch};
 use super::orientation::{self, Apart};
-use super::simd::{F, LANES, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
-use super::touch::{Cells, Kind, Line, Sweep, Touch};
-use super::{axis, centroid};
-use crate::percept::{Flags, Outputs};
-use crate::scene::Stages;
+use crate::percept::{Component, Flags, Outputs};
+use crate::scene::{Plan, Stages};
+use crate::stage::calibrate::UNUSABLE;
+
+/// Goes over all members, once a quantity.
+pub(super) trait Sweep<S: Simd>: Copy {
+    /// S, how many are pressed, and the centroid's numerators where `centroid` says so.
+    fn sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> Sums<S, F<S>>;
+    /// The same for two vectors of lanes.
+    #[inline(always)]
+    fn two_sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> [Sums<S, F<S>>; 2] {
+        [self.sums::<A>(simd, at, centroid), self.sums::<A>(simd, at + width::<S>(), centroid)]
+    }
+    /// The largest P, and the area of the pressed taxels, m².
+    fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>);
+    /// The statuses of all members together, and where all of them are unusable.
+    fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>);
+    /// The numerator of the centroid's third coordinate.
+    fn depth<A: Sum<S>>(self, simd: S, at: usize) -> F<S>;
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S>;
+    /// a, b and d of the second moments.
+    fn moments<A: Sum<S>>(self, simd: S, at: usize, touch: &Touch<S>) -> [F<S>; 3];
+}
+
+/// A cell a lane, each going over its members in their order.
+#[derive(Clone, Copy)]
+pub(super) struct Abreast<P>(pub(super) P);
+
+impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
+    #[inline(always)]
+    fn sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> Sums<S, F<S>> {
+        let [sums] = contact::sums::<S, A, P, 1>(simd, self.0, at, centroid);
+        sums.totals()
+    }
+
+    #[inline(always)]
+    fn two_sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> [Sums<S, F<S>>; 2] {
+        let [one, other] = contact::sums::<S, A, P, 2>(simd, self.0, at, centroid);
+        [one.totals(), other.totals()]
+    }
+
+    #[inline(always)]
+    fn peak_and_area(self, simd: S, at: usize) -> (F<S>, F<S>) {
+        contact::peak_and_area(simd, self.0, at)
+    }
+
+    #[inline(always)]
+    fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>) {
+        let (any, all) = contact::statuses(simd, self.0, at);
+        (any & !UNUSABLE, (all & UNUSABLE).simd_gt(splat_u(simd, 0)))
+    }
+
+    #[inline(always)]
+    fn depth<A: Sum<S>>(self, simd: S, at: usize) -> F<S> {
+        contact::depth::<S, A, P>(simd, self.0, at).total()
+    }
+
+    #[inline(always)]
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
+        orientation::farthest(simd, self.0, at, touch)
+    }
+
+    #[inline(always)]
+    fn moments<A: Sum<S>>(self, simd: S, at: usize, touch: &Touch<S>) -> [F<S>; 3] {
+        let [a, b, d] = axis::moments::<S, A, P>(simd, self.0, at, touch);
+        [a.total(), b.total(), d.total()]
+    }
+}
 
 /// What is to be computed.
 #[derive(Clone, Copy, Debug)]
@@ -19,10 +87,16 @@ pub(super) struct Wanted {
     pub(super) stages: Stages,
     /// Columns that no stage or output of these fills are left as they are.
     pub(super) outputs: Outputs,
-    /// Whether calibration said something of any value.
+    /// Whether any value has a status.
     pub(super) faults: bool,
     /// Whether sums are compensated.
-    pub(super) care: bool,
+    pub(super) compensated: bool,
+}
+
+impl Wanted {
+    pub(super) fn new(plan: &Plan, faults: bool) -> Self {
+        Self { stages: plan.stages(), outputs: plan.columns, faults, compensated: plan.is_compensated() }
+    }
 }
 
 /// What a cell's stages leave for later ones, a row each.
@@ -53,24 +127,25 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
     between: &mut [Between],
     cells: &mut [Cells],
 ) {
-    let Wanted { stages, care, .. } = wanted;
+    let Wanted { stages, compensated, .. } = wanted;
     for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
         let (members, kind) = lot(index);
         let mut at = 0;
         while at < lanes {
             let next = at + width::<S>();
-            if care || next >= lanes {
-                for at in [at, next].into_iter().filter(|&at| at < lanes) {
-                    let sums = match care {
-                        true => members.sums_with_care(simd, at, stages.centroid),
-                        false => members.sums(simd, at, stages.centroid),
-                    };
-                    contact(simd, members, &kind, wanted, at, &sums, between, cells);
-                }
+            if next >= lanes {
+                let sums = match compensated {
+                    true => members.sums::<Compensated<S>>(simd, at, stages.centroid),
+                    false => members.sums::<OnePass<S>>(simd, at, stages.centroid),
+                };
+                find_contact(simd, members, &kind, wanted, at, &sums, between, cells);
             } else {
-                let [sums, next_sums] = members.two_sums(simd, at, stages.centroid);
-                contact(simd, members, &kind, wanted, at, &sums, between, cells);
-                contact(simd, members, &kind, wanted, next, &next_sums, between, cells);
+                let [sums, next_sums] = match compensated {
+                    true => members.two_sums::<Compensated<S>>(simd, at, stages.centroid),
+                    false => members.two_sums::<OnePass<S>>(simd, at, stages.centroid),
+                };
+                find_contact(simd, members, &kind, wanted, at, &sums, between, cells);
+                find_contact(simd, members, &kind, wanted, next, &next_sums, between, cells);
             }
             at = next + width::<S>();
         }
@@ -82,7 +157,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
         let (members, kind) = lot(index);
         let mut at = 0;
         while at < lanes {
-            find_centroid(simd, members, &kind, care, at, between, cells);
+            find_centroid(simd, members, &kind, compensated, at, between, cells);
             at += width::<S>();
         }
     }
@@ -104,9 +179,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
                     let [r1, r2, r3, x, y] = kept(simd, at, between);
-                    let line = orientation::line(simd, &touch, &Apart { r: [r1, r2, r3], x, y });
-                    store(simd, line.angle, &mut cells.orientation, at);
-                    say(simd, &line, at, cells);
+                    orientation::finish(simd, &touch, &Apart { r: [r1, r2, r3], x, y }, at, cells);
                 }
                 at += width::<S>();
             }
@@ -118,12 +191,11 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
-                    let axis::Moments { a, b, d } = if care {
-                        members.moments_with_care(simd, at, &touch)
-                    } else {
-                        members.moments(simd, at, &touch)
+                    let moments = match compensated {
+                        true => members.moments::<Compensated<S>>(simd, at, &touch),
+                        false => members.moments::<OnePass<S>>(simd, at, &touch),
                     };
-                    keep(simd, [a, b, d], at, between);
+                    keep(simd, moments, at, between);
                 }
                 at += width::<S>();
             }
@@ -133,11 +205,7 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
             let mut at = 0;
             while at < lanes {
                 if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
-                    let [a, b, d] = kept(simd, at, between);
-                    let (line, anisotropy) = axis::line(simd, &touch, &axis::Moments { a, b, d });
-                    store(simd, line.angle, &mut cells.axis, at);
-                    store(simd, anisotropy, &mut cells.anisotropy, at);
-                    say(simd, &line, at, cells);
+                    axis::finish(simd, &touch, kept(simd, at, between), at, cells);
                 }
                 at += width::<S>();
             }
@@ -148,13 +216,13 @@ pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
 /// Total, contact, peak, area and active; and the centroid's numerators.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "a cell, what it is made of, and where")]
-fn contact<S: Simd, P: Sweep<S>>(
+fn find_contact<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
     kind: &impl Kind<S>,
     wanted: Wanted,
     at: usize,
-    sums: &Sums<S>,
+    sums: &Sums<S, F<S>>,
     between: &mut Between,
     cells: &mut Cells,
 ) {
@@ -170,26 +238,26 @@ fn contact<S: Simd, P: Sweep<S>>(
     }
     store_u(simd, flags, &mut cells.flags, at);
     store_u(simd, present, &mut cells.present, at);
-    store(simd, sums.total, &mut cells.total, at);
+    cells.put(simd, Component::Total, sums.total, at);
     store_u(simd, sums.active, &mut between.active, at);
     store(simd, sums.u, &mut between.u, at);
     store(simd, sums.v, &mut between.v, at);
     if outputs.intersects(Outputs::PEAK | Outputs::AREA) {
         let (peak, area) = members.peak_and_area(simd, at);
-        store(simd, peak, &mut cells.peak, at);
-        store(simd, area, &mut cells.area, at);
+        cells.put(simd, Component::Peak, peak, at);
+        cells.put(simd, Component::Area, area, at);
     }
     if outputs.contains(Outputs::ACTIVE) {
         store_u(simd, sums.active, &mut cells.active, at);
     }
     if !(touched.any_true() && kind.any_charted()) {
-        for column in [&mut cells.orientation, &mut cells.axis, &mut cells.anisotropy] {
-            store(simd, none, column, at);
+        for part in orientation::PARTS.into_iter().chain(axis::PARTS) {
+            cells.put(simd, part, none, at);
         }
     }
     if !touched.any_true() {
-        for column in [&mut cells.u, &mut cells.v, &mut cells.depth] {
-            store(simd, none, column, at);
+        for part in [Component::CentroidU, Component::CentroidV, Component::CentroidDepth] {
+            cells.put(simd, part, none, at);
         }
     }
 }
@@ -200,13 +268,13 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     simd: S,
     members: P,
     kind: &impl Kind<S>,
-    care: bool,
+    compensated: bool,
     at: usize,
     between: &mut Between,
     cells: &mut Cells,
 ) {
     let none = splat(simd, 0.0);
-    let total = load(simd, &cells.total, at);
+    let total = load(simd, &cells[Component::Total], at);
     let touched = total.simd_gt(none);
     if !touched.any_true() {
         return;
@@ -215,21 +283,24 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     let present = load_u(simd, &cells.present, at) | touched.select(found, splat_u(simd, 0));
     store_u(simd, present, &mut cells.present, at);
     let numerators = (load(simd, &between.u, at), load(simd, &between.v, at));
-    let (u, v) = centroid::quotients(simd, total, numerators, touched);
+    let (u, v) = contact::quotients(simd, total, numerators, touched);
     store(simd, u, &mut between.u, at);
     store(simd, v, &mut between.v, at);
     let unit = kind.unit_m(simd, at);
-    store(simd, u * unit, &mut cells.u, at);
-    store(simd, v * unit, &mut cells.v, at);
+    cells.put(simd, Component::CentroidU, u * unit, at);
+    cells.put(simd, Component::CentroidV, v * unit, at);
     let depth = if kind.any_uncharted() {
         let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
-        let sum = if care { members.depth_with_care(simd, at) } else { members.depth(simd, at) };
+        let sum = match compensated {
+            true => members.depth::<Compensated<S>>(simd, at),
+            false => members.depth::<OnePass<S>>(simd, at),
+        };
         let depth = sum / total;
         (touched & !charted).select(depth, none) * unit
     } else {
         none
     };
-    store(simd, depth, &mut cells.depth, at);
+    cells.put(simd, Component::CentroidDepth, depth, at);
 }
 
 /// What is known of touches in charts after the centroid, if there are any of `LEAST` taxels and more.
@@ -241,7 +312,7 @@ fn so_far<S: Simd, const LEAST: u32>(
     between: &Between,
     cells: &Cells,
 ) -> Option<Touch<S>> {
-    let total = load(simd, &cells.total, at);
+    let total = load(simd, &cells[Component::Total], at);
     let touched = total.simd_gt(splat(simd, 0.0));
     let active = load_u(simd, &between.active, at);
     let enough = if LEAST > 1 { touched & active.simd_ge(splat_u(simd, LEAST)) } else { touched };
@@ -273,15 +344,6 @@ fn kept<S: Simd, const N: usize>(simd: S, at: usize, between: &Between) -> [F<S>
         *found = load(simd, row, at);
     }
     found
-}
-
-/// Adds to a cell's flags, and to what it gives.
-#[inline(always)]
-fn say<S: Simd>(simd: S, line: &Line<S>, at: usize, cells: &mut Cells) {
-    let flags = load_u(simd, &cells.flags, at) | line.flags;
-    store_u(simd, flags, &mut cells.flags, at);
-    let present = load_u(simd, &cells.present, at) | line.present;
-    store_u(simd, present, &mut cells.present, at);
 }
 
 /// 1 where `total` is neither under 1 nor so large that squares would be none; the power of two that brings it into [1, 2)

@@ -1,0 +1,399 @@
+//! Every output, once: its name, unit, shape, stage and where its numbers are kept.
+//!
+//! Batches, sinks, the live table, dumps, device readback and the comparison with the reference go by [`COLUMNS`]. A new
+//! output is a row here, and its formulas and bound in its stage's files.
+
+use bitflags::bitflags;
+use bytemuck::{Pod, Zeroable};
+use serde::Serialize;
+
+use super::Flags;
+
+/// An output as data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Column {
+    /// Its bit.
+    pub output: Outputs,
+    /// As `--outputs` and NDJSON spell it.
+    pub name: &'static str,
+    /// What it is measured in.
+    pub unit: Unit,
+    /// Numbers of a value: 1, 2 (along u and v) or 3 (x, y and z).
+    pub components: usize,
+    /// How two values of it are compared.
+    pub measure: Measure,
+    /// The stage that makes it, as in `src/stage`.
+    pub stage: &'static str,
+    /// What it is, in a line.
+    pub help: &'static str,
+    /// Where its components are kept.
+    pub(crate) store: Store,
+    /// What shaders call the override that says in which of a device's columns it is.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "for shaders alone"))]
+    pub(crate) shader_override: &'static str,
+}
+
+/// What an output is measured in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// The unit of P, as the calibration has it.
+    P,
+    /// None: a number, a part or a direction in space.
+    One,
+    /// m.
+    Metre,
+    /// m².
+    SquareMetre,
+    /// rad.
+    Radian,
+    /// m/s.
+    MetrePerSecond,
+}
+
+impl Unit {
+    /// As data files spell it.
+    #[must_use]
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::P => "P",
+            Self::One => "1",
+            Self::Metre => "m",
+            Self::SquareMetre => "m²",
+            Self::Radian => "rad",
+            Self::MetrePerSecond => "m/s",
+        }
+    }
+}
+
+/// How far two values of an output are apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Their difference.
+    Number,
+    /// The angle between two lines, at most π/2.
+    Line,
+    /// The angle between two directions, at most π.
+    Direction,
+    /// Their distance.
+    Vector,
+    /// Their distance, each coordinate having a bound of its own.
+    Place,
+}
+
+/// Where an output's components are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Store {
+    /// Among the counts of pressed taxels.
+    Active,
+    /// One part each, in the precision of the backend.
+    Backend(&'static [Component]),
+    /// Side by side, in double precision on every backend.
+    Host(Host),
+}
+
+/// The type of a percept's quantity, made of its components.
+pub(super) trait Quantity {
+    fn of(components: [f64; 3]) -> Self;
+    fn components(self) -> [f64; 3];
+}
+
+impl Quantity for f64 {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        value
+    }
+
+    fn components(self) -> [f64; 3] {
+        [self, 0.0, 0.0]
+    }
+}
+
+impl Quantity for u32 {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        value as Self
+    }
+
+    fn components(self) -> [f64; 3] {
+        [self.into(), 0.0, 0.0]
+    }
+}
+
+impl Quantity for [f64; 2] {
+    fn of([u, v, _]: [f64; 3]) -> Self {
+        [u, v]
+    }
+
+    fn components(self) -> [f64; 3] {
+        [self[0], self[1], 0.0]
+    }
+}
+
+impl Quantity for [f64; 3] {
+    fn of(components: [f64; 3]) -> Self {
+        components
+    }
+
+    fn components(self) -> [f64; 3] {
+        self
+    }
+}
+
+/// Makes, of one row an output, what is typed: the outputs' bits, the percept's fields, and where numbers are kept.
+macro_rules! columns {
+    ($(
+        #[doc = $help:literal]
+        $output:ident $bit:literal $name:ident: $type:ty, $unit:ident, $measure:ident, $stage:ident,
+            parts [$($part:ident)*] host [$($host:ident)?];
+    )*) => {
+        bitflags! {
+            /// Quantities a percept can hold: what is asked for, and what is present.
+            #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
+            #[repr(transparent)]
+            pub struct Outputs: u32 {
+                $(#[doc = $help] const $output = 1 << $bit;)*
+                /// The separate touches of the field, each with an identity; only on request.
+                const TOUCHES = 1 << 16;
+            }
+        }
+
+        /// One field's percept for one frame. Lengths in metres, angles in radians.
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+        #[non_exhaustive]
+        pub struct Percept {
+            /// Index of the field, as [`crate::Plan::fields`] counts: once for each letter.
+            pub field: usize,
+            /// Which of the run's letters it is of, as [`crate::Plan::letters`] counts.
+            pub letter: usize,
+            /// Whether the field is touched.
+            pub contact: bool,
+            $(
+                #[doc = $help]
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $name: Option<$type>,
+            )*
+            /// Why quantities are absent, or in doubt.
+            pub flags: Flags,
+            /// Whether position and normal are in the world, because the frame carried a pose, or in the field's anchor.
+            pub in_world: bool,
+        }
+
+        impl Percept {
+            /// A percept that has every quantity for which `read` gives components.
+            pub(super) fn with(
+                (field, letter): (usize, usize),
+                flags: Flags,
+                in_world: bool,
+                read: impl Fn(&'static Column) -> Option<[f64; 3]>,
+            ) -> Self {
+                let mut columns = COLUMNS.iter();
+                let mut next = || columns.next().and_then(&read);
+                Self {
+                    field,
+                    letter,
+                    contact: !flags.contains(Flags::NO_CONTACT),
+                    $($name: next().map(Quantity::of),)*
+                    flags,
+                    in_world,
+                }
+            }
+
+            /// The quantity of `column`, its components first, if it is present.
+            #[must_use]
+            pub fn value(&self, column: &Column) -> Option<[f64; 3]> {
+                match column.output {
+                    $(Outputs::$output => self.$name.map(Quantity::components),)*
+                    _ => None,
+                }
+            }
+        }
+
+        /// One component of an output that backends write, or what stages keep beside the outputs.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Component {
+            $($($part,)*)*
+            /// The centroid's third coordinate, for positions.
+            CentroidDepth,
+        }
+
+        impl Component {
+            /// All of them, in their order.
+            pub(crate) const ALL: &'static [Self] = &[$($(Self::$part,)*)* Self::CentroidDepth];
+            pub(crate) const COUNT: usize = Self::ALL.len();
+        }
+
+        /// An output that the host makes in double precision.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Host {
+            $($($host,)?)*
+        }
+
+        impl Host {
+            pub(crate) const ALL: &'static [Self] = &[$($(Self::$host,)?)*];
+            pub(crate) const COUNT: usize = Self::ALL.len();
+        }
+
+        /// Every output but [`Outputs::TOUCHES`], which are a table of their own.
+        pub const COLUMNS: &[Column] = &[$(
+            Column {
+                output: Outputs::$output,
+                name: stringify!($name),
+                unit: Unit::$unit,
+                components: size_of::<$type>().div_ceil(size_of::<f64>()),
+                measure: Measure::$measure,
+                stage: stringify!($stage),
+                help: $help,
+                store: store(&[$(Component::$part),*], &[$(Host::$host)?]),
+                shader_override: concat!(stringify!($output), "_AT"),
+            },
+        )*];
+    };
+}
+
+const fn store(parts: &'static [Component], host: &'static [Host]) -> Store {
+    match (parts, host) {
+        ([], []) => Store::Active,
+        ([], [host, ..]) => Store::Host(*host),
+        (parts, _) => Store::Backend(parts),
+    }
+}
+
+columns! {
+    #[doc = "S = Σ wᵢPᵢ, in the unit of P."]
+    TOTAL 0 total: f64, P, Number, contact, parts [Total] host [];
+    #[doc = "max Pᵢ, in the unit of P."]
+    PEAK 1 peak: f64, P, Number, contact, parts [Peak] host [];
+    #[doc = "Number of taxels with P > 0."]
+    ACTIVE 2 active: u32, One, Number, contact, parts [] host [];
+    #[doc = "Summed area of the taxels with P > 0, m²."]
+    AREA 3 area: f64, SquareMetre, Number, contact, parts [Area] host [];
+    #[doc = "Pressure-weighted mean (u, v) in the field's chart, m (eq. 1–2)."]
+    CENTROID 4 centroid: [f64; 2], Metre, Place, centroid, parts [CentroidU CentroidV] host [];
+    #[doc = "The same point on the surface, m; for a field without a chart the pressure-weighted mean."]
+    POSITION 5 position: [f64; 3], Metre, Vector, position, parts [] host [Position];
+    #[doc = "The outward unit normal there."]
+    NORMAL 6 normal: [f64; 3], One, Vector, position, parts [] host [Normal];
+    #[doc = "Angle of the line through the two farthest points, rad in [0, π) (eq. 9–19)."]
+    ORIENTATION 7 orientation: f64, Radian, Line, orientation, parts [Orientation] host [];
+    #[doc = "Principal axis of the pressure-weighted second moments, rad in [0, π)."]
+    AXIS 8 axis: f64, Radian, Line, axis, parts [Axis] host [];
+    #[doc = "(λ₁ − λ₂)/(λ₁ + λ₂) of those moments, in [0, 1]."]
+    ANISOTROPY 9 anisotropy: f64, One, Number, axis, parts [Anisotropy] host [];
+    #[doc = "(Δu, Δv) of the centroid since the frame before, m (eq. 3–4)."]
+    DISPLACEMENT 10 displacement: [f64; 2], Metre, Vector, motion, parts [DisplacementU DisplacementV] host [];
+    #[doc = "Its direction, rad in (−π, π] (eq. 5)."]
+    DIRECTION 11 direction: f64, Radian, Direction, motion, parts [Direction] host [];
+    #[doc = "Its length, m."]
+    DISTANCE 12 distance: f64, Metre, Number, motion, parts [Distance] host [];
+    #[doc = "Change of the centroid's distance from the chart's origin, m (eq. 6–7): blind to motion around it."]
+    RADIAL_DISTANCE 13 radial_distance: f64, Metre, Number, motion, parts [RadialDistance] host [];
+    #[doc = "Distance over time, m/s."]
+    SPEED 14 speed: f64, MetrePerSecond, Number, motion, parts [Speed] host [];
+    #[doc = "Radial distance over time, m/s (eq. 8)."]
+    RADIAL_SPEED 15 radial_speed: f64, MetrePerSecond, Number, motion, parts [RadialSpeed] host [];
+    #[doc = "(Δu, Δv) since the last centroid that counted, m, where this one counts too; only on request, as is all filtered motion."]
+    FILTERED_DISPLACEMENT 17 filtered_displacement: [f64; 2], Metre, Vector, filter, parts [] host [FilteredDisplacement];
+    #[doc = "The direction of such steps, averaged over time, rad in (−π, π]."]
+    FILTERED_DIRECTION 18 filtered_direction: f64, Radian, Direction, filter, parts [] host [FilteredDirection];
+    #[doc = "The length of such a step over the time that it took, m/s."]
+    FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
+}
+
+impl Outputs {
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`] and [`Outputs::FILTERED`].
+    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED);
+
+    /// Motion that counts, of [`crate::scene::MotionFilter`].
+    pub const FILTERED: Self = Self::of_stage("filter");
+
+    /// What the stage *motion* gives.
+    pub(crate) const MOTION: Self = Self::of_stage("motion");
+
+    /// What stage `stage` gives.
+    pub(crate) const fn of_stage(stage: &str) -> Self {
+        let (mut outputs, mut i) = (Self::empty(), 0);
+        while i < COLUMNS.len() {
+            if is_same(COLUMNS[i].stage.as_bytes(), stage.as_bytes()) {
+                outputs = outputs.union(COLUMNS[i].output);
+            }
+            i += 1;
+        }
+        outputs
+    }
+
+    /// The outputs' names as the command line and NDJSON spell them, in order.
+    pub fn names(self) -> impl Iterator<Item = String> {
+        self.iter_names().map(|(name, _)| name.to_lowercase())
+    }
+
+    /// The one output called `name`, if there is one.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
+    }
+
+    /// The columns of these outputs, in the table's order.
+    pub fn columns(self) -> impl Iterator<Item = &'static Column> {
+        COLUMNS.iter().filter(move |column| self.contains(column.output))
+    }
+}
+
+const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    match (a, b) {
+        ([], []) => true,
+        ([x, a @ ..], [y, b @ ..]) => *x == *y && is_same(a, b),
+        _ => false,
+    }
+}
+
+impl Column {
+    /// What shaders call its bit.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn shader_constant(&self) -> String {
+        self.name.to_uppercase()
+    }
+
+    /// Whether it is in double precision on every backend.
+    #[must_use]
+    pub fn is_double(&self) -> bool {
+        matches!(self.store, Store::Host(_))
+    }
+}
+
+impl Component {
+    /// The column that it is a component of; none for what is kept beside the outputs.
+    pub(crate) fn column(self) -> Option<&'static Column> {
+        COLUMNS.iter().find(|column| matches!(column.store, Store::Backend(parts) if parts.contains(&self)))
+    }
+
+    /// The outputs that it is made for: its own, and those that later stages make of it.
+    pub(crate) fn wanted_for(self) -> Outputs {
+        let place = Outputs::of_stage("position");
+        match self {
+            Self::CentroidU | Self::CentroidV => Outputs::CENTROID | place,
+            Self::CentroidDepth => place,
+            _ => self.column().map_or(Outputs::empty(), |column| column.output),
+        }
+    }
+
+    /// The outputs that it is kept for: also motion, which is made of centroids.
+    pub(crate) fn kept_for(self) -> Outputs {
+        match self {
+            Self::CentroidU | Self::CentroidV => self.wanted_for() | Outputs::MOTION,
+            _ => self.wanted_for(),
+        }
+    }
+
+    /// Whether it is a length, or a length a second: backends count it in the field's own unit of length.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn is_length(self) -> bool {
+        self.column().is_none_or(|column| matches!(column.unit, Unit::Metre | Unit::MetrePerSecond))
+    }
+}
+
+impl Host {
+    /// Its column.
+    pub(crate) fn column(self) -> &'static Column {
+        let column = COLUMNS.iter().find(|column| column.store == Store::Host(self));
+        column.unwrap_or_else(|| unreachable!("every one is of a row"))
+    }
+}

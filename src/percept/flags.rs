@@ -1,0 +1,67 @@
+//! Why quantities are absent, or in doubt.
+
+use bitflags::bitflags;
+use bytemuck::{Pod, Zeroable};
+use serde::{Serialize, Serializer};
+
+bitflags! {
+    /// Why a quantity is absent or in doubt, and what was wrong with the input.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
+    #[repr(transparent)]
+    pub struct Flags: u32 {
+        /// The field is not in contact: everything that needs a touch is absent.
+        const NO_CONTACT = 1 << 0;
+        /// Only one taxel is pressed: there is no line through two points, and no spread.
+        const ONE_TAXEL = 1 << 1;
+        /// The second and third farthest points are as good as equally far (R₂ − R₃ ≤ 2⁻¹⁴ R₁): orientation is in doubt.
+        const TIE = 1 << 2;
+        /// The points that would define a line fall together: orientation (or axis) is absent.
+        const COINCIDENT = 1 << 3;
+        /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
+        const ISOTROPIC = 1 << 4;
+        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion.
+        const STILL = 1 << 5;
+        /// A pressed taxel is above its P_max; its value is kept.
+        const SATURATED = 1 << 6;
+        /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
+        const FAULTY_INPUT = 1 << 7;
+        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept.
+        const OUT_OF_RANGE = 1 << 8;
+        /// A taxel's value is missing and left out of every sum.
+        const INCOMPLETE = 1 << 9;
+        /// The field has no chart: what needs (u, v) is absent.
+        const NO_CHART = 1 << 10;
+        /// There is no previous frame to measure motion from.
+        const NO_PREVIOUS = 1 << 11;
+        /// The time step is zero, negative, or longer than the scene allows.
+        const BAD_DT = 1 << 12;
+        /// The field's channels have not been heard from for too long.
+        const STALE = 1 << 13;
+        /// The field is touched in several places: its centroid may lie where nobody touches.
+        const SEVERAL = 1 << 14;
+        // From here on the host's alone: a word of the device has no room for them.
+        /// The centroid has not come as far as the filter's window from the last one that counted: filtered displacement
+        /// and speed are absent, the filtered direction stays what it was.
+        const HELD = 1 << 16;
+        /// The centroid went farther at once than the filter's window: it is taken for another touch, and filtered motion
+        /// starts anew.
+        const JUMPED = 1 << 17;
+        /// A taxel has been touched for long while too few others were untouched to tell its drift: its baseline is that of
+        /// the onset.
+        const DRIFT_UNKNOWN = 1 << 18;
+    }
+}
+
+impl Flags {
+    /// The flags' names as percept NDJSON spells them, in order.
+    pub fn names(self) -> impl Iterator<Item = String> {
+        self.iter_names().map(|(name, _)| name.to_lowercase())
+    }
+}
+
+/// A list of names.
+impl Serialize for Flags {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.names())
+    }
+}
