@@ -17,7 +17,7 @@ pub(crate) struct CellBound {
     /// Flags that may differ.
     pub(crate) in_doubt: Flags,
     /// By output, as its bit counts; of vectors as distances.
-    limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
+    pub(super) limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
     /// Per coordinate, m.
     pub(crate) centroid: Limit<[f64; 2]>,
     /// Each touch's; lengths in m.

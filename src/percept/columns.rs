@@ -366,13 +366,8 @@ impl Component {
     }
 
     /// The outputs that it is made for: its own, and those that later stages make of it.
-    pub(crate) fn wanted_for(self) -> Outputs {
-        let place = Outputs::of_stage("position");
-        match self {
-            Self::CentroidU | Self::CentroidV => Outputs::CENTROID | place,
-            Self::CentroidDepth => place,
-            _ => self.column().map_or(Outputs::empty(), |column| column.output),
-        }
+    pub(crate) const fn wanted_for(self) -> Outputs {
+        WANTED_FOR[self as usize]
     }
 
     /// The outputs that it is kept for: also motion, which is made of centroids.
@@ -390,10 +385,41 @@ impl Component {
     }
 }
 
+/// By component.
+const WANTED_FOR: [Outputs; Component::COUNT] = {
+    let (mut wanted, mut i) = ([Outputs::empty(); Component::COUNT], 0);
+    while i < COLUMNS.len() {
+        if let Store::Backend(components) = COLUMNS[i].store {
+            let mut k = 0;
+            while k < components.len() {
+                wanted[components[k] as usize] = COLUMNS[i].output;
+                k += 1;
+            }
+        }
+        i += 1;
+    }
+    let place = Outputs::of_stage("position");
+    wanted[Component::CentroidU as usize] = place.union(Outputs::CENTROID);
+    wanted[Component::CentroidV as usize] = place.union(Outputs::CENTROID);
+    wanted[Component::CentroidDepth as usize] = place;
+    wanted
+};
+
 impl Host {
     /// Its column.
-    pub(crate) fn column(self) -> &'static Column {
-        let column = COLUMNS.iter().find(|column| column.store == Store::Host(self));
-        column.unwrap_or_else(|| unreachable!("every one is of a row"))
+    pub(crate) const fn column(self) -> &'static Column {
+        HOST_COLUMNS[self as usize]
     }
 }
+
+/// By what the host makes.
+const HOST_COLUMNS: [&Column; Host::COUNT] = {
+    let (mut columns, mut i) = ([&COLUMNS[0]; Host::COUNT], 0);
+    while i < COLUMNS.len() {
+        if let Store::Host(host) = COLUMNS[i].store {
+            columns[host as usize] = &COLUMNS[i];
+        }
+        i += 1;
+    }
+    columns
+};

@@ -32,7 +32,7 @@ pub(crate) use self::lanes::with_widest;
 use super::{Backend, RawBatch};
 use crate::error::Result;
 use crate::parallel;
-use crate::percept::Percepts;
+use crate::percept::{CellsMut, Percepts};
 use crate::scene::Plan;
 use crate::signal::RawValue;
 
@@ -117,12 +117,19 @@ impl Backend for Cpu {
             all.split_at(raw.first).1.split_at(raw.frames).0
         };
         if raw.frames < LANES {
-            let mut rest = cells.reborrow();
-            for frame in 0..raw.frames {
-                let (mut first, later) = rest.split_at(1);
+            let mut frame = |frame: usize, cells: &mut CellsMut<'_>| {
                 let moment = live::Moment::new(raw, frame, &self.before);
-                self.live.frame(self.level, &self.plan, &self.tiles, &moment, &mut first);
-                rest = later;
+                self.live.frame(self.level, &self.plan, &self.tiles, &moment, cells);
+            };
+            if raw.frames == 1 {
+                frame(0, &mut cells);
+            } else {
+                let mut rest = cells.reborrow();
+                for index in 0..raw.frames {
+                    let (mut first, later) = rest.split_at(1);
+                    frame(index, &mut first);
+                    rest = later;
+                }
             }
         } else {
             let Self { level, plan, tiles, before, .. } = self;
