@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use super::Step;
 use super::reference::{Before, Reference};
+use super::{Backend, RawBatch, Step};
 use crate::percept::{Flags, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
@@ -69,7 +69,7 @@ const INPUT: Flags = Flags::SATURATED
 
 /// What a field's next bound hangs on, beside what its next percept does.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Doubt {
+struct Doubt {
     /// How far the centroid of the frame before may be off, as a distance in the unit.
     place: f64,
     /// That centroid is not known, as it was too close to call and is not in the percepts.
@@ -110,26 +110,62 @@ impl Left {
 }
 
 /// One field in one frame.
-pub(super) struct Cell<'a> {
-    pub(super) index: usize,
-    pub(super) pressures: &'a [Pressure],
-    pub(super) step: &'a Step,
+struct Cell<'a> {
+    index: usize,
+    pressures: &'a [Pressure],
+    step: &'a Step,
     /// What the reference has.
-    pub(super) present: Outputs,
+    present: Outputs,
     /// What the frame before left of it.
-    pub(super) before: Before,
+    before: Before,
     /// Whether what the host remembers goes on, as it does unless the percept is kept.
-    pub(super) advances: bool,
+    advances: bool,
 }
 
-impl Reference {
+/// The reference, which says of every cell how far single precision may be off.
+pub(crate) struct BoundedReference {
+    reference: Reference,
+    /// Per field, how far what the frame before left may be off in single precision.
+    doubts: Vec<Doubt>,
+}
+
+impl BoundedReference {
+    pub(crate) fn new(plan: &Plan) -> Self {
+        Self { reference: Reference::new(plan), doubts: vec![Doubt::default(); plan.fields.len()] }
+    }
+
+    /// Calibrates from now on as `plan` does.
+    pub(crate) fn recalibrate(&mut self, plan: &Plan) {
+        self.reference.recalibrate(plan);
+    }
+
+    /// Runs frame `frame` of `raw`, and says how far single precision may be off in each of its cells. `advances` says
+    /// whether what the host remembers of a field goes on with this frame.
+    pub(crate) fn run(
+        &mut self,
+        raw: &RawBatch<'_>,
+        frame: usize,
+        percepts: &mut Percepts,
+        advances: impl Fn(usize) -> bool,
+    ) -> Vec<CellBound> {
+        let (before, step) = (self.reference.before.clone(), &raw.steps[frame]);
+        let (pressures, present) = self.reference.frame(raw, frame, percepts);
+        let cells = before.into_iter().zip(present).enumerate();
+        cells
+            .map(|(index, (before, present))| {
+                let advances = advances(index);
+                self.bound(&Cell { index, pressures: &pressures, step, present, before, advances })
+            })
+            .collect()
+    }
+
     /// Goes on from what another backend left of field `index`, where the reference cannot tell.
     pub(crate) fn resume(&mut self, index: usize, left: Left) {
-        let field = &self.plan.fields[index];
-        let moves = left.contact && field.charted && self.plan.stages().motion;
+        let field = &self.reference.plan.fields[index];
+        let moves = left.contact && field.charted && self.reference.plan.stages().motion;
         let in_unit = |c: motion::Centroid| motion::Centroid { place: c.place / f64::from(field.unit_m), ..c };
         let centroid = left.centroid.filter(|_| moves).map(in_unit);
-        self.before[index] = Before { contact: left.contact, centroid };
+        self.reference.before[index] = Before { contact: left.contact, centroid };
         (self.doubts[index].place, self.doubts[index].unread) = (0.0, moves && centroid.is_none());
     }
 
@@ -144,7 +180,7 @@ impl Reference {
     }
 
     /// How far single precision may be off in `cell`.
-    pub(super) fn bound(&mut self, cell: &Cell<'_>) -> CellBound {
+    fn bound(&mut self, cell: &Cell<'_>) -> CellBound {
         let mut doubt = std::mem::take(&mut self.doubts[cell.index]);
         let bound = self.bound_after(cell, &mut doubt);
         self.doubts[cell.index] = doubt;
@@ -152,7 +188,7 @@ impl Reference {
     }
 
     fn bound_after(&self, cell: &Cell<'_>, doubt: &mut Doubt) -> CellBound {
-        let (plan, pressures) = (&self.plan, cell.pressures);
+        let (plan, pressures) = (&self.reference.plan, cell.pressures);
         let field = &plan.fields[cell.index];
         let of_members = plan.members_of(field).iter().map(|member| pressures[member.slot as usize]);
         let (flags, in_doubt) = of_members.fold((Flags::empty(), false), |(flags, in_doubt), pressure| {
@@ -161,7 +197,7 @@ impl Reference {
         if in_doubt {
             return CellBound::of_contact(flags);
         }
-        let pressed = self.pressed(field, pressures);
+        let pressed = self.reference.pressed(field, pressures);
         let how = plan.sums(field.count);
         let sums = contact::bound(&pressed, how);
         let mut bound = CellBound { in_doubt: flags, ..CellBound::default() };
@@ -225,13 +261,13 @@ impl Reference {
 
     /// Adds the bounds of orientation and axis about a centroid, which comes with its bound.
     fn lines(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, [c, c_bound]: [DVec2; 2]) {
-        if self.plan.stages().orientation {
+        if self.reference.plan.stages().orientation {
             let line = orientation::bound(pressed, c, c_bound);
             bound.set(line.limits(cell.present));
             bound.in_doubt |= line.in_doubt;
         }
-        if self.plan.stages().axis {
-            let how = self.plan.sums(self.plan.fields[cell.index].count);
+        if self.reference.plan.stages().axis {
+            let how = self.reference.plan.sums(self.reference.plan.fields[cell.index].count);
             let axis = axis::bound(pressed, how, c, c_bound);
             bound.set(axis.limits(cell.present));
             bound.in_doubt |= axis.line.in_doubt;
@@ -240,15 +276,15 @@ impl Reference {
 
     /// Adds the bounds of separate touches.
     fn touches(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, doubt: &mut touches::Doubt) {
-        let field = &self.plan.fields[cell.index];
+        let field = &self.reference.plan.fields[cell.index];
         let pulls = |member: usize, slot: u32, weight: f32| {
             let pressure = cell.pressures[slot as usize];
-            let right = self.plan.weight(field, member);
+            let right = self.reference.plan.weight(field, member);
             let rounding = (f64::from(weight) - right).abs() * (pressure.value + pressure.bound);
             let pressed = pressure.value > 0.0;
             (right * pressure.value, if pressed { right * pressure.bound + rounding } else { 0.0 })
         };
-        let members = self.plan.members_of(field).iter().enumerate();
+        let members = self.reference.plan.members_of(field).iter().enumerate();
         let (pulls, off): (Vec<f64>, Vec<f64>) =
             members.map(|(index, member)| pulls(index, member.slot, member.weight)).unzip();
         let in_doubt = cell.advances && doubt.follow(&field.skin(), &pulls, off);

@@ -1,6 +1,5 @@
 //! Backend `reference`: the stages' own f64, one cell after the other, and the bounds that the others are held to.
 
-use super::bounds::{self, CellBound, Doubt};
 use super::{Backend, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Component, Components, Flags, Outputs, Percepts, Store, Values};
@@ -17,8 +16,6 @@ pub(crate) struct Reference {
     pub(super) before: Vec<Before>,
     /// The raw values of the frame before, by channel.
     raw_before: Vec<RawValue>,
-    /// Per field, how far that may be off in single precision.
-    pub(super) doubts: Vec<Doubt>,
 }
 
 /// What a field's next percept hangs on.
@@ -36,7 +33,6 @@ impl Reference {
             plan: plan.clone(),
             before: vec![Before::default(); fields],
             raw_before: vec![RawValue::MISSING; plan.channels()],
-            doubts: vec![Doubt::default(); fields],
         }
     }
 
@@ -79,28 +75,13 @@ impl Reference {
             .collect()
     }
 
-    /// Runs frame `frame` of `raw`, and says how far single precision may be off in each of its cells. `advances` says
-    /// whether what the host remembers of a field goes on with this frame.
-    pub(crate) fn checked(
+    /// Runs frame `frame` of `raw`; gives its pressures, slot by slot, and what is present in each field.
+    pub(super) fn frame(
         &mut self,
         raw: &RawBatch<'_>,
         frame: usize,
         percepts: &mut Percepts,
-        advances: impl Fn(usize) -> bool,
-    ) -> Vec<CellBound> {
-        let (before, step) = (self.before.clone(), &raw.steps[frame]);
-        let (pressures, present) = self.frame(raw, frame, percepts);
-        let cells = before.into_iter().zip(present).enumerate();
-        cells
-            .map(|(index, (before, present))| {
-                let advances = advances(index);
-                self.bound(&bounds::Cell { index, pressures: &pressures, step, present, before, advances })
-            })
-            .collect()
-    }
-
-    /// Runs frame `frame` of `raw`; gives its pressures, slot by slot, and what is present in each field.
-    fn frame(&mut self, raw: &RawBatch<'_>, frame: usize, percepts: &mut Percepts) -> (Vec<Pressure>, Vec<Outputs>) {
+    ) -> (Vec<Pressure>, Vec<Outputs>) {
         let (fields, step) = (self.plan.fields.len(), &raw.steps[frame]);
         let values: Vec<RawValue> = raw.rows.row(frame).collect();
         let pressures = self.pressures(&values, &self.raw_before, step);
@@ -236,7 +217,6 @@ impl Backend for Reference {
 
     fn restart(&mut self) {
         self.before.fill(Before::default());
-        self.doubts.fill(Doubt::default());
     }
 
     fn recalibrate(&mut self, plan: &Plan) {

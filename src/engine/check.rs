@@ -6,8 +6,7 @@
 //! comparison, to the bit.
 
 use super::host::{Host, Side};
-use crate::backend::bounds::{CellBound, Left};
-use crate::backend::reference::Reference;
+use crate::backend::bounds::{BoundedReference, CellBound, Left};
 use crate::backend::{Backend, RawBatch};
 use crate::error::Result;
 use crate::percept::{Percepts, Precision};
@@ -16,7 +15,7 @@ use crate::signal::Frame;
 
 /// The reference's side of a comparison.
 pub(super) struct Check {
-    pub(super) reference: Reference,
+    pub(super) reference: BoundedReference,
     side: Side,
     pub(super) right: Percepts,
     pub(super) bounds: Vec<CellBound>,
@@ -27,7 +26,7 @@ pub(super) struct Check {
 impl Check {
     pub(super) fn new(plan: &Plan) -> Self {
         Self {
-            reference: Reference::new(plan),
+            reference: BoundedReference::new(plan),
             side: Side::new(plan.fields.len()),
             right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
                 .with_columns(plan.columns, plan.kept_pressures())
@@ -55,7 +54,7 @@ impl Check {
             let left = Left::by(host.plan, percepts, raw.first + offset);
             host.frame(offset, frame, raw, percepts, side);
             let advances = |field| host.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
-            let bounds = self.reference.checked(raw, offset, &mut self.right, advances);
+            let bounds = self.reference.run(raw, offset, &mut self.right, advances);
             host.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
             host.frame(offset, frame, raw, &mut self.right, &mut self.side);
             for (field, bound) in bounds.iter().enumerate() {

@@ -2,6 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// The bit of a cell's status from which on it says which outputs are present.
+#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "for shaders alone"))]
+pub(crate) const PRESENT: u32 = 16;
+
 /// A field of more members than this, or each of its parts, is taken by a whole group of the GPU's invocations. lavapipe ends
 /// an invocation's loops after 65,535 rounds in all, of which a field that is not wide makes three a member at most.
 pub(crate) const WIDE: usize = 4096;

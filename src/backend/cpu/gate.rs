@@ -7,7 +7,8 @@
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
-use super::super::{BLOCK, Rows};
+use super::super::Rows;
+use super::super::raw::TILES_A_BLOCK;
 use super::calibrate::{self, Tile, Tiles};
 use super::lanes::{Aligned, LANES, Lines, Row, load, load_u, width, with_widest};
 use super::read::{OneFrame, Values};
@@ -141,11 +142,11 @@ impl Gate {
         while let Some(tile) = tiles.all.get(index) {
             // Many at once, while they are the same.
             if self.known
-                && index % BLOCK == 0
-                && let Some(values) = raw.straight_block(frame, index / BLOCK)
-                && *values == *self.bits[index..index + BLOCK].as_flattened()
+                && index % TILES_A_BLOCK == 0
+                && let Some(values) = raw.straight_block(frame, index / TILES_A_BLOCK)
+                && *values == *self.bits[index..index + TILES_A_BLOCK].as_flattened()
             {
-                index += BLOCK;
+                index += TILES_A_BLOCK;
                 continue;
             }
             self.tile(simd, plan, (raw, frame), (index, tile), pressures, statuses);

@@ -7,7 +7,7 @@ use super::super::{RawBatch, Rows, Step};
 use super::calibrate::Tiles;
 use super::gate::Gate;
 use super::lanes::{F, LANES, Lines, Row, U, load, load_u, with_widest};
-use super::members::{Cells, Kinds, Members, OneKind, Sample};
+use super::members::{Cells, Kinds, Members, Sample};
 use super::pipeline::{Abreast, Between, Wanted, touch};
 use super::recording::the_one_before;
 use super::wide::{self, Table, Values, Wide};
@@ -36,13 +36,6 @@ impl<'a> Moment<'a> {
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
 
-/// A field that is computed by itself.
-#[derive(Clone, Debug)]
-struct Alone {
-    field: usize,
-    kind: OneKind,
-}
-
 /// Whether `threads` share a frame of `plan`.
 pub(super) fn is_shared(plan: &Plan, threads: usize) -> bool {
     plan.memberships() >= SHARED && threads > 1
@@ -64,7 +57,7 @@ struct Gathered {
 /// The plan laid out for one frame, and the memory for it.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
-    wide: Vec<Alone>,
+    wide: Vec<Table>,
     narrow: Vec<Narrow>,
     /// How many of the narrow are computed together.
     together: usize,
@@ -81,8 +74,6 @@ pub(super) struct Live {
     gate: Option<Gate>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
-    /// Members of the wide fields.
-    tables: Vec<Table>,
     columned: Columned,
 }
 
@@ -112,30 +103,18 @@ impl Live {
             Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
         });
         let threads = crate::parallel::threads();
-        let tables = wide.iter().map(|&field| {
-            let field = &plan.fields[field];
-            let members = plan.members_of(field).iter().zip(&field.depths);
-            Table::new(members.map(|(member, &depth)| {
-                let area = plan.taxels[member.slot as usize].area;
-                (member.slot, [member.weight, member.u, member.v, depth, area])
-            }))
-        });
+        let before = if plan.has_changes() { tiles } else { 0 };
         Self {
-            tables: tables.collect(),
             columned: Columned::new(plan),
             gate,
             everything: vec![true; wide.len() + narrow.len()],
             answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
-            wide: wide.into_iter().map(|field| Alone { field, kind: OneKind::new(&plan.fields[field]) }).collect(),
+            wide: wide.into_iter().map(|field| Table::new(plan, field)).collect(),
             narrow,
             together,
             pressures: Lines::new(tiles + 1, 0.0),
             statuses: Lines::new(tiles + 1, 0),
-            before: if plan.has_changes() {
-                (Lines::new(tiles, 0.0), Lines::new(tiles, 0))
-            } else {
-                (Lines::default(), Lines::default())
-            },
+            before: (Lines::new(before, 0.0), Lines::new(before, 0)),
             gathered: Gathered::default(),
             others: vec![Gathered::default(); if is_shared(plan, threads) { threads - 1 } else { 0 }],
         }
@@ -175,7 +154,6 @@ impl Live {
         let frame = Frame {
             level,
             plan,
-            tables: &self.tables,
             pressures: self.pressures.as_flattened(),
             statuses: self.statuses.as_flattened(),
             faults,
@@ -191,10 +169,8 @@ impl Live {
             let gathered = (&mut self.gathered, &mut self.others[..]);
             frame.shared(fields, (wide, narrow), (stale_wide, stale_narrow), gathered);
         } else {
-            let wide = self.wide.iter().zip(wide).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
-            for (table, ((field, answer), _)) in wide {
-                frame.wide(table, field, &mut self.gathered, answer);
-            }
+            let wide = self.wide.iter().zip(wide).zip(stale_wide).filter(|(_, stale)| **stale);
+            wide.for_each(|((table, answer), _)| frame.wide(table, &mut self.gathered, answer));
             let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
             for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
                 frame.stale(groups, stale, &mut self.gathered, answers);
@@ -227,7 +203,6 @@ impl Live {
 struct Frame<'a> {
     level: Level,
     plan: &'a Plan,
-    tables: &'a [Table],
     pressures: &'a [f32],
     statuses: &'a [u32],
     faults: bool,
@@ -239,13 +214,13 @@ impl Frame<'_> {
     #[inline(never)]
     fn shared(
         &self,
-        (wide, narrow, together): (&[Alone], &[Narrow], usize),
+        (wide, narrow, together): (&[Table], &[Narrow], usize),
         (wide_answers, narrow_answers): (&mut [Cells], &mut [Cells]),
         (stale_wide, stale_narrow): (&[bool], &[bool]),
         (own, others): (&mut Gathered, &mut [Gathered]),
     ) {
         let threads = 1 + others.len();
-        let wide = wide.iter().zip(wide_answers).zip(stale_wide).enumerate().filter(|(_, (_, stale))| **stale);
+        let wide = wide.iter().zip(wide_answers).zip(stale_wide).filter(|(_, stale)| **stale);
         // Several at a time, and yet enough to choose from.
         let some = (narrow.len() / (16 * threads)).next_multiple_of(together).max(together);
         let narrow = narrow.chunks(some).zip(narrow_answers.chunks_mut(some)).zip(stale_narrow.chunks(some));
@@ -253,8 +228,8 @@ impl Frame<'_> {
         let gathered = Tasks::new(std::iter::once(own).chain(others));
         on_threads(threads, || {
             let Some(gathered) = gathered.take() else { return };
-            while let Some((table, ((field, answer), _))) = wide.take() {
-                self.wide(table, field, gathered, answer);
+            while let Some(((table, answer), _)) = wide.take() {
+                self.wide(table, gathered, answer);
             }
             while let Some(((groups, answers), stale)) = narrow.take() {
                 let pieces = groups.chunks(together).zip(answers.chunks_mut(together));
@@ -266,10 +241,10 @@ impl Frame<'_> {
     }
 
     /// A field alone.
-    fn wide(&self, table: usize, field: &Alone, gathered: &mut Gathered, answer: &mut Cells) {
-        let (table, values): (&Table, _) = (&self.tables[table], &mut gathered.values);
+    fn wide(&self, table: &Table, gathered: &mut Gathered, answer: &mut Cells) {
+        let values = &mut gathered.values;
         values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
-        wide::cell(self.level, self.plan, Wide { table, values }, &field.kind, self.faults, answer);
+        wide::cell(self.level, self.plan, Wide { table, values }, self.faults, answer);
     }
 
     /// Those of `groups` that are stale, those side by side together.

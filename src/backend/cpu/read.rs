@@ -9,7 +9,8 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
-use super::super::{ELSEWHERE, Near, Picks, Rows, Shuffle};
+use super::super::Rows;
+use super::super::raw::{ELSEWHERE, Near, Picks, Shuffle};
 use super::lanes::{Aligned, Columns, LANES, Row, store_first, transpose, with_widest};
 
 /// A frame's raw values, tile by tile.

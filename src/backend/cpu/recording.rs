@@ -232,10 +232,8 @@ struct Brief {
 /// How a field's members are gone over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
-    /// One after the other.
-    Narrow {
-        weighted: bool,
-    },
+    Unweighted,
+    Weighted,
     Wide,
 }
 
@@ -243,7 +241,11 @@ impl Brief {
     /// Of all fields of `plan`.
     fn all(plan: &Plan) -> Vec<Self> {
         let of = |field: &PlanField| {
-            let way = if field.is_wide() { Way::Wide } else { Way::Narrow { weighted: !field.unweighted } };
+            let way = match (field.is_wide(), field.unweighted) {
+                (true, _) => Way::Wide,
+                (false, true) => Way::Unweighted,
+                (false, false) => Way::Weighted,
+            };
             Self { first: field.first, count: field.count, way, kind: OneKind::new(field) }
         };
         plan.fields.iter().map(of).collect()
@@ -446,8 +448,8 @@ fn answer<S: Simd>(
                 }
             }
             Way::Wide => answer!(ManyAbreast, true),
-            Way::Narrow { weighted: false } => answer!(Abreast, false),
-            Way::Narrow { weighted: true } => answer!(Abreast, true),
+            Way::Unweighted => answer!(Abreast, false),
+            Way::Weighted => answer!(Abreast, true),
         }
         start += alike;
     }

@@ -5,7 +5,8 @@ use glam::{DAffine3, DVec3};
 
 use super::lanes::{LANES, levels};
 use super::*;
-use crate::backend::{Near, Picks, Rows, Step};
+use crate::backend::raw::{Near, Picks};
+use crate::backend::{Rows, Step};
 use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};

@@ -17,9 +17,11 @@ use crate::scene::Plan;
 use crate::stage::calibrate::UNUSABLE;
 
 /// A wide field's members in rows of [`LANES`], the last one filled up with unpressed ones.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Table {
-    pub(super) slots: Vec<u32>,
+    pub(super) field: usize,
+    kind: OneKind,
+    slots: Vec<u32>,
     weights: Lines<f32>,
     u: Lines<f32>,
     v: Lines<f32>,
@@ -28,26 +30,29 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Of members with slot, weight, u, v, depth and area.
-    pub(super) fn new(members: impl ExactSizeIterator<Item = (u32, [f32; 5])>) -> Self {
-        let rows = members.len().div_ceil(LANES);
+    /// Of field `field`.
+    pub(super) fn new(plan: &Plan, field: usize) -> Self {
+        let of = &plan.fields[field];
+        let rows = of.count.div_ceil(LANES);
         let blank = Lines::new(rows, 0.0);
         let mut table = Self {
-            slots: Vec::with_capacity(members.len()),
+            field,
+            kind: OneKind::new(of),
+            slots: Vec::with_capacity(of.count),
             weights: blank.clone(),
             u: blank.clone(),
             v: blank.clone(),
             depths: blank.clone(),
             areas: blank,
         };
-        for (index, (slot, [weight, u, v, depth, area])) in members.enumerate() {
+        for (index, (member, &depth)) in plan.members_of(of).iter().zip(&of.depths).enumerate() {
             let (row, lane) = (index / LANES, index % LANES);
-            table.slots.push(slot);
-            table.weights[row][lane] = weight;
-            table.u[row][lane] = u;
-            table.v[row][lane] = v;
+            table.slots.push(member.slot);
+            table.weights[row][lane] = member.weight;
+            table.u[row][lane] = member.u;
+            table.v[row][lane] = member.v;
             table.depths[row][lane] = depth;
-            table.areas[row][lane] = area;
+            table.areas[row][lane] = plan.taxels[member.slot as usize].area;
         }
         table
     }
@@ -131,11 +136,11 @@ impl<S: Simd> Members<S> for Wide<'_> {
 
 /// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
 #[inline(never)]
-pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, kind: &OneKind, faults: bool, cells: &mut Cells) {
+pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, faults: bool, cells: &mut Cells) {
     let wanted = Wanted::new(plan, faults);
     let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
     let between = std::slice::from_mut(&mut between);
-    with_widest!(level, simd => touch(simd, |_| (field, kind), 1, wanted, between, cells));
+    with_widest!(level, simd => touch(simd, |_| (field, &field.table.kind), 1, wanted, between, cells));
 }
 
 /// The sum of all lanes, as a tree.

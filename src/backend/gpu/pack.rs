@@ -25,9 +25,8 @@ impl Form {
     /// Bytes of `frames` frames of `channels` values.
     pub(super) fn bytes(self, channels: usize, frames: usize) -> usize {
         match self {
-            Self::Rows => frames * layout::padded_channels(channels) * 4,
+            Self::Rows | Self::One => frames * layout::padded_channels(channels) * 4,
             Self::Quads => layout::padded_quads(frames) * channels * 16,
-            Self::One => channels * 4,
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 
-use super::unpack::PRESENT;
 use crate::percept::COLUMNS;
+use crate::stage::layout::PRESENT;
 
 /// A program's name, the stages that it computes, and its whole WGSL.
 pub(crate) struct Shader {

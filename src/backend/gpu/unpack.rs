@@ -5,10 +5,8 @@ use bytemuck::cast_slice;
 use super::Gpu;
 use super::columns::Column;
 use crate::percept::{CellsMut, Flags, Outputs};
-use crate::stage::layout;
+use crate::stage::layout::{self, PRESENT};
 
-/// The bit of a cell's status from which on it says which quantities are present.
-pub(super) const PRESENT: u32 = 16;
 const FLAG_BITS: u32 = (1 << PRESENT) - 1;
 
 impl Gpu {
