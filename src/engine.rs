@@ -55,7 +55,7 @@ impl Default for Options {
 /// let mut frame = engine.frame(0.0);
 /// frame.values.fill(somatic::RawValue::new(0.0));
 /// frame.values[engine.value_of(4).unwrap()] = somatic::RawValue::new(512.0);
-/// let percepts = engine.process(&[frame])?;
+/// let percepts = engine.process_one(&frame)?;
 /// assert!(percepts.touched(0).all(|percept| percept.total == Some(512.0)));
 /// # Ok(())
 /// # }
@@ -130,7 +130,8 @@ impl Engine {
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures())
-                .with_letters(plan.letters().len()),
+                .with_letters(plan.letters().len())
+                .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
             upkeep,
             side: Side::new(plan.fields.len()),
@@ -241,6 +242,14 @@ impl Engine {
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
         self.advance(frames, None)?;
         Ok(&self.percepts)
+    }
+
+    /// The same for one frame, as on a live robot.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    pub fn process_one(&mut self, frame: &Frame) -> Result<&Percepts> {
+        self.process(std::slice::from_ref(frame))
     }
 
     /// What the last call gave.

@@ -3,19 +3,30 @@
 //! An [`Error`] is one line a person can act on: which file, where in it, what is wrong, what to do. Programs ask it
 //! questions ([`Error::is_usage`], [`Error::is_not_found`]) instead of matching on its insides.
 
-use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
+use std::{fmt, io};
 
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What went wrong, in one line.
-#[derive(Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub struct Error {
     kind: Kind,
     place: Option<String>,
     what: String,
+    cause: Option<Arc<io::Error>>,
 }
+
+/// Equal where they say the same.
+impl PartialEq for Error {
+    fn eq(&self, other: &Self) -> bool {
+        (self.kind, &self.place, &self.what) == (other.kind, &other.place, &other.what)
+    }
+}
+
+impl Eq for Error {}
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -46,17 +57,21 @@ impl Error {
 
     /// An operation on the file at `path` failed in the operating system.
     #[must_use]
-    pub fn io(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
+    pub fn io(path: impl AsRef<Path>, error: &io::Error) -> Self {
         let (kind, what) = match error.kind() {
-            std::io::ErrorKind::NotFound => (Kind::NotFound, "no such file or directory".to_owned()),
-            std::io::ErrorKind::IsADirectory => (Kind::Failed, "this is a folder; name a file".to_owned()),
+            io::ErrorKind::NotFound => (Kind::NotFound, "no such file or directory".to_owned()),
+            io::ErrorKind::IsADirectory => (Kind::Failed, "this is a folder; name a file".to_owned()),
             _ => (Kind::Failed, error.to_string()),
         };
-        Self::new(kind, what).at(path.as_ref().display().to_string())
+        // It cannot be copied, but what it says can.
+        let cause = error
+            .raw_os_error()
+            .map_or_else(|| io::Error::new(error.kind(), error.to_string()), io::Error::from_raw_os_error);
+        Self { cause: Some(Arc::new(cause)), ..Self::new(kind, what) }.at(path.as_ref().display().to_string())
     }
 
     fn new(kind: Kind, what: String) -> Self {
-        Self { kind, place: None, what }
+        Self { kind, place: None, what, cause: None }
     }
 
     /// The same error, told to be at `place` (a file, a row, a key). Called again, the outer place comes first.
@@ -112,7 +127,11 @@ impl fmt::Debug for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.cause.as_deref().map(|cause| cause as _)
+    }
+}
 
 /// The name among `known` that is nearest to `asked`, if one is near enough to be a slip of the hand.
 ///
@@ -141,6 +160,14 @@ mod tests {
         assert_eq!(error.to_string(), "a.csv: row 3: bad value");
         assert_eq!(error.exit_code(), 1);
         assert_eq!(Error::usage("x").exit_code(), 2);
+    }
+
+    #[test]
+    fn an_error_keeps_its_cause() {
+        let error = Error::io("a.csv", &io::Error::from_raw_os_error(2)).at("run");
+        let cause = std::error::Error::source(&error).and_then(|cause| cause.downcast_ref::<io::Error>());
+        assert_eq!(cause.map(io::Error::kind), Some(io::ErrorKind::NotFound));
+        assert!(std::error::Error::source(&Error::usage("x")).is_none());
     }
 
     #[test]

@@ -25,9 +25,9 @@
 //! for id in 0..9 {
 //!     frame.values[engine.value_of(id).unwrap()] = RawValue::new(f64::from(10 * id));
 //! }
-//! let percepts = engine.process(&[frame])?;
+//! let percepts = engine.process_one(&frame)?;
 //! for percept in percepts.touched(0) {
-//!     println!("{:?} N at {:?} m, {:?}", percept.total, percept.position, percept.flags);
+//!     println!("{}: {:?} at {:?} m", percepts.field_name(percept.field), percept.total, percept.position);
 //! }
 //! # Ok(())
 //! # }
@@ -86,6 +86,6 @@ pub use body::Body;
 pub use engine::{Engine, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
-pub use percept::{Flags, Outputs, Percept, Percepts, Precision, Touch};
+pub use percept::{COLUMNS, Column, Flags, Outputs, Percept, Percepts, Precision, Touch};
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};

@@ -1,6 +1,7 @@
 //! A batch of percepts, in columns.
 
 use std::ops::{Index, IndexMut};
+use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
 use super::{Flags, Outputs, Percept, Precision, Touch};
@@ -64,6 +65,8 @@ pub struct Percepts {
     letters: usize,
     /// Taxels whose pressures are kept, 0 unless a stage works on them.
     pub(super) slots: usize,
+    /// By field; none where nobody said them.
+    names: Arc<[String]>,
     pub(crate) first_frame: u64,
     pub(crate) t_s: Vec<f64>,
     pub(crate) in_world: Vec<bool>,
@@ -90,6 +93,7 @@ impl Percepts {
             fields,
             letters: 1,
             slots: 0,
+            names: Arc::default(),
             first_frame: 0,
             t_s: Vec::new(),
             in_world: Vec::new(),
@@ -110,6 +114,12 @@ impl Percepts {
     /// The same, for fields of which each stands there in `letters` letters, one after the other.
     pub(crate) fn with_letters(mut self, letters: usize) -> Self {
         self.letters = letters.max(1);
+        self
+    }
+
+    /// The same, of fields called so.
+    pub(crate) fn with_names(mut self, names: Arc<[String]>) -> Self {
+        self.names = names;
         self
     }
 
@@ -180,6 +190,12 @@ impl Percepts {
     #[must_use]
     pub fn fields(&self) -> usize {
         self.fields
+    }
+
+    /// The name of field `field` ([`Percept::field`]), with its letter where it is there in several.
+    #[must_use]
+    pub fn field_name(&self, field: usize) -> &str {
+        self.names.get(field).map_or("", String::as_str)
     }
 
     /// Number of the batch's frame `frame` since the engine started.

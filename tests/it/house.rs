@@ -1,7 +1,9 @@
 //! The house stays in order: who may use whom, and each heavy dependency behind its one door.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+
+use crate::paths::{Paths, circle};
 
 /// What each module of the crate may use of the others.
 fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
@@ -67,33 +69,95 @@ fn sources() -> Vec<(String, PathBuf, String)> {
         .collect()
 }
 
-/// The crate's own modules that `text` names.
-fn used(text: &str) -> Vec<String> {
-    let code = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n");
-    code.split("crate::")
-        .skip(1)
-        .map(|rest| rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap().to_owned())
-        .collect()
+/// All files but the command's own root, with their tests, which [`Paths`] leaves out.
+fn paths() -> Paths {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&root, &mut files);
+    Paths::of(files.into_iter().filter(|file| !file.ends_with("main.rs")).map(|file| {
+        let text = std::fs::read_to_string(&file).unwrap();
+        (file.strip_prefix(&root).unwrap().to_path_buf(), text)
+    }))
+}
+
+/// The room that a file is of: a folder of `src/`, or a file there.
+fn room(file: &Path) -> &str {
+    file.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs")
 }
 
 #[test]
 fn arrows_point_one_way() {
-    let allowed = allowed();
-    for (module, path, text) in sources() {
-        if ["lib", "main", "cli", "tradeoff"].contains(&module.as_str()) {
+    let (allowed, paths) = (allowed(), paths());
+    for (file, used) in paths.uses() {
+        let room_of = room(file);
+        if ["lib", "cli", "tradeoff"].contains(&room_of) {
             continue;
         }
-        let may = allowed.get(module.as_str()).unwrap_or_else(|| panic!("say in this test what `{module}` may use"));
-        for name in used(&text) {
-            let own = name == module || name.is_empty();
-            assert!(
-                own || may.contains(&name.as_str()),
-                "{} uses crate::{name}; see the arrows in this test",
-                path.display()
-            );
+        let may = allowed.get(room_of).unwrap_or_else(|| panic!("say in this test what `{room_of}` may use"));
+        for other in used {
+            let is_allowed = room(other) == room_of || may.contains(&room(other));
+            assert!(is_allowed, "{} uses {}; see the arrows in this test", file.display(), other.display());
         }
     }
-    assert_eq!(used("use crate::error::Error; // crate::engine\nlet x = crate::body::load();"), ["error", "body"]);
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    /// Rooms in which some files still do.
+    const WITH_CIRCLES: [&str; 10] =
+        ["author", "backend/gpu", "body", "cli", "field", "output", "scene", "signal", "source", "wire"];
+    let paths = paths();
+    let mut uses = paths.uses();
+    for (file, used) in &mut uses {
+        let is_left = |room: &&str| file.starts_with(room);
+        if let Some(room) = WITH_CIRCLES.iter().find(is_left) {
+            used.retain(|other| !other.starts_with(room));
+        }
+    }
+    assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 500, "so many arrows are not seen");
+    if let Some(circle) = circle(&uses) {
+        panic!("these use each other: {circle:?}");
+    }
+}
+
+#[test]
+fn an_arrow_is_seen_however_it_is_written() {
+    let files = |third: &str| {
+        [
+            ("lib.rs", "mod one; mod two; mod three { } pub use one::One;"),
+            ("one.rs", "pub(super) struct One; #[cfg(test)] mod tests { use crate::two::Two; }"),
+            ("two/mod.rs", "mod deep; pub use self::deep::Deep; pub struct Two;"),
+            ("two/deep.rs", "pub struct Deep;"),
+            ("three.rs", third),
+        ]
+        .map(|(path, text)| (PathBuf::from(path), text.to_owned()))
+    };
+    let used_by_third = |text: &str| -> Vec<String> {
+        let paths = Paths::of(files(text));
+        let uses = paths.uses();
+        assert!(uses[Path::new("one.rs")].is_empty(), "what tests use does not count");
+        uses[Path::new("three.rs")].iter().map(|path| path.display().to_string()).collect()
+    };
+    for text in [
+        "use crate::one::One;",
+        "use crate::{one::{One as Other}};",
+        "use super::One;",
+        "fn f(_: &crate::one::One) {}",
+        "fn f() { println!(\"{:?}\", crate::one::One); }",
+        "mod inner { use super::super::one::One; }",
+    ] {
+        assert_eq!(used_by_third(text), ["one.rs"], "{text}");
+    }
+    // What a module hands on is its maker's.
+    assert_eq!(used_by_third("use crate::two::{Deep, Two};"), ["two/deep.rs", "two/mod.rs"]);
+    assert!(used_by_third("pub use crate::one::One; use std::fmt;").is_empty());
+    let paths = Paths::of(
+        [("a.rs", "use crate::{b::B};"), ("b.rs", "use super::c::C;"), ("c.rs", "struct C(super::a::A);")]
+            .map(|(path, text)| (PathBuf::from(path), text.to_owned()))
+            .into_iter()
+            .chain([(PathBuf::from("lib.rs"), String::new())]),
+    );
+    assert_eq!(circle(&paths.uses()).map(|files| files.len()), Some(3));
 }
 
 #[test]

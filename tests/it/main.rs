@@ -24,6 +24,7 @@ mod letters;
 mod lint;
 mod meshes;
 mod motion;
+mod paths;
 mod properties;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]

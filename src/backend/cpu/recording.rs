@@ -129,7 +129,7 @@ impl Recording {
             scratch.in_view.keep_pressures(plan, cells);
         }
         let Scratch { in_view, cells: of_fields, between, faults, .. } = scratch;
-        let skin = Skin::new(plan, in_view);
+        let skin = Skin { plan, pressures: &in_view.pressures, statuses: &in_view.statuses };
         // The last first, as what is written of it may reach into the first ones of the next frame.
         let last = stretch.start_of_last_sixteen();
         for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
@@ -164,7 +164,7 @@ impl Recording {
     }
 }
 
-/// Where the frame before frame `frame` of `rows` is; `before` has the one before the first.
+/// Where the frame before frame `frame` is; `before` has the one before the first.
 pub(super) fn the_one_before<'a>(rows: Rows<'a>, frame: usize, before: &'a [RawValue]) -> (Rows<'a>, usize) {
     match frame.checked_sub(1) {
         Some(last) => (rows, last),
@@ -205,12 +205,6 @@ struct Skin<'a> {
     statuses: &'a [Row<u32>],
 }
 
-impl<'a> Skin<'a> {
-    fn new(plan: &'a Plan, in_view: &'a InView) -> Self {
-        Self { plan, pressures: &in_view.pressures, statuses: &in_view.statuses }
-    }
-}
-
 /// A field's members over sixteen frames; `WEIGHTED` where weights are not all 1.
 #[derive(Clone, Copy)]
 struct OverFrames<'a, const WEIGHTED: bool> {
@@ -241,11 +235,8 @@ impl Brief {
     /// Of all fields of `plan`.
     fn all(plan: &Plan) -> Vec<Self> {
         let of = |field: &PlanField| {
-            let way = match (field.is_wide(), field.unweighted) {
-                (true, _) => Way::Wide,
-                (false, true) => Way::Unweighted,
-                (false, false) => Way::Weighted,
-            };
+            let narrow = if field.unweighted { Way::Unweighted } else { Way::Weighted };
+            let way = if field.is_wide() { Way::Wide } else { narrow };
             Self { first: field.first, count: field.count, way, kind: OneKind::new(field) }
         };
         plan.fields.iter().map(of).collect()
@@ -443,9 +434,7 @@ fn answer<S: Simd>(
         }
         match way {
             _ if rest => {
-                for (cells, brief) in answers.iter_mut().zip(briefs) {
-                    *cells = brief.kind.at_rest();
-                }
+                answers.iter_mut().zip(briefs).for_each(|(cells, brief)| *cells = brief.kind.at_rest());
             }
             Way::Wide => answer!(ManyAbreast, true),
             Way::Unweighted => answer!(Abreast, false),
