@@ -13,7 +13,8 @@ use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
 use somatic::{BackendKind, Body, Engine, Error, Options, OutputPath, Result};
 
-pub(super) use self::settled::{Settled, driver, settled};
+use self::settled::driver;
+pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::input::Input;
