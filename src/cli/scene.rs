@@ -223,7 +223,7 @@ fn output_names(schema: &mut schemars::Schema) {
     schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
 }
 
-fn outputs_help() -> String {
+pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!("Only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
 }
@@ -237,6 +237,11 @@ pub(super) fn output(name: &str) -> Result<Outputs> {
         };
         Error::usage(format!("there is no output `{name}`; {hint}"))
     })
+}
+
+/// All of `named`, or the default outputs where none are.
+pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
+    named.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
 }
 
 impl Asked {
@@ -325,7 +330,7 @@ impl Asked {
 
     /// The outputs that are wanted.
     pub(super) fn outputs(&self) -> Outputs {
-        self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
+        outputs_or_usual(&self.outputs)
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.
