@@ -125,7 +125,23 @@ fn help_teaches_and_names_everything() {
         assert!(help.contains(word), "{word}: {help}");
     }
     assert_eq!(done(&["--version"]), format!("somatic {}\n", env!("CARGO_PKG_VERSION")));
-    assert!(fails(2, &[]).contains("Usage"));
+}
+
+#[test]
+fn the_command_alone_names_what_people_use_first() {
+    let output = output(&[]);
+    assert_eq!((output.status.code(), stderr(&output)), (Some(0), String::new()));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.starts_with("somatic ") && text.lines().count() <= 12, "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let named: Vec<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("  somatic ")?.split_whitespace().next()).collect();
+    assert_eq!(named.len(), 5, "{text}");
+    // Each of them is a command, and help is where it says.
+    for command in named {
+        done(&[command, "--help"]);
+    }
+    assert!(text.contains("somatic --help") && text.contains("somatic run -h"), "{text}");
 }
 
 #[test]
