@@ -12,7 +12,7 @@ use somatic::{Error, Result};
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
 use super::input::Input;
-use super::scene::Asked;
+use super::scene::{Asked, grouped};
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -27,9 +27,9 @@ with every taxel pressed. A stage's time is what a plan with it takes more than 
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// What is asked for, a TOML file; docs/scenes.md [default: the flags alone].
+    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 

@@ -124,6 +124,13 @@ fn help_teaches_and_names_everything() {
     for word in ["--source", "--verify", "Examples:", "centroid", "anisotropy", "Hz", "seconds"] {
         assert!(help.contains(word), "{word}: {help}");
     }
+    let short = done(&["run", "-h"]);
+    let flags = |help: &str| help.lines().filter(|line| line.trim_start().starts_with("--")).count();
+    assert!(flags(&short) == 10 && flags(&help) > 30, "{short}");
+    let headings =
+        ["Options:", "What is computed:", "Recordings:", "Live:", "Accuracy and speed:", "Output:", "Examples:"];
+    let places: Vec<usize> = headings.iter().map(|heading| help.find(&format!("\n{heading}\n")).unwrap()).collect();
+    assert!(places.is_sorted(), "{help}");
     assert_eq!(done(&["--version"]), format!("somatic {}\n", env!("CARGO_PKG_VERSION")));
 }
 
