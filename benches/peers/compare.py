@@ -32,7 +32,7 @@ U = 2.0**-24  # unit roundoff of single precision
 def bench(shape, *more):
     sensors, fields, members, frames = shape
     command = [SOMATIC, "bench", "--sensors", sensors, "--fields", fields, "--members", members, "--frames", frames]
-    command += ["--backend", "cpu", "--json", *more]
+    command += ["--outputs", "centroid,orientation", "--backend", "cpu", "--json", *more]
     done = subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True)
     return json.loads(done.stdout)
 

@@ -214,8 +214,8 @@ fn fill(
             }
             if laid.reached_share < 0.999 {
                 notes.push(format!(
-                    "place `{}`: the grid covers the part of its region that hangs together with the origin, {:.0} % of it; \
-                     give the others a place of their own",
+                    "place `{}`: the grid covers the part of its region that is connected to the origin, {:.0} % of it; write \
+                     a [[place]] for each other part",
                     place.name,
                     100.0 * laid.reached_share
                 ));
@@ -258,8 +258,8 @@ fn without_area(place: &Place, filled: &[Filled], ids: &[u32]) -> Option<String>
     let lone: Vec<u32> = lone.map(|(_, &id)| id).collect();
     (!lone.is_empty()).then(|| {
         format!(
-            "place `{}`: no area for {}, as no other taxel of the place is near on the same part of the surface; a csv can give \
-             it in a column `area`: {}",
+            "place `{}`: no area for {}, as no other taxel of the place is near on the same part of the surface; give it in \
+             the column `area` of a csv: {}",
             place.name,
             if lone.len() == 1 { "1 taxel".to_owned() } else { format!("{} taxels", lone.len()) },
             listed(&lone)
@@ -338,7 +338,11 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
     let loose: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).filter(|id| !held.contains(id)).collect();
     let are = if loose.len() == 1 { "taxel is" } else { "taxels are" };
     (!loose.is_empty()).then(|| {
-        format!("{} {are} in no field, so that nothing is felt there; give them some: {}", loose.len(), listed(&loose))
+        format!(
+            "{} {are} in no field, so that nothing is felt there; put them into a [[fields]]: {}",
+            loose.len(),
+            listed(&loose)
+        )
     })
 }
 

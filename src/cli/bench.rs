@@ -16,7 +16,7 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::run::stop_on_signal;
-use super::scene::output;
+use super::scene::{output, outputs_help, outputs_or_usual};
 use super::words::count;
 use super::{DONE, print, say};
 
@@ -24,8 +24,8 @@ const EXAMPLES: &str = "\
 Examples:
   somatic bench                                               a whole robot, one frame a call
   somatic bench --sensors 7560 --fields 600 --members 24 --frames 9984 --backend cpu
-  somatic bench --outputs total,centroid,axis --json
-  somatic bench --sensors 100000 --wide 100000 --dump arrays  with a field over all of them; check it with your own program
+  somatic bench --outputs centroid,orientation --json         these alone, as JSON
+  somatic bench --sensors 100000 --wide 100000 --dump arrays  a field over all; check it by a program
 
 docs/performance.md has figures and what they were compared with.";
 
@@ -73,9 +73,8 @@ pub(super) struct Arguments {
         .try_map(|name| name.parse::<BackendKind>()))]
     backend: BackendKind,
 
-    /// The quantities computed.
-    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output,
-        default_value = "centroid,orientation")]
+    /// Only these quantities [default: those of `somatic run`].
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     outputs: Vec<Outputs>,
 
     /// Measure so many calls [default: as many as fit into 2 s, at most 20000].
@@ -101,7 +100,7 @@ pub(super) struct Arguments {
 
 pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
     let shape = arguments.shape();
-    let outputs = arguments.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or_default();
+    let outputs = outputs_or_usual(&arguments.outputs);
     shape.check()?;
     check_memory(&shape, outputs)?;
     let files = match &arguments.dump {

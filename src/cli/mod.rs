@@ -51,6 +51,22 @@ const FAILED: u8 = 1;
 /// Exit code: done, but some input was never processed.
 const LOST: u8 = 3;
 
+/// What `somatic` alone prints.
+const GREETING: &str = concat!(
+    "somatic ",
+    env!("CARGO_PKG_VERSION"),
+    ", a sense of touch for whole robots: touch frames in, percepts out
+
+  somatic run         turn touch frames into percepts; alone, on a bundled touch
+  somatic inspect     show the taxels and fields of a body
+  somatic author      put taxels and fields on a mesh
+  somatic calibrate   calibrate the sensors from a rest and a press
+  somatic bench       measure how fast this machine computes percepts
+
+All commands: somatic --help. First flags of one: somatic run -h
+"
+);
+
 const EXAMPLES: &str = "\
 Examples:
   somatic run                                   watch a recorded touch on the bundled hand
@@ -77,10 +93,10 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never pro
 /// It reads where the sensors sit from a glTF body, groups them into receptive fields, and says for every field and
 /// frame where the touch is, how strong, and how it is oriented.
 #[derive(Parser)]
-#[command(name = "somatic", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 100)]
+#[command(name = "somatic", version, after_help = EXAMPLES, max_term_width = 100)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
@@ -107,7 +123,11 @@ enum Command {
 
 /// Does what was asked for and gives the exit code.
 pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
-    match &arguments.command {
+    let Some(command) = &arguments.command else {
+        print(GREETING)?;
+        return Ok(DONE);
+    };
+    match command {
         Command::Run(arguments) => run::run(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Author(arguments) => author::run(arguments),

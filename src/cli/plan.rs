@@ -1,7 +1,6 @@
 //! `somatic plan`: what a scene costs, and what it leaves out.
 
 mod bill;
-mod estimated;
 mod shown;
 mod timed;
 
@@ -13,7 +12,7 @@ use somatic::{Error, Result};
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
 use super::input::Input;
-use super::scene::Asked;
+use super::scene::{Asked, grouped};
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -21,19 +20,16 @@ Examples:
   somatic plan robot.scene.toml
   somatic plan --body humanoid --fields 'left_arm/**' --outputs centroid
   somatic plan robot.scene.toml --json | jq '.stages[] | select(.runs) | [.stage, .us]'
-  somatic plan robot.scene.toml --estimate                   nothing is run, as by EXPLAIN without ANALYZE
   somatic plan --schema > scene.schema.json      for editors that know JSON Schema
 
 Measured times are of now and here, on the source's first frames where it is a recording, else
-with every taxel pressed. A stage's time is what a plan with it takes more than a plan without.
-Estimates are made without running the plan: its counts times what this machine takes for each,
-which is found out once, on other skins, and kept.";
+with every taxel pressed. A stage's time is what a plan with it takes more than a plan without.";
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// What is asked for, a TOML file; docs/scenes.md [default: the flags alone].
+    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
@@ -43,10 +39,6 @@ pub(super) struct Arguments {
     /// Print JSON: bytes of a frame, times of a frame in µs.
     #[arg(long)]
     json: bool,
-
-    /// Measure nothing: give the estimate alone.
-    #[arg(long)]
-    estimate: bool,
 
     /// Print the JSON Schema of scene files, and nothing else.
     #[arg(long)]
@@ -65,7 +57,7 @@ pub(super) fn plan(arguments: &Arguments) -> Result<u8> {
         Some(input) => asked.body_for(input)?,
         None => super::load_body(asked.body.as_deref().unwrap_or("hand"))?,
     };
-    let bill = Bill::of(&asked, input.as_ref(), &body, !arguments.estimate)?;
+    let bill = Bill::of(&asked, input.as_ref(), &body)?;
     print(&if arguments.json { format!("{}\n", bill.json()) } else { bill.text() })?;
     Ok(DONE)
 }

@@ -10,18 +10,18 @@ use somatic::{Calibration, Error, Result};
 /// How boards on serial lines are read.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct LineFlags {
-    /// Which taxel hangs on which channel of which board on a serial line, TOML; docs/wire.md [default: as many boards as
-    /// ports, numbered from 1, share the taxels in ascending order of their ids].
+    /// Which taxel is on which channel of which board, a TOML file; docs/wire.md [default: the boards, one per port,
+    /// share the taxels in ascending order of their ids].
     #[arg(long, value_name = "FILE")]
     pub(super) wiring: Option<PathBuf>,
 
-    /// Frames a second that boards on serial lines are put together to, in Hz; 0 is one at each frame of any board
-    /// [default: one at each frame of the fastest board].
+    /// Merge the boards' frames at this rate, in Hz; 0 gives one for each frame of any board [default: one for each
+    /// frame of the fastest board].
     #[arg(long, value_name = "HZ")]
     pub(super) live_rate: Option<f64>,
 
-    /// Frames a second that boards on serial lines are told to send, in Hz; 0 is as many as the line takes [default: as they
-    /// do].
+    /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
+    /// are].
     #[arg(long, value_name = "HZ")]
     pub(super) board_rate: Option<f64>,
 }

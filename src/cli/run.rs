@@ -22,9 +22,17 @@ use super::keys::{self, Keys};
 use super::lines::Live;
 use super::live::{About, View};
 use super::repeats::Repeats;
-use super::scene::Asked;
+use super::scene::{Asked, grouped};
 use super::tradeoff::{say_kept, settled};
 use super::{DONE, FAILED, LOST, say, words};
+
+const FIRST_EXAMPLES: &str = "\
+Examples:
+  somatic run                                             the bundled touch
+  somatic run --source touch.csv --sink percepts.ndjson   a recording to a file
+  robot-driver | somatic run --body robot.glb --source - | controller
+
+All flags and more examples: somatic run --help";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -38,7 +46,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
   zcat touch.csv.gz | somatic run --body robot.glb --source csv:-
-  somatic run --source mcap:touch.mcap --from 60 --to 90   that minute's half, with the body it was made on
+  somatic run --source mcap:touch.mcap --from 60 --to 90   its second minute's first half
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
 
@@ -46,28 +54,28 @@ A frame on standard input is a line such as
   {\"t\":0.5,\"values\":{\"4\":12.0},\"pose\":{\"hand\":[0.1,0,0.3,0,0,0,1]}}
 t in seconds, raw values by taxel id, and, if links move, where each is in the world: x,y,z in
 metres and a quaternion qx,qy,qz,qw. With --source csv:- it is a row under t,<taxel id>,...
-At a terminal the touched fields are shown until q or Ctrl-C; into a pipe goes a line of JSON a frame.";
+At a terminal a table of the touched fields is shown until q or Ctrl-C; into a pipe goes a line
+of JSON a frame.";
 
 /// Frames a call for recordings, unless told otherwise.
 pub(super) const RECORDED_BATCH: usize = 256;
 
 /// Turn touch frames into percepts, live or from a recording.
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// What is asked for, a TOML file whose keys are the flags below; docs/scenes.md [default: the flags alone].
+    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
     #[command(flatten)]
     asked: Asked,
 
-    /// End after so long, such as 10s.
+    /// Stop after this time, such as 10s.
     #[arg(long = "for", value_name = "TIME")]
     lasts: Option<String>,
 
-    /// Write what became of the frames of boards on serial lines, and how long percepts took, to this file in the end, as
-    /// JSON.
+    /// At the end, write how many frames each board sent and lost, and how long percepts took, to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
 }

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod check;
+mod groups;
 mod said;
 
 use std::path::{Path, PathBuf};
@@ -19,6 +20,7 @@ use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
+pub(super) use self::groups::{first, grouped};
 use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 use super::input::Input;
 use super::ports::LineFlags;
@@ -30,187 +32,192 @@ use super::{attached, load_body};
 #[serde(default, deny_unknown_fields)]
 #[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do; docs/scenes.md")]
 pub(super) struct Asked {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid [default: hand, or a
-    /// simulation's or a recording's own].
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
+    /// hand].
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, serial:PORT[@BAUD], which may be several, or on standard
-    /// input - for NDJSON and csv:- for CSV [default: the bundled touch].
+    /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, one or more serial:PORT[@BAUD], or from
+    /// standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, mcap:FILE, or - for NDJSON on standard output; may be several.
+    /// Where percepts go: ndjson:FILE, mcap:FILE, or - for NDJSON on standard output; may be repeated [default: a table
+    /// at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sinks: Vec<String>,
 
-    /// What computes: double precision (reference), single precision on the CPU, shaders (gpu), or the faster of the last
-    /// two by a measurement [default: auto].
-    #[arg(long, value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
-        .try_map(|name| name.parse::<BackendKind>()))]
-    #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
-    pub(super) backend: Option<BackendKind>,
-
-    /// Only these quantities [default: all but touches and filtered_*].
-    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
-    #[serde(deserialize_with = "outputs")]
-    #[schemars(with = "Vec<String>", transform = output_names)]
-    pub(super) outputs: Vec<Outputs>,
-
-    /// Only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be several.
+    /// Compute only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be repeated.
     #[arg(long, value_name = "GLOB")]
     #[serde(deserialize_with = "texts")]
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// List fields without contact too.
-    #[arg(long)]
-    pub(super) all_fields: bool,
+    /// Compute only these quantities [default: all but touches and filtered_*].
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
+    #[serde(deserialize_with = "outputs")]
+    #[schemars(with = "Vec<String>", transform = output_names)]
+    pub(super) outputs: Vec<Outputs>,
 
-    /// The robot's calibration, a TOML file; without one, pressures are the raw values [default: a simulation's own, or what
-    /// lies in the recording beside the body, if that is used].
+    /// The calibration of the sensors, a TOML file; without one, pressures are raw values [default: the source's own,
+    /// if it has one].
     #[arg(long, value_name = "FILE")]
     pub(super) calibration: Option<PathBuf>,
 
-    /// What of the sensors' pressures is looked at: how hard they are pressed (sustained), or how fast that changes, per
-    /// second (change). Every field is there once for each [default: sustained].
-    #[arg(long, value_name = "LETTER,...", value_delimiter = ',',
+    /// What computes: reference in double precision, cpu or gpu in single precision, or auto, the faster of cpu and gpu
+    /// [default: auto].
+    #[arg(long, hide_possible_values = true,
+        value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
+        .try_map(|name| name.parse::<BackendKind>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
+    pub(super) backend: Option<BackendKind>,
+
+    /// Play a recording at this many times its own speed [default: as fast as possible].
+    #[arg(long, value_name = "X")]
+    pub(super) speed: Option<f64>,
+
+    /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
+    #[arg(long)]
+    pub(super) verify: bool,
+
+    /// Replace output files that exist; a file that is read is never replaced.
+    #[arg(long)]
+    pub(super) force: bool,
+
+    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each [default:
+    /// sustained].
+    #[arg(long, hide_possible_values = true, value_name = "LETTER,...", value_delimiter = ',',
         value_parser = PossibleValuesParser::new(["sustained", "change"]).try_map(|name| name.parse::<Receptor>()))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) letters: Vec<Receptor>,
 
-    /// Which signal force-sensing resistors deliver (raw, linear), instead of what the calibration says; with both, every
-    /// field is there once for each.
-    #[arg(long, value_name = "SIGNAL,...", value_delimiter = ',',
+    /// Compute from the raw or linear signal of force-sensing resistors, not the one in the calibration; with both,
+    /// every field is computed once from each.
+    #[arg(long, hide_possible_values = true, value_name = "SIGNAL,...", value_delimiter = ',',
         value_parser = PossibleValuesParser::new(["raw", "linear"]).try_map(|name| name.parse::<FsrSignal>()))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) signal: Vec<FsrSignal>,
 
-    /// Take the first frame's values as the baselines; only for a robot that nothing touches at the start.
+    /// Take the first frame's values as the sensors' baselines; nothing may touch the robot then.
     #[arg(long)]
     pub(super) tare: bool,
 
-    /// End with an error at the first taxel on standard input that the body does not have [default: its values are left
-    /// out, and the exit code is 3].
-    #[arg(long)]
-    pub(super) strict: bool,
-
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
-    #[serde(rename = "rate_hz")]
-    pub(super) rate: Option<f64>,
-
-    /// Which taxel hangs on which channel of which board on a serial line, TOML; docs/wire.md [default: as many boards as
-    /// ports, numbered from 1, share the taxels in ascending order of their ids].
-    #[arg(long, value_name = "FILE")]
-    pub(super) wiring: Option<PathBuf>,
-
-    /// Frames a second that boards on serial lines are put together to, in Hz; 0 is one at each frame of any board
-    /// [default: one at each frame of the fastest board].
-    #[arg(long, value_name = "HZ")]
-    #[serde(rename = "live_rate_hz")]
-    pub(super) live_rate: Option<f64>,
-
-    /// Frames a second that boards on serial lines are told to send, in Hz; 0 is as many as the line takes [default: as they
-    /// do].
-    #[arg(long, value_name = "HZ")]
-    #[serde(rename = "board_rate_hz")]
-    pub(super) board_rate: Option<f64>,
-
-    /// Frames a call, at most: more is faster, fewer is sooner [default: 256 for recordings, 1 live].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    #[serde(deserialize_with = "batch")]
-    #[schemars(range(min = 1, max = 65536))]
-    pub(super) batch: Option<u32>,
-
-    /// Play a recording at this many times the speed it was made at [default: as fast as possible].
-    #[arg(long, value_name = "X")]
-    pub(super) speed: Option<f64>,
-
-    /// Play a recording from this time on, in seconds after its start [default: 0].
-    #[arg(long, value_name = "S")]
-    #[serde(rename = "from_s")]
-    pub(super) from: Option<f64>,
-
-    /// Play a recording up to this time, in seconds after its start [default: its end].
-    #[arg(long, value_name = "S")]
-    #[serde(rename = "to_s")]
-    pub(super) to: Option<f64>,
-
-    /// Play a recording so many times, or without N until interrupted; its time goes on.
-    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
-    #[serde(rename = "loop")]
-    pub(super) repeat: Option<u64>,
-
-    /// What mcap:FILE holds: frames as they came, percepts, and what viewers show (view) [default: all].
-    #[arg(long, value_name = "PART,...", value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<Part>()))]
-    #[serde(deserialize_with = "words")]
-    #[schemars(with = "OneOrMany")]
-    pub(super) record: Vec<Part>,
-
-    /// Replace the files that are written if they are there.
-    #[arg(long)]
-    pub(super) force: bool,
-
-    /// How long a value that frames leave out stays what it was, in seconds, before it counts as missing [default: 0; for
-    /// boards on serial lines three of their frames, and at least 0.05].
-    #[arg(long, value_name = "S")]
-    #[serde(rename = "max_age_s")]
-    pub(super) max_age: Option<f64>,
+    /// Frame of positions and normals: the world where frames carry poses, or always the field's anchor [default:
+    /// world].
+    #[arg(long, hide_possible_values = true, value_name = "FRAME",
+        value_parser = PossibleValuesParser::new(Coordinates::WORDS)
+        .try_map(|name| name.parse::<Coordinates>()))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
+    pub(super) coordinates: Option<Coordinates>,
 
     /// The longest time between two frames over which motion is measured, in seconds [default: 10].
     #[arg(long, value_name = "S")]
     #[serde(rename = "max_gap_s")]
     pub(super) max_gap: Option<f64>,
 
-    /// Which motion counts, for the filtered_* outputs: the centroid's way from where it last counted. What is shorter is
-    /// held back until it has added up, so that slow motion passes and jitter does not; what is longer is another touch.
-    /// Either end may be left out [default: from 1/16 of the spacing of a field's taxels to 3 times that].
+    /// How far a centroid must move until the filtered_* outputs count it, and how far it moves at most within one
+    /// touch, such as 0.5mm..20mm; either end may be left out [default: 1/16 and 3 times the spacing of the field's
+    /// taxels].
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
     #[serde(deserialize_with = "window")]
     pub(super) filter_window: Option<String>,
 
-    /// What that window measures: the way, or the paper's change of the distance from the chart's origin, which is blind to
-    /// motion around it [default: distance].
-    #[arg(long, value_name = "MEASURE", value_parser = PossibleValuesParser::new(["distance", "radial"])
+    /// What --filter-window measures: how far the centroid moves (distance), or how much its distance from the chart's
+    /// origin changes, as in the paper (radial) [default: distance].
+    #[arg(long, hide_possible_values = true, value_name = "MEASURE",
+        value_parser = PossibleValuesParser::new(["distance", "radial"])
         .try_map(|name| name.parse::<FilterBy>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = ["distance", "radial"]))]
     pub(super) filter_by: Option<FilterBy>,
 
-    /// How long filtered_direction takes to turn (its time constant), in seconds; 0 is at once [default: 0.1].
+    /// Time constant of filtered_direction, in seconds; 0 follows at once [default: 0.1].
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
+
+    /// Play a recording from this time after its start, in seconds [default: 0].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "from_s")]
+    pub(super) from: Option<f64>,
+
+    /// Play a recording up to this time after its start, in seconds [default: its end].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "to_s")]
+    pub(super) to: Option<f64>,
+
+    /// Play a recording N times, or without N until interrupted; its time goes on.
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    #[serde(rename = "loop")]
+    pub(super) repeat: Option<u64>,
+
+    /// Frames per second of a CSV recording without a column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "rate_hz")]
+    pub(super) rate: Option<f64>,
+
+    /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
+    #[arg(long, hide_possible_values = true, value_name = "PART,...", value_delimiter = ',',
+        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<Part>()))]
+    #[serde(deserialize_with = "words")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) record: Vec<Part>,
+
+    /// How long a taxel that frames leave out keeps its value, in seconds; after that it counts as missing [default: 0;
+    /// for boards three of their frames, and at least 0.05].
+    #[arg(long, value_name = "S")]
+    #[serde(rename = "max_age_s")]
+    pub(super) max_age: Option<f64>,
+
+    /// Fail at the first taxel on standard input that the body does not have [default: leave its values out and exit
+    /// with 3].
+    #[arg(long)]
+    pub(super) strict: bool,
+
+    /// Which taxel is on which channel of which board, a TOML file; docs/wire.md [default: the boards, one per port,
+    /// share the taxels in ascending order of their ids].
+    #[arg(long, value_name = "FILE")]
+    pub(super) wiring: Option<PathBuf>,
+
+    /// Merge the boards' frames at this rate, in Hz; 0 gives one for each frame of any board [default: one for each
+    /// frame of the fastest board].
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "live_rate_hz")]
+    pub(super) live_rate: Option<f64>,
+
+    /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
+    /// are].
+    #[arg(long, value_name = "HZ")]
+    #[serde(rename = "board_rate_hz")]
+    pub(super) board_rate: Option<f64>,
 
     #[command(flatten)]
     #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
     pub(super) accuracy: Accuracy,
 
-    /// By how much a pressure may change, in its unit, until its fields are computed again, with --coverage touched; what
-    /// goes to 0 or comes from it always counts [default: 0, the same percepts to the last bit].
+    /// With --coverage touched: compute fields again only when a pressure changes by more than this, in its unit, or to
+    /// or from 0 [default: 0].
     #[arg(long, value_name = "P")]
     pub(super) change_threshold: Option<f64>,
 
-    /// In which frame positions and normals are given: the world where frames carry poses, or each field's anchor whatever
-    /// they carry [default: world].
-    #[arg(long, value_name = "FRAME", value_parser = PossibleValuesParser::new(Coordinates::WORDS)
-        .try_map(|name| name.parse::<Coordinates>()))]
-    #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
-    pub(super) coordinates: Option<Coordinates>,
+    /// Compute at most this many frames in one call: more is faster, fewer is sooner [default: 256 for recordings, 1
+    /// live].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[serde(deserialize_with = "batch")]
+    #[schemars(range(min = 1, max = 65536))]
+    pub(super) batch: Option<u32>,
 
-    /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
+    /// Write fields without contact too.
     #[arg(long)]
-    pub(super) verify: bool,
+    pub(super) all_fields: bool,
 
     /// Show no table, progress or remarks.
     #[arg(short, long)]
@@ -223,9 +230,9 @@ fn output_names(schema: &mut schemars::Schema) {
     schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
 }
 
-fn outputs_help() -> String {
+pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
-    format!("Only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
+    format!("Compute only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
 }
 
 pub(super) fn output(name: &str) -> Result<Outputs> {
@@ -237,6 +244,11 @@ pub(super) fn output(name: &str) -> Result<Outputs> {
         };
         Error::usage(format!("there is no output `{name}`; {hint}"))
     })
+}
+
+/// All of `named`, or the default outputs where none are.
+pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
+    named.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
 }
 
 impl Asked {
@@ -325,7 +337,7 @@ impl Asked {
 
     /// The outputs that are wanted.
     pub(super) fn outputs(&self) -> Outputs {
-        self.outputs.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
+        outputs_or_usual(&self.outputs)
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.

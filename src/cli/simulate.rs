@@ -11,7 +11,7 @@ use super::{DONE, say};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic simulate examples/simulations/rod.toml -o rod.csv     also rod.truth.csv and rod.calibration.toml
+  somatic simulate examples/simulations/rod.toml -o rod.csv     and truth, and calibration
   somatic run --source rod.csv --calibration rod.calibration.toml --sink ndjson:percepts.ndjson
   somatic run --source sim:examples/simulations/rod.toml        without a file in between
 

@@ -13,13 +13,14 @@ use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
 use somatic::{BackendKind, Body, Engine, Error, Options, OutputPath, Result};
 
-pub(super) use self::settled::{Settled, driver, settled};
+use self::settled::driver;
+pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::input::Input;
 use super::plot::Plot;
 use super::run::{RECORDED_BATCH, stop_on_signal};
-use super::scene::Asked;
+use super::scene::{Asked, first, grouped};
 use super::table::{plain, right, shown};
 use super::words::{count, number};
 use super::{DONE, FAILED, print, say};
@@ -28,8 +29,8 @@ const EXAMPLES: &str = "\
 Examples:
   somatic tradeoff                                       the bundled touch on the bundled hand
   somatic tradeoff --source sim:examples/simulations/rod.toml --plot rod.svg     against the truth
-  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write             the fastest that is so true
-  somatic tradeoff robot.scene.toml --budget 100us                               the truest that is so fast
+  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write   the fastest that is so true
+  somatic tradeoff robot.scene.toml --budget 100us                     the truest that is so fast
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
 Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is
@@ -44,9 +45,9 @@ const VALUES: usize = 1 << 24;
 
 /// Measure speed against accuracy, knob by knob, on your own body, recording and machine.
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
 pub(super) struct Arguments {
-    /// What is asked for, a TOML file; docs/scenes.md [default: the flags alone].
+    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 

@@ -83,38 +83,46 @@ impl fmt::Display for NoChart {
         match self {
             Self::SeveralLinks(count) => write!(f, "its taxels sit on {count} links that move against each other"),
             Self::Wraps(angle) => {
-                write!(f, "it wraps around: a normal lies {:.0}° from the mean, over 75°; split it", angle.to_degrees())
+                let angle = angle.to_degrees();
+                write!(
+                    f,
+                    "it wraps around: a taxel's normal is {angle:.0}° from the mean, and 75° is the limit; split it"
+                )
             }
             Self::ByChoice => f.write_str("the layout asks for none"),
             Self::Unplaced(count) => {
-                write!(f, "it is to be geodesic, and {count} of its taxels have no (u, v); lay it again")
+                write!(
+                    f,
+                    "its chart is geodesic, and {count} of its taxels have no (u, v); lay it with `somatic author`"
+                )
             }
             Self::NoTaxels => f.write_str("it has no taxels of its own; list those that it is to chart"),
             Self::NoSurface => f.write_str("there is no surface to measure ways on; add the mesh"),
             Self::Unreachable(taxel, count) => {
-                write!(f, "no way over the surface leads from its origin to taxel {taxel}")?;
+                write!(f, "no path on the surface leads from its origin to taxel {taxel}")?;
                 if *count > 1 {
-                    write!(f, ", nor to {} more", count - 1)?;
+                    write!(f, " and {} more", count - 1)?;
                 }
                 f.write_str("; split it, or join the parts of the mesh")
             }
-            Self::CutLocus { taxel, distance_m, apart_rad } => write!(
+            Self::CutLocus { taxel, distance_m, .. } => write!(
                 f,
-                "it meets itself around a limb or a knob: to taxel {taxel}, {:.1} mm away, two ways lead that leave {:.0}° \
-                 apart; split it",
-                distance_m * 1e3,
-                apart_rad.to_degrees()
+                "it goes all the way around a limb or a knob: two paths lead to taxel {taxel}, {:.1} mm away, one on each \
+                 side; split it",
+                distance_m * 1e3
             ),
-            Self::Torn(a, b, times) => {
-                write!(f, "it meets itself: taxels {a} and {b} would be {times:.1} times too far apart; split it")
-            }
+            Self::Torn(a, b, times) => write!(
+                f,
+                "it goes all the way around: taxels {a} and {b}, which are neighbours, would be {times:.1} times too far \
+                 apart; split it"
+            ),
             Self::Bent(taxel, bend) => write!(
                 f,
-                "the way to taxel {taxel} bends by {:.0}° around a hole or the surface's edge; split it",
+                "the path to taxel {taxel} turns by {:.0}° around a hole or the surface's edge; split it",
                 bend.to_degrees()
             ),
             Self::TooRough(why) => f.write_str(why),
-            Self::Untrue(most) => write!(f, "its truest chart is up to {:.0} % off", most * 100.0),
+            Self::Untrue(most) => write!(f, "distances in its best chart are up to {:.0} % off", most * 100.0),
         }
     }
 }

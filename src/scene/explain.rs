@@ -20,8 +20,6 @@ pub struct PlannedStage {
     pub over: usize,
     /// Memberships that it goes over, once or several times; 0 where it works on what others found.
     pub memberships: usize,
-    /// Of these, those in fields of so many members that the CPU takes them by themselves.
-    pub wide: usize,
     /// Bytes that a frame brings to it, and that it adds to what comes back from a device.
     pub bytes: [usize; 2],
 }
@@ -35,17 +33,15 @@ impl Plan {
         let charted = |field: &PlanField| field.charted;
         let of = |which: &dyn Fn(&PlanField) -> bool| {
             let chosen = self.fields.iter().filter(|field| which(field));
-            chosen.fold((0, 0, 0), |(fields, memberships, wide), field| {
-                (fields + 1, memberships + field.count, wide + if field.is_wide() { field.count } else { 0 })
-            })
+            chosen.fold((0, 0), |(fields, memberships), field| (fields + 1, memberships + field.count))
         };
-        let slots = (self.calibrated(), 0, 0);
-        let found = (of(&all).0, 0, 0);
-        let found_charted = (of(&charted).0, 0, 0);
+        let slots = (self.calibrated(), 0);
+        let found = (of(&all).0, 0);
+        let found_charted = (of(&charted).0, 0);
         // Of each stage whether it runs, what it goes over, and why it might not.
         let rows = [
             ("calibrate", true, slots, ""),
-            ("change", self.has_changes(), (self.slots() - slots.0, 0, 0), "no letter is `change`"),
+            ("change", self.has_changes(), (self.slots() - slots.0, 0), "no letter is `change`"),
             ("contact", true, of(&all), ""),
             ("centroid", stages.centroid, of(&all), ""),
             ("orientation", stages.orientation, of(&charted), ""),
@@ -56,7 +52,7 @@ impl Plan {
             ("touches", stages.touches, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
         ];
-        let row = |&(name, runs, (over, memberships, wide), idle): &(&'static str, bool, (_, _, _), &str)| {
+        let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
             let asked: Vec<String> = (self.outputs() & gives).names().collect();
             let why = match (runs, asked.is_empty(), idle.is_empty()) {
@@ -73,7 +69,6 @@ impl Plan {
                 gives,
                 over: if runs { over } else { 0 },
                 memberships: if runs { memberships } else { 0 },
-                wide: if runs { wide } else { 0 },
                 bytes: [if name == "calibrate" { self.bytes_up() } else { 0 }, self.bytes_from(name)],
             }
         };
@@ -184,7 +179,5 @@ mod tests {
             assert_eq!([sum(0), sum(1)], [plan.bytes_up(), plan.bytes_down()], "{outputs:?}");
             assert!(stages.iter().all(|stage| stage.runs || stage.bytes == [0, 0]), "{outputs:?}");
         }
-        let contact = &plan(Outputs::TOTAL, &[]).explain()[2];
-        assert!(0 < contact.wide && contact.wide < contact.memberships, "{contact:?}");
     }
 }

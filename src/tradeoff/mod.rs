@@ -1,13 +1,12 @@
 //! What each knob costs and gives, measured on a body, a recording and a machine; and the pick for a tolerance or a budget.
-//! What a plan should cost before it is measured, by rates that a machine is known by.
 //!
 //! Combinations of knobs take turns, so that a machine that slows down slows all of them. Each one's percepts are compared
 //! with those of the reference in the layout's own charts, and with the truth where a source knows it.
 
 mod errors;
+mod ladder;
 mod measure;
 mod plot;
-mod rates;
 mod store;
 mod wish;
 
@@ -16,10 +15,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 pub use errors::Errors;
+pub use ladder::{Rung, ladder};
 pub use measure::{Manner, Played, measure};
 pub use plot::{plot_png, plot_svg};
-pub use rates::{Rates, Rung, ladder};
-pub use store::{Found, Store, Stored, StoredRates, day};
+pub use store::{Found, Store, Stored, day};
 pub use wish::{Pick, Wish, angle, length, time};
 
 use crate::backend::BackendKind;

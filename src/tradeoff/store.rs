@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Rates, Report};
+use super::Report;
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
@@ -43,16 +43,6 @@ pub struct Stored {
     pub taken_at_s: u64,
     /// What was measured.
     pub report: Report,
-}
-
-/// Rates that were kept.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StoredRates {
-    key: Key,
-    /// When they were learned, s since 1970.
-    pub taken_at_s: u64,
-    /// What was learned.
-    pub rates: Rates,
 }
 
 /// What a look into a store finds.
@@ -130,28 +120,6 @@ impl Store {
         self.write(&self.file(body, options), &stored)
     }
 
-    /// Where rates are kept of what `of` says in words, such as a backend.
-    #[must_use]
-    pub fn rates_file(&self, of: &str) -> PathBuf {
-        self.folder.join(format!("rates-{:016x}.json", hash(&[of])))
-    }
-
-    /// The rates of `of`, if there are any that hold on this machine with this `driver`.
-    #[must_use]
-    pub fn rates(&self, of: &str, driver: &str) -> Option<StoredRates> {
-        let text = std::fs::read_to_string(self.rates_file(of)).ok()?;
-        serde_json::from_str::<StoredRates>(&text).ok().filter(|stored| stored.key == Key::of_rates(of, driver))
-    }
-
-    /// Keeps `rates`, in place of any before.
-    ///
-    /// # Errors
-    /// They cannot be written.
-    pub fn keep_rates(&self, of: &str, driver: &str, rates: &Rates) -> Result<()> {
-        let stored = StoredRates { key: Key::of_rates(of, driver), taken_at_s: now_s(), rates: rates.clone() };
-        self.write(&self.rates_file(of), &stored)
-    }
-
     fn write(&self, path: &Path, stored: &impl Serialize) -> Result<()> {
         let text = serde_json::to_string_pretty(stored).map_err(|e| Error::failed(e.to_string()))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -171,22 +139,13 @@ impl Key {
         let laid = format!("{:?} {:?} {:?}", body.taxels, body.fields, body.links);
         let calibration = options.calibration.as_ref().map(|calibration| format!("{calibration:?}"));
         let scene = [&asked(options), calibration.as_deref().unwrap_or_default()];
-        Self::of(format!("{:016x}", hash(&[&laid])), format!("{:016x}", hash(&scene)), driver)
-    }
-
-    /// Rates hang on no body.
-    fn of_rates(of: &str, driver: &str) -> Self {
-        Self::of(String::new(), of.to_owned(), driver)
-    }
-
-    fn of(body: String, scene: String, driver: &str) -> Self {
         Self {
             version: VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
             machine: machine(),
             driver: driver.to_owned(),
-            body,
-            scene,
+            body: format!("{:016x}", hash(&[&laid])),
+            scene: format!("{:016x}", hash(&scene)),
         }
     }
 }
@@ -278,23 +237,5 @@ mod tests {
         assert!(why(find(&body, &options, "a")).contains("another version"));
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();
         assert!(why(find(&body, &options, "a")).contains("damaged"));
-    }
-
-    #[test]
-    fn rates_that_are_kept_hold_for_what_they_were_learned_of() {
-        let folder = tempfile::tempdir().unwrap();
-        let store = Store::at(folder.path().join("new"));
-        let rates = Rates::learn(crate::BackendKind::Cpu, None, 1).unwrap();
-        assert!(store.rates("cpu, 1", "a").is_none());
-        store.keep_rates("cpu, 1", "a", &rates).unwrap();
-        assert_eq!(store.rates("cpu, 1", "a").map(|stored| stored.rates), Some(rates));
-        assert!(store.rates("cpu, 1", "b").is_none(), "with another driver");
-        assert!(store.rates("cpu, 256", "a").is_none(), "of something else");
-        let path = store.rates_file("cpu, 1");
-        let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 0")).unwrap();
-        assert!(store.rates("cpu, 1", "a").is_none());
-        std::fs::write(&path, &text[..text.len() / 2]).unwrap();
-        assert!(store.rates("cpu, 1", "a").is_none());
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::{code_of, done, fails, files_in, somatic, stderr, text_of};
+use super::{code_of, done, fails, files_in, frames, somatic, stderr, text_of};
 
 const SMALL: [&str; 9] = ["bench", "--sensors", "60", "--fields", "8", "--members", "5", "--calls", "5"];
 
@@ -101,7 +101,8 @@ fn a_dump_is_what_the_equations_give() {
     let folder = tempfile::tempdir().unwrap();
     for (backend, u) in [("reference", 0.5 * f64::EPSILON), ("cpu", 0.5 * f64::from(f32::EPSILON))] {
         let out = folder.path().join(backend);
-        done(&with(&["--frames", "20", "--wide", "60", "--backend", backend, "--dump", text_of(&out)]));
+        let pair = ["--outputs", "centroid,orientation", "--backend", backend];
+        done(&with(&[&["--frames", "20", "--wide", "60"][..], &pair, &["--dump", text_of(&out)]].concat()));
         check(&out, u);
         assert_eq!(files_in(&out).len(), 12);
     }
@@ -110,12 +111,33 @@ fn a_dump_is_what_the_equations_give() {
 }
 
 #[test]
+fn what_is_measured_by_default_is_what_run_computes() {
+    let folder = tempfile::tempdir().unwrap();
+    let outputs = |more: &[&str]| -> BTreeSet<String> {
+        let out = folder.path().join(more.len().to_string());
+        done(&with(&[&["--backend", "cpu", "--dump", text_of(&out)], more].concat()));
+        let index: Value = serde_json::from_slice(&std::fs::read(out.join("dump.json")).unwrap()).unwrap();
+        index["present_bits"].as_object().unwrap().keys().cloned().collect()
+    };
+    // What a percept has beside its outputs.
+    let own = ["field", "link", "contact", "flags"];
+    let percepts = frames(&done(&["run", "--backend", "cpu", "--fields", "hand/back", "--quiet"]));
+    let fields = percepts.iter().flat_map(|frame| frame["fields"].as_array().unwrap());
+    let keys = fields.flat_map(|field| field.as_object().unwrap().keys().cloned());
+    let computed: BTreeSet<String> = keys.filter(|key| !own.contains(&key.as_str())).collect();
+    assert_eq!(outputs(&[]), computed);
+    let pair = ["centroid", "orientation"].map(str::to_owned);
+    assert_eq!(outputs(&["--outputs", "centroid,orientation"]), pair.into());
+}
+
+#[test]
 fn what_is_absent_in_a_dump_is_marked_and_the_seed_decides_everything() {
     let folder = tempfile::tempdir().unwrap();
     let dump = |name: &str, seed: &str| {
         let out = folder.path().join(name);
         let one = ["bench", "--sensors", "60", "--fields", "8", "--members", "1", "--frames", "2", "--calls", "1"];
-        done(&[&one[..], &["--backend", "cpu", "--seed", seed, "--dump", text_of(&out)]].concat());
+        let pair = ["--outputs", "centroid,orientation", "--backend", "cpu"];
+        done(&[&one[..], &pair, &["--seed", seed, "--dump", text_of(&out)]].concat());
         out
     };
     let (first, again, other) = (dump("first", "3"), dump("again", "3"), dump("other", "4"));

@@ -124,8 +124,31 @@ fn help_teaches_and_names_everything() {
     for word in ["--source", "--verify", "Examples:", "centroid", "anisotropy", "Hz", "seconds"] {
         assert!(help.contains(word), "{word}: {help}");
     }
+    let short = done(&["run", "-h"]);
+    let flags = |help: &str| help.lines().filter(|line| line.trim_start().starts_with("--")).count();
+    assert!(flags(&short) == 10 && flags(&help) > 30, "{short}");
+    let headings =
+        ["Options:", "What is computed:", "Recordings:", "Live:", "Accuracy and speed:", "Output:", "Examples:"];
+    let places: Vec<usize> = headings.iter().map(|heading| help.find(&format!("\n{heading}\n")).unwrap()).collect();
+    assert!(places.is_sorted(), "{help}");
     assert_eq!(done(&["--version"]), format!("somatic {}\n", env!("CARGO_PKG_VERSION")));
-    assert!(fails(2, &[]).contains("Usage"));
+}
+
+#[test]
+fn the_command_alone_names_what_people_use_first() {
+    let output = output(&[]);
+    assert_eq!((output.status.code(), stderr(&output)), (Some(0), String::new()));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.starts_with("somatic ") && text.lines().count() <= 12, "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let named: Vec<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("  somatic ")?.split_whitespace().next()).collect();
+    assert_eq!(named.len(), 5, "{text}");
+    // Each of them is a command, and help is where it says.
+    for command in named {
+        done(&[command, "--help"]);
+    }
+    assert!(text.contains("somatic --help") && text.contains("somatic run -h"), "{text}");
 }
 
 #[test]

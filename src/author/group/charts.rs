@@ -85,7 +85,9 @@ impl Grower<'_> {
                             fields.extend(parts);
                         }
                         None => self.notes.push(format!(
-                            "field `{name}` has no chart: {why}; and no split into {MOST_PARTS} or fewer has"
+                            "field `{name}` has no chart: {}; no {MOST_PARTS} parts or fewer have one: choose fewer \
+                             taxels",
+                            words::plain(&why)
                         )),
                     }
                 }

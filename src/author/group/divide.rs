@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::Grower;
 use super::patches::{patches, spread};
-use super::rule::{FieldRule, Patches, Rows, Seeds};
+use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
 use super::ways::Ways;
 use crate::error::{Error, Result};
 use crate::field::unions;
@@ -32,7 +32,15 @@ impl Grower<'_> {
             let (children, nameless) = self.by_each(each, chosen);
             if nameless > 0 {
                 let what = self.call(rule);
-                self.notes.push(format!("{what}: {nameless} taxels have none of what there is a field for each of"));
+                let without = match each {
+                    Each::Link => "link",
+                    Each::Mesh => "mesh",
+                    Each::Material => "material",
+                };
+                self.notes.push(format!(
+                    "{what}: {nameless} taxels have no {without} and are in none of its fields; write another [[fields]] for \
+                     them"
+                ));
             }
             return Ok(children);
         }
@@ -45,8 +53,8 @@ impl Grower<'_> {
             if patches.len() != count && matches!(wanted, Patches::Number(_)) {
                 let what = self.call(rule);
                 self.notes.push(format!(
-                    "{what}: {} patches instead of {count}: a patch keeps to one link and one connected part of the \
-                     surface, and has a place of its own",
+                    "{what}: {} patches instead of {count}, as a patch keeps to one link and one connected part of the \
+                     surface; choose fewer links, or another number",
                     patches.len()
                 ));
             }
@@ -101,8 +109,8 @@ impl Grower<'_> {
         for ways in links.iter().filter(|ways| ways.are_rough()) {
             let link = &self.body.links[self.body.taxels[ways.taxels[0]].link].name;
             let note = format!(
-                "link `{link}`: distances are those along edges, or from taxel to taxel, as its surface is too rough to \
-                 measure on, or there is none"
+                "link `{link}`: distances are measured along edges or from taxel to taxel, as its surface is missing or too \
+                 rough; add or smooth the mesh for exact ones"
             );
             if !self.notes.contains(&note) {
                 self.notes.push(note);
@@ -171,7 +179,10 @@ impl Grower<'_> {
         let held: BTreeSet<usize> = discs.iter().flatten().copied().collect();
         if held.len() < chosen.len() {
             let what = self.call(rule);
-            self.notes.push(format!("{what}: {} taxels are in no disc", chosen.len() - held.len()));
+            self.notes.push(format!(
+                "{what}: {} taxels are in no disc; widen `radius`, or add seeds",
+                chosen.len() - held.len()
+            ));
         }
         Ok(discs)
     }

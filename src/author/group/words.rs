@@ -25,11 +25,11 @@ impl Words {
     fn of_split(&self) -> Vec<String> {
         match &self.split[..] {
             [] => Vec::new(),
-            [(name, parts, why)] => vec![format!("field `{name}` is split into {parts}: {why}")],
+            [(name, parts, why)] => vec![format!("field `{name}` is split into {parts} parts: {why}")],
             [(first, _, why), ..] => {
                 let each: Vec<String> =
                     self.split.iter().map(|(name, parts, _)| format!("`{name}` into {parts}")).collect();
-                vec![format!("{} fields are split: {}; `{first}` because {why}", each.len(), each.join(", "))]
+                vec![format!("{} fields are split into parts: {}; `{first}`, as {why}", each.len(), each.join(", "))]
             }
         }
     }
@@ -47,22 +47,23 @@ impl Words {
             let alike: Vec<_> = self.bare.iter().filter(|one| (Kind::of(&one.1), one.2) == *of).collect();
             let (name, why, _) = alike.first()?;
             let advice = match of {
-                (Kind::Links, _) => "; one field for each of them (`each = \"link\"`) may have one",
+                (Kind::Links, _) => "; for a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
                 (Kind::Surface, _) => "",
-                (_, true) => "; fields below it may have",
-                _ => "; in a recipe's [[fields]], `patches` or `wrap = \"split\"` give some that have",
+                (_, true) => "; use the fields below it",
+                _ => "; to split it, write `wrap = \"split\"` or `patches` in a recipe's [[fields]]",
             };
             let why = plain(why);
             if alike.len() == 1 {
-                return Some(format!("field `{name}` has no chart: {why}{advice}"));
+                return Some(format!("field `{name}` has no chart, thus no orientation: {why}{advice}"));
             }
             let names: Vec<&str> = alike.iter().map(|one| &one.0[..]).collect();
             let names = names.join("`, `");
             Some(match of.0 {
                 Kind::Wraps => {
-                    format!("{} fields go around something and have no chart{advice}: `{names}`", alike.len())
+                    let (count, advice) = (alike.len(), advice.replace(" it", " them"));
+                    format!("{count} fields wrap around and have no chart, thus no orientation{advice}: `{names}`")
                 }
-                _ => format!("{} fields have no chart: `{names}`; `{name}` because {why}{advice}", alike.len()),
+                _ => format!("{} fields have no chart: `{names}`; `{name}`, as {why}{advice}", alike.len()),
             })
         };
         kinds.iter().filter_map(line).collect()
@@ -71,13 +72,14 @@ impl Words {
     fn of_poor(&self) -> Option<String> {
         let worst = self.poor.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let off = |share: f64| format!("{:.0} %", share * 100.0);
-        let advice = "; `wrap = \"split\"` or smaller `patches` give truer ones";
+        let advice = "; for better ones write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
         Some(match &self.poor[..] {
-            [(name, most)] => format!("the chart of field `{name}` is up to {} off{advice}", off(*most)),
+            [(name, most)] => format!("distances in the chart of field `{name}` are up to {} off{advice}", off(*most)),
             poor => {
                 let names: Vec<&str> = poor.iter().map(|(name, _)| &name[..]).collect();
-                let worst = format!("that of `{}` up to {}", worst.0, off(worst.1));
-                format!("{} charts are over {} off, {worst}{advice}: `{}`", poor.len(), off(POOR), names.join("`, `"))
+                let (count, worst) = (poor.len(), format!("{} in `{}`", off(worst.1), worst.0));
+                let names = names.join("`, `");
+                format!("distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`", off(POOR))
             }
         })
     }
@@ -112,10 +114,57 @@ pub(super) fn plain(why: &NoChart) -> String {
 /// What to do about a field that is refused; `parts` is how many would have what it asks for, if any up to `most` have.
 pub(super) fn advice(why: &NoChart, parts: Option<usize>, is_parent: bool, most: usize) -> String {
     match (why, parts) {
-        (NoChart::SeveralLinks(_), _) => "; one field for each of them (`each = \"link\"`) may have".into(),
-        (_, Some(parts)) => format!("; {parts} parts would have (`wrap = \"split\"`)"),
-        _ if is_parent => "; fields below it may have".into(),
+        (NoChart::SeveralLinks(_), _) => "; for a field on each link, write `each = \"link\"`".into(),
+        (_, Some(parts)) => format!("; to split it into {parts} parts that have one, write `wrap = \"split\"`"),
+        _ if is_parent => "; ask for charts of the fields below it".into(),
         (NoChart::NoSurface, _) => String::new(),
-        _ => format!("; no split into {most} or fewer has"),
+        _ => format!("; no {most} parts or fewer have one: choose fewer taxels"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(bare: &[(&str, NoChart, bool)], poor: &[(&str, f64)]) -> Vec<String> {
+        let bare = bare.iter().map(|(name, why, is_parent)| ((*name).to_owned(), why.clone(), *is_parent)).collect();
+        let poor = poor.iter().map(|(name, off)| ((*name).to_owned(), *off)).collect();
+        Words { split: Vec::new(), bare, poor }.lines()
+    }
+
+    #[test]
+    fn a_line_on_charts_says_what_to_write() {
+        let around = NoChart::CutLocus { taxel: 12, distance_m: 0.035, apart_rad: 2.9 };
+        assert_eq!(
+            lines(&[("limb", around.clone(), false)], &[]),
+            [
+                "field `limb` has no chart, thus no orientation: it goes all the way around a limb or a knob: two paths lead to \
+              taxel 12, 35.0 mm away, one on each side; to split it, write `wrap = \"split\"` or `patches` in a recipe's \
+              [[fields]]"
+            ]
+        );
+        assert_eq!(
+            lines(&[("arm", around, false), ("leg", NoChart::Wraps(2.0), false)], &[]),
+            [
+                "2 fields wrap around and have no chart, thus no orientation; to split them, write `wrap = \"split\"` or \
+              `patches` in a recipe's [[fields]]: `arm`, `leg`"
+            ]
+        );
+        assert_eq!(
+            lines(&[("all", NoChart::SeveralLinks(3), true)], &[("palm", 0.3)]),
+            [
+                "field `all` has no chart, thus no orientation: its taxels sit on 3 links that move against each other; for \
+                 a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
+                "distances in the chart of field `palm` are up to 30 % off; for better ones write `wrap = \"split\"` or \
+                 smaller `patches` in a recipe's [[fields]]",
+            ]
+        );
+        assert_eq!(
+            lines(&[], &[("palm", 0.3), ("back", 0.4)]),
+            [
+                "distances in 2 charts are over 25 % off, up to 40 % in `back`; for better ones write `wrap = \"split\"` or \
+              smaller `patches` in a recipe's [[fields]]: `palm`, `back`"
+            ]
+        );
     }
 }

@@ -24,7 +24,7 @@ use super::{DONE, load_body, print, words};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic board --link /tmp/hand --loop           a hand that is touched again and again, at /tmp/hand
+  somatic board --link /tmp/hand --loop           a hand, touched again and again, at /tmp/hand
   somatic board --wiring hand.toml --source sim:rod.toml --frames 500
   somatic board --boards 4 --for 10s --faults noise=1e-4,drop=1e-4,unplug=1s@5s
 

@@ -1,10 +1,9 @@
-//! What a scene costs: counted, estimated, measured.
+//! What a scene costs: counted and measured.
 
 use somatic::scene::PlannedStage;
 use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Options, Outputs, Result};
 
-use super::estimated::Estimate;
 use super::timed::{Played, measured, pressed};
 use crate::cli::input::Input;
 use crate::cli::run::RECORDED_BATCH;
@@ -29,15 +28,12 @@ pub(super) struct Bill {
     /// Frames a call.
     pub(super) batch: usize,
     pub(super) stages: Vec<Stage>,
-    pub(super) estimate: Estimate,
-    /// None where nothing is to be measured.
-    pub(super) measured: Option<Measured>,
+    pub(super) measured: Measured,
 }
 
-/// A stage, and times of a frame, µs, where there are any of it.
+/// A stage, and its time in a frame, µs, where it is timed by itself.
 pub(super) struct Stage {
     pub(super) planned: PlannedStage,
-    pub(super) estimated_us: Option<f64>,
     pub(super) measured_us: Option<f64>,
 }
 
@@ -52,8 +48,8 @@ pub(super) struct Measured {
 }
 
 impl Bill {
-    /// The bill of `asked`, measured too if `measures` says so.
-    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body, measures: bool) -> Result<Self> {
+    /// The bill of `asked`.
+    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
@@ -64,35 +60,25 @@ impl Bill {
         let kind: BackendKind = name.parse()?;
         let plan = engine.plan();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
-        let explained = plan.explain();
         let rungs = ladder(plan);
-        // Before anything of this plan is measured: neither knows of the other.
-        let estimate = Estimate::new(&rungs, &explained, knobs, batch);
         let made = |outputs: Outputs| -> Result<Engine> {
             let mut options = Options { backend: kind, ..options.clone() };
             options.scene.outputs = outputs;
             Engine::new(body, options)
         };
-        let mut stages: Vec<Stage> =
-            explained.into_iter().map(|planned| Stage { planned, estimated_us: None, measured_us: None }).collect();
-        for (rung, us) in rungs.iter().zip(&estimate.rungs_us) {
-            stages[rung.stages.end - 1].estimated_us = *us;
+        let planned = plan.explain().into_iter();
+        let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
+        let mut engines = rungs.iter().map(|rung| made(rung.outputs)).collect::<Result<Vec<_>>>()?;
+        let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs())).transpose()?;
+        engines.extend(compared);
+        let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
+        let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();
+        let us = measured(&mut engines, &mut played)?;
+        let below = std::iter::once(0.0).chain(us.iter().copied());
+        for ((rung, us), below) in rungs.iter().zip(&us).zip(below) {
+            stages[rung.stages.end - 1].measured_us = Some((us - below).max(0.0));
         }
-        let mut measured_too = None;
-        if measures {
-            let mut engines = rungs.iter().map(|rung| made(rung.outputs)).collect::<Result<Vec<_>>>()?;
-            let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs())).transpose()?;
-            engines.extend(compared);
-            let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
-            let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();
-            let us = measured(&mut engines, &mut played)?;
-            let below = std::iter::once(0.0).chain(us.iter().copied());
-            for ((rung, us), below) in rungs.iter().zip(&us).zip(below) {
-                stages[rung.stages.end - 1].measured_us = Some((us - below).max(0.0));
-            }
-            let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
-            measured_too = Some(Measured { on, whole_us: us[us.len() - 1], agreement });
-        }
+        let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
         Ok(Self {
             body: body.name.clone(),
             taxels: [plan.channels(), body.taxels.len()],
@@ -105,8 +91,7 @@ impl Bill {
             kept,
             batch,
             stages,
-            estimate,
-            measured: measured_too,
+            measured: Measured { on, whole_us: us[us.len() - 1], agreement },
         })
     }
 }

@@ -17,14 +17,7 @@ impl Bill {
         line("taxels", format!("{} of {} are read", self.taxels[0], self.taxels[1]));
         line("memberships", self.memberships.to_string());
         let moved = format!("{} B up, {} B down", self.bytes[0], self.bytes[1]);
-        line(
-            "a frame",
-            match &self.measured {
-                Some(measured) => format!("{moved}, {:.2} µs {}", measured.whole_us, measured.on),
-                None => moved,
-            },
-        );
-        line("estimated", self.estimated());
+        line("a frame", format!("{moved}, {:.2} µs {}", self.measured.whole_us, self.measured.on));
         let (name, what, why) = &self.backend;
         line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
         let [_, knobs @ ..] = self.knobs.words();
@@ -33,32 +26,23 @@ impl Bill {
             line("measured", kept.clone());
         }
         self.kept_charts.iter().for_each(|kept| line("kept chart", kept.clone()));
-        if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
+        if let Some(agreement) = &self.measured.agreement {
             line("accuracy", accuracy(agreement));
         }
         text + "\n" + &self.table()
     }
 
-    /// The estimate in words, and how far it is from what was measured.
-    fn estimated(&self) -> String {
-        let Some(us) = self.estimate.whole_us else { return format!("no estimate: {}", self.estimate.by) };
-        let measured = self.measured.as_ref().map(|measured| us / measured.whole_us);
-        let beside = measured.map_or(String::new(), |times| format!(", {times:.2} times what is measured"));
-        format!("{us:.2} µs with every field touched{beside}; {}", self.estimate.by)
-    }
-
     fn table(&self) -> String {
-        let headings = ["stage", "over", "memberships", "bytes", "estimated µs", "measured µs", "where", "why"];
+        let headings = ["stage", "over", "memberships", "bytes", "measured µs", "where", "why"];
         let mut table = plain(headings);
-        table.set_constraints((0..7).map(|_| ColumnConstraint::ContentWidth));
-        for column in 1..6 {
+        table.set_constraints((0..6).map(|_| ColumnConstraint::ContentWidth));
+        for column in 1..5 {
             right(&mut table, column);
         }
-        for Stage { planned: stage, estimated_us, measured_us } in &self.stages {
+        for Stage { planned: stage, measured_us } in &self.stages {
             let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
             let place = if stage.on_host { "host" } else { &self.backend.0 };
             let over = if ["calibrate", "change"].contains(&stage.name) { "value" } else { "field" };
-            let us = |us: &Option<f64>| us.map_or(String::new(), |us| format!("{us:.3}"));
             table.add_row([
                 stage.name.to_owned(),
                 if stage.runs { count(stage.over as u64, over) } else { "–".to_owned() },
@@ -68,8 +52,7 @@ impl Bill {
                     [0, down] => format!("{down} down"),
                     [up, _] => format!("{up} up"),
                 },
-                us(estimated_us),
-                us(measured_us),
+                measured_us.map_or(String::new(), |us| format!("{us:.3}")),
                 if stage.runs { place.to_owned() } else { String::new() },
                 stage.why.clone(),
             ]);
@@ -90,7 +73,7 @@ impl Bill {
 
     pub(super) fn json(&self) -> Value {
         let (name, what, why) = &self.backend;
-        let stage = |Stage { planned, estimated_us, measured_us }: &Stage| {
+        let stage = |Stage { planned, measured_us }: &Stage| {
             json!({
                 "stage": planned.name,
                 "runs": planned.runs,
@@ -100,7 +83,6 @@ impl Bill {
                 "memberships": planned.memberships,
                 "bytes_up": planned.bytes[0],
                 "bytes_down": planned.bytes[1],
-                "estimated_us": estimated_us.map(rounded),
                 "us": measured_us.map(rounded),
             })
         };
@@ -120,12 +102,10 @@ impl Bill {
             "kept_charts": self.kept_charts,
             "measured": self.kept,
             "batch": self.batch,
-            "estimated_us": self.estimate.whole_us.map(rounded),
-            "estimated_by": self.estimate.by,
-            "us": self.measured.as_ref().map(|measured| rounded(measured.whole_us)),
+            "us": rounded(self.measured.whole_us),
             "stages": self.stages.iter().map(stage).collect::<Vec<_>>(),
         });
-        if let Some(agreement) = self.measured.as_ref().and_then(|measured| measured.agreement.as_ref()) {
+        if let Some(agreement) = &self.measured.agreement {
             // What is counted or chosen has no error to speak of.
             let measured = agreement
                 .quantities

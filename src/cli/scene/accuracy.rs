@@ -17,8 +17,8 @@ use super::said::word;
 pub(in crate::cli) struct Accuracy {
     /// Tolerances by flag; in a file they are two keys.
     #[arg(long, value_name = "LENGTH,ANGLE", value_parser = Wish::within,
-        help = "How far 99 % of the percepts may be off, centroid and orientation, as in \"0.5 mm, 2 deg\"; either may be \
-                left out. The knobs are then chosen by measurement")]
+        help = "Measure, and use the fastest knobs that keep 99 % of the centroids and orientations within this, such as \
+                '0.5 mm, 2 deg' or one of these")]
     #[serde(skip)]
     pub(in crate::cli) within: Option<Wish>,
 
@@ -34,47 +34,53 @@ pub(in crate::cli) struct Accuracy {
     #[schemars(with = "Option<String>")]
     orientation: Option<f64>,
 
-    /// How long a frame may take in the median, such as 100us: the truest knobs within that are chosen by measurement.
+    /// Measure, and use only knobs with which a frame takes at most this in the median, such as 100us; without --within
+    /// the most accurate of them.
     #[arg(long, value_name = "TIME", value_parser = time)]
     #[serde(deserialize_with = "seconds")]
     #[schemars(with = "Option<String>")]
     pub(in crate::cli) budget: Option<f64>,
 
-    /// How sums are made: each term added once in single precision (one-pass), with what additions lose carried along
-    /// (compensated), or in double precision on the CPU (double) [default: one-pass; double on the reference].
-    #[arg(long, value_name = "HOW", value_parser = PossibleValuesParser::new(Arithmetic::WORDS)
+    /// How sums are made: in single precision (one-pass), with the rounding errors added back (compensated), or in
+    /// double precision on the CPU (double) [default: one-pass; reference: double].
+    #[arg(long, hide_possible_values = true, value_name = "HOW",
+        value_parser = PossibleValuesParser::new(Arithmetic::WORDS)
         .try_map(|name| name.parse::<Arithmetic>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS))]
     pub(in crate::cli) arithmetic: Option<Arithmetic>,
 
-    /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest ways over the surface
-    /// (geodesic), where there can be such [default: as-authored].
-    #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(Charts::WORDS)
+    /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest paths over the surface
+    /// where that is possible (geodesic) [default: as-authored].
+    #[arg(long, hide_possible_values = true, value_name = "KIND",
+        value_parser = PossibleValuesParser::new(Charts::WORDS)
         .try_map(|name| name.parse::<Charts>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
     pub(in crate::cli) charts: Option<Charts>,
 
-    /// What is given for an orientation: outputs as they are named (as-asked), the line through the two farthest points
-    /// (two-points, output orientation), or the principal axis (second-moments, output axis) [default: as-asked].
-    #[arg(long, value_name = "WAY", value_parser = PossibleValuesParser::new(OrientationBy::WORDS)
+    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), or axis
+    /// alone (second-moments) [default: as-asked].
+    #[arg(long, hide_possible_values = true, value_name = "WAY",
+        value_parser = PossibleValuesParser::new(OrientationBy::WORDS)
         .try_map(|name| name.parse::<OrientationBy>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS))]
     pub(in crate::cli) orientation_by: Option<OrientationBy>,
 
-    /// Which fields are computed in a live frame, on the CPU: all, those that changed (touched), or what pays (auto).
-    /// Percepts are the same [default: auto].
-    #[arg(long, value_name = "WHICH", value_parser = PossibleValuesParser::new(Coverage::WORDS)
+    /// Which fields are computed in a live frame on the CPU: all, only those that changed (touched), or the faster of
+    /// these (auto); percepts are the same [default: auto].
+    #[arg(long, hide_possible_values = true, value_name = "WHICH",
+        value_parser = PossibleValuesParser::new(Coverage::WORDS)
         .try_map(|name| name.parse::<Coverage>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coverage::WORDS))]
     pub(in crate::cli) coverage: Option<Coverage>,
 
-    /// When a field is looked at: in every-frame, or on-change of its values, from which to which motion is then measured
-    /// [default: every-frame].
-    #[arg(long, value_name = "WHEN", value_parser = PossibleValuesParser::new(Cadence::WORDS)
+    /// When a field is computed: in every frame (every-frame), or when its values change (on-change), and motion then
+    /// from change to change [default: every-frame].
+    #[arg(long, hide_possible_values = true, value_name = "WHEN",
+        value_parser = PossibleValuesParser::new(Cadence::WORDS)
         .try_map(|name| name.parse::<Cadence>()))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Cadence::WORDS))]

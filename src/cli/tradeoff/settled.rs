@@ -23,7 +23,7 @@ pub(in crate::cli) struct Settled {
 }
 
 /// The GPU drivers of this machine, in words.
-pub(in crate::cli) fn driver() -> String {
+pub(super) fn driver() -> String {
     #[cfg(feature = "gpu")]
     return format!("{:?}", somatic::backend::gpu::adapters());
     #[cfg(not(feature = "gpu"))]
