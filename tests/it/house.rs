@@ -109,8 +109,7 @@ fn no_files_use_each_other_in_a_circle() {
     let paths = paths();
     let mut uses = paths.uses();
     for (file, used) in &mut uses {
-        let is_left = |room: &&str| file.starts_with(room);
-        if let Some(room) = WITH_CIRCLES.iter().find(is_left) {
+        if let Some(room) = WITH_CIRCLES.into_iter().find(|room| file.starts_with(room)) {
             used.retain(|other| !other.starts_with(room));
         }
     }
