@@ -8,7 +8,7 @@ use glam::DVec3;
 use rstar::RTree;
 use somatic::author::{Placed, SurfacePoint, place_apart, place_by_density, place_evenly, widest_radius};
 use somatic::body::Topology;
-use somatic::field::geodesic::{LogMap, Place};
+use somatic::field::geodesic::{LogMap, SurfacePlace};
 
 /// A unit sphere of 20·4ⁿ triangles.
 fn icosphere(cuts: u32) -> Topology {
@@ -49,17 +49,17 @@ fn icosphere(cuts: u32) -> Topology {
 fn against_peers() {
     let topology = icosphere(5);
     let pole = topology.corners(0)[0];
-    let place = Place::in_triangle(&topology, 0, pole);
+    let place = SurfacePlace::in_triangle(&topology, 0, pole);
     let mut corner_of = vec![None; topology.positions.len()];
     for (t, triangle) in topology.triangles.iter().enumerate() {
         for (corner, &v) in triangle.iter().enumerate() {
             let mut barycentric = [0.0; 3];
             barycentric[corner] = 1.0;
-            corner_of[v as usize] = Some(Place { triangle: t as u32, barycentric });
+            corner_of[v as usize] = Some(SurfacePlace { triangle: t as u32, barycentric });
         }
     }
     let near = |p: DVec3| (0.01..=1.0).contains(&p.dot(pole).acos());
-    let places: Vec<(DVec3, Place)> = topology
+    let places: Vec<(DVec3, SurfacePlace)> = topology
         .positions
         .iter()
         .zip(corner_of)
@@ -112,14 +112,14 @@ fn unrolling() {
     let (positions, triangles) = sphere(6, |_| 0.0);
     let (seconds, topology) = timed(|| Topology::new(&positions, &triangles));
     println!("{} triangles: topology in {seconds:.4} s", topology.triangles.len());
-    let place = Place::in_triangle(&topology, 0, topology.corners(0)[0]);
+    let place = SurfacePlace::in_triangle(&topology, 0, topology.corners(0)[0]);
     let (seconds, map) = timed(|| LogMap::new(&topology, place, DVec3::Z, 1.05).unwrap());
     let pole = topology.corners(0)[0];
     let places = (0..topology.triangles.len() as u32).flat_map(|t| topology.corners(t).map(|p| (t, p)));
     let near: Vec<(u32, DVec3)> = places.filter(|(_, p)| (0.01..1.0).contains(&p.dot(pole).acos())).collect();
     let began = Instant::now();
     let off = |&(t, p): &(u32, DVec3)| {
-        let reached = map.reach(&Place::in_triangle(&topology, t, p)).expect("it is within the limit");
+        let reached = map.reach(&SurfacePlace::in_triangle(&topology, t, p)).expect("it is within the limit");
         (reached.distance_m / p.dot(pole).acos() - 1.0).abs()
     };
     let worst = near.iter().map(off).fold(0.0, f64::max);

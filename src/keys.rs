@@ -94,7 +94,7 @@ impl Text<'_> {
     }
 
     /// The whole number under `key`, where it is given and in `range`.
-    pub(crate) fn whole(self, key: &str, value: Option<&Spanned<i64>>, range: Range<i64>) -> Result<Option<u32>> {
+    pub(crate) fn int(self, key: &str, value: Option<&Spanned<i64>>, range: Range<i64>) -> Result<Option<u32>> {
         let Some(value) = value else { return Ok(None) };
         let number = *value.get_ref();
         if range.contains(&number) {

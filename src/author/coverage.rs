@@ -1,4 +1,4 @@
-//! How much of a body's skin its taxels see, and where it is bare.
+//! The share of a body's surface that its taxels cover, and the largest holes.
 
 use glam::DVec3;
 use rstar::RTree;
@@ -6,78 +6,78 @@ use rstar::primitives::GeomWithData;
 
 use crate::body::{Body, Taxel};
 
-/// Places on the surface that are looked at, at least; and for each taxel.
-const LEAST_SAMPLES: usize = 20_000;
-const SAMPLES_A_TAXEL: usize = 8;
-const MOST_SAMPLES: usize = 200_000;
+/// Number of samples of the surface: limits, and samples per taxel.
+const MIN_SAMPLES: usize = 20_000;
+const SAMPLES_PER_TAXEL: usize = 8;
+const MAX_SAMPLES: usize = 200_000;
 
-/// Neighbours that a taxel's spacing is the mean distance of.
+/// Number of neighbours for a taxel's spacing.
 const NEIGHBOURS: usize = 3;
 
-/// Taxels looked at for one that faces the same way, before a place counts as bare.
-const MOST_TRIES: usize = 32;
+/// Maximum number of nearest taxels to search for one that faces the same way.
+const MAX_CANDIDATES: usize = 32;
 
-/// Taxels nearer than this to each other are at one place, m.
-const ONE_PLACE_M: f64 = 1e-6;
+/// Taxels nearer to each other than this are coincident, m.
+const COINCIDENT_M: f64 = 1e-6;
 
-/// Bare samples are one spot where they are nearer than so many times what they would lie apart on a square grid.
-const JOINED: f64 = 2.0;
+/// Bare samples nearer to each other than this belong to one hole; in spacings of a square grid of the samples.
+const HOLE_LINK_DISTANCE: f64 = 2.0;
 
-/// Bare spots that are told.
-const MOST_HOLES: usize = 3;
+/// Maximum number of reported holes.
+const MAX_HOLES: usize = 3;
 
-/// What a link's skin is like.
+/// The coverage of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkCoverage {
     /// Index of the link.
     pub link: usize,
-    /// Surface it carries, m².
+    /// Its surface, m².
     pub area: f64,
-    /// Of that, what lies within the spacing of a taxel that faces the same way, m².
+    /// The part within the spacing of a taxel that faces the same way, m².
     pub seen: f64,
 }
 
-/// A bare spot.
+/// A connected part of the surface without taxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hole {
-    /// Index of the link that carries the surface at its middle.
+    /// Index of the link of its middle.
     pub link: usize,
-    /// About its middle, in that link's frame, m.
+    /// A point near its middle, in that link's frame, m.
     pub position_in_link: DVec3,
-    /// How large it is, m².
+    /// Its area, m².
     pub area: f64,
 }
 
 /// Coverage of a body by its taxels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
-    /// Links that carry surface.
+    /// Links with a surface.
     pub links: Vec<LinkCoverage>,
-    /// The largest connected bare spots on links of which some is seen, largest first.
+    /// The largest holes on partly covered links, largest first.
     pub holes: Vec<Hole>,
 }
 
 impl Coverage {
-    /// Area and seen area of all links of which some is seen, m². Links that nothing sees are no skin.
+    /// Area and covered area of all partly covered links, m².
     #[must_use]
     pub fn of_skin(&self) -> (f64, f64) {
-        let skin = self.links.iter().filter(|link| link.seen > 0.0);
-        skin.fold((0.0, 0.0), |(area, seen), link| (area + link.area, seen + link.seen))
+        let surface = self.links.iter().filter(|link| link.seen > 0.0);
+        surface.fold((0.0, 0.0), |(area, seen), link| (area + link.area, seen + link.seen))
     }
 }
 
-/// A bare place on the surface, in the world at rest.
+/// A sample of bare surface, in the world at rest.
 struct Sample {
     position: DVec3,
     normal: DVec3,
     link: usize,
 }
 
-/// How much of `body` its taxels see, at rest.
+/// The coverage of `body` by its taxels, at rest.
 ///
-/// A taxel sees what lies within its spacing, in a straight line, and faces the same way, less than 90° from its normal:
-/// the far side of a thin part is not seen. Its spacing is the mean distance of the three nearest taxels that do. The
-/// surface is sampled, at 20,000 places at least, and 8 a taxel up to 200,000: areas are good to about a percent of the whole.
+/// A taxel covers the surface within its spacing, in a straight line, with normals less than 90° from its own. Its spacing
+/// is the mean distance of the three nearest such taxels. The surface is sampled at 8 points per taxel, 20,000 to 200,000:
+/// areas are accurate to about a percent of the total.
 #[must_use]
 pub fn coverage(body: &Body) -> Coverage {
     let taxels = Taxels::of(body);
@@ -92,7 +92,7 @@ pub fn coverage(body: &Body) -> Coverage {
         return Coverage { links, holes: Vec::new() };
     }
 
-    let count = (SAMPLES_A_TAXEL * body.taxels.len()).clamp(LEAST_SAMPLES, MOST_SAMPLES);
+    let count = (SAMPLES_PER_TAXEL * body.taxels.len()).clamp(MIN_SAMPLES, MAX_SAMPLES);
     let each = whole / count as f64;
     let mut seen = vec![0.0; body.links.len()];
     let (mut taken, mut bare) = (0, Vec::new());
@@ -101,7 +101,7 @@ pub fn coverage(body: &Body) -> Coverage {
         up_to += area_of(triangle);
         let [a, b, c] = triangle;
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
-        // One every `each` of area, so that small triangles have their fair share.
+        // One sample per area `each`, also over small triangles.
         while (f64::from(taken) + 0.5) * each < up_to {
             let [beta, gamma] = within(taken);
             let position = a + (b - a) * beta + (c - a) * gamma;
@@ -137,22 +137,22 @@ impl Taxels {
         let mut taxels = Self { tree, normals, spacings: Vec::new() };
         let spacing = |(&p, &normal): (&DVec3, &DVec3)| {
             let others = taxels.facing(p, normal).map(|(_, distance)| distance);
-            let others: Vec<f64> = others.filter(|&distance| distance > ONE_PLACE_M).take(NEIGHBOURS).collect();
+            let others: Vec<f64> = others.filter(|&distance| distance > COINCIDENT_M).take(NEIGHBOURS).collect();
             others.iter().sum::<f64>() / others.len().max(1) as f64
         };
         taxels.spacings = places.iter().zip(&taxels.normals).map(spacing).collect();
         taxels
     }
 
-    /// Those near `p` whose normals are less than 90° from `normal`, nearest first, each with its distance, m.
+    /// Taxels near `p` with normals less than 90° from `normal`, nearest first, with distances, m.
     fn facing(&self, p: DVec3, normal: DVec3) -> impl Iterator<Item = (usize, f64)> {
-        let near = self.tree.nearest_neighbor_iter_with_distance_2(p.to_array()).take(MOST_TRIES);
+        let near = self.tree.nearest_neighbor_iter_with_distance_2(p.to_array()).take(MAX_CANDIDATES);
         let near = near.map(|(taxel, squared)| (taxel.data, squared.sqrt()));
         near.filter(move |&(taxel, _)| self.normals[taxel].dot(normal) > 0.0)
     }
 }
 
-/// Where in its triangle sample `index` lies: weights of the second and third corner, spread evenly over many samples
+/// Weights of the second and third corner of sample `index` in its triangle: a quasirandom sequence
 /// (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018: steps of 1/g and 1/g², g³ = g + 1).
 fn within(index: u32) -> [f64; 2] {
     let step = |by: f64| (0.5 + by * f64::from(index)).fract();
@@ -160,12 +160,12 @@ fn within(index: u32) -> [f64; 2] {
     if beta + gamma > 1.0 { [1.0 - beta, 1.0 - gamma] } else { [beta, gamma] }
 }
 
-/// The largest connected parts of what is bare, on links of which some is seen.
+/// The largest connected bare parts on partly covered links.
 fn holes(body: &Body, mut bare: Vec<Sample>, seen: &[f64], each: f64) -> Vec<Hole> {
     bare.retain(|sample| seen[sample.link] > 0.0);
     let tree = bare.iter().zip(0..).map(|(sample, i)| GeomWithData::new(sample.position.to_array(), i)).collect();
     let tree: RTree<GeomWithData<[f64; 3], usize>> = RTree::bulk_load(tree);
-    let reach_squared = (JOINED * JOINED) * each;
+    let reach_squared = (HOLE_LINK_DISTANCE * HOLE_LINK_DISTANCE) * each;
     let mut part = vec![usize::MAX; bare.len()];
     let mut parts: Vec<Vec<usize>> = Vec::new();
     for start in 0..bare.len() {
@@ -195,5 +195,5 @@ fn holes(body: &Body, mut bare: Vec<Sample>, seen: &[f64], each: f64) -> Vec<Hol
         let position_in_link = link_from_world.transform_point3(middle.position);
         Some(Hole { link: middle.link, position_in_link, area: members.len() as f64 * each })
     };
-    parts.iter().take(MOST_HOLES).filter_map(hole).collect()
+    parts.iter().take(MAX_HOLES).filter_map(hole).collect()
 }

@@ -1,40 +1,40 @@
-//! Names as people ask for them: `palm*`, `finger_?`.
+//! Globs over names: `palm*`, `finger_?`.
 
 use globset::{GlobBuilder, GlobSet, GlobSetBuilder};
 
 use crate::error::{Error, Result};
 
-/// Globs of which a name has to match one.
+/// A list of globs, of which a name must match one.
 #[derive(Clone, Debug)]
 pub(super) struct Globs {
-    asked: Vec<String>,
+    globs: Vec<String>,
     set: GlobSet,
 }
 
 impl Globs {
-    pub(super) fn new(asked: &[String]) -> Result<Self> {
+    pub(super) fn new(globs: &[String]) -> Result<Self> {
         let wrong =
             |glob: &str, e: &globset::Error| Error::failed(format!("`{glob}` is no glob over names: {}", e.kind()));
         let mut set = GlobSetBuilder::new();
-        for glob in asked {
+        for glob in globs {
             set.add(GlobBuilder::new(glob).build().map_err(|e| wrong(glob, &e))?);
         }
-        let set = set.build().map_err(|e| wrong(&asked.join(", "), &e))?;
-        Ok(Self { asked: asked.to_vec(), set })
+        let set = set.build().map_err(|e| wrong(&globs.join(", "), &e))?;
+        Ok(Self { globs: globs.to_vec(), set })
     }
 
-    /// Whether `name` is meant; a name that is asked for as it is always is, even with brackets in it.
+    /// Whether `name` matches; it always matches itself, even with brackets in it.
     pub(super) fn is_match(&self, name: &str) -> bool {
-        self.set.is_match(name) || self.asked.iter().any(|asked| asked == name)
+        self.set.is_match(name) || self.globs.iter().any(|globs| globs == name)
     }
 
-    /// As they were asked for.
+    /// The globs as text.
     pub(super) fn text(&self) -> String {
-        self.asked.join(", ")
+        self.globs.join(", ")
     }
 
-    /// The first, to find what else may have been meant.
+    /// The first glob, for suggestions.
     pub(super) fn first(&self) -> &str {
-        self.asked.first().map_or("", String::as_str)
+        self.globs.first().map_or("", String::as_str)
     }
 }

@@ -1,7 +1,7 @@
-//! Points sorted into cubes, so that what lies near a place is found without a tree.
+//! Points sorted into cubes, for neighbour searches.
 //!
-//! Cubes are counted along x, then y, then z. Three cubes side by side along x are one stretch of the sorted points, so
-//! that the 27 cubes around a place are nine look-ups.
+//! Cubes are numbered along x, then y, then z. Three adjacent cubes along x are one range of the sorted points, so that the
+//! 27 cubes around a place are nine ranges.
 
 use glam::DVec3;
 
@@ -12,26 +12,26 @@ const BITS: u32 = 21;
 pub(super) struct Grid {
     low: DVec3,
     cubes_per_m: f64,
-    /// Numbers of the cubes that hold points, rising, each with where its points begin.
+    /// Ascending numbers of the occupied cubes, each with the start of its points.
     cubes: Vec<(u64, u32)>,
-    /// The points with their indices, cube by cube, rising within each.
-    points: Vec<Spot>,
+    /// The points with their indices, cube by cube, ascending within each.
+    points: Vec<GridPoint>,
 }
 
 /// A point and its index.
-pub(super) type Spot = (DVec3, u32);
+pub(super) type GridPoint = (DVec3, u32);
 
 impl Grid {
-    /// The points of `which`, by their `positions`, in cubes of `side_m` or, where those would be too many, larger ones.
+    /// The points `which` of `positions` in cubes of `side_m`, or larger ones if there would be too many.
     pub(super) fn new(positions: &[DVec3], which: impl Iterator<Item = u32> + Clone, side_m: f64) -> Self {
         let at = |i: u32| positions[i as usize];
         let (low, high) = which
             .clone()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), i| (low.min(at(i)), high.max(at(i))));
-        // One cube is left free on each side, so that a cube's neighbours always have a number.
-        let most = f64::from((1_u32 << BITS) - 4);
+        // A margin of one cube, so that all neighbours of a cube have a number.
+        let max_cubes = f64::from((1_u32 << BITS) - 4);
         let extent = (high - low).max_element().max(0.0);
-        let cubes_per_m = 1.0 / side_m.max(extent / most).max(f64::MIN_POSITIVE);
+        let cubes_per_m = 1.0 / side_m.max(extent / max_cubes).max(f64::MIN_POSITIVE);
         let mut grid = Self { low, cubes_per_m, cubes: Vec::new(), points: Vec::new() };
         let mut sorted: Vec<(u64, u32)> = which.map(|i| (number(grid.cube(at(i))), i)).collect();
         sorted.sort_unstable();
@@ -45,7 +45,7 @@ impl Grid {
     }
 
     /// All points, those of a cube together.
-    pub(super) fn points(&self) -> &[Spot] {
+    pub(super) fn points(&self) -> &[GridPoint] {
         &self.points
     }
 
@@ -54,8 +54,8 @@ impl Grid {
         ((p - self.low) * self.cubes_per_m).to_array().map(|steps| steps as u64 + 1)
     }
 
-    /// The points in `cube` and the 26 around it, as nine stretches.
-    pub(super) fn around(&self, cube: [u64; 3]) -> [&[Spot]; 9] {
+    /// The points in `cube` and the 26 around it, as nine ranges.
+    pub(super) fn around(&self, cube: [u64; 3]) -> [&[GridPoint]; 9] {
         let [x, y, z] = cube;
         std::array::from_fn(|row| {
             let (dy, dz) = (row as u64 % 3, row as u64 / 3);
@@ -68,7 +68,7 @@ impl Grid {
     }
 }
 
-/// A cube's number; a cube beyond the grid gets one that no point has.
+/// A cube's number; cubes beyond the grid get one without points.
 fn number(cube: [u64; 3]) -> u64 {
     let [x, y, z] = cube.map(|c| c.min((1 << BITS) - 1));
     (z << (2 * BITS)) | (y << BITS) | x

@@ -1,11 +1,10 @@
-//! Position files of the iCub's skin: text in, taxels out, every row accounted for.
+//! Reads position files of the iCub's skin and accounts for every row.
 //!
 //! The format is that of the robot's skin configuration: `name`, `spatial_sampling` and `taxel2Repr ( … )`, then
-//! `[calibration]` and a row for each channel, `x y z nx ny nz` in metres in the link's frame. A row's number is its channel.
-//! Six zeros say that there is no such taxel. `taxel2Repr` has for each row the taxel that stands for its group (a triangle
-//! of 12, or what is left of one), −1 where there is no taxel, and −2 for a thermal pad. What real files do beyond that is
-//! survived and told: fewer ids than rows or more, several taxels on one point, ids without a place and places without an id,
-//! normals that are no unit vectors.
+//! `[calibration]` and a row per channel, `x y z nx ny nz` in metres in the link's frame. Six zeros mean no taxel.
+//! `taxel2Repr` has per row the representative taxel of its group (a triangle of up to 12), −1 for no taxel, and −2 for a
+//! thermal pad. Irregular files are accepted with notes: another number of ids than rows, coincident taxels, ids without a
+//! place, places without an id, normals that are no unit vectors.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +14,7 @@ use crate::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
 use crate::error::{Error, Result};
 
 /// Rows of one triangle of the skin.
-const TRIANGLE: u32 = 12;
+const TRIANGLE_ROWS: u32 = 12;
 
 /// The id of a row without a taxel.
 const NO_TAXEL: i64 = -1;
@@ -23,51 +22,51 @@ const NO_TAXEL: i64 = -1;
 /// The id of a thermal pad.
 const THERMAL: i64 = -2;
 
-/// Coordinates beyond this are no metres, on a robot of this size.
-const FARTHEST_M: f64 = 10.0;
+/// Maximum coordinate in metres on a robot of this size.
+const MAX_COORDINATE_M: f64 = 10.0;
 
-/// How far a normal may be from unit length and be told as one: files have three digits.
-const NEARLY_UNIT: f64 = 1e-3;
+/// Tolerance of a unit normal's length: files have three digits.
+const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Neighbours that a missing normal is made of.
-const AROUND: usize = 4;
+/// Number of neighbours for a missing normal.
+const NORMAL_NEIGHBOURS: usize = 4;
 
-/// What a row of the file says.
+/// A row of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Row {
+pub enum IcubRow {
     /// A taxel.
     Taxel(IcubTaxel),
-    /// Six zeros, and no id, or one that says so: there is no taxel.
+    /// Six zeros, with no id or −1: no taxel.
     Absent,
-    /// Six zeros, and an id (of the group, or −2): a taxel whose place is not known.
+    /// Six zeros with an id (of the group, or −2): a taxel at an unknown place.
     Unplaced(i64),
-    /// A place, and the id −1, which says that there is no taxel.
+    /// A place with the id −1: no taxel.
     Disowned,
 }
 
 /// A taxel of a position file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IcubTaxel {
-    /// Where it is in the link's frame, m.
+    /// Its position in the link's frame, m.
     pub position_in_link: DVec3,
     /// Outward unit normal in the link's frame.
     pub normal_in_link: DVec3,
-    /// The channel that stands for its group, where the file says so.
+    /// The channel of its group's representative, if given.
     pub group: Option<u32>,
     /// Pressure, or temperature for a thermal pad.
     pub modality: Modality,
-    /// How its normal came about.
+    /// The origin of its normal.
     pub normal: NormalFrom,
 }
 
-/// How a normal came about.
+/// The origin of a normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NormalFrom {
-    /// The file has it, a unit vector to a thousandth.
+    /// A unit vector in the file.
     File,
-    /// The file has it, of another length.
+    /// A vector of another length in the file, normalised.
     Scaled,
-    /// The file has none; it is the mean of its neighbours'.
+    /// The mean of its neighbours' normals, as the file has none.
     Neighbours,
 }
 
@@ -76,11 +75,11 @@ pub enum NormalFrom {
 pub struct IcubFile {
     /// The part that the file names, like `l_forearm`.
     pub part: String,
-    /// One for each channel, from 0.
-    pub rows: Vec<Row>,
-    /// How many ids `taxel2Repr` has.
+    /// One per channel, from 0.
+    pub rows: Vec<IcubRow>,
+    /// Number of ids in `taxel2Repr`.
     pub ids: usize,
-    /// What a person should know, a line each; every row that is no ordinary taxel is counted in one of them.
+    /// Notes for the user, a line each; every row that is no ordinary taxel is counted in one of them.
     pub notes: Vec<String>,
 }
 
@@ -103,7 +102,7 @@ impl IcubFile {
             }
             raw.push(row(line).map_err(|e| e.at(format!("line {number}")))?);
         }
-        // Ids beyond the rows that say "no taxel" lack nothing.
+        // Ids −1 beyond the last row are harmless.
         if let Some(last) = ids.iter().rposition(|&id| id != NO_TAXEL).filter(|&last| last >= raw.len()) {
             return Err(Error::failed(format!(
                 "taxel2Repr gives row {last} the id {} and there are only {} rows: the file is cut short",
@@ -111,28 +110,30 @@ impl IcubFile {
                 raw.len()
             )));
         }
-        let mut rows: Vec<Row> = raw.iter().enumerate().map(|(i, &row)| judge(row, ids.get(i).copied())).collect();
-        if !rows.iter().any(|row| matches!(row, Row::Taxel(_))) {
+        let mut rows: Vec<IcubRow> =
+            raw.iter().enumerate().map(|(i, &row)| classify(row, ids.get(i).copied())).collect();
+        if !rows.iter().any(|row| matches!(row, IcubRow::Taxel(_))) {
             return Err(Error::failed("none of its rows has a taxel with a place"));
         }
         complete_normals(&mut rows);
         let mut file = Self { part, rows, ids: ids.len(), notes: Vec::new() };
-        file.notes = file.tell();
+        file.notes = file.describe();
         Ok(file)
     }
 
     /// The taxels with their channels.
     pub fn taxels(&self) -> impl Iterator<Item = (u32, &IcubTaxel)> {
         let numbered = (0..).zip(&self.rows);
-        numbered.filter_map(|(channel, row)| if let Row::Taxel(taxel) = row { Some((channel, taxel)) } else { None })
+        numbered
+            .filter_map(|(channel, row)| if let IcubRow::Taxel(taxel) = row { Some((channel, taxel)) } else { None })
     }
 
-    /// The channels of taxels that share a place, place by place.
+    /// The channels of coincident taxels, place by place.
     #[must_use]
     pub fn shared_places(&self) -> Vec<Vec<u32>> {
         let mut at: BTreeMap<[u64; 3], Vec<u32>> = BTreeMap::new();
         for (channel, taxel) in self.taxels() {
-            // Adding 0 makes −0 one with it.
+            // Adding 0 turns −0 into 0.
             let place = taxel.position_in_link.to_array().map(|x| (x + 0.0).to_bits());
             at.entry(place).or_default().push(channel);
         }
@@ -153,7 +154,9 @@ impl IcubFile {
         for (channel, taxel) in self.taxels().filter(|(_, taxel)| taxel.modality == Modality::Pressure) {
             let name = match taxel.group {
                 Some(group) => Some(format!("{part}/group_{group:0width$}")),
-                None if channel as usize >= self.ids => Some(format!("{part}/triangle_{:0width$}", channel / TRIANGLE)),
+                None if channel as usize >= self.ids => {
+                    Some(format!("{part}/triangle_{:0width$}", channel / TRIANGLE_ROWS))
+                }
                 None => None,
             };
             let members = name.map_or(&mut alone, |name| children.entry(name).or_default());
@@ -198,30 +201,30 @@ impl IcubFile {
         glb
     }
 
-    /// Everything that is not an ordinary taxel, with its channels.
-    fn tell(&self) -> Vec<String> {
+    /// The notes: everything that is no ordinary taxel, with its channels.
+    fn describe(&self) -> Vec<String> {
         let rows = self.rows.len();
-        let that = |is: &dyn Fn(&Row) -> bool| -> Vec<u32> {
+        let that = |is: &dyn Fn(&IcubRow) -> bool| -> Vec<u32> {
             (0..).zip(&self.rows).filter(|(_, row)| is(row)).map(|(channel, _)| channel).collect()
         };
-        let taxel = |is: fn(&IcubTaxel) -> bool| that(&|row| matches!(row, Row::Taxel(taxel) if is(taxel)));
+        let taxel = |is: fn(&IcubTaxel) -> bool| that(&|row| matches!(row, IcubRow::Taxel(taxel) if is(taxel)));
         let mut notes = vec![format!("`{}`: {} of {rows} rows have a taxel", self.part, self.taxels().count())];
-        let mut say = |channels: &[u32], what: &str| {
+        let mut note = |channels: &[u32], what: &str| {
             if !channels.is_empty() {
                 notes.push(format!("{} {what}: {}", channels.len(), spans(channels)));
             }
         };
-        say(&that(&|row| matches!(row, Row::Absent)), "absent, six zeros");
-        say(&that(&|row| matches!(row, Row::Unplaced(id) if *id != THERMAL)), "with an id and no place, left out");
-        say(&that(&|row| *row == Row::Unplaced(THERMAL)), "thermal pads (id -2) without a place, left out");
-        say(&that(&|row| *row == Row::Disowned), "with a place and the id -1, which says there is none, left out");
-        say(&taxel(|taxel| taxel.modality == Modality::Temperature), "thermal pads (id -2), of modality temperature");
+        note(&that(&|row| matches!(row, IcubRow::Absent)), "absent, six zeros");
+        note(&that(&|row| matches!(row, IcubRow::Unplaced(id) if *id != THERMAL)), "with an id and no place, left out");
+        note(&that(&|row| *row == IcubRow::Unplaced(THERMAL)), "thermal pads (id -2) without a place, left out");
+        note(&that(&|row| *row == IcubRow::Disowned), "with a place and the id -1, which says there is none, left out");
+        note(&taxel(|taxel| taxel.modality == Modality::Temperature), "thermal pads (id -2), of modality temperature");
         let without: Vec<u32> = that(&|_| true).into_iter().filter(|&channel| channel as usize >= self.ids).collect();
-        say(&without, "rows beyond the last id, kept where they have a place");
+        note(&without, "rows beyond the last id, kept where they have a place");
         let beyond: Vec<u32> = (self.rows.len()..self.ids).map(|channel| channel as u32).collect();
-        say(&beyond, "ids -1 beyond the last row, which say that there is no taxel");
-        say(&taxel(|taxel| taxel.normal == NormalFrom::Scaled), "normals of another length than 1, made 1");
-        say(&taxel(|taxel| taxel.normal == NormalFrom::Neighbours), "normals missing, made from their neighbours'");
+        note(&beyond, "ids -1 beyond the last row, which say that there is no taxel");
+        note(&taxel(|taxel| taxel.normal == NormalFrom::Scaled), "normals of another length than 1, made 1");
+        note(&taxel(|taxel| taxel.normal == NormalFrom::Neighbours), "normals missing, made from their neighbours'");
         let shared = self.shared_places();
         let each: Vec<String> = shared.iter().map(|place| spans(place)).collect();
         match &shared[..] {
@@ -283,32 +286,32 @@ fn row(line: &str) -> Result<[DVec3; 2]> {
     if !position.is_finite() || !normal.is_finite() {
         return Err(Error::failed(format!("`{line}` has a number that is not finite")));
     }
-    if position.abs().max_element() > FARTHEST_M || normal.abs().max_element() > FARTHEST_M {
-        return Err(Error::failed(format!("`{line}` is over {FARTHEST_M} m away; positions are in metres")));
+    if position.abs().max_element() > MAX_COORDINATE_M || normal.abs().max_element() > MAX_COORDINATE_M {
+        return Err(Error::failed(format!("`{line}` is over {MAX_COORDINATE_M} m away; positions are in metres")));
     }
     Ok([position, normal])
 }
 
-/// What a row and its id say together.
-fn judge([position, normal]: [DVec3; 2], id: Option<i64>) -> Row {
+/// Classifies a row by its numbers and id.
+fn classify([position, normal]: [DVec3; 2], id: Option<i64>) -> IcubRow {
     if position == DVec3::ZERO && normal == DVec3::ZERO {
         return match id {
-            None | Some(NO_TAXEL) => Row::Absent,
-            Some(id) => Row::Unplaced(id),
+            None | Some(NO_TAXEL) => IcubRow::Absent,
+            Some(id) => IcubRow::Unplaced(id),
         };
     }
     if id == Some(NO_TAXEL) {
-        return Row::Disowned;
+        return IcubRow::Disowned;
     }
     let length = normal.length();
-    Row::Taxel(IcubTaxel {
+    IcubRow::Taxel(IcubTaxel {
         position_in_link: position,
         normal_in_link: normal.try_normalize().unwrap_or(DVec3::ZERO),
         group: id.and_then(|id| u32::try_from(id).ok()),
         modality: if id == Some(THERMAL) { Modality::Temperature } else { Modality::Pressure },
         normal: if normal.try_normalize().is_none() {
             NormalFrom::Neighbours
-        } else if (length - 1.0).abs() <= NEARLY_UNIT {
+        } else if (length - 1.0).abs() <= UNIT_TOLERANCE {
             NormalFrom::File
         } else {
             NormalFrom::Scaled
@@ -316,27 +319,27 @@ fn judge([position, normal]: [DVec3; 2], id: Option<i64>) -> Row {
     })
 }
 
-/// Gives those without a normal the mean of their nearest neighbours', or away from the middle of all where there is none.
-fn complete_normals(rows: &mut [Row]) {
+/// Sets missing normals to the mean of the nearest neighbours', or else away from the middle of all taxels.
+fn complete_normals(rows: &mut [IcubRow]) {
     let all: Vec<IcubTaxel> =
-        rows.iter().filter_map(|row| if let Row::Taxel(t) = row { Some(*t) } else { None }).collect();
+        rows.iter().filter_map(|row| if let IcubRow::Taxel(t) = row { Some(*t) } else { None }).collect();
     let known: Vec<&IcubTaxel> = all.iter().filter(|taxel| taxel.normal != NormalFrom::Neighbours).collect();
     let middle = all.iter().map(|taxel| taxel.position_in_link).sum::<DVec3>() / all.len().max(1) as f64;
     for row in rows {
-        let Row::Taxel(taxel) = row else { continue };
+        let IcubRow::Taxel(taxel) = row else { continue };
         if taxel.normal != NormalFrom::Neighbours {
             continue;
         }
         let here = taxel.position_in_link;
         let mut near = known.clone();
         near.sort_by(|a, b| a.position_in_link.distance(here).total_cmp(&b.position_in_link.distance(here)));
-        let mean = near.iter().take(AROUND).map(|taxel| taxel.normal_in_link).sum::<DVec3>().try_normalize();
+        let mean = near.iter().take(NORMAL_NEIGHBOURS).map(|taxel| taxel.normal_in_link).sum::<DVec3>().try_normalize();
         let nearest = near.first().map(|taxel| taxel.normal_in_link);
         taxel.normal_in_link = mean.or(nearest).or((here - middle).try_normalize()).unwrap_or(DVec3::Z);
     }
 }
 
-/// Ascending numbers as spans: `0–11, 14, 18–20`.
+/// Ascending numbers as ranges: `0–11, 14, 18–20`.
 fn spans(numbers: &[u32]) -> String {
     let runs = numbers.chunk_by(|a, b| a + 1 == *b);
     let span = |run: &[u32]| match run {
@@ -360,15 +363,18 @@ mod tests {
         assert_eq!((file.part.as_str(), file.rows.len(), file.ids), ("l_palm", 9, 7));
         let channels: Vec<u32> = file.taxels().map(|(channel, _)| channel).collect();
         assert_eq!(channels, [0, 1, 2, 7]);
-        assert_eq!((file.rows[3], file.rows[4], file.rows[5]), (Row::Absent, Row::Unplaced(0), Row::Disowned));
-        assert_eq!((file.rows[6], file.rows[8]), (Row::Unplaced(-2), Row::Absent));
-        let Row::Taxel(scaled) = file.rows[0] else { panic!("{:?}", file.rows[0]) };
+        assert_eq!(
+            (file.rows[3], file.rows[4], file.rows[5]),
+            (IcubRow::Absent, IcubRow::Unplaced(0), IcubRow::Disowned)
+        );
+        assert_eq!((file.rows[6], file.rows[8]), (IcubRow::Unplaced(-2), IcubRow::Absent));
+        let IcubRow::Taxel(scaled) = file.rows[0] else { panic!("{:?}", file.rows[0]) };
         assert_eq!((scaled.normal_in_link, scaled.normal, scaled.group), (DVec3::Z, NormalFrom::Scaled, Some(0)));
-        let Row::Taxel(made) = file.rows[1] else { panic!("{:?}", file.rows[1]) };
+        let IcubRow::Taxel(made) = file.rows[1] else { panic!("{:?}", file.rows[1]) };
         assert_eq!(made.normal, NormalFrom::Neighbours);
         // Its neighbours look along z, z and y.
         assert!(made.normal_in_link.distance(DVec3::new(0.0, 1.0, 2.0).normalize()) < 1e-15);
-        let Row::Taxel(pad) = file.rows[2] else { panic!("{:?}", file.rows[2]) };
+        let IcubRow::Taxel(pad) = file.rows[2] else { panic!("{:?}", file.rows[2]) };
         assert_eq!((pad.modality, pad.group), (Modality::Temperature, None));
         assert_eq!(file.shared_places(), [[0, 7]]);
         let notes = file.notes.join("\n");

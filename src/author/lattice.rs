@@ -1,62 +1,66 @@
-//! Taxels on a grid: hexagonal or rectangular in the plane of a geodesic chart, each found by walking straight over the
-//! surface from the chart's origin.
+//! Taxels on a hexagonal or rectangular grid in a geodesic chart, found by straight walks over the surface from its origin.
 
 use glam::{DVec2, DVec3};
 
-use super::canvas::Canvas;
 use super::grid::Grid;
 use super::place::{Placed, Progress};
-use super::{SurfacePoint, crowd};
+use super::rest_surface::RestSurface;
+use super::{SurfacePoint, sample_neighbours};
 use crate::body::{NONE, SurfaceIndex, Topology, next};
 use crate::error::{Error, Result};
-use crate::field::geodesic::{LogMap, Place};
+use crate::field::geodesic::{LogMap, SurfacePlace};
 
-/// The first ways followed are as long as around half a circle whose diameter is the straight distance, and a bit.
-const FIRST_REACH: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
+/// First distance limit over the straight distance: half a circle, and a margin.
+const FIRST_LIMIT: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
 
-/// How often ways are followed twice as far before a part of the region counts as out of reach.
-const MOST_DOUBLINGS: u32 = 6;
+/// How often the limit is doubled before a part of the region counts as unreachable.
+const MAX_DOUBLINGS: u32 = 6;
 
-/// No more places of the grid than this are tried.
-const MOST_PLACES: f64 = 4e6;
+/// Maximum number of grid points.
+const MAX_GRID_POINTS: f64 = 4e6;
 
-/// A walk that ends this part of its length away from where the shortest way leads has gone past where ways meet.
-const ASTRAY: f64 = 1e-6;
+/// A walk longer than the shortest distance by this share is not the shortest path, and is dropped.
+const DETOUR_TOLERANCE: f64 = 1e-6;
 
-/// The start is kept this far, in barycentric weight, from its triangle's edges, where directions would be in doubt.
-const INWARD: f64 = 1e-6;
+/// Minimum barycentric weight of the start, away from its triangle's edges, where directions are ambiguous.
+const EDGE_MARGIN: f64 = 1e-6;
 
-/// +x is no +u where it lies within 10° of the normal.
-const NEARLY_PARALLEL: f64 = 0.984_807_753_012_208;
+/// cos 10°: +u is not +x within 10° of the normal.
+const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
 
-/// The grid that is asked for.
+/// A grid as requested.
 pub(super) struct Lattice {
     pub(super) hexagonal: bool,
     pub(super) pitch_m: f64,
-    /// Near which surface point it begins, in the world; none is the middle of the region.
+    /// Its origin is the nearest surface point, in the world; the middle of the region by default.
     pub(super) origin: Option<DVec3>,
-    /// Which way its rows run, in the world.
+    /// Direction of its rows, in the world.
     pub(super) u: Option<DVec3>,
 }
 
 /// A grid laid on a region.
-pub(super) struct Laid {
+pub(super) struct LaidGrid {
     /// Row by row, each with the area of a cell of the grid.
     pub(super) placed: Vec<Placed>,
-    /// The share of the region's surface that hangs together with the origin's.
+    /// The share of the region's surface that is connected to the origin.
     pub(super) reached_share: f64,
 }
 
 impl Lattice {
-    /// Lays it on the triangles of `canvas` that are in `region`.
-    pub(super) fn lay(&self, canvas: &Canvas<'_>, region: &[bool], progress: Progress<'_>) -> Result<Laid> {
-        let topology = canvas.topology();
+    /// Lays it on the triangles of `rest_surface` that are in `region`.
+    pub(super) fn lay(
+        &self,
+        rest_surface: &RestSurface<'_>,
+        region: &[bool],
+        progress: Progress<'_>,
+    ) -> Result<LaidGrid> {
+        let topology = rest_surface.topology();
         let sound: Vec<u32> = (0..topology.triangles.len() as u32)
             .filter(|&triangle| region[topology.given[triangle as usize] as usize])
             .collect();
         let start = self.start(topology, &sound)?;
         let part = topology.part[start.triangle as usize];
-        let area = |triangle: u32| canvas.area(topology.given[triangle as usize] as usize);
+        let area = |triangle: u32| rest_surface.area(topology.given[triangle as usize] as usize);
         let whole: f64 = sound.iter().map(|&triangle| area(triangle)).sum();
         let near: Vec<u32> = sound.into_iter().filter(|&triangle| topology.part[triangle as usize] == part).collect();
         let reached_share = near.iter().map(|&triangle| area(triangle)).sum::<f64>() / whole;
@@ -80,18 +84,18 @@ impl Lattice {
                 continue;
             }
             let shortest = map.reach(&place).map_or(0.0, |way| way.distance_m);
-            if shortest >= length * (1.0 - ASTRAY) {
+            if shortest >= length * (1.0 - DETOUR_TOLERANCE) {
                 let [a, b, c] = topology.corners(place.triangle);
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 let point = SurfacePoint { position: place.position(topology), normal, area: cell_area };
                 found.push((length, Placed { point, triangle, barycentric: place.barycentric }));
             }
         }
-        Ok(Laid { placed: self.without_meetings(found), reached_share })
+        Ok(LaidGrid { placed: self.without_overlaps(found), reached_share })
     }
 
-    /// Where the grid begins.
-    fn start(&self, topology: &Topology, sound: &[u32]) -> Result<Place> {
+    /// The grid's origin.
+    fn start(&self, topology: &Topology, sound: &[u32]) -> Result<SurfacePlace> {
         let index = SurfaceIndex::of_triangles(sound.iter().map(|&triangle| topology.corners(triangle)));
         let weighted = |&triangle: &u32| {
             let [a, b, c] = topology.corners(triangle);
@@ -101,18 +105,18 @@ impl Lattice {
         let (area, sum) = sound.iter().map(weighted).fold((0.0, DVec3::ZERO), |(a, s), (b, t)| (a + b, s + t));
         let wanted = self.origin.unwrap_or(sum / area);
         let hit = index.nearest(wanted).ok_or_else(|| Error::failed("the surface has no area to lay a grid on"))?;
-        Ok(inward(Place::in_triangle(topology, sound[hit.triangle], hit.position)))
+        Ok(inward(SurfacePlace::in_triangle(topology, sound[hit.triangle], hit.position)))
     }
 
-    /// The ways to all of the triangles `near`.
-    fn map<'t>(&self, topology: &'t Topology, start: Place, near: &[u32]) -> Result<LogMap<'t>> {
+    /// The distances to all of the triangles `near`.
+    fn map<'t>(&self, topology: &'t Topology, start: SurfacePlace, near: &[u32]) -> Result<LogMap<'t>> {
         let [a, b, c] = topology.corners(start.triangle);
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        let u = self.u.unwrap_or(if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X });
+        let u = self.u.unwrap_or(if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X });
         let from = start.position(topology);
         let corners = near.iter().flat_map(|&triangle| topology.corners(triangle));
-        let mut limit = corners.map(|corner| corner.distance(from)).fold(self.pitch_m, f64::max) * FIRST_REACH;
-        for _ in 0..MOST_DOUBLINGS {
+        let mut limit = corners.map(|corner| corner.distance(from)).fold(self.pitch_m, f64::max) * FIRST_LIMIT;
+        for _ in 0..MAX_DOUBLINGS {
             let map = LogMap::new(topology, start, u, limit)?;
             if extent(&map, near) <= limit {
                 return Ok(map);
@@ -122,11 +126,11 @@ impl Lattice {
         Err(Error::failed("the region winds too far away from the grid's origin; split it"))
     }
 
-    /// The grid's places within `extent` of its origin, row by row.
+    /// The grid's points within `extent` of its origin, row by row.
     fn cells(&self, extent: f64) -> Result<Vec<DVec2>> {
         let row_m = self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
         let (rows, columns) = ((extent / row_m).floor(), (extent / self.pitch_m).floor() + 1.0);
-        if 4.0 * rows * columns > MOST_PLACES {
+        if 4.0 * rows * columns > MAX_GRID_POINTS {
             return Err(Error::failed(format!(
                 "a grid of {} m on a region that reaches {extent:.3} m has too many places; is `pitch` in metres?",
                 self.pitch_m
@@ -146,8 +150,8 @@ impl Lattice {
         Ok(cells)
     }
 
-    /// Of places closer than half the pitch, where rows meet behind what the grid wraps, the one nearer the origin.
-    fn without_meetings(&self, found: Vec<(f64, Placed)>) -> Vec<Placed> {
+    /// Removes overlaps behind a wrapped part: of points closer than half the pitch, the one farther from the origin.
+    fn without_overlaps(&self, found: Vec<(f64, Placed)>) -> Vec<Placed> {
         let positions: Vec<DVec3> = found.iter().map(|(_, placed)| placed.point.position).collect();
         let grid = Grid::new(&positions, 0..positions.len() as u32, self.pitch_m / 2.0);
         let mut nearest_first: Vec<usize> = (0..found.len()).collect();
@@ -158,7 +162,7 @@ impl Lattice {
             let meets = |&(p, j): &(DVec3, u32)| {
                 kept[j as usize]
                     && p.distance(positions[i]) < self.pitch_m / 2.0
-                    && crowd::same_side(&found[i].1, &found[j as usize].1)
+                    && sample_neighbours::same_side(&found[i].1, &found[j as usize].1)
             };
             kept[i] = !around.into_iter().flatten().any(meets);
         }
@@ -166,29 +170,31 @@ impl Lattice {
     }
 }
 
-/// How long the shortest way to a corner of `near` is at most, m; infinite where one was not reached.
+/// The maximum distance to the corners of `near`, m; infinite if one is not reached.
 fn extent(map: &LogMap<'_>, near: &[u32]) -> f64 {
     let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let places = near.iter().flat_map(|&triangle| corners.map(|barycentric| Place { triangle, barycentric }));
+    let places = near.iter().flat_map(|&triangle| corners.map(|barycentric| SurfacePlace { triangle, barycentric }));
     places.map(|place| map.reach(&place).map_or(f64::INFINITY, |way| way.distance_m)).fold(0.0, f64::max)
 }
 
-/// `place`, moved off the edges of its triangle by so little that it does not count.
-pub(super) fn inward(place: Place) -> Place {
-    Place { barycentric: place.barycentric.map(|weight| weight * (1.0 - 3.0 * INWARD) + INWARD), ..place }
+/// `place` moved slightly off the edges of its triangle.
+pub(super) fn inward(place: SurfacePlace) -> SurfacePlace {
+    SurfacePlace {
+        barycentric: place.barycentric.map(|weight| weight * (1.0 - 3.0 * EDGE_MARGIN) + EDGE_MARGIN),
+        ..place
+    }
 }
 
-/// Where somebody comes who goes straight on for `length` from `from` in `triangle`; at the surface's edge, how much of it
-/// is left.
+/// The end of a straight walk of `length` from `from` in `triangle`; at the surface's edge, an error with the length left.
 pub(super) fn walk(
     topology: &Topology,
     mut triangle: u32,
     mut from: DVec3,
     mut direction: DVec3,
     mut length: f64,
-) -> Result<Place, f64> {
+) -> Result<SurfacePlace, f64> {
     let mut entered = NONE;
-    // A walk crosses a triangle more than once only by coming round.
+    // A bound: a walk crosses a triangle again only after going around the surface.
     for _ in 0..100 * topology.triangles.len().max(100) {
         let corners = topology.corners(triangle);
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
@@ -210,7 +216,7 @@ pub(super) fn walk(
         }
         let Some((t, edge)) = exit else { return Err(length) };
         if t >= length {
-            return Ok(Place::in_triangle(topology, triangle, from + direction * length));
+            return Ok(SurfacePlace::in_triangle(topology, triangle, from + direction * length));
         }
         from += direction * t;
         length -= t;

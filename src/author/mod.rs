@@ -1,7 +1,7 @@
 //! Authoring: placing taxels on a surface and grouping them into fields.
 //!
-//! [`author`] does all of it to a file, as a [`Recipe`] says; the pieces are here too. [`place_evenly`] and its kin place
-//! points on triangles, [`group::group`] makes fields of a body's taxels, [`lint()`] finds what is wrong with a layout:
+//! [`author`] applies a [`Recipe`] to a file. The steps are available too: [`place_evenly`] and similar functions place
+//! points on triangles, [`group::group`] groups a body's taxels into fields, [`lint()`] finds problems of a layout:
 //!
 //! ```
 //! use glam::DVec3;
@@ -15,17 +15,11 @@
 //! # Ok::<(), somatic::Error>(())
 //! ```
 //!
-//! Everything here gives the same answer on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties
-//! go to the lower index.
+//! Results are the same on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties go to the lower index.
 
-mod canvas;
-mod carry;
-mod cells;
 mod coverage;
-mod crowd;
 mod glob;
 mod grid;
-mod ground;
 pub mod group;
 pub mod icub;
 mod lattice;
@@ -34,29 +28,34 @@ mod place;
 mod points;
 pub(crate) mod random;
 mod recipe;
+pub mod recipe_values;
 mod refresh;
 mod region;
+mod rest_surface;
+mod sample_neighbours;
 mod scatter;
 mod skin;
-pub mod words;
+mod skin_weights;
+mod surface_search;
+mod voronoi;
 
 use glam::DVec3;
 
-pub use carry::{blend_skinning, heaviest_four};
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use lint::{Finding, FindingKind, lint};
 pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
 pub use recipe::Recipe;
 pub use refresh::refresh;
 pub use skin::{Authored, PlaceReport, author};
+pub use skin_weights::{blend_skinning, heaviest_four};
 
-/// A point of a surface that a taxel sits on, or could. Coordinates are those of the mesh it was made from.
+/// A point on a surface, in the coordinates of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Where it is, m.
+    /// Its position, m.
     pub position: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
-    /// Surface that is nearer to it than to any other, m².
+    /// The surface nearer to it than to other points, m².
     pub area: f64,
 }

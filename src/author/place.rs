@@ -1,4 +1,4 @@
-//! Taxels spread over triangles: blue noise by weighted sample elimination.
+//! Places taxels on triangles: blue noise by weighted sample elimination.
 //!
 //! Yuksel, *Sample Elimination for Generating Poisson Disk Sample Sets* (2015): scatter several times as many samples
 //! as wanted, then remove the one with the most crowded neighbourhood until the wanted number is left.
@@ -8,20 +8,20 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::SurfacePoint;
-use super::crowd::{Crowd, face_alike, pack, same_side, thin_out};
+use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack, points_on_same_side, same_side};
 use super::scatter::Pieces;
 use crate::error::{Error, Result};
 
-/// Samples scattered for each one kept.
+/// Samples per point.
 const OVERSAMPLING: usize = 5;
 
-/// Samples scattered for each disk of the densest packing, where a spacing is given.
+/// Samples per disk of the densest packing, for a given spacing.
 const PACKED_OVERSAMPLING: f64 = 9.0;
 
-/// No more points than this are placed at a time.
-const MOST_POINTS: f64 = 4e6;
+/// Maximum number of points.
+const MAX_POINTS: f64 = 4e6;
 
-/// A point that was chosen, and where on the mesh it lies.
+/// A point and its place on the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// The point; its normal is that of the triangle.
@@ -32,18 +32,18 @@ pub struct Placed {
     pub barycentric: [f64; 3],
 }
 
-/// The radius, in m, of `count` disks that cover a plane of `area` (m²) as densely as disks can without overlapping.
-/// No placement of `count` points has a smallest spacing over twice this.
+/// The radius, m, of `count` disks in the densest packing of a plane of `area` (m²). No placement of `count` points has a
+/// smallest spacing over twice this.
 #[must_use]
 pub fn widest_radius(area: f64, count: usize) -> f64 {
     (area / (2.0 * 3.0_f64.sqrt() * count as f64)).sqrt()
 }
 
-/// Places exactly `count` points on a mesh, as evenly as blue noise goes: irregular, but none close to another.
+/// Places exactly `count` points on a mesh as blue noise: irregular, but none close to another.
 ///
-/// `positions` are in metres and `triangles` counter-clockwise seen from outside. Two places whose normals are over 90°
-/// apart are no neighbours however close they are, so that both sides of a thin part get their own. The points come in
-/// the order of the triangles; `seed` picks one of many equally good placements.
+/// `positions` are in metres and `triangles` counter-clockwise seen from outside. Points with normals over 90° apart are
+/// no neighbours, so that both sides of a thin part get points. The points are in the order of the triangles; `seed`
+/// selects one of many equally good placements.
 ///
 /// # Errors
 /// `count` is 0 or over 4 million, a triangle names a vertex that is not there, or the triangles have no finite,
@@ -52,7 +52,7 @@ pub fn place_evenly(positions: &[DVec3], triangles: &[[u32; 3]], count: usize, s
     evenly(positions, triangles, count, seed, &mut |_| {})
 }
 
-/// As [`place_evenly`]; tells `progress` the share that is done.
+/// As [`place_evenly`]; `progress` gets the share that is done.
 pub(super) fn evenly(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -67,7 +67,7 @@ pub(super) fn evenly(
     Ok(eliminate(&samples, &reaches, count, progress))
 }
 
-/// As [`evenly`], but no two neighbours closer than `spacing_m`; `None` if so many do not fit.
+/// As [`evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -90,8 +90,8 @@ pub(super) fn evenly_apart(
     Ok(Ok(eliminate(&packed, &reaches, count, progress)))
 }
 
-/// Places exactly `count` points, as [`place_evenly`] does, more of them where `density` is higher: how many there are
-/// a square metre is in proportion to it. It may be 0, and only its ratios matter.
+/// Places exactly `count` points, as [`place_evenly`] does, in proportion to `density`, which may be 0 and need not be
+/// normalised.
 ///
 /// Where points are `density` times as dense, they keep 1/√density of the spacing.
 ///
@@ -120,7 +120,7 @@ pub(super) fn by_density(
     let area = Pieces::whole(positions, triangles)?.weight();
     let pieces = Pieces::by_density(positions, triangles, OVERSAMPLING * count, &density)?;
     let samples = pieces.scatter(OVERSAMPLING * count, seed);
-    // Beyond what one point on the whole surface would keep, thinner is no different.
+    // No reach exceeds that of a single point on the whole surface.
     let widest = 2.0 * widest_radius(area, 1);
     let reach_at = |sample: &Placed| {
         let density = density(sample);
@@ -130,8 +130,8 @@ pub(super) fn by_density(
     Ok(eliminate(&samples, &reaches, count, progress))
 }
 
-/// Places as many points as it finds room for with any two neighbours at least `spacing_m` apart: about two thirds of
-/// the disks of that diameter that a plane could hold.
+/// Places as many points as it can with neighbours at least `spacing_m` apart: about two thirds of the densest packing of
+/// disks of that diameter.
 ///
 /// Order, sides and `seed` are as in [`place_evenly`].
 ///
@@ -142,7 +142,7 @@ pub fn place_apart(positions: &[DVec3], triangles: &[[u32; 3]], spacing_m: f64, 
     apart(positions, triangles, spacing_m, seed, &mut |_| {})
 }
 
-/// As [`place_apart`]; tells `progress` the share that is done.
+/// As [`place_apart`]; `progress` gets the share that is done.
 pub(super) fn apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -155,15 +155,15 @@ pub(super) fn apart(
     }
     let pieces = Pieces::whole(positions, triangles)?;
     let most = pieces.weight() * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m);
-    if most > MOST_POINTS {
+    if most > MAX_POINTS {
         return Err(Error::failed(format!(
-            "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MOST_POINTS:.0e} that can be placed; is the \
+            "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MAX_POINTS:.0e} that can be placed; is the \
              spacing in metres?"
         )));
     }
     let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
     let reaches = vec![spacing_m; samples.len()];
-    let crowd = Crowd::new(&samples, &reaches, |_, _| ());
+    let crowd = SampleNeighbours::new(&samples, &reaches, |_, _| ());
     progress(0.5);
     let kept = pack(&crowd, samples.len(), &mut |share| progress(0.5 + 0.5 * share));
     Ok(share_area(&samples, &kept, &crowd))
@@ -173,32 +173,32 @@ fn check_count(count: usize) -> Result<()> {
     if count == 0 {
         return Err(Error::failed("no taxels were asked for; place at least one"));
     }
-    if count as f64 > MOST_POINTS {
+    if count as f64 > MAX_POINTS {
         return Err(Error::failed(format!(
-            "{count} taxels are over the {MOST_POINTS:.0e} that can be placed at a time"
+            "{count} taxels are over the {MAX_POINTS:.0e} that can be placed at a time"
         )));
     }
     Ok(())
 }
 
-/// The `count` samples that stay, each with the area that is its own.
+/// Eliminates all but `count` samples; each gets its share of the area.
 fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Vec<Placed> {
     let ratio = count as f64 / samples.len() as f64;
-    // Samples much closer than the outcome's spacing all have to go: that one is closer still says nothing.
+    // Distances far below the final spacing all get the same weight.
     let closest = 1.0 - ratio * ratio.sqrt();
-    let crowd = Crowd::new(samples, reaches_m, |distance, reach| {
+    let crowd = SampleNeighbours::new(samples, reaches_m, |distance, reach| {
         let share = (1.0 - distance.max(reach * closest * 0.65) / reach).max(0.0);
         let squared = share * share;
         let fourth = squared * squared;
         fourth * fourth
     });
     progress(0.5);
-    let kept = thin_out(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share));
+    let kept = eliminate_crowded(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share));
     share_area(samples, &kept, &crowd)
 }
 
-/// The samples that were kept, each with the area of those that are nearest to it on its own side.
-fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Crowd<T>) -> Vec<Placed> {
+/// The kept samples, each with the area of the samples nearest to it on its side.
+fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &SampleNeighbours<T>) -> Vec<Placed> {
     const GONE: u32 = u32::MAX;
     let mut place_of = vec![GONE; samples.len()];
     for (place, &sample) in kept.iter().enumerate() {
@@ -216,14 +216,14 @@ fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Crowd<
             own => Some(own as usize),
         };
         let owner = own.or_else(|| {
-            // Nothing that was kept is within reach.
+            // No kept sample is within reach.
             let tree = tree.get_or_insert_with(|| {
                 let spots = kept.iter().enumerate().map(|(k, &j)| Spot::new(samples[j].point.position.to_array(), k));
                 RTree::bulk_load(spots.collect())
             });
             let mut nearest = tree.nearest_neighbor_iter(here.to_array()).map(|spot| spot.data);
             let own = nearest.find(|&k| same_side(sample, &samples[kept[k]]));
-            // On a part so thin that no kept sample shares the side, the nearest one stands for it.
+            // If no kept sample is on the same side, the nearest one gets the area.
             own.or_else(|| tree.nearest_neighbor(here.to_array()).map(|spot| spot.data))
         });
         if let Some(owner) = owner {
@@ -233,19 +233,19 @@ fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Crowd<
     placed
 }
 
-/// Per point how far away its nearest neighbour is, m; `None` where nobody else is on its side.
+/// Per point the distance to its nearest neighbour on its side, m; `None` if there is none.
 pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
     let spots = points.iter().enumerate().map(|(index, point)| Spot::new(point.position.to_array(), index));
     let tree = RTree::bulk_load(spots.collect());
     let nearest = |(index, point): (usize, &SurfacePoint)| {
         let mut others = tree.nearest_neighbor_iter(point.position.to_array()).map(|spot| spot.data);
-        let other = others.find(|&other| other != index && face_alike(&points[other], point))?;
+        let other = others.find(|&other| other != index && points_on_same_side(&points[other], point))?;
         Some(points[other].position.distance(point.position))
     };
     points.iter().enumerate().map(nearest).collect()
 }
 
-/// Told the share of the work that is done.
+/// Called with the share of the work that is done.
 pub(super) type Progress<'a> = &'a mut dyn FnMut(f64);
 
 type Spot = GeomWithData<[f64; 3], usize>;

@@ -1,41 +1,41 @@
-//! Taxels whose places are given: by empties and points in the file, or by a table. Each is taken to the nearest surface.
+//! Taxels at given places: empties and points in the file, or rows of a table, projected to the nearest surface.
 
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::canvas::Canvas;
 use super::glob::Globs;
 use super::icub::IcubFile;
 use super::place::Placed;
-use super::{SurfacePoint, cells, recipe};
+use super::rest_surface::RestSurface;
+use super::{SurfacePoint, recipe, voronoi};
 use crate::body::{MAX_TAXEL_ID, Modality, SurfaceIndex};
 use crate::error::{Error, Result, nearest};
 use crate::field::geodesic::barycentric;
 
-/// A place that was given.
-pub(super) struct Given {
-    /// Its id, where one came along.
+/// A given place.
+pub(super) struct GivenPoint {
+    /// Its id, if given.
     pub(super) id: Option<u32>,
     position_in_world: DVec3,
-    /// The surface that it stands for, m², where that came along.
+    /// Its area, m², if given.
     area_m2: Option<f64>,
-    /// What messages call it.
+    /// Its name in messages.
     name: String,
 }
 
-/// A given place on the surface, and how far it was moved there, m.
+/// A place on the surface, and how far it was moved there, m.
 pub(super) struct Snapped {
     pub(super) placed: Placed,
     pub(super) id: Option<u32>,
     pub(super) moved_m: f64,
 }
 
-/// The places that the marks called `names` make, those of one name after the other, `tip.2` before `tip.10`.
-pub(super) fn of_marks(canvas: &Canvas<'_>, names: &Globs) -> Result<Vec<Given>> {
-    let mut marks: Vec<_> = canvas.details.marks.iter().filter(|mark| names.is_match(&mark.name)).collect();
+/// The places of the marks called `names`, sorted by name, `tip.2` before `tip.10`.
+pub(super) fn of_marks(rest_surface: &RestSurface<'_>, names: &Globs) -> Result<Vec<GivenPoint>> {
+    let mut marks: Vec<_> = rest_surface.details.marks.iter().filter(|mark| names.is_match(&mark.name)).collect();
     if marks.is_empty() {
-        let known = canvas.details.marks.iter().map(|mark| mark.name.as_str());
+        let known = rest_surface.details.marks.iter().map(|mark| mark.name.as_str());
         let hint = nearest(names.first(), known).map_or_else(
             || "put empties or points there and name them so".to_owned(),
             |near| format!("did you mean `{near}`?"),
@@ -47,7 +47,7 @@ pub(super) fn of_marks(canvas: &Canvas<'_>, names: &Globs) -> Result<Vec<Given>>
     }
     marks.sort_by_key(|mark| natural(&mark.name));
     let given = marks.iter().flat_map(|mark| {
-        mark.positions_in_world.iter().enumerate().map(|(index, &position_in_world)| Given {
+        mark.positions_in_world.iter().enumerate().map(|(index, &position_in_world)| GivenPoint {
             id: None,
             position_in_world,
             area_m2: None,
@@ -61,7 +61,7 @@ pub(super) fn of_marks(canvas: &Canvas<'_>, names: &Globs) -> Result<Vec<Given>>
     Ok(given.collect())
 }
 
-/// A name in pieces that sort as people count.
+/// A sort key for names with numbers.
 fn natural(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
@@ -79,16 +79,16 @@ fn natural(name: &str) -> Vec<(String, u64)> {
 /// Columns of a table of places.
 const COLUMNS: [&str; 6] = ["id", "x", "y", "z", "link", "area"];
 
-/// A taxel of more than this is measured in another unit, m².
-const LARGEST_M2: f64 = 1.0;
+/// Maximum area of a taxel, m²; larger ones are in another unit.
+const MAX_TAXEL_AREA_M2: f64 = 1.0;
 
-/// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres; where they are in links' frames, `link`; and
-/// where it is known, `area` in m².
-pub(super) fn of_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
-    read_table(canvas, path).map_err(|e| e.at(path.display()))
+/// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres, optionally `link` for coordinates in a link's
+/// frame, and `area` in m².
+pub(super) fn of_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
+    read_table(rest_surface, path).map_err(|e| e.at(path.display()))
 }
 
-fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
+fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
     let file = std::fs::File::open(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file; it is looked for beside the recipe"),
         _ => Error::failed(e.to_string()),
@@ -117,7 +117,7 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
     };
     let (id, places) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?]);
     let (link, area) = (column("link"), column("area"));
-    let mut given: Vec<Given> = Vec::new();
+    let mut given: Vec<GivenPoint> = Vec::new();
     let mut seen = std::collections::HashMap::new();
     for row in reader.records() {
         let row = row.map_err(|e| broken(&e))?;
@@ -142,8 +142,8 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
         }
         let mut position = DVec3::from_array(position);
         if let Some(name) = link.map(cell).filter(|name| !name.is_empty()) {
-            let links = &canvas.body.links;
-            let link = canvas.body.link_index(name).ok_or_else(|| {
+            let links = &rest_surface.body.links;
+            let link = rest_surface.body.link_index(name).ok_or_else(|| {
                 let hint = nearest(name, links.iter().map(|link| link.name.as_str()));
                 let hint = hint.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
                 at(Error::failed(format!("the body has no link `{name}`{hint}")))
@@ -152,7 +152,7 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
         }
         let area_m2 =
             area.map(cell).filter(|text| !text.is_empty()).map(|text| area_of(text).map_err(at)).transpose()?;
-        given.push(Given {
+        given.push(GivenPoint {
             id: Some(id),
             position_in_world: position,
             area_m2,
@@ -165,37 +165,37 @@ fn read_table(canvas: &Canvas<'_>, path: &Path) -> Result<Vec<Given>> {
     Ok(given)
 }
 
-/// The area that `text` says, m².
+/// Parses an area, m².
 fn area_of(text: &str) -> Result<f64> {
-    let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= LARGEST_M2);
+    let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
     area.ok_or_else(|| {
         Error::failed(format!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
     })
 }
 
-/// The places in the iCub's position file at `path`, in the frame of the link that the file names or `link`: of its taxels
-/// for what `modality` is, each with its channel plus `first_id` for an id. With them comes what there is to say.
+/// The places of the taxels of `modality` in the iCub's position file at `path`, in the frame of `link` or of the link that
+/// the file names; ids are channels plus `first_id`. Also returns notes.
 pub(super) fn of_icub(
-    canvas: &Canvas<'_>,
+    rest_surface: &RestSurface<'_>,
     path: &Path,
     link: Option<&str>,
     modality: Modality,
     first_id: u32,
-) -> Result<(Vec<Given>, Vec<String>)> {
+) -> Result<(Vec<GivenPoint>, Vec<String>)> {
     let place = |e: Error| e.at(path.display());
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let mut file = IcubFile::read(&text).map_err(place)?;
-    let links = &canvas.body.links;
+    let links = &rest_surface.body.links;
     let name = link.unwrap_or(&file.part);
-    let link = canvas.body.link_index(name).ok_or_else(|| {
+    let link = rest_surface.body.link_index(name).ok_or_else(|| {
         let near = nearest(name, links.iter().map(|link| link.name.as_str()));
         let hint = near.map_or("say which it is by `link`".to_owned(), |near| format!("did you mean `{near}`?"));
         Error::failed(format!("the body has no link `{name}`; {hint}"))
     })?;
     let world_from_link = links[link].world_from_link;
     let chosen = file.taxels().filter(|(_, taxel)| taxel.modality == modality);
-    let given: Vec<Given> = chosen
-        .map(|(channel, taxel)| Given {
+    let given: Vec<GivenPoint> = chosen
+        .map(|(channel, taxel)| GivenPoint {
             id: Some(first_id.saturating_add(channel)),
             position_in_world: world_from_link.transform_point3(taxel.position_in_link),
             area_m2: None,
@@ -216,10 +216,15 @@ pub(super) fn of_icub(
     Ok((given, notes.into_iter().map(|note| format!("{name}: {note}")).collect()))
 }
 
-/// `given` taken to the nearest place in `region`.
-pub(super) fn snap(canvas: &Canvas<'_>, region: &[bool], given: &[Given], within_m: f64) -> Result<Vec<Snapped>> {
+/// `given` projected to the nearest points of `region`.
+pub(super) fn snap(
+    rest_surface: &RestSurface<'_>,
+    region: &[bool],
+    given: &[GivenPoint],
+    within_m: f64,
+) -> Result<Vec<Snapped>> {
     let triangles: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
-    let index = SurfaceIndex::of_triangles(triangles.iter().map(|&triangle| canvas.corners(triangle)));
+    let index = SurfaceIndex::of_triangles(triangles.iter().map(|&triangle| rest_surface.corners(triangle)));
     let mut snapped = Vec::with_capacity(given.len());
     for place in given {
         let hit = index.nearest(place.position_in_world);
@@ -234,13 +239,13 @@ pub(super) fn snap(canvas: &Canvas<'_>, region: &[bool], given: &[Given], within
             )));
         }
         let triangle = triangles[hit.triangle];
-        let barycentric = barycentric(canvas.corners(triangle), hit.position);
+        let barycentric = barycentric(rest_surface.corners(triangle), hit.position);
         let point = SurfacePoint { position: hit.position, normal: hit.normal, area: 0.0 };
         snapped.push(Snapped { placed: Placed { point, triangle, barycentric }, id: place.id, moved_m });
     }
     let placed: Vec<Placed> = snapped.iter().map(|snapped| snapped.placed).collect();
     let all_known = given.iter().all(|place| place.area_m2.is_some());
-    let cells = if all_known { vec![0.0; placed.len()] } else { cells::areas(canvas, &placed) };
+    let cells = if all_known { vec![0.0; placed.len()] } else { voronoi::areas(rest_surface, &placed) };
     for ((snapped, place), cell) in snapped.iter_mut().zip(given).zip(cells) {
         snapped.placed.point.area = place.area_m2.unwrap_or(cell);
     }

@@ -1,4 +1,4 @@
-//! A small seeded generator: the same numbers on every machine and in every version of this crate. Tests take it too.
+//! A seeded random generator with the same numbers on every machine and in every version of this crate.
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
 pub(crate) struct Random(u64);

@@ -1,30 +1,29 @@
-//! What is derived from the surface, derived again.
+//! Recomputes what a layout derives from the surface.
 
-use super::ground::Ground;
-use super::lint::checks::{Footing, drift};
+use super::lint::checks::{SurfaceFit, drift};
 use super::lint::listed;
+use super::surface_search::SurfaceSearch;
 use crate::body::{Body, ChartKind};
 use crate::field::Unroller;
 
-/// Brings up to date what `body` stores and its surface gives: the normals of taxels that were moved, and the (u, v) of
-/// geodesic charts. What is current, as [`lint`](super::lint) has it, keeps its bits. A line each of what changed, and
-/// of charts that can no longer be laid; those lose their (u, v), so that nothing wrong is felt.
+/// Recomputes the normals of taxels that were moved and the (u, v) of geodesic charts of `body`. Values that are current,
+/// as in [`lint`](super::lint), stay unchanged. Returns a line for each change, and for each chart that can no longer be
+/// computed; such a chart loses its (u, v).
 ///
-/// Positions are the author's: a taxel off the surface stays there and takes the normal of the nearest surface. Areas
-/// stay too.
+/// Positions and areas stay: a taxel off the surface gets the normal of the nearest surface point.
 pub fn refresh(body: &mut Body) -> Vec<String> {
     let mut notes = Vec::new();
-    let ground = Ground::of(body);
+    let surface_search = SurfaceSearch::of(body);
     let stale: Vec<_> = body
         .taxels
         .iter()
         .enumerate()
         .filter_map(|(index, taxel)| {
-            let footing = Footing::of(body, &ground, taxel).filter(Footing::is_stale)?;
-            Some((index, footing.normal_in_link))
+            let fit = SurfaceFit::of(body, &surface_search, taxel).filter(SurfaceFit::is_stale)?;
+            Some((index, fit.normal_in_link))
         })
         .collect();
-    drop(ground);
+    drop(surface_search);
     if !stale.is_empty() {
         let ids: Vec<u32> = stale.iter().map(|&(index, _)| body.taxels[index].id).collect();
         notes.push(format!(

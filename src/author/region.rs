@@ -1,15 +1,15 @@
-//! Regions: which triangles of a body a recipe means.
+//! Regions: sets of triangles selected by a recipe.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::canvas::Canvas;
 use super::glob::Globs;
 use super::recipe::Origin;
+use super::rest_surface::RestSurface;
 use crate::error::{Error, Result, nearest};
 
-/// What a triangle must have to be in a region; all of it has to hold.
+/// The conditions for a triangle to be in a region; all must hold.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     /// Names of nodes with meshes, of those meshes, or of links.
@@ -21,25 +21,25 @@ pub(super) struct Region {
     pub(super) bounds: Option<[DVec3; 2]>,
     /// Names of regions that it is not in.
     pub(super) except: Vec<String>,
-    /// Where it stands in the recipe.
+    /// Its place in the recipe.
     pub(super) at: Origin,
 }
 
-/// The regions of a recipe on a body, worked out as they are asked for.
+/// The regions of a recipe on a body, computed on demand.
 pub(super) struct Regions<'a> {
-    canvas: &'a Canvas<'a>,
+    rest_surface: &'a RestSurface<'a>,
     known: &'a BTreeMap<String, Region>,
     found: BTreeMap<String, Vec<bool>>,
 }
 
 impl<'a> Regions<'a> {
-    pub(super) fn new(canvas: &'a Canvas<'a>, known: &'a BTreeMap<String, Region>) -> Self {
-        Self { canvas, known, found: BTreeMap::new() }
+    pub(super) fn new(rest_surface: &'a RestSurface<'a>, known: &'a BTreeMap<String, Region>) -> Self {
+        Self { rest_surface, known, found: BTreeMap::new() }
     }
 
-    /// Per triangle whether it is in one of the regions `names`, asked for at `at`.
+    /// Per triangle whether it is in one of the regions `names`, requested at `at`.
     pub(super) fn union(&mut self, names: &[String], at: &Origin) -> Result<Vec<bool>> {
-        let mut all = vec![false; self.canvas.triangles.len()];
+        let mut all = vec![false; self.rest_surface.triangles.len()];
         for name in names {
             self.find(name, at, &mut BTreeSet::new())?;
             for (all, own) in all.iter_mut().zip(&self.found[name]) {
@@ -49,7 +49,7 @@ impl<'a> Regions<'a> {
         Ok(all)
     }
 
-    /// Works out the region `name`; `above` are those that wait for it.
+    /// Computes the region `name`; `above` are the regions that depend on it.
     fn find(&mut self, name: &str, asked_at: &Origin, above: &mut BTreeSet<String>) -> Result<()> {
         if self.found.contains_key(name) {
             return Ok(());
@@ -61,7 +61,9 @@ impl<'a> Regions<'a> {
             return Err(asked_at.wrong(format!("there is no region `{name}`; {hint}")));
         };
         if !above.insert(name.to_owned()) {
-            return Err(asked_at.wrong(format!("region `{name}` takes itself away through `except`; break the ring")));
+            return Err(
+                asked_at.wrong(format!("region `{name}` excludes itself through `except`; remove one of these"))
+            );
         }
         let mut own = self.select(region).map_err(|e| region.at.put(e))?;
         if !own.contains(&true) {
@@ -82,9 +84,9 @@ impl<'a> Regions<'a> {
     }
 
     fn select(&self, region: &Region) -> Result<Vec<bool>> {
-        let canvas = self.canvas;
-        let (surfaces, details) = (&canvas.body.surfaces, &canvas.details.parts);
-        let painted = region.attribute.as_ref().map(|name| canvas.painted(name)).transpose()?;
+        let rest_surface = self.rest_surface;
+        let (surfaces, details) = (&rest_surface.body.surfaces, &rest_surface.details.parts);
+        let painted = region.attribute.as_ref().map(|name| rest_surface.painted(name)).transpose()?;
         let by_part: Vec<(bool, bool)> = surfaces
             .iter()
             .zip(details)
@@ -99,27 +101,27 @@ impl<'a> Regions<'a> {
                 (named, material)
             })
             .collect();
-        let links: Vec<bool> = (canvas.body.links.iter())
+        let links: Vec<bool> = (rest_surface.body.links.iter())
             .map(|link| region.node.as_ref().is_some_and(|globs| globs.is_match(&link.name)))
             .collect();
         let is_in = |triangle: usize| {
-            let (named, material) = by_part[canvas.origin[triangle].0 as usize];
-            let [a, b, c] = canvas.corners(triangle);
+            let (named, material) = by_part[rest_surface.origin[triangle].0 as usize];
+            let [a, b, c] = rest_surface.corners(triangle);
             let middle = (a + b + c) / 3.0;
             let full = |values: &Vec<Option<f64>>| {
-                let corners = canvas.triangles[triangle].map(|v| values[v as usize]);
+                let corners = rest_surface.triangles[triangle].map(|v| values[v as usize]);
                 matches!(corners, [Some(a), Some(b), Some(c)] if a + b + c > 1.5)
             };
-            (named || links[canvas.link[triangle] as usize])
+            (named || links[rest_surface.link[triangle] as usize])
                 && material
                 && painted.as_ref().is_none_or(full)
                 && region.bounds.is_none_or(|[low, high]| middle.cmpge(low).all() && middle.cmple(high).all())
         };
-        Ok((0..canvas.triangles.len()).map(is_in).collect())
+        Ok((0..rest_surface.triangles.len()).map(is_in).collect())
     }
 
     fn why_empty(&self, name: &str, region: &Region) -> String {
-        let canvas = self.canvas;
+        let rest_surface = self.rest_surface;
         let mut reasons = Vec::new();
         let list = |names: BTreeSet<&str>| {
             let shown: Vec<&str> = names.iter().copied().take(12).collect();
@@ -138,13 +140,18 @@ impl<'a> Regions<'a> {
             };
             reasons.push(format!("no {what} is called `{}`; {hint}", globs.text()));
         };
-        let mut nodes: BTreeSet<&str> = canvas.body.surfaces.iter().map(|surface| surface.name.as_str()).collect();
-        nodes.extend(canvas.details.parts.iter().filter_map(|part| part.mesh.as_deref()));
-        nodes.extend(canvas.link.iter().map(|&link| canvas.body.links[link as usize].name.as_str()));
+        let mut nodes: BTreeSet<&str> =
+            rest_surface.body.surfaces.iter().map(|surface| surface.name.as_str()).collect();
+        nodes.extend(rest_surface.details.parts.iter().filter_map(|part| part.mesh.as_deref()));
+        nodes.extend(rest_surface.link.iter().map(|&link| rest_surface.body.links[link as usize].name.as_str()));
         look(&region.node, "node with a mesh", nodes);
-        look(&region.material, "material", canvas.details.parts.iter().filter_map(|p| p.material.as_deref()).collect());
+        look(
+            &region.material,
+            "material",
+            rest_surface.details.parts.iter().filter_map(|p| p.material.as_deref()).collect(),
+        );
         if reasons.is_empty() {
-            let all = canvas.triangles.iter().flatten().map(|&v| canvas.positions[v as usize]);
+            let all = rest_surface.triangles.iter().flatten().map(|&v| rest_surface.positions[v as usize]);
             let (low, high) =
                 all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
             reasons
@@ -154,7 +161,7 @@ impl<'a> Regions<'a> {
     }
 }
 
-/// The error where a place is on no triangle at all.
+/// The error for a place without any triangle.
 pub(super) fn nothing_left(name: &str) -> Error {
     Error::failed(format!("place `{name}` has no skin: its regions are all kept bare"))
 }

@@ -1,4 +1,4 @@
-//! Samples scattered over triangles, uniformly or by a density.
+//! Random samples on triangles, uniform or by a density.
 
 use glam::DVec3;
 
@@ -7,13 +7,13 @@ use super::place::Placed;
 use super::random::Random;
 use crate::error::{Error, Result};
 
-/// How often a triangle is cut into four at most.
-const MOST_CUTS: u32 = 12;
+/// Maximum number of subdivisions of a triangle.
+const MAX_CUTS: u32 = 12;
 
 /// A triangle's own corners in its barycentric coordinates.
 const CORNERS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// A part of a triangle over which the density counts as constant.
+/// A part of a triangle with constant density.
 #[derive(Clone, Copy)]
 struct Piece {
     triangle: u32,
@@ -23,7 +23,7 @@ struct Piece {
     cuts: u32,
 }
 
-/// A surface in pieces that samples fall on in proportion to area times density.
+/// A surface in pieces, sampled in proportion to area times density.
 pub(super) struct Pieces {
     corners: Vec<[DVec3; 3]>,
     pieces: Vec<Piece>,
@@ -65,7 +65,7 @@ impl Pieces {
         Self::new(corners, pieces, "the surface has no area to place taxels on")
     }
 
-    /// The triangles cut up until a piece gets few of `count` samples and `density` at its middle stands for all of it.
+    /// Triangles subdivided until each piece gets few of `count` samples; `density` is evaluated at the pieces' middles.
     pub(super) fn by_density(
         positions: &[DVec3],
         triangles: &[[u32; 3]],
@@ -100,7 +100,7 @@ impl Pieces {
         let mut open: Vec<(Piece, f64)> = first.into_iter().rev().collect();
         while let Some((piece, area)) = open.pop() {
             let fine = area <= most_area && area * piece.density <= most_weight.max(f64::MIN_POSITIVE);
-            if fine || piece.cuts == MOST_CUTS {
+            if fine || piece.cuts == MAX_CUTS {
                 pieces.push(piece);
                 continue;
             }
@@ -130,12 +130,12 @@ impl Pieces {
         Ok(Self { corners, pieces, weight_up_to })
     }
 
-    /// Area times density of all of it, m².
+    /// Sum of area times density, m².
     pub(super) fn weight(&self) -> f64 {
         self.weight_up_to.last().copied().unwrap_or(0.0)
     }
 
-    /// Scatters `count` samples; each one's `area` is what it stands for.
+    /// Draws `count` samples, each with its share of the area.
     pub(super) fn scatter(&self, count: usize, seed: u64) -> Vec<Placed> {
         let mut random = Random::new(seed);
         let weight = self.weight();
@@ -143,7 +143,7 @@ impl Pieces {
         let mut index = 0;
         (0..count)
             .map(|sample| {
-                // One sample in each of `count` equal shares: as uniform, and with fewer gaps, than anywhere.
+                // One sample in each of `count` equal shares: uniform, with fewer gaps.
                 let place = weight * (sample as f64 + random.unit()) / count as f64;
                 while index + 1 < self.pieces.len() && self.weight_up_to[index] <= place {
                     index += 1;

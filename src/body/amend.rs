@@ -1,4 +1,4 @@
-//! A layout that stays in somebody's file, brought up to date there: ids, normals, and what fields say of their members.
+//! Updates a layout in its file: ids, normals and members of fields.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,24 +6,24 @@ use glam::DVec3;
 
 use super::details::Details;
 use super::document::Document;
+use super::json_edit::JsonEdit;
 use super::layout::{FIELD_KEY, NORMAL, TAXEL_ID};
 use super::original::Original;
 use super::read::custom;
-use super::splice::Splice;
 use super::{Body, FieldSpec};
 use crate::error::Result;
 
-/// New columns of taxels' attributes: by mesh and primitive, names (without their underscore) and one number a point.
+/// New columns of taxel attributes: by mesh and primitive, the name (without underscore) and one number per point.
 type Columns = BTreeMap<(usize, usize), Vec<(&'static str, Vec<f32>)>>;
 
 impl Original {
-    /// Takes over from `now` what of its taxels' ids and normals, and of its fields, the file has otherwise. `read` is the
-    /// body that the file holds, with its `details`, and `now` the same but for those. What is the same keeps its bits.
+    /// Writes the ids and normals of taxels and the fields of `now` that differ from `read`, the body in the file with its
+    /// `details`. Everything else stays unchanged.
     ///
-    /// Gives a line for each mesh whose points stay as they are because several nodes show it.
+    /// Returns a line for each mesh whose points cannot be changed because several nodes show it.
     ///
     /// # Errors
-    /// The file is no sound body any more.
+    /// The file is no valid body any more.
     pub fn amend(&mut self, read: &Body, now: &Body, details: &Details) -> Result<Vec<String>> {
         let (columns, notes) = self.columns(read, now, details)?;
         let mut addition = self.addition();
@@ -34,36 +34,36 @@ impl Original {
             }
         }
         self.add(&addition);
-        let mut splice = Splice::new(&self.text);
-        let meshes = splice.list("meshes");
+        let mut edit = JsonEdit::new(&self.text);
+        let meshes = edit.list("meshes");
         let mut added: BTreeMap<(usize, usize), Vec<(String, String)>> = BTreeMap::new();
         for ((mesh, primitive), name, accessor) in accessors {
-            let primitives = splice.member(&meshes[mesh], "primitives").map_or_else(Vec::new, |s| splice.elements(&s));
-            let Some(attributes) = primitives.get(primitive).and_then(|p| splice.member(p, "attributes")) else {
+            let primitives = edit.member(&meshes[mesh], "primitives").map_or_else(Vec::new, |s| edit.elements(&s));
+            let Some(attributes) = primitives.get(primitive).and_then(|p| edit.member(p, "attributes")) else {
                 continue;
             };
-            match splice.member(&attributes, &name) {
-                Some(old) => splice.replace(old, accessor.to_string()),
+            match edit.member(&attributes, &name) {
+                Some(old) => edit.replace(old, accessor.to_string()),
                 None => added.entry((attributes.start, attributes.end)).or_default().push((name, accessor.to_string())),
             }
         }
         for ((start, end), members) in added {
-            splice.extend(&(start..end), &members);
+            edit.extend(&(start..end), &members);
         }
-        for node in splice.list("nodes") {
-            let extras = splice.member(&node, "extras");
-            let Some(span) = extras.and_then(|extras| splice.member(&extras, FIELD_KEY)) else { continue };
-            let text = serde_json::from_str::<String>(splice.get(&span));
+        for node in edit.list("nodes") {
+            let extras = edit.member(&node, "extras");
+            let Some(span) = extras.and_then(|extras| edit.member(&extras, FIELD_KEY)) else { continue };
+            let text = serde_json::from_str::<String>(edit.get(&span));
             let Some(old) = text.ok().and_then(|text| FieldSpec::from_json(&text).ok()) else { continue };
             if let Some(new) = now.fields.iter().find(|field| field.name == old.name).filter(|new| **new != old) {
-                splice.replace(span, serde_json::Value::from(new.to_json()).to_string());
+                edit.replace(span, serde_json::Value::from(new.to_json()).to_string());
             }
         }
-        self.text = splice.apply();
+        self.text = edit.apply();
         Ok(notes)
     }
 
-    /// The columns that have something else in `now`.
+    /// The columns that differ in `now`.
     fn columns(&self, read: &Body, now: &Body, details: &Details) -> Result<(Columns, Vec<String>)> {
         let mut changed: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
         let (mut points, mut shared) = (BTreeSet::new(), BTreeSet::new());
@@ -109,7 +109,7 @@ impl Original {
             }
             let own = details.taxels.iter().filter(|source| (source.mesh, source.primitive) == place).count();
             for (axis, name) in NORMAL.into_iter().enumerate() {
-                // A normal that the file does not have is zero, which is as good as none.
+                // A missing normal is stored as zero.
                 let mut values = column(name)?.unwrap_or_else(|| vec![0.0; own]);
                 for &index in &turned {
                     let source = &details.taxels[index];
@@ -123,8 +123,7 @@ impl Original {
     }
 }
 
-/// The unit normal in a mesh's coordinates that is `normal` in the link's: by the transpose, which is the inverse of what a
-/// reader takes it by, but for its length.
+/// The link's `normal` in a mesh's coordinates, by the transpose: the inverse of the reader's transform, up to length.
 fn in_mesh(link_from_mesh: glam::DAffine3, normal: DVec3) -> DVec3 {
     (link_from_mesh.matrix3.transpose() * normal).normalize_or(normal)
 }

@@ -1,5 +1,4 @@
-//! What authoring asks of a file beyond a [`Body`]: materials, painted attributes, what carries each vertex, and where in
-//! the file all that stands.
+//! What authoring needs of a file beyond a [`Body`]: materials, painted attributes, joint weights, and indices in the file.
 
 use glam::DVec3;
 use gltf::json;
@@ -13,20 +12,20 @@ use super::read::{Sources, attribute, from_document};
 use super::{Body, Skinning};
 use crate::error::{Error, Result};
 
-/// A file's surfaces with what is painted on them.
+/// Details of a file's surfaces, marks and taxels.
 #[derive(Clone, Debug)]
 pub struct Details {
-    /// One a surface of the body.
+    /// One per surface of the body.
     pub parts: Vec<Part>,
     /// Places that were marked by hand.
     pub marks: Vec<Mark>,
     /// Per link of the body its glTF node.
     pub node_of_link: Vec<usize>,
-    /// Per taxel of the body where the file has it.
+    /// Per taxel of the body its place in the file.
     pub taxels: Vec<TaxelSource>,
 }
 
-/// What a file says of a surface, beside its triangles.
+/// Details of a surface.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Index of the glTF node that shows it.
@@ -37,18 +36,18 @@ pub struct Part {
     pub material: Option<String>,
     /// Index of the glTF skin, if it has one.
     pub skin: Option<usize>,
-    /// For a skinned part, what carries each vertex: `JOINTS_n` and `WEIGHTS_n`, set by set.
+    /// For a skinned part the joints and weights of each vertex: `JOINTS_n` and `WEIGHTS_n`, set by set.
     pub carriers: Vec<Skinning>,
-    /// Colours and attributes of its own.
+    /// Colours and custom attributes.
     pub paints: Vec<Paint>,
 }
 
-/// Numbers painted on vertices.
+/// A painted vertex attribute.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Paint {
-    /// As the file has it: `_DENSITY`, `COLOR_0`.
+    /// Its name in the file: `_DENSITY`, `COLOR_0`.
     pub name: String,
-    /// How many numbers a vertex has.
+    /// Numbers per vertex.
     pub width: usize,
     /// The numbers, vertex by vertex; integers normalised where the file says so.
     pub values: Vec<f32>,
@@ -59,11 +58,11 @@ pub struct Paint {
 pub struct Mark {
     /// The node's name.
     pub name: String,
-    /// Where, in the world at rest, m.
+    /// Positions in the world at rest, m.
     pub positions_in_world: Vec<DVec3>,
 }
 
-/// The body called `name` in `bytes`, a whole file that holds its own buffers, and its details.
+/// The body called `name` in `bytes`, a file with its own buffers, and its details.
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
     let document = Document::parse(bytes, None)?;
     let nodes = Nodes::of(&document)?;
@@ -121,7 +120,7 @@ fn carriers(document: &Document, primitive: &Primitive) -> Result<Vec<Skinning>>
     Ok(sets)
 }
 
-/// Colours and custom attributes; one that cannot be read is as if it were not there.
+/// Colours and custom attributes; unreadable ones are skipped.
 fn paints(document: &Document, primitive: &Primitive, vertices: usize) -> Vec<Paint> {
     let named = primitive.attributes.iter().filter_map(|(semantic, accessor)| match semantic {
         Checked::Valid(Semantic::Colors(set)) => Some((format!("COLOR_{set}"), accessor.value())),

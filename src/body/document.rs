@@ -1,4 +1,4 @@
-//! A glTF file taken apart: its JSON, its buffers, and accessors read with every bound checked.
+//! A parsed glTF file: its JSON, its buffers, and accessors with all bounds checked.
 //!
 //! The crate `gltf` knows the format's structure and validates it. Accessors are read here, because its own reader
 //! refuses legal ones (without a bufferView, sparse on top of that) and trusts lengths that a damaged file gets wrong.
@@ -13,8 +13,8 @@ use json::validation::{Checked, Validate};
 
 use crate::error::{Error, Result};
 
-/// Elements an accessor without any data may claim before it is taken for a damaged file.
-const MOST_ZERO_ELEMENTS: u64 = 1 << 22;
+/// Maximum number of elements of an accessor without data; more mean a damaged file.
+const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
 
 /// The file's JSON and the bytes of its buffers.
 pub(crate) struct Document {
@@ -23,13 +23,13 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Takes `bytes` apart; buffers in files of their own are looked for in `folder`.
+    /// Parses `bytes`; external buffers are read from `folder`.
     pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
         let (text, chunk) = split(bytes)?;
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
         let root: json::Root = json::deserialize::from_slice(text)
             .map_err(|e| Error::failed(format!("not a glTF: its JSON does not hold what glTF asks for: {e}")))?;
-        refuse_what_is_compressed(&root)?;
+        refuse_unsupported_extensions(&root)?;
         validate(&root)?;
         let mut chunk = chunk;
         let mut buffers = Vec::with_capacity(root.buffers.len());
@@ -51,12 +51,12 @@ impl Document {
         Ok(Self { root, buffers })
     }
 
-    /// Takes out the bytes of its buffers.
+    /// The bytes of its buffers.
     pub(crate) fn into_buffers(self) -> Vec<Vec<u8>> {
         self.buffers
     }
 
-    /// Accessor `index` as rows of as many numbers as it has, one after the other, and how many that is.
+    /// The numbers of accessor `index`, row by row, and the number of columns.
     pub(crate) fn numbers(&self, index: usize) -> Result<(usize, Vec<f32>)> {
         let Some(Checked::Valid(shape)) = self.root.accessors.get(index).map(|accessor| accessor.type_) else {
             return Err(Error::failed(format!("accessor {index} is of no type that glTF has")));
@@ -124,7 +124,7 @@ impl Document {
         let count = accessor.count.0;
         let bytes = match accessor.buffer_view {
             Some(view) => self.strided(view.value(), accessor.byte_offset.map_or(0, |o| o.0), count, size)?,
-            None if count > MOST_ZERO_ELEMENTS => {
+            None if count > MAX_ZERO_ELEMENTS => {
                 return Err(damaged(&format!("it claims {count} elements and has no data")));
             }
             None => Cow::Owned(vec![0; count as usize * size]),
@@ -154,7 +154,7 @@ impl Document {
         Ok(Elements { bytes, component, width, normalized: accessor.normalized })
     }
 
-    /// `count` elements of `size` bytes from a buffer view, side by side.
+    /// `count` elements of `size` bytes from a buffer view, contiguous.
     fn strided(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Cow<'_, [u8]>> {
         let beyond = || {
             Error::failed(format!(
@@ -190,7 +190,7 @@ impl Document {
     }
 }
 
-/// An accessor's elements, side by side.
+/// An accessor's elements, contiguous.
 struct Elements<'a> {
     bytes: Cow<'a, [u8]>,
     component: ComponentType,
@@ -224,7 +224,7 @@ impl Elements<'_> {
     }
 }
 
-/// Refuses `bytes` from a file called `name` whose ending says that it is a mesh or a robot in another format.
+/// Rejects `bytes` of a file called `name` whose extension is that of another format.
 pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
     let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -260,7 +260,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
         return Err(Error::failed("its glTF header is damaged or cut short; export or copy the file again"));
     }
     let cut = bytes.len() < length as usize;
-    // What follows the container is none of it.
+    // Bytes after the container are ignored.
     let container = bytes.get(..length as usize).unwrap_or(bytes);
     let glb = gltf::binary::Glb::from_slice(container).map_err(|e| {
         let why = if cut {
@@ -283,7 +283,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
     }
 }
 
-fn refuse_what_is_compressed(root: &json::Root) -> Result<()> {
+fn refuse_unsupported_extensions(root: &json::Root) -> Result<()> {
     const KNOWN: [&str; 8] = [
         "KHR_materials_unlit",
         "KHR_materials_emissive_strength",
@@ -313,7 +313,7 @@ fn refuse_what_is_compressed(root: &json::Root) -> Result<()> {
     Ok(())
 }
 
-/// The crate's own validation, less the one rule where it is stricter than glTF.
+/// The crate's validation, without the one rule that is stricter than glTF.
 fn validate(root: &json::Root) -> Result<()> {
     // The crate follows this one index before it has checked it.
     let positions = Checked::Valid(json::mesh::Semantic::Positions);
@@ -373,7 +373,7 @@ pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
     let path = folder.join(name.as_ref());
     let kind = std::fs::metadata(&path).map_err(|e| Error::io(&path, &e))?;
     if !kind.is_file() {
-        // A device would be read without end.
+        // A device may be endless.
         return Err(Error::failed("this is no plain file; save the buffer beside the body").at(path.display()));
     }
     std::fs::read(&path).map_err(|e| Error::io(&path, &e))

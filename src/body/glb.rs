@@ -1,6 +1,6 @@
-//! Writing glTF: a `.glb` held open as JSON and bytes, to which meshes, taxels and fields are added.
+//! Writes glTF: a `.glb` as JSON and bytes, to which meshes, taxels and fields are added.
 //!
-//! Nothing already in the file is understood or touched: accessors and bytes are appended, nodes are added.
+//! Existing content is not changed: accessors, bytes and nodes are appended.
 
 use std::collections::BTreeMap;
 
@@ -18,21 +18,21 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// A `.glb` being written, or what is to be added to a file that is there already.
+/// A new `.glb`, or an addition to an existing file.
 pub struct Glb {
     pub(super) json: Map<String, Value>,
     pub(super) bin: Vec<u8>,
-    pub(super) before: Before,
+    pub(super) before: BaseFile,
 }
 
-/// What a file holds that is added to.
+/// The file to which an addition belongs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Before {
-    /// How long each of its lists is.
+pub(super) struct BaseFile {
+    /// Lengths of its lists.
     pub(super) counts: BTreeMap<String, usize>,
     /// Bytes of its buffer, a multiple of four.
     pub(super) bytes: usize,
-    /// Nodes of its own that get children: (parent, child).
+    /// New children of its nodes: (parent, child).
     pub(super) adopted: Vec<(usize, usize)>,
 }
 
@@ -41,15 +41,15 @@ pub(super) struct Before {
 pub struct MeshData {
     /// Vertices.
     pub positions: Vec<[f32; 3]>,
-    /// Unit normals, one a vertex.
+    /// Unit normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// What carries each vertex, for a skinned mesh.
+    /// Joints and weights of each vertex, for a skinned mesh.
     pub skinning: Option<Skinning>,
 }
 
-/// The four joints that carry each vertex most, and how much; weights of a vertex sum to 1.
+/// The four joints with the largest weights for each vertex; weights sum to 1.
 #[derive(Clone, Debug, Default)]
 pub struct Skinning {
     /// Indices into the skin's joints.
@@ -74,11 +74,11 @@ impl Glb {
             "scenes": [{"nodes": []}],
         });
         let Value::Object(json) = json else { unreachable!("it was written as an object") };
-        Self { json, bin: Vec::new(), before: Before::default() }
+        Self { json, bin: Vec::new(), before: BaseFile::default() }
     }
 
-    /// What is added to a file that has `before`.
-    pub(super) fn added_to(before: Before) -> Self {
+    /// An empty addition to the file `before`.
+    pub(super) fn for_base(before: BaseFile) -> Self {
         Self { before, ..Self::new() }
     }
 
@@ -86,7 +86,7 @@ impl Glb {
         self.before.counts.get(key).copied().unwrap_or(0)
     }
 
-    /// Element `index` of a list, if it is one that was added.
+    /// Element `index` of a list, if it was added.
     fn element(&mut self, key: &str, index: usize) -> Option<&mut Value> {
         let own = index.checked_sub(self.count_before(key))?;
         self.list(key).get_mut(own)
@@ -133,7 +133,7 @@ impl Glb {
         self.accessor(bytes, Some(ARRAY_BUFFER), json!({"componentType": FLOAT, "count": count, "type": kind}))
     }
 
-    /// Adds one number for each of some points, and returns the index of the accessor.
+    /// Adds a column of numbers and returns the index of its accessor.
     pub(super) fn scalars(&mut self, values: &[f32]) -> usize {
         self.vectors("SCALAR", values.len(), bytemuck::cast_slice(values))
     }
@@ -172,7 +172,7 @@ impl Glb {
         self.push("materials", material)
     }
 
-    /// Adds a skin whose joints are the nodes `joints`; `inverse_binds` are column-major, one a joint.
+    /// Adds a skin whose joints are the nodes `joints`; `inverse_binds` are column-major, one per joint.
     pub fn skin(&mut self, name: &str, joints: &[usize], inverse_binds: &[[f32; 16]]) -> usize {
         let accessor = json!({"componentType": FLOAT, "count": inverse_binds.len(), "type": "MAT4"});
         let binds = self.accessor(bytemuck::cast_slice(inverse_binds), None, accessor);
@@ -214,8 +214,8 @@ impl Glb {
         }
     }
 
-    /// Adds `taxels` as points of a node of their own under `parent`. Their positions and normals are read as being in
-    /// that node's frame; on a skin, in the skinned mesh's, and `skinning` says what carries each.
+    /// Adds `taxels` as points of a new node under `parent`. Positions and normals are in that node's frame; with `skin`, in
+    /// the skinned mesh's, with joints and weights.
     pub fn taxels(
         &mut self,
         name: &str,
@@ -252,7 +252,7 @@ impl Glb {
         node
     }
 
-    /// Sets how the scene introduces itself, for people who open the file.
+    /// Sets the scene's description for people who open the file.
     pub fn describe(&mut self, notes: &BTreeMap<&str, &str>) {
         self.list("scenes")[0]["extras"] = json!(notes);
     }
@@ -282,7 +282,7 @@ impl Glb {
         .map_err(|e| Error::failed(e.to_string()))
     }
 
-    /// Writes the file to `output`, whole or not at all.
+    /// Writes the file to `output` atomically.
     ///
     /// # Errors
     /// The folder cannot be written to, or the disk is full.

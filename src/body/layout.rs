@@ -1,6 +1,6 @@
-//! The layout's own words inside a glTF: names of attributes and keys, and the JSON that a field carries.
+//! The layout's encoding in glTF: names of attributes and keys, and the JSON of fields.
 //!
-//! `docs/layout.md` is the specification. What reads and what writes both use these.
+//! `docs/layout.md` is the specification.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// Version of the field JSON that this crate writes, and the latest it reads.
+/// Version of the field JSON that is written, and the latest that is read.
 pub(crate) const VERSION: u32 = 1;
 
 /// Key in a node's `extras` whose value is the field's JSON, as one string.
@@ -20,20 +20,20 @@ pub(crate) const NORMAL: [&str; 3] = ["NX", "NY", "NZ"];
 pub(crate) const AREA: &str = "AREA";
 pub(crate) const MODALITY: &str = "MODALITY";
 
-/// A receptive field as a layout outlines it, before a body gives it an anchor and a chart.
+/// The specification of a receptive field in a layout, without anchor and chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldSpec {
-    /// Unique name; slashes make it readable (`hand/palm`) and mean nothing.
+    /// Unique name; slashes (`hand/palm`) have no meaning.
     pub name: String,
     /// Name of the parent field. A parent holds all taxels of its descendants beside its own.
     pub parent: Option<String>,
     /// Its own members by taxel id.
     pub members: BTreeMap<u32, MemberSpec>,
-    /// Its chart; without one the default tangent plane is laid.
+    /// Its chart; by default a plane chart.
     pub chart: Option<ChartSpec>,
 }
 
-/// What a field says of one of its taxels.
+/// A member of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MemberSpec {
     /// Weight w > 0 in every sum of the field.
@@ -48,22 +48,22 @@ impl Default for MemberSpec {
     }
 }
 
-/// How a field's chart is laid.
+/// The kind of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChartKind {
     /// Orthogonal projection on the tangent plane at the origin.
     Plane,
-    /// Geodesic polar coordinates, as the layout has them: the shortest way on the surface from the origin.
+    /// Geodesic polar coordinates, stored in the layout: the shortest path on the surface from the origin.
     Geodesic,
-    /// No chart, by the author's wish.
+    /// No chart.
     None,
 }
 
-/// A chart that the layout fixes instead of leaving it to the default.
+/// The chart specified in a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChartSpec {
-    /// How coordinates come about.
+    /// The kind of chart.
     pub kind: ChartKind,
     /// Origin in the anchor's frame, m.
     pub origin_in_anchor: Option<[f64; 3]>,
@@ -97,8 +97,8 @@ struct ChartJson {
 }
 
 impl FieldSpec {
-    /// The same field with `ids` among its own members, with weight 1 where they were not: what a parent needs that is to
-    /// chart what is below it.
+    /// The same field with `ids` among its own members, new ones with weight 1. A parent needs this for a geodesic chart of
+    /// its descendants' taxels.
     #[must_use]
     pub fn with_members(mut self, ids: impl IntoIterator<Item = u32>) -> Self {
         for id in ids {
@@ -185,7 +185,7 @@ impl FieldSpec {
     }
 }
 
-/// Weights beyond these would take products out of single precision.
+/// Weights in this range keep products in single precision.
 pub(crate) const MIN_WEIGHT: f64 = 1.0 / 1_048_576.0;
 pub(crate) const MAX_WEIGHT: f64 = 1_048_576.0;
 

@@ -1,24 +1,23 @@
-//! Bodies: links, their surfaces, and the taxels and field outlines authored on them, read from and written to glTF.
+//! Bodies: links, surfaces, taxels and field specifications, read from and written to glTF.
 //!
-//! A [`Body`] is what a glTF file says, checked and brought to metres; it knows nothing of channels, calibration or
-//! percepts. `docs/layout.md` specifies the encoding.
+//! A [`Body`] is the checked content of a glTF file, in metres. `docs/layout.md` specifies the encoding.
 //!
-//! **Frames.** Every glTF node that is not itself a set of taxels or a field is a [`Link`]. A link's frame is the
-//! node's frame with scale and shear taken out, so that coordinates in it are metres whatever the file's units; a
-//! mirrored or scaled node keeps its rigid part as the frame and its points are stretched into it.
+//! **Frames.** Every glTF node that is neither a set of taxels nor a field is a [`Link`]. A link's frame is the rigid part
+//! of the node's frame, without scale, shear and mirroring, so that coordinates in it are metres; the node's points are
+//! transformed into it.
 
 mod amend;
-mod beside;
+mod clear_layout;
 mod details;
 mod document;
 mod glb;
+mod json_edit;
 mod layout;
-mod mend;
 mod nodes;
 mod original;
 mod read;
-mod splice;
-mod strip;
+mod referenced_files;
+mod repair;
 mod surface;
 mod topology;
 
@@ -37,7 +36,7 @@ pub use topology::{Flaws, NONE, Topology};
 
 use crate::error::{Error, Result};
 
-/// Largest taxel id: the largest integer up to which a float attribute is exact.
+/// Largest taxel id: integers up to this one are exact as f32.
 pub const MAX_TAXEL_ID: u32 = 1 << 24;
 
 /// A rigid part of a robot, from a glTF node.
@@ -49,7 +48,7 @@ pub struct Link {
     pub parent: Option<usize>,
     /// Rigid pose in the body at rest: world_from_link.
     pub world_from_link: DAffine3,
-    /// What the node's scale and shear do to its own coordinates: link_from_node.
+    /// The node's scale and shear: link_from_node.
     pub link_from_node: DAffine3,
 }
 
@@ -64,7 +63,7 @@ pub enum Modality {
     Temperature,
     /// Proximity.
     Proximity,
-    /// A number that this version has no name for.
+    /// An unknown modality code.
     Other(u32),
 }
 
@@ -108,22 +107,22 @@ impl Modality {
 pub struct Taxel {
     /// Stable id, unique in the body, at most [`MAX_TAXEL_ID`].
     pub id: u32,
-    /// Index of the link it rides on.
+    /// Index of its link.
     pub link: usize,
-    /// Where it is in the link's frame, m.
+    /// Position in the link's frame, m.
     pub position_in_link: DVec3,
     /// Outward unit normal in the link's frame.
     pub normal_in_link: DVec3,
-    /// Surface it stands for, m²; 0 where the layout does not say.
+    /// Its area, m²; 0 if unknown.
     pub area: f64,
     /// What it measures.
     pub modality: Modality,
 }
 
-/// A robot's shape and the layout of its skin.
+/// A robot's shape, taxels and fields.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// The file's name, or whatever the loader was told.
+    /// The file's name, or the name given to the loader.
     pub name: String,
     /// Links; a parent comes before its children.
     pub links: Vec<Link>,
@@ -131,9 +130,9 @@ pub struct Body {
     pub surfaces: Vec<Surface>,
     /// Taxels by ascending id.
     pub taxels: Vec<Taxel>,
-    /// Fields as the file outlines them, a parent before its children.
+    /// Field specifications, a parent before its children.
     pub fields: Vec<FieldSpec>,
-    /// What is odd about the file without making it unusable.
+    /// Problems of the file that do not prevent its use.
     pub findings: Vec<String>,
 }
 
@@ -141,7 +140,7 @@ impl Body {
     /// Reads the body in the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read, is no sound glTF, is compressed, or its layout contradicts itself. One line says where.
+    /// The file cannot be read, is no valid glTF, is compressed, or its layout is inconsistent; with the place.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
@@ -149,11 +148,11 @@ impl Body {
         read::body(&name, &bytes, path.parent()).map_err(|e| e.at(name))
     }
 
-    /// The file at `path` and those beside it that it takes buffers and images from, as far as it can be read: what a
-    /// program that reads the body must not write over.
+    /// The file at `path` and the files of its buffers and images, as far as it can be read. A program that reads the body
+    /// must not overwrite them.
     #[must_use]
     pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
-        beside::files(path.as_ref())
+        referenced_files::files(path.as_ref())
     }
 
     /// Reads the body in `bytes`, a whole `.glb` (or a `.gltf` that holds its own buffers), called `name` in messages.
@@ -176,7 +175,7 @@ impl Body {
         self.links.iter().position(|link| link.name == name)
     }
 
-    /// The lowest link that all of `links` are, or descend from. `None` for links of separate trees, or none at all.
+    /// The lowest common ancestor of `links`, possibly one of them. `None` for links of separate trees, or no links.
     #[must_use]
     pub fn common_ancestor(&self, links: impl IntoIterator<Item = usize>) -> Option<usize> {
         let mut common: Option<Vec<usize>> = None;
@@ -212,7 +211,7 @@ impl Body {
 
 /// The rigid part of `world_from_node`: its translation, and its axes made orthonormal and right-handed.
 ///
-/// A transform without scale comes back unchanged in its bits as far as its axes already are orthonormal to 1e-6.
+/// A transform whose axes are orthonormal to 1e-6 is returned unchanged.
 pub(crate) fn rigid_part(world_from_node: &DAffine3) -> DAffine3 {
     let m = world_from_node.matrix3;
     let right_handed = m.determinant() > 0.0;

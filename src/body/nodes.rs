@@ -1,4 +1,4 @@
-//! The node tree of a glTF: transforms worked out, and what each node is to a body: a link, taxels, or a field.
+//! The node tree of a glTF: transforms, and the role of each node: a link, taxels, or a field.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,10 +11,10 @@ use super::read::is_taxels;
 use super::{Link, rigid_part};
 use crate::error::{Error, Result};
 
-/// Metres beyond which a coordinate is damage. Sums and products of what is nearer stay far from overflow.
-pub(super) const FARTHEST: f64 = 1e9;
+/// Maximum coordinate, m; sums and products of smaller ones do not overflow.
+pub(super) const MAX_COORDINATE_M: f64 = 1e9;
 
-/// The node tree, with every transform worked out.
+/// The node tree with all transforms.
 pub(super) struct Nodes<'a> {
     pub(super) raw: &'a [json::Node],
     pub(super) parent: Vec<Option<usize>>,
@@ -56,9 +56,9 @@ impl<'a> Nodes<'a> {
                 return Err(Error::failed(format!("node {node} has a transform that is not finite; export it again")));
             }
             world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
-            if !is_near(&world_from_node[node]) {
+            if !is_in_range(&world_from_node[node]) {
                 return Err(Error::failed(format!(
-                    "node {node} is moved or scaled by over {FARTHEST:e}; check the scene's units and export it again"
+                    "node {node} is moved or scaled by over {MAX_COORDINATE_M:e}; check the scene's units and export it again"
                 )));
             }
         }
@@ -66,7 +66,7 @@ impl<'a> Nodes<'a> {
         let mut link = vec![None; raw.len()];
         let mut links = 0;
         for &node in &in_order {
-            // What carries taxels is a link above them, or the joints of their skin.
+            // Taxels need a link above them, or joints.
             let carried = parent[node].is_some() || raw[node].skin.is_some();
             if field[node].is_none() && !(holds_taxels(document, &raw[node]) && carried) {
                 link[node] = Some(links);
@@ -125,9 +125,9 @@ fn local_transform(node: &json::Node) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(three(node.scale, 1.0), rotation, three(node.translation, 0.0))
 }
 
-/// Whether nothing in `transform` is infinite, undefined, or absurdly large.
-pub(super) fn is_near(transform: &DAffine3) -> bool {
-    transform.to_cols_array().iter().all(|x| x.abs() <= FARTHEST)
+/// Whether all numbers in `transform` are finite and within [`MAX_COORDINATE_M`].
+pub(super) fn is_in_range(transform: &DAffine3) -> bool {
+    transform.to_cols_array().iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
 
 /// The field's JSON in a node's extras, if it carries one.

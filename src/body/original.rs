@@ -1,7 +1,6 @@
-//! Somebody's file, opened to have a layout added: everything else in it stays as it is, to the byte where glTF allows.
+//! A user's file to which a layout is added; everything else stays unchanged, to the byte where glTF allows.
 //!
-//! The JSON is changed as text and the buffer only grows. Buffers and images in files of their own are taken in, so that
-//! what is written stands alone.
+//! The JSON is edited as text and the buffer only grows. External buffers and images are embedded.
 
 use std::path::Path;
 
@@ -10,16 +9,16 @@ use serde_json::{Value, json};
 
 use super::details::{self, Details};
 use super::document::{Document, fetch, refuse_other_formats, split};
-use super::glb::{Before, Glb};
-use super::splice::{Span, Splice};
-use super::{Body, strip};
+use super::glb::{BaseFile, Glb};
+use super::json_edit::{JsonEdit, Span};
+use super::{Body, clear_layout};
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
 
-/// The lists that a layout adds to.
-const LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
+/// The lists to which a layout adds.
+const LAYOUT_LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
 
-/// Key in the extras of a node that scales a file to metres: what the file was drawn in.
+/// Key in the extras of a node that scales a file to metres: the file's unit.
 const UNIT_KEY: &str = "somatic_unit";
 
 /// A glTF file that is to get a layout.
@@ -31,7 +30,7 @@ pub struct Original {
     pub(super) bin: Vec<u8>,
     /// The chunks that a `.glb` has after the buffer.
     rest: Vec<u8>,
-    /// What could not be taken in.
+    /// External files that could not be embedded.
     pub notes: Vec<String>,
 }
 
@@ -39,22 +38,22 @@ impl Original {
     /// Opens the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read or is no sound glTF.
+    /// The file cannot be read or is no valid glTF.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
         Self::from_bytes(&path.display().to_string(), &bytes, path.parent())
     }
 
-    /// Opens the file in `bytes`, called `name` in messages; files that it refers to are looked for in `folder`.
+    /// Opens the file in `bytes`, called `name` in messages; external files are read from `folder`.
     ///
     /// # Errors
     /// As [`Original::open`].
     pub fn from_bytes(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
-        Self::take_up(name, bytes, folder).map_err(|e| e.at(name))
+        Self::read_file(name, bytes, folder).map_err(|e| e.at(name))
     }
 
-    fn take_up(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
+    fn read_file(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
         refuse_other_formats(name, bytes)?;
         let buffers = Document::parse(bytes, folder)?.into_buffers();
         let (text, chunk) = split(bytes)?;
@@ -63,31 +62,31 @@ impl Original {
         let rest = rest_of(bytes).to_vec();
         let mut original =
             Self { name: name.to_owned(), text: text.trim_end().to_owned(), bin: Vec::new(), rest, notes: Vec::new() };
-        original.gather(buffers, chunk)?;
+        original.merge_buffers(buffers, chunk)?;
         if let Some(folder) = folder {
-            original.take_in_images(folder);
+            original.embed_images(folder);
         }
         Ok(original)
     }
 
-    /// Makes one buffer of all.
-    fn gather(&mut self, buffers: Vec<Vec<u8>>, chunk: Option<&[u8]>) -> Result<()> {
-        let mut splice = Splice::new(&self.text);
-        let spans = splice.list("buffers");
+    /// Merges all buffers into one.
+    fn merge_buffers(&mut self, buffers: Vec<Vec<u8>>, chunk: Option<&[u8]>) -> Result<()> {
+        let mut edit = JsonEdit::new(&self.text);
+        let spans = edit.list("buffers");
         let Some(first) = spans.first().cloned() else {
             self.bin = chunk.unwrap_or_default().to_vec();
             return Ok(());
         };
-        let length = |splice: &Splice<'_>, span: &Span| {
-            let length = splice.member(span, "byteLength").and_then(|span| splice.number(&span));
+        let length = |edit: &JsonEdit<'_>, span: &Span| {
+            let length = edit.member(span, "byteLength").and_then(|span| edit.number(&span));
             length.ok_or_else(|| Error::failed("a buffer has no length; export the file again"))
         };
-        let is_alone = spans.len() == 1 && splice.member(&first, "uri").is_none();
+        let is_alone = spans.len() == 1 && edit.member(&first, "uri").is_none();
         let mut bases = Vec::with_capacity(buffers.len());
         for (mut bytes, span) in buffers.into_iter().zip(&spans) {
-            // What lies beyond a buffer's length in its file is none of it; a chunk may be padded.
+            // Bytes after a buffer's length are ignored; a chunk may be padded.
             if !is_alone {
-                bytes.truncate(length(&splice, span)?);
+                bytes.truncate(length(&edit, span)?);
             }
             self.bin.resize(self.bin.len().next_multiple_of(4), 0);
             bases.push(self.bin.len());
@@ -96,41 +95,41 @@ impl Original {
         if is_alone {
             return Ok(());
         }
-        for view in splice.list("bufferViews") {
-            let Some(buffer) = splice.member(&view, "buffer") else { continue };
-            let base = splice.number(&buffer).and_then(|index| bases.get(index)).copied().unwrap_or(0);
+        for view in edit.list("bufferViews") {
+            let Some(buffer) = edit.member(&view, "buffer") else { continue };
+            let base = edit.number(&buffer).and_then(|index| bases.get(index)).copied().unwrap_or(0);
             if base > 0 {
-                splice.replace(buffer, "0".to_owned());
-                match splice.member(&view, "byteOffset") {
+                edit.replace(buffer, "0".to_owned());
+                match edit.member(&view, "byteOffset") {
                     Some(span) => {
-                        let offset = splice.number(&span).unwrap_or(0);
-                        splice.replace(span, (base + offset).to_string());
+                        let offset = edit.number(&span).unwrap_or(0);
+                        edit.replace(span, (base + offset).to_string());
                     }
-                    None => splice.extend(&view, &[("byteOffset".to_owned(), base.to_string())]),
+                    None => edit.extend(&view, &[("byteOffset".to_owned(), base.to_string())]),
                 }
             }
         }
-        splice.remove_members(&first, |key| key == "uri");
+        edit.remove_members(&first, |key| key == "uri");
         if spans.len() > 1 {
-            if let Some(span) = splice.member(&first, "byteLength") {
-                splice.replace(span, self.bin.len().to_string());
+            if let Some(span) = edit.member(&first, "byteLength") {
+                edit.replace(span, self.bin.len().to_string());
             }
-            if let Some(list) = splice.member(&splice.root(), "buffers") {
-                splice.remove_elements(&list, |index| index > 0);
+            if let Some(list) = edit.member(&edit.root(), "buffers") {
+                edit.remove_elements(&list, |index| index > 0);
             }
         }
-        self.text = splice.apply();
+        self.text = edit.apply();
         Ok(())
     }
 
-    /// Takes in images that lie beside the file.
-    fn take_in_images(&mut self, folder: &Path) {
-        let mut splice = Splice::new(&self.text);
-        let first = splice.list("bufferViews").len();
+    /// Embeds external images.
+    fn embed_images(&mut self, folder: &Path) {
+        let mut edit = JsonEdit::new(&self.text);
+        let first = edit.list("bufferViews").len();
         let mut views = Vec::new();
-        for image in splice.list("images") {
-            let Some(uri) = splice.member(&image, "uri") else { continue };
-            let Ok(uri) = serde_json::from_str::<String>(splice.get(&uri)) else { continue };
+        for image in edit.list("images") {
+            let Some(uri) = edit.member(&image, "uri") else { continue };
+            let Ok(uri) = serde_json::from_str::<String>(edit.get(&uri)) else { continue };
             if uri.starts_with("data:") {
                 continue;
             }
@@ -147,48 +146,48 @@ impl Original {
             self.bin.resize(self.bin.len().next_multiple_of(4), 0);
             let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
             let mut members = vec![("bufferView".to_owned(), (first + views.len()).to_string())];
-            if splice.member(&image, "mimeType").is_none() {
+            if edit.member(&image, "mimeType").is_none() {
                 members.push(("mimeType".to_owned(), kind.to_owned()));
             }
             views.push(view.to_string());
             self.bin.extend(bytes);
-            // In its place, so that nothing is added to an object that loses its only member.
+            // Replaced in place, as the object may have no other member.
             let written: Vec<String> = members.iter().map(|(key, value)| format!("\"{key}\":{value}")).collect();
-            if let Some(span) = splice.member_with_key(&image, "uri") {
-                splice.replace(span, written.join(","));
+            if let Some(span) = edit.member_with_key(&image, "uri") {
+                edit.replace(span, written.join(","));
             }
         }
         if !views.is_empty() {
-            add_to_list(&mut splice, "bufferViews", &views);
-            set_length(&mut splice, self.bin.len());
-            self.text = splice.apply();
+            add_to_list(&mut edit, "bufferViews", &views);
+            set_length(&mut edit, self.bin.len());
+            self.text = edit.apply();
         }
     }
 
-    /// What messages call it.
+    /// Its name in messages.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Takes out the fields that it has, and unless `keep_taxels` the taxels.
+    /// Removes its fields, and unless `keep_taxels` its taxels.
     ///
     /// # Errors
-    /// They stand where nothing can be taken out, because an extension may count what comes after them.
+    /// They cannot be removed, because an extension may refer to later nodes by number.
     pub fn clear_layout(&mut self, keep_taxels: bool) -> Result<()> {
-        strip::clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
+        clear_layout::clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
     }
 
-    /// Says that its numbers are in a `unit` of `metres`: everything comes under a node that is scaled by that.
+    /// Sets the unit of its numbers to `unit` of `metres`: adds a root node with that scale.
     ///
     /// # Errors
-    /// It has been told another unit before, or two of its scenes share nodes.
+    /// It has another unit already, or two of its scenes share nodes.
     pub fn set_unit(&mut self, unit: &str, metres: f64) -> Result<()> {
-        let mut splice = Splice::new(&self.text);
-        let nodes = splice.list("nodes");
-        let extras = nodes.iter().filter_map(|node| splice.member(node, "extras"));
-        let known = extras.filter_map(|extras| splice.member(&extras, UNIT_KEY)).next();
-        if let Some(known) = known.map(|span| splice.get(&span).trim_matches('"')) {
+        let mut edit = JsonEdit::new(&self.text);
+        let nodes = edit.list("nodes");
+        let extras = nodes.iter().filter_map(|node| edit.member(node, "extras"));
+        let known = extras.filter_map(|extras| edit.member(&extras, UNIT_KEY)).next();
+        if let Some(known) = known.map(|span| edit.get(&span).trim_matches('"')) {
             return match known == unit {
                 true => Ok(()),
                 false => Err(Error::usage(format!("it is in {known} already; leave `unit` out")).at(&self.name)),
@@ -198,16 +197,16 @@ impl Original {
             return Ok(());
         }
         let mut is_root = vec![true; nodes.len()];
-        for child in nodes.iter().filter_map(|node| splice.member(node, "children")).flat_map(|c| splice.elements(&c)) {
-            if let Some(child) = splice.number(&child).and_then(|child| is_root.get_mut(child)) {
+        for child in nodes.iter().filter_map(|node| edit.member(node, "children")).flat_map(|c| edit.elements(&c)) {
+            if let Some(child) = edit.number(&child).and_then(|child| is_root.get_mut(child)) {
                 *child = false;
             }
         }
         let wrapper = |children: &[usize]| json!({"name": format!("unit {unit}"), "scale": [metres, metres, metres], "children": children, "extras": {UNIT_KEY: unit}});
         let mut wrappers = Vec::new();
-        for scene in splice.list("scenes") {
-            let Some(list) = splice.member(&scene, "nodes") else { continue };
-            let roots: Vec<usize> = splice.elements(&list).iter().filter_map(|span| splice.number(span)).collect();
+        for scene in edit.list("scenes") {
+            let Some(list) = edit.member(&scene, "nodes") else { continue };
+            let roots: Vec<usize> = edit.elements(&list).iter().filter_map(|span| edit.number(span)).collect();
             for &root in &roots {
                 if !is_root.get_mut(root).is_some_and(|is_root| std::mem::replace(is_root, false)) {
                     let what = "two of its scenes share nodes, so that a unit cannot be given to each; keep one scene";
@@ -215,7 +214,7 @@ impl Original {
                 }
             }
             if !roots.is_empty() {
-                splice.replace(list, format!("[{}]", nodes.len() + wrappers.len()));
+                edit.replace(list, format!("[{}]", nodes.len() + wrappers.len()));
                 wrappers.push(wrapper(&roots).to_string());
             }
         }
@@ -223,12 +222,12 @@ impl Original {
         if !unseen.is_empty() {
             wrappers.push(wrapper(&unseen).to_string());
         }
-        add_to_list(&mut splice, "nodes", &wrappers);
-        self.text = splice.apply();
+        add_to_list(&mut edit, "nodes", &wrappers);
+        self.text = edit.apply();
         Ok(())
     }
 
-    /// The body that it holds now, and what else there is to its surfaces.
+    /// The body that it holds now, and its details.
     ///
     /// # Errors
     /// As [`Body::load`].
@@ -239,45 +238,45 @@ impl Original {
     /// An empty addition; nodes are given parents by their index in the file.
     #[must_use]
     pub fn addition(&self) -> Glb {
-        let splice = Splice::new(&self.text);
-        let counts = LISTS.iter().map(|&key| (key.to_owned(), splice.list(key).len())).collect();
-        Glb::added_to(Before { counts, bytes: self.bin.len().next_multiple_of(4), adopted: Vec::new() })
+        let edit = JsonEdit::new(&self.text);
+        let counts = LAYOUT_LISTS.iter().map(|&key| (key.to_owned(), edit.list(key).len())).collect();
+        Glb::for_base(BaseFile { counts, bytes: self.bin.len().next_multiple_of(4), adopted: Vec::new() })
     }
 
-    /// Adds what was put into `addition`, which was made for the file as it is now.
+    /// Adds `addition`, which was made for the file in its present state.
     pub fn add(&mut self, addition: &Glb) {
-        let mut splice = Splice::new(&self.text);
-        for key in LISTS {
+        let mut edit = JsonEdit::new(&self.text);
+        for key in LAYOUT_LISTS {
             let elements = addition.json.get(key).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
             let written: Vec<String> = elements.iter().map(ToString::to_string).collect();
-            add_to_list(&mut splice, key, &written);
+            add_to_list(&mut edit, key, &written);
         }
-        let nodes = splice.list("nodes");
+        let nodes = edit.list("nodes");
         let mut adopted = addition.before.adopted.clone();
         adopted.sort_unstable();
         for children in adopted.chunk_by(|a, b| a.0 == b.0) {
             let written: Vec<String> = children.iter().map(|(_, child)| child.to_string()).collect();
             let Some(parent) = nodes.get(children[0].0) else { continue };
-            match splice.member(parent, "children") {
-                Some(list) => splice.append(&list, &written),
-                None => splice.extend(parent, &[("children".to_owned(), format!("[{}]", written.join(",")))]),
+            match edit.member(parent, "children") {
+                Some(list) => edit.append(&list, &written),
+                None => edit.extend(parent, &[("children".to_owned(), format!("[{}]", written.join(",")))]),
             }
         }
         let in_scene = addition.json["scenes"][0]["nodes"].as_array().map_or(&[][..], Vec::as_slice);
         let in_scene: Vec<String> = in_scene.iter().map(ToString::to_string).collect();
-        let shown = splice.member(&splice.root(), "scene").and_then(|span| splice.number(&span)).unwrap_or(0);
-        if let Some(scene) = splice.list("scenes").get(shown).filter(|_| !in_scene.is_empty()) {
-            match splice.member(scene, "nodes") {
-                Some(list) => splice.append(&list, &in_scene),
-                None => splice.extend(scene, &[("nodes".to_owned(), format!("[{}]", in_scene.join(",")))]),
+        let shown = edit.member(&edit.root(), "scene").and_then(|span| edit.number(&span)).unwrap_or(0);
+        if let Some(scene) = edit.list("scenes").get(shown).filter(|_| !in_scene.is_empty()) {
+            match edit.member(scene, "nodes") {
+                Some(list) => edit.append(&list, &in_scene),
+                None => edit.extend(scene, &[("nodes".to_owned(), format!("[{}]", in_scene.join(",")))]),
             }
         }
         if !addition.bin.is_empty() {
             self.bin.resize(addition.before.bytes, 0);
             self.bin.extend(&addition.bin);
-            set_length(&mut splice, self.bin.len());
+            set_length(&mut edit, self.bin.len());
         }
-        self.text = splice.apply();
+        self.text = edit.apply();
     }
 
     /// The whole file as a `.glb`.
@@ -308,19 +307,19 @@ impl Original {
         Ok(bytes)
     }
 
-    /// The whole file as a `.gltf` that carries its buffer along.
+    /// The whole file as a `.gltf` with an embedded buffer.
     #[must_use]
     pub fn to_gltf(&self) -> String {
-        let mut splice = Splice::new(&self.text);
-        if let Some(buffer) = splice.list("buffers").first() {
+        let mut edit = JsonEdit::new(&self.text);
+        if let Some(buffer) = edit.list("buffers").first() {
             let data = base64::engine::general_purpose::STANDARD.encode(&self.bin);
             let uri = format!("\"data:application/octet-stream;base64,{data}\"");
-            splice.extend(buffer, &[("uri".to_owned(), uri)]);
+            edit.extend(buffer, &[("uri".to_owned(), uri)]);
         }
-        splice.apply()
+        edit.apply()
     }
 
-    /// Writes the file to `output`, whole or not at all: a `.gltf` if that is its ending, else a `.glb`.
+    /// Writes the file to `output` atomically: a `.gltf` if that is its extension, else a `.glb`.
     ///
     /// # Errors
     /// The folder cannot be written to, or the disk is full.
@@ -331,26 +330,26 @@ impl Original {
     }
 }
 
-/// Adds `elements` to the list `key` of the root, which may not be there yet.
-fn add_to_list(splice: &mut Splice<'_>, key: &str, elements: &[String]) {
-    let root = splice.root();
-    match splice.member(&root, key) {
-        Some(list) => splice.append(&list, elements),
+/// Adds `elements` to the list `key` of the root, which is created if needed.
+fn add_to_list(edit: &mut JsonEdit<'_>, key: &str, elements: &[String]) {
+    let root = edit.root();
+    match edit.member(&root, key) {
+        Some(list) => edit.append(&list, elements),
         None if elements.is_empty() => {}
-        None => splice.extend(&root, &[(key.to_owned(), format!("[{}]", elements.join(",")))]),
+        None => edit.extend(&root, &[(key.to_owned(), format!("[{}]", elements.join(",")))]),
     }
 }
 
 /// Sets the length of the one buffer.
-pub(super) fn set_length(splice: &mut Splice<'_>, length: usize) {
-    let buffer = splice.list("buffers").first().cloned();
-    match buffer.and_then(|buffer| splice.member(&buffer, "byteLength")) {
-        Some(span) => splice.replace(span, length.to_string()),
-        None => add_to_list(splice, "buffers", &[json!({"byteLength": length}).to_string()]),
+pub(super) fn set_length(edit: &mut JsonEdit<'_>, length: usize) {
+    let buffer = edit.list("buffers").first().cloned();
+    match buffer.and_then(|buffer| edit.member(&buffer, "byteLength")) {
+        Some(span) => edit.replace(span, length.to_string()),
+        None => add_to_list(edit, "buffers", &[json!({"byteLength": length}).to_string()]),
     }
 }
 
-/// What a `.glb` has after its JSON and its buffer.
+/// The chunks of a `.glb` after JSON and buffer.
 fn rest_of(bytes: &[u8]) -> &[u8] {
     let number = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     if !bytes.starts_with(b"glTF") {

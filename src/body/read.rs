@@ -1,4 +1,4 @@
-//! From a glTF document to a [`Body`].
+//! Reads a [`Body`] from a glTF document.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -10,16 +10,16 @@ use json::validation::Checked;
 
 use super::document::{Document, refuse_other_formats};
 use super::layout::{AREA, MODALITY, NORMAL, TAXEL_ID};
-use super::nodes::{FARTHEST, Nodes, is_near};
-use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, mend};
+use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
+use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, repair};
 use crate::error::{Error, Result};
 
-/// Where in the file what was read comes from, for those who write to it.
+/// Places in the file of what was read, for writing.
 #[derive(Default)]
 pub(super) struct Sources {
     /// Per surface its node, and the primitive within the node's mesh.
     pub(super) surfaces: Vec<(usize, usize)>,
-    /// Points that are no taxels: the node's name, and where they are in the world at rest.
+    /// Points that are no taxels: the node's name, and positions in the world at rest, m.
     pub(super) points: Vec<(String, Vec<DVec3>)>,
     /// Per taxel of the body, in its order.
     pub(super) taxels: Vec<TaxelSource>,
@@ -67,11 +67,11 @@ pub(super) fn from_document(
         read_meshes(document, nodes, node, &mut body, sources.as_deref_mut())?;
     }
     complete_normals(&mut body)?;
-    if let (Some(order), Some(sources)) = (mend::renumber(&mut body)?, sources) {
+    if let (Some(order), Some(sources)) = (repair::renumber(&mut body)?, sources) {
         sources.taxels = order.into_iter().map(|index| sources.taxels[index]).collect();
     }
     body.fields = read_fields(document, nodes, &mut body)?;
-    mend::name_what_was_not_exported(document, &mut body);
+    repair::suggest_export_options(document, &mut body);
     Ok(body)
 }
 
@@ -95,7 +95,7 @@ pub(super) fn is_taxels(primitive: &Primitive) -> bool {
     has_mode(primitive, Mode::Points) && custom(primitive, TAXEL_ID).is_some()
 }
 
-/// How the joints of a skinned node carry its points: per joint its link, and link_from_mesh.
+/// Per joint of a skinned node its link, and link_from_mesh.
 fn joints_of(
     document: &Document,
     nodes: &Nodes<'_>,
@@ -124,9 +124,9 @@ fn joints_of(
             Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
             None => DAffine3::IDENTITY,
         };
-        if !is_near(&joint_from_mesh) {
+        if !is_in_range(&joint_from_mesh) {
             return Err(Error::failed(format!(
-                "the inverse bind matrix of joint `{}` is not finite or beyond {FARTHEST:e}; export the file again",
+                "the inverse bind matrix of joint `{}` is not finite or beyond {MAX_COORDINATE_M:e}; export the file again",
                 links[link].name
             )));
         }
@@ -135,7 +135,7 @@ fn joints_of(
     Ok(Some(joints))
 }
 
-/// For each point of a skinned primitive, the joint that carries it most.
+/// For each point of a skinned primitive the joint with the largest weight.
 fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, joints: usize) -> Result<Vec<usize>> {
     let mut best = vec![(0.0_f32, 0_usize); points];
     for set in 0.. {
@@ -204,11 +204,11 @@ fn read_meshes(
         };
         let far = positions.iter().enumerate().find(|&(point, p)| {
             let position = of_point(point).1.transform_point3(DVec3::from_array(p.map(f64::from)));
-            position.abs().max_element() > FARTHEST
+            position.abs().max_element() > MAX_COORDINATE_M
         });
         if let Some((vertex, _)) = far {
             return Err(in_place(Error::failed(format!(
-                "vertex {vertex} lies over {FARTHEST:e} m away; check the scene's units and export it again"
+                "vertex {vertex} lies over {MAX_COORDINATE_M:e} m away; check the scene's units and export it again"
             ))));
         }
         if is_taxels(primitive) {
@@ -278,7 +278,7 @@ fn read_triangles(document: &Document, primitive: &Primitive, vertices: usize) -
             .collect(),
         _ => order.get(1..).unwrap_or(&[]).windows(2).map(|t| [order[0], t[0], t[1]]).collect(),
     };
-    // A triangle that names a vertex twice covers nothing.
+    // Triangles with a repeated vertex have no area.
     Ok(triangles.into_iter().filter(|[a, b, c]| a != b && b != c && c != a).collect())
 }
 
@@ -322,8 +322,7 @@ fn read_taxels(
             _ => DVec3::ZERO,
         }
         .normalize_or_zero();
-        // Normals go by the inverse transpose; an area by how much the plane across its normal is stretched. The
-        // cofactors are both in one, and exist for a flattened node too.
+        // The cofactor matrix transforms normals (as the inverse transpose) and scales areas, also for a singular node.
         let DMat3 { x_axis: x, y_axis: y, z_axis: z } = link_from_mesh.matrix3;
         let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
         let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
@@ -346,7 +345,7 @@ fn read_taxels(
     Ok(taxels)
 }
 
-/// A taxel whose normal the file leaves out, or has as zero, takes that of the surface beneath it.
+/// Sets missing or zero normals of taxels to that of the nearest surface.
 fn complete_normals(body: &mut Body) -> Result<()> {
     let mut without: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (index, taxel) in body.taxels.iter().enumerate() {
@@ -386,11 +385,11 @@ fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &mut Body) -> Resul
     if let Some(pair) = fields.windows(2).find(|pair| pair[0].name == pair[1].name) {
         return Err(Error::failed(format!("two fields are called `{}`; rename one", pair[0].name)));
     }
-    mend::forget_absent(body, &mut fields);
+    repair::remove_absent_members(body, &mut fields);
     parents_first(fields)
 }
 
-/// The fields by name, but every parent before its children.
+/// The fields sorted by name, with parents before children.
 fn parents_first(fields: Vec<FieldSpec>) -> Result<Vec<FieldSpec>> {
     let names: HashMap<&str, usize> = fields.iter().enumerate().map(|(i, f)| (f.name.as_str(), i)).collect();
     let mut depths = Vec::with_capacity(fields.len());

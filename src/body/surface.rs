@@ -1,4 +1,4 @@
-//! A body's triangles, and the two questions asked of them: what is nearest, and what does a ray hit.
+//! A body's triangles, with nearest-point and ray queries.
 
 use glam::{DAffine3, DVec3};
 use rstar::primitives::{CachedEnvelope, GeomWithData};
@@ -15,25 +15,25 @@ pub struct Surface {
     pub positions: Vec<DVec3>,
     /// Vertex indices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// What carries it.
+    /// Its link or joints.
     pub home: Home,
 }
 
-/// What carries a mesh.
+/// The link or joints that move a mesh.
 #[derive(Clone, Debug)]
 pub enum Home {
-    /// One link carries all of it.
+    /// A rigid mesh of one link.
     Rigid {
         /// The link.
         link: usize,
         /// Takes mesh coordinates to the link's frame.
         link_from_mesh: DAffine3,
     },
-    /// Joints carry it, each vertex by several; its node's transform means nothing.
+    /// A skinned mesh; its node's transform is ignored.
     Skinned {
         /// Per joint its link, and link_from_mesh at bind.
         joints: Vec<(usize, DAffine3)>,
-        /// Per vertex the joint that carries it most.
+        /// Per vertex the joint with the largest weight.
         heaviest: Vec<usize>,
     },
 }
@@ -53,7 +53,7 @@ impl Surface {
         }
     }
 
-    /// The corners of its triangles, taken through `way`, each counter-clockwise seen from outside.
+    /// The corners of its triangles, transformed by `way`, counter-clockwise seen from outside.
     pub(crate) fn corners_through(&self, way: DAffine3) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let mirrored = way.matrix3.determinant() < 0.0;
         let points: Vec<DVec3> = self.positions.iter().map(|&p| way.transform_point3(p)).collect();
@@ -63,7 +63,7 @@ impl Surface {
         })
     }
 
-    /// The link that carries vertex `vertex` most.
+    /// The link of vertex `vertex`, or the one with the largest weight.
     #[must_use]
     pub fn carrier(&self, vertex: usize) -> usize {
         match &self.home {
@@ -74,7 +74,7 @@ impl Surface {
 }
 
 impl Body {
-    /// The surface in the frame of `link`, searchable. With `reach`, only triangles that touch the ball (centre, radius).
+    /// A search index of the surface in the frame of `link`; with `reach`, of triangles near the ball (centre, radius).
     #[must_use]
     pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
         match reach {
@@ -92,8 +92,8 @@ impl Body {
         seen.flat_map(|(surface, link_from_mesh)| surface.corners_through(link_from_mesh))
     }
 
-    /// All triangles in the world at rest, counter-clockwise seen from outside, each with the link that carries it. Of a
-    /// skinned one every corner goes with the joint that carries it most.
+    /// All triangles in the world at rest, counter-clockwise seen from outside, each with its link. Corners of a skinned one
+    /// are transformed by the joint with the largest weight.
     #[must_use]
     pub fn triangles_at_rest(&self) -> Vec<(usize, [DVec3; 3])> {
         let mut triangles = Vec::new();
@@ -120,7 +120,7 @@ impl Body {
     }
 }
 
-/// Finds the nearest points of a body's surface, in any link's frame, without an index of each.
+/// Finds the nearest points of a body's surface in any link's frame, without search indices.
 #[derive(Debug)]
 pub(crate) struct Nearest<'a> {
     body: &'a Body,
@@ -148,7 +148,7 @@ impl<'a> Nearest<'a> {
         let mut near = Vec::new();
         for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
             let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
-            // Most triangles are told to be far by one corner.
+            // One corner excludes most triangles.
             let within = (radius + slack(&link_from_mesh, *longest)).powi(2);
             let close = surface.corners_through(link_from_mesh);
             let close = close.filter(|[a, ..]| a.distance_squared(centre) <= within).map(Triangle);
@@ -186,8 +186,8 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// By how much a corner lies farther away than the nearest point of its triangle's box, at most, where no edge is longer
-/// than `longest` in the mesh: the box is as wide as its longest edge along each axis.
+/// Upper bound of the distance from a corner to the nearest point of its triangle's bounding box, for edges up to
+/// `longest` in the mesh.
 fn slack(link_from_mesh: &DAffine3, longest: f64) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|axis| link_from_mesh.matrix3.col(axis).length_squared());
     (x + y + z).sqrt() * longest * 3.0_f64.sqrt() * (1.0 + 1e-9)
@@ -204,7 +204,7 @@ impl Triangle {
         (b - a).cross(c - a).try_normalize()
     }
 
-    /// Squared distance of `p` from the box around it: at most that from the triangle.
+    /// Squared distance of `p` from the bounding box: a lower bound for the triangle.
     fn box_distance_squared(&self, p: DVec3) -> f64 {
         let [a, b, c] = self.0;
         p.distance_squared(p.clamp(a.min(b).min(c), a.max(b).max(c)))
@@ -244,13 +244,13 @@ impl Triangle {
         a + ab * (vb * scale) + ac * (vc * scale)
     }
 
-    /// Where the line `origin + t·direction` pierces the triangle, as t (Möller and Trumbore).
+    /// The intersection of the line `origin + t·direction` with the triangle, as t (Möller and Trumbore).
     fn pierced(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let [a, b, c] = self.0;
         let (ab, ac) = (b - a, c - a);
         let across = direction.cross(ac);
         let determinant = ab.dot(across);
-        // Edge-on, or so near to it that the division means nothing.
+        // Nearly parallel to the triangle.
         if determinant.abs() <= 1e-12 * ab.length() * ac.length() * direction.length() {
             return None;
         }
@@ -258,7 +258,7 @@ impl Triangle {
         let beta = from_a.dot(across) / determinant;
         let turned = from_a.cross(ab);
         let gamma = direction.dot(turned) / determinant;
-        // A ray along a shared edge must not slip between the two triangles.
+        // A tolerance, so that a ray along a shared edge hits one of the triangles.
         let inside = beta >= -1e-9 && gamma >= -1e-9 && beta + gamma <= 1.0 + 1e-9;
         inside.then(|| ac.dot(turned) / determinant)
     }
@@ -282,18 +282,18 @@ impl PointDistance for Triangle {
 /// A point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Where, in the frame the index was made in.
+    /// Position in the frame of the index.
     pub position: DVec3,
     /// The outward unit normal of the triangle there.
     pub normal: DVec3,
-    /// The triangle, as a number among all those that the index was made of.
+    /// Index of the triangle among those given.
     pub triangle: usize,
 }
 
-/// A surface's triangles in one frame, in a tree.
+/// A search index of triangles in one frame.
 #[derive(Debug)]
 pub struct SurfaceIndex {
-    /// Each with its outward unit normal and its number.
+    /// Triangles with their outward unit normals and indices.
     tree: RTree<GeomWithData<CachedEnvelope<Triangle>, (DVec3, u32)>>,
 }
 
@@ -309,7 +309,7 @@ impl SurfaceIndex {
         Self { tree: RTree::bulk_load(triangles) }
     }
 
-    /// A searchable surface of the triangles whose corners `triangles` gives; those without area are left out.
+    /// A search index of `triangles`, given by corners; those without area are left out.
     #[must_use]
     pub fn of_triangles(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
         Self::new(triangles.into_iter().map(Triangle).collect())
@@ -341,8 +341,8 @@ impl SurfaceIndex {
         self.tree.locate_within_distance(p.to_array(), within_m * within_m).map(|triangle| triangle.data.0)
     }
 
-    /// Where the line through `p` along the unit vector `direction` meets the surface nearest to `p`, among places
-    /// within `reach` of `p` whose outward normal does not look away from `direction`.
+    /// The intersection nearest to `p` of the surface and the line through `p` along the unit vector `direction`, within
+    /// `reach` of `p` and with an outward normal along `direction`.
     #[must_use]
     pub fn along(&self, p: DVec3, direction: DVec3, reach: f64) -> Option<Hit> {
         let ends = AABB::from_corners((p - direction * reach).to_array(), (p + direction * reach).to_array());

@@ -1,44 +1,44 @@
-//! How triangles hang together: what lies across each edge, where the surface ends, what its parts are.
+//! The topology of triangles: neighbours across edges, boundaries, connected parts.
 //!
-//! Exporters split vertices along seams, and real meshes have triangles without area, edges with three triangles and
-//! loose parts. All of that is survived here and counted.
+//! Exporters split vertices along seams, and real meshes have triangles without area, edges with three triangles and loose
+//! parts. These are handled and counted.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-/// Vertices are one where they lie within this part of the largest coordinate: four units in the last place of single
-/// precision, two for each of two exporters' roundings.
-const WELD: f64 = 1.0 / (1 << 22) as f64;
+/// Vertices within this share of the largest coordinate are welded: four units in the last place of single precision, two
+/// for each of two roundings.
+const WELD_TOLERANCE: f64 = 1.0 / (1 << 22) as f64;
 
-/// A triangle whose height is under this part of its longest edge has no area to speak of.
-const LEAST_HEIGHT: f64 = 1e-9;
+/// Minimum height of a triangle, share of its longest edge; others are degenerate.
+const MIN_HEIGHT: f64 = 1e-9;
 
 /// No triangle, vertex or part.
 pub const NONE: u32 = u32::MAX;
 
 /// Triangles with welded vertices and known neighbours.
 ///
-/// An edge is named by a number: edge 3·t + k of triangle t runs from its corner k to corner (k + 1) mod 3.
+/// Edge 3·t + k of triangle t runs from its corner k to corner (k + 1) mod 3.
 #[derive(Clone, Debug, Default)]
 pub struct Topology {
     /// Welded vertices, m.
     pub positions: Vec<DVec3>,
     /// Per vertex given, the welded one; [`NONE`] for one that is not finite.
     pub welded: Vec<u32>,
-    /// Sound triangles over the welded vertices, counter-clockwise seen from outside.
+    /// Valid triangles over the welded vertices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Per sound triangle, its index among those given.
+    /// Per valid triangle its index among those given.
     pub given: Vec<u32>,
     /// Per edge the same edge of the triangle beyond, or [`NONE`].
     pub across: Vec<u32>,
     /// Per triangle the connected part it belongs to; parts count from 0 in the order of the triangles.
     pub part: Vec<u32>,
-    /// What was found on the way.
+    /// Counted defects.
     pub flaws: Flaws,
 }
 
-/// What is odd about a mesh, counted.
+/// Counts of a mesh's defects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flaws {
     /// Triangles without area, or with a corner that is not there or not finite; left out.
@@ -49,7 +49,7 @@ pub struct Flaws {
     pub branching_edges: usize,
     /// Edges whose two triangles disagree on what is outside; nothing crosses them.
     pub flipped_edges: usize,
-    /// Edges of one triangle, where the surface ends.
+    /// Edges of one triangle, at the surface's boundary.
     pub boundary_edges: usize,
 }
 
@@ -67,8 +67,8 @@ impl Topology {
 
     fn weld(&mut self, positions: &[DVec3]) {
         let largest = positions.iter().filter(|p| p.is_finite()).map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let within = (largest * WELD).max(f64::MIN_POSITIVE);
-        // Cubes much larger than the tolerance: most points need only their own looked at.
+        let within = (largest * WELD_TOLERANCE).max(f64::MIN_POSITIVE);
+        // Cubes much larger than the tolerance, so that most points need only one.
         let side = 8.0 * within;
         let cube = |p: DVec3| (p / side).floor().to_array().map(|steps| steps as i64);
         let mut known: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(positions.len());
@@ -97,7 +97,7 @@ impl Topology {
         }
     }
 
-    /// Keeps the triangles that have an area of their own.
+    /// Keeps valid triangles.
     fn take(&mut self, triangles: &[[u32; 3]]) {
         let mut seen: HashMap<[u32; 3], ()> = HashMap::with_capacity(triangles.len());
         for (index, triangle) in triangles.iter().enumerate() {
@@ -123,7 +123,7 @@ impl Topology {
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
         // Twice the area is height times base; the comparison also fails for lengths that overflow.
         let twice = (b - a).cross(c - a).length();
-        twice.is_finite() && twice > LEAST_HEIGHT * longest
+        twice.is_finite() && twice > MIN_HEIGHT * longest
     }
 
     fn join(&mut self) {
@@ -190,13 +190,12 @@ impl Topology {
         self.part.iter().max().map_or(0, |&last| last as usize + 1)
     }
 
-    /// The edges that leave the vertex at the start of edge `edge`, counter-clockwise seen from outside, and whether
-    /// they close around it. Where the surface ends there, the first is the one farthest clockwise, and the last
-    /// triangle's far side is no leaving edge.
+    /// The edges that start at the first vertex of edge `edge`, counter-clockwise seen from outside, and whether they close
+    /// around it. At a boundary the first is the most clockwise one, and the last triangle's far side is not included.
     #[must_use]
     pub fn fan(&self, edge: u32) -> (Vec<u32>, bool) {
         let in_triangle = |edge: u32, step: u32| edge - edge % 3 + (edge % 3 + step) % 3;
-        // Clockwise over edge (v → x) lies the triangle in which it runs (x → v); the next edge from v follows that.
+        // The triangle clockwise of edge (v → x) has the edge (x → v); the next edge from v follows it.
         let mut first = edge;
         loop {
             let beyond = self.across[first as usize];
@@ -233,7 +232,7 @@ mod tests {
     use super::*;
 
     /// A strip of squares, each of two triangles, along +x in the plane z = 0.
-    fn strip(squares: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    fn clear_layout(squares: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let positions = (0..=squares).flat_map(|x| [DVec3::new(x.into(), 0.0, 0.0), DVec3::new(x.into(), 1.0, 0.0)]);
         let triangles = (0..squares).flat_map(|s| [[2 * s, 2 * s + 2, 2 * s + 3], [2 * s, 2 * s + 3, 2 * s + 1]]);
         (positions.collect(), triangles.collect())
@@ -241,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_seam_is_closed_and_a_gap_is_not() {
-        let (positions, triangles) = strip(3);
+        let (positions, triangles) = clear_layout(3);
         // Each triangle with corners of its own, the way that flat shading is exported.
         let soup: Vec<DVec3> = triangles.iter().flatten().map(|&v| positions[v as usize]).collect();
         let split: Vec<[u32; 3]> = (0..6).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
@@ -256,7 +255,7 @@ mod tests {
 
     #[test]
     fn what_lies_across_an_edge_runs_the_other_way() {
-        let (positions, triangles) = strip(4);
+        let (positions, triangles) = clear_layout(4);
         let topology = Topology::new(&positions, &triangles);
         for edge in 0..24 {
             let beyond = topology.across[edge as usize];
@@ -270,7 +269,7 @@ mod tests {
 
     #[test]
     fn flawed_triangles_are_counted_and_survived() {
-        let (mut positions, mut triangles) = strip(2);
+        let (mut positions, mut triangles) = clear_layout(2);
         let sound = triangles.len();
         positions.extend([DVec3::new(0.5, 0.0, 0.0), DVec3::NAN, DVec3::new(0.5, 0.5, 1.0)]);
         // Flat, doubled, not a number, a vertex too many, one corner twice.
@@ -284,7 +283,7 @@ mod tests {
         assert_eq!(topology.given[sound..], [9, 10]);
         triangles.push([4, 5, 6]);
         assert_eq!(Topology::new(&positions, &triangles).flaws.branching_edges, 2);
-        let (positions, mut triangles) = strip(1);
+        let (positions, mut triangles) = clear_layout(1);
         triangles[1].swap(0, 1);
         assert_eq!(Topology::new(&positions, &triangles).flaws.flipped_edges, 1);
     }

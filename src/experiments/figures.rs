@@ -9,16 +9,16 @@ use crate::field::FieldSet;
 use crate::ink::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 use crate::signal::FsrCircuit;
 
-/// Both stand for users to run, too.
+/// Simulations that users can run, too.
 const TAPS: &str = include_str!("../../examples/simulations/taps.toml");
 const ROD: &str = include_str!("../../examples/simulations/rod.toml");
 
 /// The taxel under the finger that taps.
-const TAPPED: u32 = 4;
-/// When the rod is looked at, s.
-const INSTANTS_S: [f64; 6] = [0.8, 1.3, 1.8, 2.3, 2.8, 3.3];
-/// Half of what a panel of Fig. 6 shows, mm.
-const HALF_MM: f64 = 18.0;
+const TAPPED_TAXEL: u32 = 4;
+/// Times of the panels of Fig. 6, s.
+const PANEL_TIMES_S: [f64; 6] = [0.8, 1.3, 1.8, 2.3, 2.8, 3.3];
+/// Half the side of a panel of Fig. 6, mm.
+const PANEL_HALF_MM: f64 = 18.0;
 /// Of an Interlink 400's sensing disc, mm.
 const SENSOR_RADIUS_MM: f64 = 2.5;
 
@@ -30,24 +30,24 @@ const GREY: Colour = [165, 165, 165];
 const FAINT_GREEN: Colour = [150, 215, 150];
 const FAINT_BLUE: Colour = [165, 165, 245];
 const DOTTED: Colour = [110, 110, 220];
-/// As in the paper: of [`Signal::ALL`].
+/// The paper's colours of [`Signal::ALL`].
 const LINES: [Colour; 2] = [GREEN, BLUE];
 const NAMES: [&str; 2] = ["logarithmic raw", "linearised"];
 
 /// A figure and the name of its files.
-pub(super) struct Named {
+pub(super) struct NamedFigure {
     pub(super) name: &'static str,
     pub(super) figure: Figure,
 }
 
 /// All three on the bundled hand.
-pub(super) fn figures(body: &Body) -> Result<[Named; 3]> {
+pub(super) fn figures(body: &Body) -> Result<[NamedFigure; 3]> {
     let taps = trial::run("taps", TAPS, body, "hand/palm")?;
     let rod = trial::run("rod", ROD, body, "hand/back")?;
     Ok([
-        Named { name: "fig3", figure: taps_figure(&taps) },
-        Named { name: "fig6", figure: rod_figure(&rod, body)? },
-        Named { name: "fig7", figure: time_figure(&rod) },
+        NamedFigure { name: "fig3", figure: taps_figure(&taps) },
+        NamedFigure { name: "fig6", figure: rod_figure(&rod, body)? },
+        NamedFigure { name: "fig7", figure: time_figure(&rod) },
     ])
 }
 
@@ -60,9 +60,9 @@ fn time(range: [f64; 2], step: f64) -> Axis {
     Axis { label: "time (s)", range, ticks: (0..=count).map(|i| range[0] + step * f64::from(i)).collect() }
 }
 
-/// Fig. 3: what one sensor's taps look like in counts and in both signals.
+/// Fig. 3: taps on one sensor in counts and in both signals.
 fn taps_figure(taps: &Trial) -> Figure {
-    let tapped = taps.ids.iter().position(|&id| id == TAPPED).unwrap_or(0);
+    let tapped = taps.ids.iter().position(|&id| id == TAPPED_TAXEL).unwrap_or(0);
     let over_time = |value: &dyn Fn(&Moment) -> f64| -> Vec<Point> {
         taps.moments.iter().map(|moment| (moment.t_s, value(moment))).collect()
     };
@@ -112,7 +112,7 @@ fn rod_figure(rod: &Trial, body: &Body) -> Result<Figure> {
             Some((value, (member.place.x * 1e3, member.place.y * 1e3)))
         })
         .collect();
-    let panels = INSTANTS_S.iter().filter_map(|&t_s| {
+    let panels = PANEL_TIMES_S.iter().filter_map(|&t_s| {
         let moment = rod.moments.iter().min_by(|a, b| (a.t_s - t_s).abs().total_cmp(&(b.t_s - t_s).abs()))?;
         Some(instant(moment, &places))
     });
@@ -152,18 +152,18 @@ fn instant(moment: &Moment, places: &[(usize, Point)]) -> Panel {
     if let Some(at) = centroids[1] {
         layers.push(Layer { mark: Mark::Asterisk { at, size: 6.0 }, colour: CYAN, name: Some("centroid, linearised") });
     }
-    let axis = |label| Axis { label, range: [-HALF_MM, HALF_MM], ticks: vec![-12.0, 0.0, 12.0] };
+    let axis = |label| Axis { label, range: [-PANEL_HALF_MM, PANEL_HALF_MM], ticks: vec![-12.0, 0.0, 12.0] };
     Panel { title: format!("{:.1} s", moment.t_s), x: axis("u (mm)"), y: axis("v (mm)"), layers }
 }
 
 /// The line through `point` at `angle`, as far as a panel of Fig. 6 goes.
 fn line_through(point: Point, angle: f64, colour: Colour, width: f64, name: &'static str) -> Layer {
     let direction = (libm::cos(angle), libm::sin(angle));
-    // How far along the line both of its coordinates stay within the panel.
-    let (mut from, mut to) = (-4.0 * HALF_MM, 4.0 * HALF_MM);
+    // Clip the line to the panel.
+    let (mut from, mut to) = (-4.0 * PANEL_HALF_MM, 4.0 * PANEL_HALF_MM);
     for (start, slope) in [(point.0, direction.0), (point.1, direction.1)] {
         if slope.abs() > 1e-12 {
-            let ends = [(-HALF_MM - start) / slope, (HALF_MM - start) / slope];
+            let ends = [(-PANEL_HALF_MM - start) / slope, (PANEL_HALF_MM - start) / slope];
             from = from.max(ends[0].min(ends[1]));
             to = to.min(ends[0].max(ends[1]));
         }
@@ -278,7 +278,7 @@ mod tests {
             let Mark::Lines { runs, .. } = layer.mark else { panic!() };
             assert_eq!(runs[0].len(), 2);
             for (x, y) in &runs[0] {
-                assert!((x.abs().max(y.abs()) - HALF_MM).abs() < 1e-9, "{degrees}: {x} {y}");
+                assert!((x.abs().max(y.abs()) - PANEL_HALF_MM).abs() < 1e-9, "{degrees}: {x} {y}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! How far a percept is from the truth.
+//! Errors of percepts.
 
 use std::f64::consts::PI;
 
@@ -8,9 +8,9 @@ pub(super) fn between_lines(a: f64, b: f64) -> f64 {
     turned.min(PI - turned)
 }
 
-/// The part of `error` across a line at `angle`, in the error's unit.
+/// The component of `error` across a line at `angle`, in the error's unit.
 ///
-/// Motion of a long rod along itself changes nothing that a sensor could feel, so that no method can be blamed for it.
+/// Sensors cannot measure the motion of a long rod along itself.
 pub(super) fn across(error: [f64; 2], angle: f64) -> f64 {
     (error[1] * libm::cos(angle) - error[0] * libm::sin(angle)).abs()
 }

@@ -1,5 +1,5 @@
-//! What the command measures: the paper's own experiments, from simulation, with the table of errors that it lacks
-//! (`docs/paper.md`); and speed, on made-up skins of any size (`docs/performance.md`).
+//! Experiments: the paper's figures from simulation, with a table of errors (`docs/paper.md`), and speed on synthetic bodies
+//! (`docs/performance.md`).
 
 pub mod dump;
 mod figures;
@@ -21,8 +21,8 @@ use crate::output::OutputFolder;
 pub const FILES: [&str; 8] =
     ["fig3.svg", "fig3.png", "fig6.svg", "fig6.png", "fig7.svg", "fig7.png", "table.md", "table.json"];
 
-/// Writes the paper's figures and the table into `folder`, which has [`FILES`] and is made where there is none, and gives
-/// the files written: each complete, or not there. `quick` leaves most of the table away. `progress` hears the share done.
+/// Writes the paper's figures and the table into `folder`, which has [`FILES`], and returns the files. `quick` omits most of
+/// the table. `progress` gets the share that is done.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -35,7 +35,7 @@ pub fn write(mut folder: OutputFolder, quick: bool, progress: &(dyn Fn(f64) + Sy
         written.push(output.name().to_owned());
         output.write(bytes)
     };
-    for figures::Named { name, figure } in figures::figures(&body)? {
+    for figures::NamedFigure { name, figure } in figures::figures(&body)? {
         put(&format!("{name}.svg"), figure.svg()?.as_bytes())?;
         put(&format!("{name}.png"), &figure.png()?)?;
     }

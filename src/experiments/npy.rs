@@ -1,4 +1,4 @@
-//! NumPy's array files, version 1.0 of the format: written only, one number after the other.
+//! Writes NumPy's array files, version 1.0 of the format.
 
 use std::io::{BufWriter, Write as _};
 
@@ -27,7 +27,7 @@ macro_rules! numbers {
 }
 numbers!(u32: "<u4", f32: "<f4", f64: "<f8");
 
-/// Writes `numbers`, as many as `shape` says, the last index fastest, as an array to `output`: whole, or not at all.
+/// Writes `numbers`, the product of `shape`, last index fastest, as an array to `output`, atomically.
 pub(super) fn write<N: Number>(output: OutputPath, shape: &[usize], numbers: impl Iterator<Item = N>) -> Result<()> {
     let path = output.name().to_owned();
     let failed = |e: &std::io::Error| Error::io(&path, e);

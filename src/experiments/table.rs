@@ -1,4 +1,4 @@
-//! The table that the paper lacks: how far its percepts are from the truth.
+//! A table of the percepts' errors, which the paper does not have.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,27 +14,27 @@ use crate::percept::Flags;
 
 const SPEEDS_MM_S: [f64; 3] = [5.0, 20.0, 80.0];
 const NOISES_COUNTS: [f64; 3] = [0.0, 1.0, 3.0];
-/// What the quick table has of both, and the table by angle.
-const USUAL_SPEED_MM_S: f64 = 20.0;
-const USUAL_NOISE_COUNTS: f64 = 1.0;
-/// What happens where taxels are nearly equally far hangs on the noise: each simulation with noise is run with so many seeds.
+/// Speed and noise of the quick table, and of the table by angle.
+const DEFAULT_SPEED_MM_S: f64 = 20.0;
+const DEFAULT_NOISE_COUNTS: f64 = 1.0;
+/// Number of seeds for each simulation with noise, as ties of two points depend on the noise.
 const SEEDS: usize = 30;
-/// A rod that is seen farther off than this is seen across itself.
+/// An orientation with a larger error is across the rod.
 const ACROSS_DEG: f64 = 45.0;
 const RATE_HZ: f64 = 50.0;
-/// Frames over which the steadier speed is taken, 0.1 s.
+/// Frames for the speed over 0.1 s.
 const SPAN_FRAMES: usize = 5;
-/// A path goes as far on either side of its middle, mm.
-const REACH_MM: f64 = 8.0;
+/// Half the length of a path, mm.
+const HALF_PATH_MM: f64 = 8.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Toucher {
+enum IndenterKind {
     Rod,
     Ball,
     Fingertip,
 }
 
-impl Toucher {
+impl IndenterKind {
     const ALL: [Self; 3] = [Self::Rod, Self::Ball, Self::Fingertip];
 
     fn name(self) -> &'static str {
@@ -45,7 +45,7 @@ impl Toucher {
         }
     }
 
-    /// Angles of a rod, directions of what is round, degrees.
+    /// Angles of a rod, directions of round indenters, degrees.
     fn angles_deg(self) -> Vec<f64> {
         match self {
             Self::Rod => (0..36).map(|i| 5.0 * f64::from(i)).collect(),
@@ -68,7 +68,7 @@ impl Toucher {
 /// One simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Case {
-    toucher: Toucher,
+    toucher: IndenterKind,
     angle_deg: f64,
     speed_mm_s: f64,
     noise_counts: f64,
@@ -77,10 +77,10 @@ struct Case {
 impl Case {
     fn all(quick: bool) -> Vec<Self> {
         let mut cases = Vec::new();
-        for toucher in Toucher::ALL {
+        for toucher in IndenterKind::ALL {
             for speed_mm_s in SPEEDS_MM_S {
                 for noise_counts in NOISES_COUNTS {
-                    let usual = speed_mm_s == USUAL_SPEED_MM_S && noise_counts == USUAL_NOISE_COUNTS;
+                    let usual = speed_mm_s == DEFAULT_SPEED_MM_S && noise_counts == DEFAULT_NOISE_COUNTS;
                     if usual || !quick {
                         let angles = toucher.angles_deg().into_iter();
                         cases.extend(angles.map(|angle_deg| Self { toucher, angle_deg, speed_mm_s, noise_counts }));
@@ -91,17 +91,17 @@ impl Case {
         cases
     }
 
-    /// No two angles have the same noise: they are whole, and below 360.
+    /// Different seeds for all angles, which are integers below 360.
     fn seeds(&self) -> Vec<u64> {
         let runs = if self.noise_counts > 0.0 { SEEDS } else { 1 };
         (0..runs).map(|run| self.angle_deg as u64 + 360 * run as u64).collect()
     }
 
-    /// A rod rolls across its own axis over the middle of the board; what is round passes the middle at 3.6 mm, so that
-    /// it does not run along a row of sensors.
+    /// A rod rolls across its axis over the middle of the board; a round indenter passes the middle at 3.6 mm, so that it does
+    /// not move along a row of sensors.
     fn simulation(&self) -> String {
         let (heading_deg, middle) = match self.toucher {
-            Toucher::Rod => (self.angle_deg - 90.0, [0.0, 0.0]),
+            IndenterKind::Rod => (self.angle_deg - 90.0, [0.0, 0.0]),
             _ => (self.angle_deg, [3.0, 2.0]),
         };
         let heading = heading_deg.to_radians();
@@ -109,7 +109,7 @@ impl Case {
             let (u, v) = (middle[0] + mm * libm::cos(heading), middle[1] + mm * libm::sin(heading));
             format!("[{:.9}, {:.9}]", u * 1e-3, v * 1e-3)
         };
-        let duration_s = 2.0 * REACH_MM / self.speed_mm_s;
+        let duration_s = 2.0 * HALF_PATH_MM / self.speed_mm_s;
         format!(
             "rate_hz = {RATE_HZ}\nduration_s = {duration_s}\n\
              [skin]\nthickness_m = 0.007\nstiffness_pa = 400e3\n\
@@ -117,8 +117,8 @@ impl Case {
              [[touch]]\non = \"hand/back\"\n{}\npath = [{}, {}]\ntimes_s = [0, {duration_s}]\n",
             self.noise_counts,
             self.toucher.keys(self.angle_deg),
-            at(-REACH_MM),
-            at(REACH_MM),
+            at(-HALF_PATH_MM),
+            at(HALF_PATH_MM),
         )
     }
 }
@@ -133,7 +133,7 @@ struct Scores {
     /// Degrees.
     two_points: Errors,
     axis: Errors,
-    /// Frames that are flagged `tie`, those of them in which two points are over [`ACROSS_DEG`] off, and all such frames.
+    /// Frames flagged `tie`; those of them in which two points are over [`ACROSS_DEG`] off; and all such frames.
     tied: u64,
     tied_across: u64,
     across: u64,
@@ -148,12 +148,12 @@ impl Scores {
         let mut scores = Self::default();
         for (index, moment) in trial.moments.iter().enumerate() {
             let earlier = index.checked_sub(SPAN_FRAMES).map(|earlier| &trial.moments[earlier]);
-            scores.see(moment, earlier, signal);
+            scores.add(moment, earlier, signal);
         }
         scores
     }
 
-    fn see(&mut self, moment: &Moment, earlier: Option<&Moment>, signal: usize) {
+    fn add(&mut self, moment: &Moment, earlier: Option<&Moment>, signal: usize) {
         let Some(truth) = &moment.truth else { return };
         let percept = &moment.percepts[signal];
         self.frames += 1;
@@ -206,9 +206,9 @@ impl Scores {
 /// RMS and worst over everything, and the lowest and the highest RMS of one seed.
 type Spread = [f64; 4];
 
-/// A row: all of a toucher's angles, or one.
+/// A row: all of an indenter's angles, or one.
 #[derive(Clone, Debug, Serialize)]
-struct Row {
+struct TableRow {
     indenter: &'static str,
     signal: &'static str,
     speed_mm_s: f64,
@@ -229,8 +229,8 @@ struct Row {
     tied_across_frames: u64,
 }
 
-impl Row {
-    /// Of all cases in `group`.
+impl TableRow {
+    /// The row of all cases in `group`.
     fn new(angle_deg: Option<f64>, signal: usize, group: &[Scored<'_>]) -> Self {
         let case = group[0].0;
         let mut scores = Scores::default();
@@ -271,15 +271,15 @@ impl Row {
 /// A case, and its scores by seed and signal.
 type Scored<'a> = (&'a Case, &'a Vec<[Scores; 2]>);
 
-/// All rows: over all angles of a toucher, and for rods by angle.
+/// All rows: over all angles of an indenter, and for rods by angle.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Table {
-    over_all_angles: Vec<Row>,
-    rods_by_angle: Vec<Row>,
+    over_all_angles: Vec<TableRow>,
+    rods_by_angle: Vec<TableRow>,
 }
 
 impl Table {
-    /// Simulates everything on `body`, the bundled hand, telling `progress` the share that is done.
+    /// Simulates all cases on `body`, the bundled hand; `progress` gets the share that is done.
     pub(super) fn new(body: &Body, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Self> {
         let cases = Case::all(quick);
         let done = AtomicUsize::new(0);
@@ -299,19 +299,19 @@ impl Table {
         let pairs: Vec<Scored<'_>> = cases.iter().zip(&scores).collect();
         for group in pairs.chunk_by(alike) {
             let (case, _) = group[0];
-            table.over_all_angles.extend((0..2).map(|signal| Row::new(None, signal, group)));
-            let usual = case.speed_mm_s == USUAL_SPEED_MM_S && case.noise_counts == USUAL_NOISE_COUNTS;
-            if case.toucher == Toucher::Rod && usual {
+            table.over_all_angles.extend((0..2).map(|signal| TableRow::new(None, signal, group)));
+            let usual = case.speed_mm_s == DEFAULT_SPEED_MM_S && case.noise_counts == DEFAULT_NOISE_COUNTS;
+            if case.toucher == IndenterKind::Rod && usual {
                 for of_angle in group.chunks(1) {
                     let angle_deg = Some(of_angle[0].0.angle_deg);
-                    table.rods_by_angle.extend((0..2).map(|signal| Row::new(angle_deg, signal, of_angle)));
+                    table.rods_by_angle.extend((0..2).map(|signal| TableRow::new(angle_deg, signal, of_angle)));
                 }
             }
         }
         Ok(table)
     }
 
-    /// As Markdown, for people.
+    /// The table as Markdown.
     pub(super) fn markdown(&self) -> String {
         let mut text = format!(
             "Each cell is RMS / worst over all frames of all angles and, with noise, of {SEEDS} seeds; in brackets the\n\
@@ -337,7 +337,7 @@ impl Table {
         }
         let _ = write!(
             text,
-            "\nRods by angle, {USUAL_SPEED_MM_S} mm/s, noise of {USUAL_NOISE_COUNTS} count, RMS / worst.\n\n\
+            "\nRods by angle, {DEFAULT_SPEED_MM_S} mm/s, noise of {DEFAULT_NOISE_COUNTS} count, RMS / worst.\n\n\
              | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | centroid mm, raw | \
              linearised |\n|---|---|---|---|---|---|---|\n",
         );

@@ -1,4 +1,4 @@
-//! From a simulated touch to what both of the paper's signals make of it.
+//! Runs a simulated touch through both of the paper's signals.
 
 use std::array;
 
@@ -14,7 +14,7 @@ use crate::source::{SimulatedSource, Source as _, Truth};
 /// The paper's two ways from counts to a calibrated sensor value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Signal {
-    /// The reading turned round: about the logarithm of the force.
+    /// The inverted reading: about the logarithm of the force.
     Raw,
     /// In proportion to the force.
     Linearised,
@@ -22,7 +22,7 @@ pub(super) enum Signal {
 
 impl Signal {
     pub(super) const ALL: [Self; 2] = [Self::Raw, Self::Linearised];
-    /// Readings so near to open are nothing but noise: under a sixth of the step that the break force makes.
+    /// Readings this near to open are noise: under a sixth of the step at the break force.
     const DEAD_BAND_COUNTS: u16 = 20;
 
     pub(super) fn name(self) -> &'static str {
@@ -32,7 +32,7 @@ impl Signal {
         }
     }
 
-    /// What `counts` stand for, 0 to 1000.
+    /// The signal of `counts`, 0 to 1000.
     pub(super) fn value(self, counts: u16) -> f64 {
         let circuit = FsrCircuit::default();
         if counts >= FsrCircuit::OPEN_COUNTS - Self::DEAD_BAND_COUNTS {
@@ -45,18 +45,18 @@ impl Signal {
     }
 }
 
-/// From about what noise makes in a frame to half of the sensors' pitch.
+/// From about the noise of a frame to half of the sensors' pitch.
 const FILTER: MotionFilter =
     MotionFilter { low_m: Some(0.5e-3), high_m: Some(6e-3), by: FilterBy::Distance, time_constant_s: 0.15 };
 
-/// One frame: what the sensors read and felt, what is true, and the field's percept from each of [`Signal::ALL`].
+/// One frame: readings, forces, truth, and the field's percept from each of [`Signal::ALL`].
 #[derive(Clone, Debug)]
 pub(super) struct Moment {
     pub(super) t_s: f64,
-    /// One a taxel, in the order of the body's pressure taxels.
+    /// One per taxel, in the order of the body's pressure taxels.
     pub(super) counts: Vec<u16>,
     pub(super) forces_newton: Vec<f64>,
-    /// Of the touch that presses, if one does.
+    /// The truth of the touch, if one presses.
     pub(super) truth: Option<Truth>,
     pub(super) percepts: [Percept; 2],
 }
@@ -73,28 +73,28 @@ pub(super) fn run(name: &str, text: &str, body: &Body, field: &str) -> Result<Tr
     let mut source = SimulatedSource::on_body(name, text, body.clone())?;
     let mut series = Series::default();
     series.read(&mut source)?;
-    Ok(Trial { ids: source.taxels().to_vec(), moments: series.felt(&source, field)? })
+    Ok(Trial { ids: source.taxels().to_vec(), moments: series.with_percepts(&source, field)? })
 }
 
 /// The same with the noise of each of `seeds`: as many trials, in that order.
 pub(super) fn run_seeds(name: &str, text: &str, body: &Body, field: &str, seeds: &[u64]) -> Result<Vec<Trial>> {
     let mut source = SimulatedSource::on_body(name, text, body.clone())?;
-    // One series for all, as it takes far longer to make an engine than to use it.
+    // One series for all, as creating an engine is slow.
     let mut series = Series::default();
     for &seed in seeds {
         source.reseed(seed);
         series.read(&mut source)?;
     }
-    let (ids, mut moments) = (source.taxels().to_vec(), series.felt(&source, field)?.into_iter());
+    let (ids, mut moments) = (source.taxels().to_vec(), series.with_percepts(&source, field)?.into_iter());
     let frames = moments.len() / seeds.len().max(1);
     let trial = |_| Trial { ids: ids.clone(), moments: moments.by_ref().take(frames).collect() };
     Ok(seeds.iter().map(trial).collect())
 }
 
-/// Time between runs, s: longer than motion is measured over, so that none is from one run to the next.
+/// Time between runs, s: too long for motion from one run to the next.
 const BETWEEN_RUNS_S: f64 = 1000.0;
 
-/// One frame as it was read: all of [`Moment`] but the percepts.
+/// One frame without percepts.
 struct Read {
     t_s: f64,
     counts: Vec<u16>,
@@ -102,7 +102,7 @@ struct Read {
     truth: Option<Truth>,
 }
 
-/// What was read, run after run.
+/// The frames of all runs.
 #[derive(Default)]
 struct Series {
     runs: u32,
@@ -112,7 +112,7 @@ struct Series {
 }
 
 impl Series {
-    /// Reads `source` to its end: another run.
+    /// Reads `source` to its end, as another run.
     fn read(&mut self, source: &mut SimulatedSource) -> Result<()> {
         let mut frame = Frame::missing(0.0, source.taxels().len());
         while source.next_frame(&mut frame)? {
@@ -130,8 +130,8 @@ impl Series {
         Ok(())
     }
 
-    /// What was read, with the percepts of `field` on the body of `source`.
-    fn felt(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
+    /// The frames with the percepts of `field` on the body of `source`.
+    fn with_percepts(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
         let mut percepts = Vec::with_capacity(2);
         for frames in &self.signals {
             let scene = Scene {

@@ -1,11 +1,11 @@
 //! Charts: a field's own two coordinates.
 //!
-//! The tangent plane's chart is the orthogonal projection on the plane through the origin across the members' mean
-//! normal. It keeps lengths along the surface up to the cosine of the tilt, and it exists only where the surface is
-//! seen from one side: no member's normal more than 75° from the mean, all members on one link.
+//! A plane chart is the orthogonal projection on the plane through the origin perpendicular to the members' mean normal.
+//! It shortens lengths by the cosine of the tilt. It requires all normals within 75° of the mean, and all members on one
+//! link.
 //!
-//! A geodesic chart has each place where the shortest way over the surface leads: its length in the direction in which it
-//! leaves the origin. It unrolls a limb. The layout has it ready; [`super::Unroller`] makes it.
+//! A geodesic chart gives each point the length and the initial direction of the shortest path from the origin over the
+//! surface, and so unrolls a limb. It is stored in the layout; [`super::Unroller`] computes it.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -16,16 +16,16 @@ use super::distortion::Distortion;
 use super::{Field, Member, anchor_from_link};
 use crate::body::{Body, ChartKind, FieldSpec, Hit, Nearest};
 
-/// cos 75°: how far a member's normal may lie from the mean.
-const LEAST_COSINE: f64 = 0.258_819_045_102_520_76;
+/// cos 75°: maximum angle of a member's normal from the mean.
+const MIN_NORMAL_COSINE: f64 = 0.258_819_045_102_520_76;
 
-/// cos 10°: how near the normal may come to the anchor's +x before +z takes its place.
-const NEARLY_PARALLEL: f64 = 0.984_807_753_012_208;
+/// cos 10°: +u is along the anchor's +z instead of +x if the normal is nearer to +x.
+const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
 
-/// A field's frame and how its coordinates come about.
+/// A field's two coordinates and their frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
-    /// How coordinates come about.
+    /// The kind of chart.
     pub kind: ChartKind,
     /// Direction of +u in the anchor's frame.
     pub u_in_anchor: DVec3,
@@ -33,48 +33,45 @@ pub struct Chart {
     pub v_in_anchor: DVec3,
     /// Outward normal in the anchor's frame.
     pub normal_in_anchor: DVec3,
-    /// How far it is from true to length: the largest relative error of the distance between neighbouring members, as
-    /// [`Distortion`] has it.
+    /// The largest relative error of distances between neighbouring members, see [`Distortion`].
     pub distortion: f64,
-    /// The root mean square of the same.
+    /// The root mean square of these errors.
     pub distortion_rms: f64,
 }
 
 /// Why a field has no chart.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NoChart {
-    /// Its members sit on links that move against each other.
+    /// Its members are on several links.
     SeveralLinks(usize),
-    /// A member's normal lies this far from the mean, rad: the field wraps around something.
+    /// A member's normal is this far from the mean, rad: the field wraps around a part.
     Wraps(f64),
-    /// The layout asks for none.
+    /// The layout requests no chart.
     ByChoice,
-    /// It is to be geodesic, and so many members have no (u, v) in the layout.
+    /// This many members of a geodesic chart have no (u, v) in the layout.
     Unplaced(usize),
-    /// It has no taxels of its own to chart.
+    /// It has no taxels of its own.
     NoTaxels,
-    /// There is no surface to measure ways on.
+    /// There is no surface to measure distances on.
     NoSurface,
-    /// A way to the taxel of this id cannot be found: it is on another part of the surface than the origin, as are so
-    /// many members in all.
+    /// The taxel with this id is on another part of the surface than the origin, as is this number of members.
     Unreachable(u32, usize),
-    /// Two ways to the taxel of this id are about as short as each other, and leave this far apart, rad: there the field
-    /// meets itself around a limb or a knob.
+    /// Two paths to the taxel with this id have about the same length: the field meets itself around a limb or a bump.
     CutLocus {
         /// Id of the taxel.
         taxel: u32,
-        /// Length of the shorter way, m.
+        /// Length of the shorter path, m.
         distance_m: f64,
-        /// The angle between the two, rad.
+        /// The angle between their departures, rad.
         apart_rad: f64,
     },
-    /// Neighbours of these ids are so many times as far apart in the chart as on the surface.
+    /// Neighbours with these ids are this many times as far apart in the chart as on the surface.
     Torn(u32, u32, f64),
-    /// The way to the taxel of this id bends by this much around a hole, or the surface's edge, rad.
+    /// The path to the taxel with this id bends by this angle around a hole or the surface's edge, rad.
     Bent(u32, f64),
-    /// Ways cannot be followed, for this reason.
+    /// Distances cannot be computed, for this reason.
     TooRough(String),
-    /// The truest chart that it could have is this far from true: the largest relative error of a distance.
+    /// The least distorted chart has this distortion.
     Untrue(f64),
 }
 
@@ -127,7 +124,7 @@ impl fmt::Display for NoChart {
     }
 }
 
-/// The field that `spec` outlines, with its anchor, origin, chart and its members' places.
+/// The field of `spec`, with its anchor, origin, chart and its members' places.
 pub(super) fn complete(
     body: &Body,
     nearest: &Nearest<'_>,
@@ -161,7 +158,7 @@ pub(super) fn complete(
         Some(NoChart::SeveralLinks(links.len()))
     } else if kind == ChartKind::Geodesic {
         (unplaced > 0).then_some(NoChart::Unplaced(unplaced))
-    } else if least_cosine < LEAST_COSINE {
+    } else if least_cosine < MIN_NORMAL_COSINE {
         Some(NoChart::Wraps(least_cosine.clamp(-1.0, 1.0).acos()))
     } else {
         None
@@ -202,7 +199,7 @@ pub(super) fn complete(
     Field { name: spec.name.clone(), parent, anchor, members, origin_in_anchor, chart }
 }
 
-/// The surface's normal at `origin`, or where there is none that of the nearest member.
+/// The surface's normal at `origin`, or without a surface that of the nearest member.
 fn normal_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
     let radius = members.iter().map(|(position, _)| position.distance(origin)).fold(0.0, f64::max);
     let surface = nearest.around(anchor, origin, radius * 0.1 + 1e-6);
@@ -211,10 +208,10 @@ fn normal_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DV
     surface.nearest(origin).and_then(around).or(closest.map(|(_, normal)| *normal)).unwrap_or(DVec3::Z)
 }
 
-/// (u, v, normal) with u along `wanted_u` as far as it is tangential, or along the default.
+/// (u, v, normal) with u along the tangential part of `wanted_u`, or of the default.
 pub(super) fn frame(normal: DVec3, wanted_u: Option<DVec3>) -> [DVec3; 3] {
     let across = |direction: DVec3| (direction - normal * direction.dot(normal)).try_normalize();
-    let default = || if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X };
+    let default = || if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X };
     let u = wanted_u.and_then(across).or_else(|| across(default())).unwrap_or(normal.any_orthonormal_vector());
     [u, normal.cross(u), normal]
 }

@@ -1,47 +1,46 @@
-//! How far a chart is from true to length.
+//! The distortion of lengths in a chart.
 
 use glam::{DVec2, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-/// Neighbours of each member that are measured.
+/// Number of neighbours to measure per member.
 const NEIGHBOURS: usize = 6;
 
-/// The nearest members that are looked at for them; the others may lie on the same point or face away.
-const MOST_TRIED: usize = 24;
+/// Number of nearest members to search for them; some may be coincident or face away.
+const MAX_CANDIDATES: usize = 24;
 
-/// Members, evenly among all, whose distances to their neighbours are measured.
-const MOST_MEASURED: usize = 4096;
+/// Maximum number of measured members.
+const MAX_MEASURED: usize = 4096;
 
-/// By how much a chart stretches and shrinks distances, one measure for every kind of chart.
+/// How much a chart stretches and shrinks distances.
 ///
-/// Each member is compared with its six nearest, those that face away by over 90° left out. The relative error of a pair
-/// is its distance in (u, v) over its distance on the surface, less 1. The distance on the surface is taken from the two
-/// places and normals as if the surface between them curved evenly from one normal to the other: with the chord c, the
-/// angle θ between the normals and m the direction of their difference, c's part along m is an arc's, (θ/2)/sin(θ/2)
-/// times as long. That is exact on planes, spheres and cylinders. Of a field with over 4096 members, as many evenly among
-/// them are measured.
+/// Each member is compared with its six nearest with normals within 90°. The relative error of a pair is its distance in
+/// (u, v) over its distance on the surface, less 1. The distance on the surface is estimated from positions and normals
+/// for a constant curvature: with the chord c, the angle θ between the normals and m the direction of their difference,
+/// c's part along m is lengthened by (θ/2)/sin(θ/2). That is exact on planes, spheres and cylinders. Of more than 4096
+/// members, 4096 are measured, evenly selected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
-    /// The largest relative error; 0 where there are no neighbours.
+    /// The largest relative error; 0 without neighbours.
     pub largest: f64,
     /// The root mean square of the relative errors.
     pub rms: f64,
-    /// The two members that are stretched the most, and by what factor.
+    /// The most stretched pair of members, and its factor.
     pub worst: Option<(usize, usize, f64)>,
 }
 
 impl Distortion {
-    /// The distortion of a chart that has at `places` (m) what lies at each (position in m, unit normal) of `members`.
+    /// The distortion of a chart that maps `members` (position, m, and unit normal) to `places`, m.
     #[must_use]
     pub fn of(members: &[(DVec3, DVec3)], places: &[DVec2]) -> Self {
         let spots = members.iter().enumerate().map(|(i, (position, _))| GeomWithData::new(position.to_array(), i));
         let tree = RTree::bulk_load(spots.collect());
         let mut measured = Self::default();
         let (mut squares, mut pairs) = (0.0, 0_u64);
-        for i in (0..members.len()).step_by(members.len().div_ceil(MOST_MEASURED).max(1)) {
+        for i in (0..members.len()).step_by(members.len().div_ceil(MAX_MEASURED).max(1)) {
             let (position, normal) = members[i];
-            let near = tree.nearest_neighbor_iter(position.to_array()).take(MOST_TRIED).map(|spot| spot.data);
+            let near = tree.nearest_neighbor_iter(position.to_array()).take(MAX_CANDIDATES).map(|spot| spot.data);
             let beside = near.filter(|&j| members[j].0 != position && members[j].1.dot(normal) > 0.0);
             for j in beside.take(NEIGHBOURS) {
                 let factor = places[i].distance(places[j]) / on_surface(members[i], members[j]);
@@ -59,10 +58,10 @@ impl Distortion {
     }
 }
 
-/// The distance on the surface between two places that face less than 90° apart, m.
+/// The distance on the surface between two points with normals within 90°, m.
 pub(super) fn on_surface(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> f64 {
     let (chord, turned) = (b.0 - a.0, b.1 - a.1);
-    // The normals are as long as 1, so that they are 2·sin(θ/2) apart.
+    // Unit normals differ by 2·sin(θ/2).
     let half_sine = turned.length() / 2.0;
     let Some(along) = turned.try_normalize() else { return chord.length() };
     let arc = chord.dot(along);

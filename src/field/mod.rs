@@ -1,16 +1,17 @@
-//! Receptive fields: which taxels, with what weight, in what coordinates.
+//! Receptive fields: taxels with weights and coordinates.
 //!
-//! A body's file outlines fields; [`FieldSet::new`] completes them: every parent gets the union of its descendants'
-//! taxels, every field an anchor, and a chart where one exists.
+//! [`FieldSet::new`] builds the fields that a body's file specifies: a parent gets the union of its descendants' taxels,
+//! every field an anchor, and a chart if it has one.
 
 mod chart;
-mod curved;
+
 mod distortion;
 pub mod geodesic;
-mod lift;
+mod geodesic_surface;
+mod link_surface;
 mod neighbours;
 mod rechart;
-mod surfaces;
+mod surface_grid;
 mod unroll;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,44 +20,44 @@ use glam::{DAffine3, DVec3};
 
 pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
-pub use lift::Lift;
+pub(crate) use link_surface::LinkSurface;
 pub use neighbours::neighbours;
 pub(crate) use rechart::Recharted;
-pub(crate) use surfaces::Skin;
+pub use surface_grid::Lift;
 pub use unroll::Unroller;
 
 use crate::body::{Body, FieldSpec, Nearest};
 use crate::error::{Error, Result};
 
-/// Name of the frame that fields are anchored in when their links share no ancestor, and of posed percepts.
+/// Name of the world frame: of fields whose links share no ancestor, and of percepts in posed frames.
 pub const WORLD: &str = "world";
 
-/// One taxel's part in a field.
+/// A taxel as a member of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Member {
     /// Index into the body's taxels.
     pub taxel: usize,
     /// Weight w > 0.
     pub weight: f64,
-    /// (u, v, depth along the normal) in the field's chart, m, where the depth of a geodesic one is 0; of a field without
-    /// a chart, the offset from its origin along its anchor's axes.
+    /// (u, v, depth along the normal) in the field's chart, m; the depth is 0 in a geodesic one. In a field without a chart,
+    /// the offset from its origin along its anchor's axes, m.
     pub place: DVec3,
 }
 
-/// A receptive field with everything worked out that does not change from frame to frame.
+/// A receptive field with all properties that do not change between frames.
 #[derive(Clone, Debug)]
 pub struct Field {
     /// Unique name.
     pub name: String,
     /// Index of the parent field.
     pub parent: Option<usize>,
-    /// The link in whose frame the field answers; `None` is the world at rest.
+    /// The link of the field's frame; `None` is the world at rest.
     pub anchor: Option<usize>,
     /// Members by ascending taxel id.
     pub members: Vec<Member>,
-    /// Where places are measured from, in the anchor's frame.
+    /// Origin of the members' places, in the anchor's frame, m.
     pub origin_in_anchor: DVec3,
-    /// The field's own coordinates, or why it has none.
+    /// The field's chart, or why it has none.
     pub chart: std::result::Result<Chart, NoChart>,
 }
 
@@ -67,7 +68,7 @@ impl Field {
         self.members.iter().map(|member| member.place.length()).fold(0.0, f64::max)
     }
 
-    /// About how far neighbouring members lie apart, m: what they would if spread evenly over the field's extent.
+    /// Estimated distance of neighbouring members, m, as if they were spread evenly over the field's extent.
     #[must_use]
     pub fn spacing_m(&self) -> f64 {
         let span = |axis: fn(DVec3) -> f64| {
@@ -90,15 +91,15 @@ pub struct FieldSet {
 }
 
 impl FieldSet {
-    /// Completes the fields that `body` outlines.
+    /// Builds the fields that `body` specifies.
     ///
     /// # Errors
-    /// A field without any taxel, even through its children.
+    /// A field has no taxel, nor have its descendants.
     pub fn new(body: &Body) -> Result<Self> {
         Self::of(body, &body.fields)
     }
 
-    /// Completes the fields that `specs` outline on `body`.
+    /// Builds the fields `specs` on `body`.
     fn of(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
         let parents = parents(specs);
         let taxels = unions(specs);

@@ -1,4 +1,4 @@
-//! Which taxels lie beside each other on the skin.
+//! Neighbouring taxels.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use rstar::primitives::GeomWithData;
 
 use crate::body::Body;
 
-/// How far neighbours may lie apart, in spacings.
-const REACH: f64 = 1.5;
+/// Maximum distance of neighbours, in spacings.
+const NEIGHBOUR_SPACINGS: f64 = 1.5;
 
-/// Per taxel of `body`, the indices of those beside it: on the same link, within 1.5 times the link's median distance
-/// between nearest taxels, their normals within 90°, so that a finger's two sides are no neighbours.
+/// Per taxel of `body` the indices of its neighbours: on the same link, within 1.5 times the link's median distance between
+/// nearest taxels, and with normals within 90°, which excludes the other side of a finger.
 #[must_use]
 pub fn neighbours(body: &Body) -> Vec<Vec<u32>> {
     let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -22,7 +22,7 @@ pub fn neighbours(body: &Body) -> Vec<Vec<u32>> {
     for taxels in by_link.values() {
         let place = |index: usize| body.taxels[index].position_in_link.to_array();
         let tree = RTree::bulk_load(taxels.iter().map(|&index| GeomWithData::new(place(index), index)).collect());
-        // Several taxels on one point still have a spacing: to the nearest other point.
+        // The spacing of coincident taxels is the distance to the nearest other point.
         let nearest = |&index: &usize| {
             tree.nearest_neighbor_iter_with_distance_2(place(index)).map(|(_, d2)| d2).find(|&d2| d2 > 0.0)
         };
@@ -31,8 +31,8 @@ pub fn neighbours(body: &Body) -> Vec<Vec<u32>> {
             continue;
         }
         distances.sort_by(f64::total_cmp);
-        // The last factor lets through the diagonal of a grid that was rounded on its way.
-        let reach = REACH * distances[distances.len() / 2] * (1.0 + 1e-6);
+        // The last factor admits the diagonals of a rounded grid.
+        let reach = NEIGHBOUR_SPACINGS * distances[distances.len() / 2] * (1.0 + 1e-6);
         for &index in taxels {
             let here = &body.taxels[index];
             let mut beside: Vec<u32> = tree

@@ -1,20 +1,20 @@
-//! The fields of a body in charts of the other kind.
+//! Fields of a body with charts of another kind.
 
 use super::{Field, FieldSet, NoChart, Unroller, unions};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
 use crate::error::Result;
 
-/// Fields in other charts than the layout's, and those that could not have one.
+/// Fields with other charts than the layout's, and those that could not have one.
 #[derive(Clone)]
 pub(crate) struct Recharted {
     pub(crate) fields: FieldSet,
-    /// Names of fields that stayed as they are, and why.
+    /// Names of unchanged fields, and why.
     pub(crate) kept: Vec<(String, NoChart)>,
 }
 
 impl FieldSet {
-    /// These fields, which are those of `body`, where those of index `which` have charts of `kind` with the origins and
-    /// directions that theirs have. What cannot have one stays as it is; so does what is to have none.
+    /// These fields of `body`, with charts of `kind` for the fields `which`, with the same origins and directions. Fields that
+    /// cannot have one, or that request none, stay unchanged.
     pub(crate) fn recharted(&self, body: &Body, which: &[usize], kind: ChartKind) -> Result<Recharted> {
         let mut specs = body.fields.clone();
         let taxels = unions(&specs);
@@ -33,7 +33,7 @@ impl FieldSet {
             };
             match made {
                 Ok(spec) => specs[index] = spec,
-                // What had no chart before and has none now has lost nothing.
+                // A field that had no chart before is not reported.
                 Err(why) if field.chart.is_ok() => kept.push((field.name.clone(), why)),
                 Err(_) => {}
             }
@@ -41,7 +41,7 @@ impl FieldSet {
         Ok(Recharted { fields: Self::of(body, &specs)?, kept })
     }
 
-    /// `spec` of field `index`, if it has its plane chart.
+    /// `spec` of field `index`, if it can have a plane chart.
     fn plane(&self, body: &Body, index: usize, spec: FieldSpec) -> std::result::Result<FieldSpec, NoChart> {
         let taxels: Vec<usize> = self.fields[index].members.iter().map(|member| member.taxel).collect();
         let alone = FieldSpec { parent: None, ..spec.clone() }.with_members(taxels.iter().map(|&t| body.taxels[t].id));
@@ -50,7 +50,7 @@ impl FieldSet {
     }
 }
 
-/// A chart of `kind` where that of `field` is.
+/// A chart of `kind` with the origin and direction of `field`'s.
 fn spec(field: &Field, kind: ChartKind) -> ChartSpec {
     match &field.chart {
         Ok(chart) => ChartSpec {

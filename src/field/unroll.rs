@@ -1,4 +1,4 @@
-//! Laying geodesic charts: from a body's surface and a field's taxels to the (u, v) that the layout keeps.
+//! Computes geodesic charts: the (u, v) of a field's taxels that a layout stores.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -6,47 +6,47 @@ use glam::{DVec2, DVec3};
 
 use super::chart::frame;
 use super::distortion::Distortion;
-use super::geodesic::{LogMap, Place};
-use super::surfaces::Surfaces;
+use super::geodesic::{LogMap, SurfacePlace};
+use super::link_surface::Surfaces;
 use super::{NoChart, anchor_from_link};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology};
 
-/// A way that bends by more than this at one point leads around something, 20°.
-const MOST_BEND: f64 = PI / 9.0;
+/// Maximum bend of a path at one point, 20°.
+const MAX_BEND: f64 = PI / 9.0;
 
-/// Neighbours that a chart takes further apart than so many times their distance are torn apart.
-const MOST_STRETCH: f64 = 3.0;
+/// Maximum stretch of the distance of neighbours.
+const MAX_STRETCH: f64 = 3.0;
 
-/// The first ways followed are as long as around half a circle whose diameter is the straight distance, and a bit.
-const FIRST_REACH: f64 = 1.1 * FRAC_PI_2;
+/// First distance limit over the straight distance: half a circle, and a margin.
+const FIRST_LIMIT: f64 = 1.1 * FRAC_PI_2;
 
-/// How often ways are followed twice as far before a member counts as out of reach.
-const MOST_DOUBLINGS: u32 = 6;
+/// How often the limit is doubled before a member counts as unreachable.
+const MAX_DOUBLINGS: u32 = 6;
 
-/// How far an origin is kept off the edges of its triangle, as a part of its height: far over what rounding does to a place.
-const OFF_EDGES: f64 = 1e-6;
+/// Minimum distance of an origin from the edges of its triangle, as a share of its height: far above rounding errors.
+const EDGE_MARGIN: f64 = 1e-6;
 
-/// A body's surface as charts need it, link by link.
+/// Computes geodesic charts on a body's surface.
 pub struct Unroller<'a> {
     body: &'a Body,
     surfaces: Surfaces<'a>,
 }
 
 impl<'a> Unroller<'a> {
-    /// For `body`; surfaces are taken up as fields on them come.
+    /// For `body`; surfaces are computed on demand.
     #[must_use]
     pub fn new(body: &'a Body) -> Self {
         Self { body, surfaces: Surfaces::new(body) }
     }
 
-    /// The surface, as taken up so far.
+    /// The surfaces in the links' frames.
     pub(crate) fn surfaces(&mut self) -> &mut Surfaces<'a> {
         &mut self.surfaces
     }
 
-    /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those that
-    /// `spec`'s chart asks for, else the defaults of a plane chart. A parent that is to have a chart needs its
-    /// descendants' taxels among its own: [`FieldSpec::with_members`].
+    /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
+    /// chart, else the defaults of a plane chart. A parent needs its descendants' taxels among its own:
+    /// [`FieldSpec::with_members`].
     ///
     /// # Errors
     /// Why there is no such chart.
@@ -69,37 +69,38 @@ impl<'a> Unroller<'a> {
                 (position, anchor_from_taxel.transform_vector3(taxel.normal_in_link))
             })
             .collect();
-        let skin = self.surfaces.in_link(link);
-        let topology = &skin.topology;
-        let locate = |(p, normal): (DVec3, DVec3)| skin.locate(p, normal).ok_or(NoChart::NoSurface);
+        let surface = self.surfaces.in_link(link);
+        let topology = &surface.topology;
+        let locate = |(p, normal): (DVec3, DVec3)| surface.locate(p, normal).ok_or(NoChart::NoSurface);
 
         let asked = |of: fn(&ChartSpec) -> Option<[f64; 3]>| spec.chart.as_ref().and_then(of).map(DVec3::from_array);
         let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
-        let places: Vec<Place> = members.iter().copied().map(locate).collect::<Result<_, _>>()?;
+        let places: Vec<SurfacePlace> = members.iter().copied().map(locate).collect::<Result<_, _>>()?;
         let ids = taxels.iter().map(|&taxel| body.taxels[taxel].id).collect();
         let patch = Patch { topology, members, places, ids, u: asked(|chart| chart.u_in_anchor) };
         let origin = asked(|chart| chart.origin_in_anchor);
-        let nearest = skin.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
-        match patch.lay(spec, off_edges(nearest)) {
-            // The mean of what is bent lies off the surface, and what is nearest to it there may be another part.
-            Err(why) if origin.is_none() => patch.lay(spec, off_edges(patch.middle(mean))).map_err(|other| match why {
-                NoChart::Unreachable(..) => other,
-                why => why,
-            }),
+        let nearest = surface.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
+        match patch.chart_around(spec, off_edges(nearest)) {
+            // The mean of a bent field is off the surface, and the nearest point may be on another part.
+            Err(why) if origin.is_none() => {
+                patch.chart_around(spec, off_edges(patch.middle(mean))).map_err(|other| match why {
+                    NoChart::Unreachable(..) => other,
+                    why => why,
+                })
+            }
             laid => laid,
         }
     }
 }
 
-/// `place`, moved off the edge or corner of its triangle that it may lie on: stored and read, it is on the same triangle, and
-/// a chart laid there again is the same chart.
-fn off_edges(place: Place) -> Place {
-    if place.barycentric.iter().all(|&weight| weight >= 0.5 * OFF_EDGES) {
+/// `place`, moved off the edges of its triangle, so that a chart computed from the stored origin is the same.
+fn off_edges(place: SurfacePlace) -> SurfacePlace {
+    if place.barycentric.iter().all(|&weight| weight >= 0.5 * EDGE_MARGIN) {
         return place;
     }
-    let inward = place.barycentric.map(|weight| weight.max(0.0) + OFF_EDGES);
+    let inward = place.barycentric.map(|weight| weight.max(0.0) + EDGE_MARGIN);
     let sum: f64 = inward.iter().sum();
-    Place { barycentric: inward.map(|weight| weight / sum), ..place }
+    SurfacePlace { barycentric: inward.map(|weight| weight / sum), ..place }
 }
 
 /// Members on a surface.
@@ -107,15 +108,15 @@ struct Patch<'a> {
     topology: &'a Topology,
     /// Per member its position and normal.
     members: Vec<(DVec3, DVec3)>,
-    places: Vec<Place>,
+    places: Vec<SurfacePlace>,
     ids: Vec<u32>,
-    /// The direction of +u that is asked for.
+    /// The requested direction of +u.
     u: Option<DVec3>,
 }
 
 impl Patch<'_> {
-    /// The place of the member nearest to `mean` among those that face as all do.
-    fn middle(&self, mean: DVec3) -> Place {
+    /// The place of the member nearest to `mean`, preferably with a normal like the mean.
+    fn middle(&self, mean: DVec3) -> SurfacePlace {
         let facing = self.members.iter().map(|(_, normal)| *normal).sum::<DVec3>().normalize_or_zero();
         let off = |i: usize| self.members[i].0.distance(mean) * (2.0 - self.members[i].1.dot(facing));
         let middle = (0..self.members.len()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
@@ -123,12 +124,12 @@ impl Patch<'_> {
     }
 
     /// `spec` with a geodesic chart around `origin`.
-    fn lay(&self, spec: &FieldSpec, origin: Place) -> Result<FieldSpec, NoChart> {
+    fn chart_around(&self, spec: &FieldSpec, origin: SurfacePlace) -> Result<FieldSpec, NoChart> {
         let Self { topology, members, places, ids, u } = self;
         let [a, b, c] = topology.corners(origin.triangle);
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
         let [u, ..] = frame(normal, *u);
-        let part = |place: &Place| topology.part[place.triangle as usize];
+        let part = |place: &SurfacePlace| topology.part[place.triangle as usize];
         let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
         let id = |i: usize| ids[i];
         if let Some(&first) = beyond.first() {
@@ -136,17 +137,17 @@ impl Patch<'_> {
         }
         let from = origin.position(topology);
         let farthest = members.iter().map(|(position, _)| position.distance(from)).fold(0.0, f64::max);
-        let mut limit = farthest * FIRST_REACH;
+        let mut limit = farthest * FIRST_LIMIT;
         let mut doublings = 0;
         let (map, reached) = loop {
             let map = LogMap::new(topology, origin, u, limit).map_err(|why| NoChart::TooRough(why.to_string()))?;
             let reached: Vec<_> = places.iter().map(|place| map.reach(place)).collect();
-            // A way that is longer than all that were followed may not be the shortest.
+            // A path beyond the limit may not be the shortest.
             let out: Vec<usize> =
                 (0..reached.len()).filter(|&i| reached[i].is_none_or(|way| way.distance_m > limit)).collect();
             match out[..] {
                 [] => break (map, reached),
-                [first, ..] if doublings == MOST_DOUBLINGS => return Err(NoChart::Unreachable(id(first), out.len())),
+                [first, ..] if doublings == MAX_DOUBLINGS => return Err(NoChart::Unreachable(id(first), out.len())),
                 _ => (limit, doublings) = (2.0 * limit, doublings + 1),
             }
         };
@@ -158,10 +159,10 @@ impl Patch<'_> {
             others.fold(f64::INFINITY, f64::min)
         };
         for (i, way) in ways.iter().enumerate() {
-            if way.bend_rad > MOST_BEND {
+            if way.bend_rad > MAX_BEND {
                 return Err(NoChart::Bent(id(i), way.bend_rad));
             }
-            // A taxel that could as well be elsewhere in the chart, further away than its neighbour is.
+            // The taxel's place in the chart is ambiguous by more than the distance to its neighbour.
             if let Some(rival) = way.rival
                 && rival.distance_m - way.distance_m < 0.5 * nearest(i)
                 && 2.0 * way.distance_m * (rival.apart_rad / 2.0).sin() > nearest(i)
@@ -170,7 +171,7 @@ impl Patch<'_> {
                 return Err(NoChart::CutLocus { taxel: id(i), distance_m, apart_rad });
             }
         }
-        if let Some((a, b, factor)) = distortion.worst.filter(|&(.., factor)| factor > MOST_STRETCH) {
+        if let Some((a, b, factor)) = distortion.worst.filter(|&(.., factor)| factor > MAX_STRETCH) {
             return Err(NoChart::Torn(id(a), id(b), factor));
         }
 

@@ -1,15 +1,15 @@
-//! Outputs that are several files in a folder.
+//! Outputs of several files in a folder.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::place::Place;
+use super::destination::Destination;
 use super::{OutputPath, OutputPaths};
 use crate::error::{Error, Result};
 
-/// A folder that files with certain names may be written into.
+/// A folder for files with given names.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -17,10 +17,10 @@ pub struct OutputFolder {
 }
 
 impl OutputPaths {
-    /// The files called `names` in the folder at `path`, which need not be there.
+    /// The files called `names` in the folder at `path`, which need not exist.
     ///
     /// # Errors
-    /// There is a file in its place; or as [`OutputPaths::add`], for each of them.
+    /// It is a file; or as [`OutputPaths::add`], for each of them.
     pub fn add_folder(
         &mut self,
         path: impl AsRef<Path>,
@@ -39,7 +39,7 @@ impl OutputPaths {
             let output = if is_there {
                 self.add(file)?
             } else {
-                OutputPath { place: Place::Nothing(file.clone()), name: file, replaces: self.force }
+                OutputPath { destination: Destination::Nothing(file.clone()), name: file, replaces: self.force }
             };
             files.insert(name, output);
         }
@@ -48,10 +48,10 @@ impl OutputPaths {
 }
 
 impl OutputFolder {
-    /// Makes the folder where there is none.
+    /// Creates the folder if needed.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// It cannot be created.
     pub fn make(&self) -> Result<()> {
         fs::create_dir_all(&self.path).map_err(|e| Error::io(&self.path, &e))
     }

@@ -1,4 +1,4 @@
-//! Outputs that are links, to give what has no steady name one.
+//! Outputs that are symbolic links, which give a fixed name to a changing path.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 use tempfile::Builder;
 
 use super::OutputPaths;
-use super::place::{Identity, folder_of};
+use super::destination::{Identity, folder_of};
 use crate::error::{Error, Result};
 
-/// A symbolic link that may be made, again and again.
+/// A symbolic link that may be made and changed.
 #[derive(Debug)]
 pub struct OutputLink {
     path: PathBuf,
 }
 
 impl OutputPaths {
-    /// A symbolic link at `path`, in the place of one to a device or to nothing.
+    /// A symbolic link at `path`, which may replace a link to a device or to nothing.
     ///
     /// # Errors
-    /// A usage error where it is or leads to an input; there is a file of this name, or a link to one.
+    /// A usage error if it is an input or a link to one; there is a file of this name, or a link to one.
     pub fn add_link(&mut self, path: impl AsRef<Path>) -> Result<OutputLink> {
         let path = path.as_ref().to_owned();
         if let Some(identity) = Identity::of_input(&path) {
@@ -36,13 +36,13 @@ impl OutputPaths {
 }
 
 impl OutputLink {
-    /// Where it is.
+    /// Its path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Makes it lead to `to`, in one step where it led elsewhere.
+    /// Points it to `to`, atomically.
     ///
     /// # Errors
     /// Its folder cannot be written to.
@@ -52,7 +52,7 @@ impl OutputLink {
         put.map_err(|e| Error::io(&self.path, &e))
     }
 
-    /// Takes it away.
+    /// Removes it.
     pub fn remove(&self) {
         let _ = fs::remove_file(&self.path);
     }

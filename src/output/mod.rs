@@ -1,11 +1,11 @@
-//! Outputs: the one place that decides where may be written, and the only one that writes files.
+//! Outputs: the only code that writes files, and the checks of where it may write.
 //!
-//! An output that is an input of the same command is refused, whatever is forced: it is the same file by its number on its
-//! device, through links and other spellings. Two outputs that are one file are refused as well. A regular file is
-//! replaced only with force. Pipes, terminals and devices are written as they are.
+//! An output that is an input of the same command is an error, even with force; files are identified by inode, through
+//! links and other spellings. Two outputs that are one file are an error too. A regular file is replaced only with force.
+//! Pipes, terminals and devices are written directly.
 //!
-//! A command asks for all of its outputs by one [`OutputPaths`] before it begins any work; nothing is made by that. Whatever
-//! writes a file takes an [`OutputPath`]:
+//! A command registers all of its outputs in one [`OutputPaths`] before it starts to work, which creates no file. Writers
+//! take an [`OutputPath`]:
 //!
 //! ```
 //! use somatic::output::OutputPath;
@@ -20,11 +20,11 @@
 //! # }
 //! ```
 
+mod destination;
 mod file;
 mod folder;
 #[cfg(unix)]
 mod link;
-mod place;
 
 use std::path::{Path, PathBuf};
 
@@ -33,36 +33,36 @@ pub use folder::OutputFolder;
 #[cfg(unix)]
 pub use link::OutputLink;
 
-use self::place::{Identity, Place, Stream};
+use self::destination::{Destination, Identity, Stream};
 use crate::error::{Error, Result};
 
-/// Where one output goes: a file that may be made or replaced, or a pipe, a terminal or a device. Used up by writing.
+/// A checked output path: a file that may be created or replaced, or a pipe, a terminal or a device. Consumed by writing.
 #[derive(Debug)]
 pub struct OutputPath {
     /// As it was written.
     name: PathBuf,
-    place: Place,
-    /// Whether what is there goes.
+    destination: Destination,
+    /// Whether an existing file is replaced.
     replaces: bool,
 }
 
 impl OutputPath {
-    /// The output at `path` of what reads the files `inputs`. A regular file that is there is replaced only with `force`.
+    /// The output at `path` of a program that reads the files `inputs`. A regular file is replaced only with `force`.
     ///
     /// # Errors
-    /// A usage error where it is one of `inputs`; it is there already, or a folder, or in a folder that is not there.
+    /// A usage error if it is one of `inputs`; it exists, is a folder, or is in a folder that does not exist.
     pub fn new(path: impl AsRef<Path>, force: bool, inputs: &[&Path]) -> Result<Self> {
         OutputPaths::new(force, inputs).add(path)
     }
 
-    /// The file at `path`, which is an input and is to be edited in place.
+    /// The file at `path`, an input to be edited in place.
     ///
     /// # Errors
-    /// It is not there, or no regular file.
+    /// It does not exist, or is no regular file.
     pub fn edit(path: impl AsRef<Path>) -> Result<Self> {
         let name = path.as_ref().to_owned();
-        match Place::of(&name).map_err(|e| Error::io(&name, &e))? {
-            place @ Place::File(_) => Ok(Self { name, place, replaces: true }),
+        match Destination::of(&name).map_err(|e| Error::io(&name, &e))? {
+            destination @ Destination::File(_) => Ok(Self { name, destination, replaces: true }),
             _ => Err(Error::failed("only a file can be edited in place").at(name.display())),
         }
     }
@@ -73,16 +73,16 @@ impl OutputPath {
         &self.name
     }
 
-    /// Whether it is a file, or will be: something can lie beside that, and not beside a pipe or a device.
+    /// Whether it is or will be a file, rather than a pipe or a device.
     #[must_use]
     pub fn is_file(&self) -> bool {
-        matches!(self.place, Place::Nothing(_) | Place::File(_))
+        matches!(self.destination, Destination::Nothing(_) | Destination::File(_))
     }
 
-    /// Writes `bytes`: whole, or not at all.
+    /// Writes `bytes` atomically.
     ///
     /// # Errors
-    /// They cannot be written; what was there stays.
+    /// They cannot be written; an existing file stays.
     pub fn write(self, bytes: &[u8]) -> Result<()> {
         use std::io::Write as _;
         let mut file = self.begin()?;
@@ -91,7 +91,7 @@ impl OutputPath {
     }
 }
 
-/// The outputs of one command, told apart from its inputs and from each other.
+/// The outputs of one command, checked against its inputs and each other.
 #[derive(Debug, Default)]
 pub struct OutputPaths {
     force: bool,
@@ -100,43 +100,40 @@ pub struct OutputPaths {
 }
 
 impl OutputPaths {
-    /// Of a command that reads the files `inputs`, of which some may not be there. Regular files that are there are
-    /// replaced only with `force`.
+    /// For a command that reads the files `inputs`, which need not exist. Regular files are replaced only with `force`.
     pub fn new(force: bool, inputs: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
         let known = |path: &Path| Some((path.to_owned(), Identity::of_input(path)?));
         let inputs = inputs.into_iter().filter_map(|path| known(path.as_ref())).collect();
         Self { force, inputs, outputs: Vec::new() }
     }
 
-    /// One more output, at `path`.
+    /// Adds an output at `path`.
     ///
     /// # Errors
-    /// A usage error where it is an input or another output; it is there already, or a folder, or in a folder that is not
-    /// there.
+    /// A usage error if it is an input or another output; it exists, is a folder, or is in a folder that does not exist.
     pub fn add(&mut self, path: impl AsRef<Path>) -> Result<OutputPath> {
         let name = path.as_ref().to_owned();
-        let place = Place::of(&name).map_err(|e| Error::io(&name, &e))?;
-        if let Some(identity) = place.identity() {
-            self.take(&name, identity, matches!(place, Place::Stream(_)))?;
+        let destination = Destination::of(&name).map_err(|e| Error::io(&name, &e))?;
+        if let Some(identity) = destination.identity() {
+            self.take(&name, identity, matches!(destination, Destination::Stream(_)))?;
         }
-        match place {
-            Place::Folder => Err(Error::io(&name, &std::io::ErrorKind::IsADirectory.into())),
-            Place::File(_) if !self.force => Err(there_already(&name)),
-            place => Ok(OutputPath { name, place, replaces: self.force }),
+        match destination {
+            Destination::Folder => Err(Error::io(&name, &std::io::ErrorKind::IsADirectory.into())),
+            Destination::File(_) if !self.force => Err(already_exists(&name)),
+            destination => Ok(OutputPath { name, destination, replaces: self.force }),
         }
     }
 
-    /// Standard output, which may be led into a file.
+    /// Adds standard output, which may be redirected to a file.
     ///
     /// # Errors
-    /// A usage error where that file is an input or another output.
+    /// A usage error if that file is an input or another output.
     pub fn add_standard_output(&mut self) -> Result<()> {
-        let identity = Place::Stream(Stream::Output).identity();
+        let identity = Destination::Stream(Stream::Output).identity();
         identity.map_or(Ok(()), |identity| self.take(Path::new("standard output"), identity, true))
     }
 
-    /// Notes that an output is the file `identity`, which nothing else of the command is; but for streams of the process's
-    /// own, which may be written in several ways.
+    /// Registers the file `identity` as an output, once unless it is a stream of this process.
     fn take(&mut self, name: &Path, identity: Identity, is_stream: bool) -> Result<()> {
         self.refuse_input(name, &identity)?;
         if let Some((other, _)) = self.outputs.iter().find(|(_, known)| *known == identity) {
@@ -160,7 +157,7 @@ impl OutputPaths {
     }
 }
 
-fn there_already(name: &Path) -> Error {
+fn already_exists(name: &Path) -> Error {
     Error::failed("it is there already; choose another name, or say --force").at(name.display())
 }
 

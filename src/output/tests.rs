@@ -129,14 +129,14 @@ fn what_cannot_be_written_is_told_before() {
 #[test]
 fn a_folder_is_made_for_the_files_that_were_asked_for() {
     let (folder, _) = with_input();
-    let place = folder.path().join("deep/out");
+    let destination = folder.path().join("deep/out");
     let write = |force: bool| {
-        let mut files = OutputPaths::new(force, [""; 0]).add_folder(&place, ["a", "b"])?;
+        let mut files = OutputPaths::new(force, [""; 0]).add_folder(&destination, ["a", "b"])?;
         files.make()?;
         files.take("b").write(b"x")
     };
     write(false).unwrap();
-    assert_eq!(names_in(&place), ["b"]);
+    assert_eq!(names_in(&destination), ["b"]);
     assert!(write(false).unwrap_err().to_string().contains("b: it is there already"));
     write(true).unwrap();
 }

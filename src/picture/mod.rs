@@ -1,10 +1,10 @@
-//! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on the GPU, or what
-//! stands in for one, without a window.
+//! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on a GPU or a
+//! software adapter, without a window.
 
 mod colour;
+mod labels;
 mod shape;
 mod view;
-mod words;
 
 use std::path::Path;
 
@@ -13,35 +13,35 @@ use glam::DVec3;
 pub use view::View;
 
 use self::colour::{PALETTE, PAPER, linear};
+use self::labels::Labels;
 use self::shape::{Dots, RIM};
 use self::view::Arrangement;
-use self::words::Words;
 use crate::backend::gpu::raster::{self, Drawing};
 use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::ink;
 
-/// The narrowest picture, pixels: a title must fit.
-const NARROWEST: u32 = 240;
-/// A chart leaves so much room around its discs, in their radii: about the distance to a neighbour.
-const AROUND: f64 = 2.5;
+/// Minimum width of a picture, pixels, for its title.
+const MIN_WIDTH: u32 = 240;
+/// Margin around the discs of a chart, in radii: about the distance to a neighbour.
+const CHART_MARGIN_RADII: f64 = 2.5;
 
-/// How a picture is to be.
+/// Options of a picture.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Width, and height at most, pixels.
+    /// Width and maximum height, pixels.
     pub size: [u32; 2],
-    /// The sides shown; none for the four that show most.
+    /// The views; empty for the four that show most.
     pub views: Vec<View>,
-    /// Indices of the fields to colour; none for those that have no children.
+    /// Indices of the fields to colour; empty for all without children.
     pub fields: Vec<usize>,
 }
 
 /// A PNG of `body` and its `fields`, which may be none.
 ///
-/// A taxel in several of the fields shown has a slice of each one's colour; one in none is pale. Up to twelve fields have
-/// a colour of their own and are named; beyond, fields beside each other differ.
+/// A taxel in several of the fields has a slice of each colour; one in none is pale. Up to twelve fields have their own
+/// colours and are named; of more, neighbouring fields differ.
 ///
 /// # Errors
 /// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
@@ -55,27 +55,27 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
         return Err(Error::failed("it has neither surface nor taxels to draw").at(&body.name));
     }
     let middle = (low + high) / 2.0;
-    let shown = Shown::of(fields, &options.fields, &dots);
+    let shown = FieldColours::of(fields, &options.fields, &dots);
     let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
 
-    let mut words = Words::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")), width);
-    let below = words.key(shown.key(fields), [width, height]);
-    let taken = words.above() + below;
+    let mut labels = Labels::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")), width);
+    let below = labels.key(shown.key(fields), [width, height]);
+    let taken = labels.above() + below;
     if height <= taken + 40 {
         return Err(Error::usage(format!("no room is left for the body; make it higher than {} pixels", taken + 40)));
     }
     let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
-    // Discs reach beyond their middles, and their rims beyond them.
+    // Include the discs and their rims.
     let reach = dots.places.iter().zip(&dots.radii).map(|(&p, &r)| (p - middle, RIM * r));
     let reach = reach.flat_map(|(p, r)| [p - r, p + r]);
     let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(reach).collect();
-    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], words.above(), words.above_view());
+    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], labels.above(), labels.above_view());
     let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
 
     let (corners, faces) = shape::surface(&triangles, middle);
     let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
     let drawing = Drawing {
-        size: [width, words.above() + arrangement.height + below],
+        size: [width, labels.above() + arrangement.height + below],
         background: linear(PAPER),
         corners,
         triangles: faces,
@@ -86,16 +86,16 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     let mut pixels = raster::draw(&drawing)?;
     for (view, placed) in views.iter().zip(&arrangement.views) {
         let [left, top, width, _] = placed.part;
-        words.caption(view.name(), [left + width / 2, top.saturating_sub(words.above_view() / 2)]);
+        labels.caption(view.name(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
     }
-    words.bar(arrangement.scale);
-    words.draw(&mut pixels, drawing.size)?;
+    labels.bar(arrangement.scale);
+    labels.draw(&mut pixels, drawing.size)?;
     ink::png(&pixels, drawing.size)
 }
 
-/// A PNG of the chart of field `index` of `fields`, laid flat: members where (u, v) has them, +u to the right.
+/// A PNG of the chart of field `index` of `fields`: members at their (u, v), +u to the right.
 ///
-/// Those of its children that `options` does not rule out give the colours.
+/// Colours are those of its children, unless `options` has others.
 ///
 /// # Errors
 /// As [`of_body`]; or the field has no chart.
@@ -109,11 +109,11 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     let mut places = vec![DVec3::NAN; body.taxels.len()];
     field.members.iter().for_each(|member| places[member.taxel] = member.place.with_z(0.0));
     let held: Vec<usize> = field.members.iter().map(|member| member.taxel).collect();
-    // A single taxel is drawn by the area that it stands for.
+    // A single taxel is drawn with its area.
     let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
     let extent = field.radius_m().max(10.0 * side);
     let dots = Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], extent);
-    // The fields as the chart numbers its members.
+    // The fields with the chart's member indices.
     let within: Vec<Field> = fields
         .iter()
         .map(|field| {
@@ -128,7 +128,7 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
             field
         })
         .collect();
-    let shown = Shown::of(&within, &options.fields, &dots);
+    let shown = FieldColours::of(&within, &options.fields, &dots);
     let kind = format!("{:?}", chart.kind).to_lowercase();
     let title = format!(
         "{} · {}, {kind} chart, distortion {:.1} %",
@@ -136,19 +136,23 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
         counted(field.members.len(), "taxel"),
         100.0 * chart.distortion
     );
-    let mut words = Words::new(&title, width);
-    let below = words.key(shown.key(&within), [width, height]);
-    let around = dots.places.iter().zip(&dots.radii).flat_map(|(&p, &r)| [p - AROUND * r, p + AROUND * r]);
+    let mut labels = Labels::new(&title, width);
+    let below = labels.key(shown.key(&within), [width, height]);
+    let around = dots
+        .places
+        .iter()
+        .zip(&dots.radii)
+        .flat_map(|(&p, &r)| [p - CHART_MARGIN_RADII * r, p + CHART_MARGIN_RADII * r]);
     let points: Vec<DVec3> = around.chain([DVec3::ZERO]).collect();
-    let taken = words.above() + below;
+    let taken = labels.above() + below;
     if height <= taken + 40 {
         return Err(Error::usage(format!("no room is left for the chart; make it higher than {} pixels", taken + 40)));
     }
     let arrangement =
-        Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], words.above(), words.above_view());
+        Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], labels.above(), labels.above_view());
     let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
     let drawing = Drawing {
-        size: [width, words.above() + arrangement.height + below],
+        size: [width, labels.above() + arrangement.height + below],
         background: linear(PAPER),
         slices: dots.slices(&shown.coloured(&within), DVec3::ZERO, usual > 2.0),
         fan: fan(usual),
@@ -157,16 +161,16 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     };
     let mut pixels = raster::draw(&drawing)?;
     let origin = arrangement.pixel(0, DVec3::ZERO);
-    words.axes(origin);
-    words.bar(arrangement.scale);
-    words.draw(&mut pixels, drawing.size)?;
+    labels.axes(origin);
+    labels.bar(arrangement.scale);
+    labels.draw(&mut pixels, drawing.size)?;
     ink::png(&pixels, drawing.size)
 }
 
 fn checked(size: [u32; 2]) -> Result<[u32; 2]> {
-    if size[0] < NARROWEST || size.iter().any(|&side| side > raster::LONGEST_SIDE) {
+    if size[0] < MIN_WIDTH || size.iter().any(|&side| side > raster::LONGEST_SIDE) {
         return Err(Error::usage(format!(
-            "a picture of {} × {} pixels cannot be drawn; give a width of {NARROWEST} at least, and sides up to {}",
+            "a picture of {} × {} pixels cannot be drawn; give a width of {MIN_WIDTH} at least, and sides up to {}",
             size[0],
             size[1],
             raster::LONGEST_SIDE
@@ -175,17 +179,17 @@ fn checked(size: [u32; 2]) -> Result<[u32; 2]> {
     Ok(size)
 }
 
-/// The fields that are coloured.
-struct Shown {
+/// The coloured fields.
+struct FieldColours {
     /// Their indices.
     fields: Vec<usize>,
-    /// Their colours' numbers in the palette.
+    /// Their colours, indices into the palette.
     colours: Vec<usize>,
-    /// Whether each has a colour of its own.
+    /// Whether all colours differ.
     own: bool,
 }
 
-impl Shown {
+impl FieldColours {
     /// The fields `chosen`, or those of `fields` without children.
     fn of(fields: &[Field], chosen: &[usize], dots: &Dots) -> Self {
         let leaf = |index: &usize| fields.iter().all(|field| field.parent != Some(*index));
@@ -205,7 +209,7 @@ impl Shown {
         self.fields.iter().zip(&self.colours).map(|(&index, &colour)| (&fields[index], PALETTE[colour])).collect()
     }
 
-    /// What the legend says.
+    /// The legend's entries.
     fn key(&self, fields: &[Field]) -> Vec<(Option<[u8; 3]>, String)> {
         if self.own {
             let named = self.coloured(fields);
@@ -217,12 +221,12 @@ impl Shown {
     }
 }
 
-/// Triangles that make a disc of `radius` pixels look round: its outline is a quarter of a pixel off at most.
+/// Number of triangles of a disc of `radius` pixels: its outline is at most a quarter of a pixel off.
 fn fan(radius: f64) -> u32 {
     (4.5 * radius.max(0.0).sqrt() + 6.0).min(256.0) as u32
 }
 
-/// The file's name without folder and ending.
+/// The file's name without folder and extension.
 fn stem(name: &str) -> &str {
     Path::new(name).file_stem().and_then(|stem| stem.to_str()).unwrap_or(name)
 }

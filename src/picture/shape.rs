@@ -1,4 +1,4 @@
-//! What is drawn of a body: its surface with normals that light can follow, and a disc for each taxel.
+//! The geometry of a picture: the surface with smooth normals, and a disc for each taxel.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -14,34 +14,34 @@ use crate::field::Field;
 
 /// Faces that meet at less than 45° are shaded as one smooth surface.
 const SMOOTH_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// A disc's radius as a part of the distance to the nearest other.
-const RADIUS: f64 = 0.40;
-/// No disc is larger than so many times the usual one.
-const LARGEST: f64 = 2.0;
-/// The dark disc under each, as a part of its radius.
+/// A disc's radius as a share of the distance to the nearest other.
+const RADIUS_SHARE: f64 = 0.40;
+/// Maximum radius of a disc, in typical radii.
+const MAX_RADIUS_RATIO: f64 = 2.0;
+/// Radius of the dark rim, in radii.
 pub(super) const RIM: f64 = 1.16;
-/// How far discs are moved towards the eye, in radii, so that a curved surface does not swallow them.
+/// Offset of discs towards the eye, in radii, so that a curved surface does not hide them.
 const LIFT: f64 = 0.6;
-/// Fields whose taxels are nearer than so many times the usual distance lie beside each other.
-const BESIDE: f64 = 1.6;
-/// Slices of one disc at most.
-const MOST_SLICES: usize = 8;
-/// Taxels nearer than this are at one place, m.
-const ONE_PLACE_M: f64 = 1e-6;
+/// Fields with taxels nearer than this many typical distances are neighbours.
+const NEIGHBOUR_SPACINGS: f64 = 1.6;
+/// Maximum number of slices of a disc.
+const MAX_SLICES: usize = 8;
+/// Taxels nearer than this are coincident, m.
+const COINCIDENT_M: f64 = 1e-6;
 
-/// The taxels as they are drawn.
+/// The discs of taxels.
 pub(super) struct Dots {
     /// In the world, m.
     pub(super) places: Vec<DVec3>,
     pub(super) normals: Vec<DVec3>,
     /// m.
     pub(super) radii: Vec<f64>,
-    /// The usual distance of neighbours, m.
+    /// Typical distance of neighbours, m.
     spacing_m: f64,
 }
 
 impl Dots {
-    /// Of `body`'s taxels, at rest, none larger than the area it stands for.
+    /// For `body`'s taxels, at rest, none larger than its area.
     pub(super) fn of(body: &Body) -> Self {
         let world = |link: usize| body.links[link].world_from_link;
         let places = body.taxels.iter().map(|t| world(t.link).transform_point3(t.position_in_link)).collect();
@@ -63,17 +63,18 @@ impl Dots {
         let tree = RTree::bulk_load(places.iter().map(DVec3::to_array).collect());
         let gap = |place: &DVec3| {
             let near = tree.nearest_neighbor_iter_with_distance_2(place.to_array()).take(32);
-            near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > ONE_PLACE_M)
+            near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > COINCIDENT_M)
         };
         let gaps: Vec<Option<f64>> = places.iter().map(gap).collect();
         let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
         known.sort_by(f64::total_cmp);
         let spacing_m = known.get(known.len() / 2).copied().unwrap_or((0.1 * extent_m).max(1e-3));
-        let radii = gaps.iter().map(|gap| RADIUS * gap.unwrap_or(spacing_m).min(LARGEST * spacing_m)).collect();
+        let radii =
+            gaps.iter().map(|gap| RADIUS_SHARE * gap.unwrap_or(spacing_m).min(MAX_RADIUS_RATIO * spacing_m)).collect();
         Self { places, normals, radii, spacing_m }
     }
 
-    /// Pairs of `fields` that share taxels or have some beside each other, by their numbers in that list.
+    /// Pairs of `fields` that share taxels or are neighbours, as indices in that list.
     pub(super) fn beside(&self, fields: &[&Field]) -> BTreeSet<(usize, usize)> {
         let mut of_taxel: Vec<Vec<usize>> = vec![Vec::new(); self.places.len()];
         for (number, field) in fields.iter().enumerate() {
@@ -81,7 +82,7 @@ impl Dots {
         }
         let tree =
             RTree::bulk_load(self.places.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.to_array(), i)).collect());
-        let reach = BESIDE * self.spacing_m;
+        let reach = NEIGHBOUR_SPACINGS * self.spacing_m;
         let mut pairs = BTreeSet::new();
         for (place, own) in self.places.iter().zip(&of_taxel) {
             for near in tree.locate_within_distance(place.to_array(), reach * reach) {
@@ -94,8 +95,7 @@ impl Dots {
         pairs
     }
 
-    /// The discs, about `middle`: each taxel's in the colours of the fields that it is in, a slice each; `colours` are
-    /// the fields' with their members.
+    /// The discs, relative to `middle`: each has a slice in the colour of each of its fields.
     pub(super) fn slices(&self, fields: &[(&Field, [u8; 3])], middle: DVec3, rims: bool) -> Vec<Slice> {
         let mut of_taxel: Vec<Vec<[u8; 3]>> = vec![Vec::new(); self.places.len()];
         for (field, colour) in fields {
@@ -120,10 +120,10 @@ impl Dots {
             if colours.is_empty() {
                 colours.push(colour::REST);
             }
-            colours.truncate(MOST_SLICES);
+            colours.truncate(MAX_SLICES);
             let sweep = TAU / colours.len() as f64;
             for (number, &colour) in colours.iter().enumerate() {
-                // Above the rim by more than depth rounds away.
+                // Above the rim by more than the depth resolution.
                 slices.push(slice(1.0, LIFT + 0.1, colour, number as f64 * sweep, sweep));
             }
         }
@@ -131,8 +131,8 @@ impl Dots {
     }
 }
 
-/// The surface of `triangles` about `middle`: corners with normals, and triangles over them. Normals are those of the
-/// faces around a corner that meet this one at less than 45°, by their area.
+/// The surface of `triangles` relative to `middle`: corners with normals, and triangles. A corner's normal is the
+/// area-weighted mean of the faces around it within 45° of this one.
 pub(super) fn surface(triangles: &[(usize, [DVec3; 3])], middle: DVec3) -> (Vec<Corner>, Vec<[u32; 3]>) {
     let soup: Vec<DVec3> = triangles.iter().flat_map(|(_, corners)| corners.map(|p| p - middle)).collect();
     let faces: Vec<[u32; 3]> = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();

@@ -1,4 +1,4 @@
-//! From where a body is seen, and how several views stand side by side at one scale.
+//! Views of a body, and their arrangement at one scale.
 
 use std::str::FromStr;
 
@@ -9,10 +9,10 @@ use crate::error::{Error, Result, nearest};
 
 /// Pixels around each view.
 const MARGIN: f64 = 14.0;
-/// A side that sees less than this part of what the best one sees shows nothing worth a picture.
-const LEAST_SEEN: f64 = 0.02;
+/// A view is left out if it shows less than this share of the best one.
+const MIN_VISIBLE_SHARE: f64 = 0.02;
 
-/// A side of a body. A body stands upright, +y up, and looks along +z; its left is +x.
+/// A view of a body, which stands upright, +y up, and faces +z; its left is +x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// From +z.
@@ -65,8 +65,8 @@ impl View {
         [right, towards.cross(right), towards]
     }
 
-    /// The four sides from which most of the taxels with these normals are seen, fewer where fewer see any; and from
-    /// the front, left and above where that leaves room. Without taxels, front, back, left and right.
+    /// The four sides that show most of the taxels with these normals, or fewer if fewer show any, and then three-quarter.
+    /// Without taxels front, back, left and right.
     pub(super) fn best(normals: &[DVec3]) -> Vec<Self> {
         let seen = |view: Self| -> f64 {
             let towards = view.axes()[2];
@@ -79,7 +79,7 @@ impl View {
             return Self::ALL[..4].to_vec();
         }
         let best: Vec<Self> =
-            sides[..4].iter().filter(|(seen, _)| *seen > LEAST_SEEN * most).map(|&(_, view)| view).collect();
+            sides[..4].iter().filter(|(seen, _)| *seen > MIN_VISIBLE_SHARE * most).map(|&(_, view)| view).collect();
         let room = best.len() < 4;
         Self::ALL.into_iter().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
     }
@@ -101,7 +101,7 @@ impl FromStr for View {
 }
 
 /// One view's place in the picture.
-pub(super) struct Placed {
+pub(super) struct PlacedView {
     pub(super) axes: [DVec3; 3],
     /// Left, top, width and height, pixels.
     pub(super) part: [u32; 4],
@@ -111,10 +111,10 @@ pub(super) struct Placed {
 
 /// Views at one scale.
 pub(super) struct Arrangement {
-    pub(super) views: Vec<Placed>,
+    pub(super) views: Vec<PlacedView>,
     /// Pixels a metre.
     pub(super) scale: f64,
-    /// Rows of pixels that they take.
+    /// Their height, pixels.
     pub(super) height: u32,
 }
 
@@ -157,7 +157,7 @@ impl Arrangement {
                 let Some(axes) = views.get(row * widths.len() + column) else { break };
                 let [across, up] = spans[row * widths.len() + column];
                 let size = [wide * scale + 2.0 * MARGIN, tall * scale + 2.0 * MARGIN];
-                placed.push(Placed {
+                placed.push(PlacedView {
                     axes: *axes,
                     part: [x, y + caption, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),
                     middle: [(across[0] + across[1]) / 2.0, (up[0] + up[1]) / 2.0],
@@ -166,14 +166,14 @@ impl Arrangement {
             }
             y += tall * scale + 2.0 * MARGIN + caption;
         }
-        // Rounding may take a part over the edge by one.
-        for Placed { part, .. } in &mut placed {
+        // Rounding may exceed the edge by one.
+        for PlacedView { part, .. } in &mut placed {
             part[2] = part[2].min(width.saturating_sub(part[0])).max(1);
         }
         Self { views: placed, scale, height: (y - f64::from(top)).ceil() as u32 }
     }
 
-    /// Where `point` (in m, about the middle) is seen in view `index`: right and down from the top left, pixels.
+    /// The position of `point` (m, relative to the middle) in view `index`: right and down from the top left, pixels.
     pub(super) fn pixel(&self, index: usize, point: DVec3) -> [f64; 2] {
         let view = &self.views[index];
         let [left, top, width, height] = view.part.map(f64::from);
@@ -181,9 +181,9 @@ impl Arrangement {
         [left + width / 2.0 + x, top + height / 2.0 - y]
     }
 
-    /// The eyes for the device. `radius_m` reaches around all that is drawn.
+    /// The cameras. A sphere of `radius_m` contains everything drawn.
     pub(super) fn eyes(&self, radius_m: f64) -> Vec<Eye> {
-        let eye = |view: &Placed| {
+        let eye = |view: &PlacedView| {
             let [right, up, towards] = view.axes;
             let [_, _, width, height] = view.part.map(f64::from);
             let (across, down) = (2.0 * self.scale / width, 2.0 * self.scale / height);
@@ -206,7 +206,7 @@ impl Arrangement {
     }
 }
 
-/// How far `points` reach along `axis`, m; at least a nanometre, so that one point has a scale.
+/// The range of `points` along `axis`, m; at least a nanometre.
 fn span(points: &[DVec3], axis: DVec3) -> [f64; 2] {
     let along = points.iter().map(|p| p.dot(axis));
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));

@@ -1,4 +1,4 @@
-//! Calibration: what turns a robot's raw values into pressures, and which raw values are not to be believed.
+//! Calibration: converts a robot's raw values to pressures, and says which raw values to reject.
 //!
 //! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
 
@@ -20,13 +20,13 @@ use super::curve::Curve;
 use super::upkeep::UpkeepKeys;
 use crate::error::{Error, Result, nearest};
 
-/// Gains beyond these would take products out of single precision.
-pub(super) const GAINS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
-/// Baselines and dead bands beyond this are beyond belief, as values are.
-pub(super) const MOST: f64 = 1.15e18;
+/// Gains for which products stay in single precision.
+pub(super) const GAIN_RANGE: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+/// Baselines, dead bands and values above this are not credible.
+pub(super) const MAX_MAGNITUDE: f64 = 1.15e18;
 
-/// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 unless over the dead band. The constants are as
-/// they are written; backends `cpu` and `gpu` round each once to single precision.
+/// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 up to the dead band. The constants are those of
+/// the file; the backends `cpu` and `gpu` round each once to single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaxelCalibration {
     /// Raw value at rest.
@@ -35,14 +35,13 @@ pub struct TaxelCalibration {
     pub gain: f64,
     /// Pressures up to this one, in the unit of P, count as 0.
     pub dead_band: f64,
-    /// The largest pressure the sensor is good for: kept above it, but flagged `saturated`.
+    /// The largest pressure of the sensor's range; higher ones are kept but flagged `saturated`.
     pub p_max: f64,
-    /// The raw values the sensor can deliver: kept beyond them, but flagged `out_of_range`. In single precision, as raw
-    /// values are: one that reads as the limit is written is at the limit.
+    /// The range of raw values, in single precision as these are; others are kept but flagged `out_of_range`.
     pub raw_range: [f32; 2],
-    /// Never believe this taxel.
+    /// Ignore this taxel.
     pub mask: bool,
-    /// What stands between raw value and pressure.
+    /// The conversion from raw value to pressure.
     pub response: Response,
 }
 
@@ -60,38 +59,38 @@ impl Default for TaxelCalibration {
     }
 }
 
-/// Which frames and values are not to be believed, judged before any field is looked at. All off by default.
+/// Checks that reject frames and values before any field is computed. All are off by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Checks {
-    /// The first frames of a source that are not believed, for sensors that begin with partial ones.
+    /// Number of first frames to reject, for sensors that begin with partial ones.
     pub settle_frames: u64,
-    /// A frame in which more than this share of the values lies outside the raw range is not believed at all.
+    /// A frame with more than this share of values outside the raw range is rejected.
     pub broken_frame_share: Option<f64>,
-    /// A raw value this many times the largest of its neighbours' is not believed, if also over `isolated_above`.
+    /// A raw value this many times the largest of its neighbours' is rejected, if also over `isolated_above`.
     pub isolated_ratio: Option<f64>,
-    /// Values up to this one (raw units above baseline) are never isolated.
+    /// Values up to this one (raw units above baseline) are never rejected as isolated.
     pub isolated_above: f64,
 }
 
 /// A robot's calibration, for the taxels of one body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// The body it is for, if it says so: its file's name, with or without folder and ending.
+    /// The file name of its body, if given, with or without folder and extension.
     pub body: Option<String>,
     /// One entry a taxel, in the body's order.
     pub taxels: Vec<TaxelCalibration>,
-    /// What [`Response::Curve`] counts in.
+    /// The curves that [`Response::Curve`] indexes.
     pub curves: Vec<Curve>,
-    /// When a field counts as touched, unless `fields` says otherwise.
+    /// Contact thresholds of fields that are not in `fields`.
     pub contact: ContactThresholds,
-    /// The same for single fields, by name.
+    /// Contact thresholds by field.
     pub fields: BTreeMap<String, ContactThresholds>,
-    /// The same for what changes, and which changes count.
+    /// Dead band and contact thresholds of pressure changes.
     pub change: ChangeCalibration,
-    /// Which input is not to be believed.
+    /// Checks of the input.
     pub checks: Checks,
-    /// How baselines follow drift, and which taxels are found unfit.
+    /// How baselines follow drift and defective taxels are detected.
     pub upkeep: UpkeepKeys,
 }
 
@@ -200,10 +199,10 @@ impl Calibration {
         Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
     }
 
-    /// Refuses a body that the calibration says it is not for.
+    /// Checks that the calibration is for the body `name`.
     ///
     /// # Errors
-    /// The names differ, folders and endings aside.
+    /// The names differ, without folders and extensions.
     pub fn check_body(&self, name: &str) -> Result<()> {
         let stem = |name: &str| Path::new(name).file_stem().map(std::ffi::OsStr::to_owned);
         match &self.body {
@@ -214,8 +213,8 @@ impl Calibration {
         }
     }
 
-    /// The curve of `taxel`, gain and sign in it, with `signal` instead of its own where it has the paper's circuit.
-    /// `None` for a straight line.
+    /// The curve of `taxel` with its gain and sign, and with `signal` for a sensor in the paper's circuit. `None` for a
+    /// linear response.
     pub(crate) fn curve_of(&self, taxel: &TaxelCalibration, signal: Option<FsrSignal>) -> Result<Option<Curve>> {
         let curve = match taxel.response {
             Response::Linear => return Ok(None),
@@ -230,8 +229,8 @@ impl Calibration {
         curve.map(Some)
     }
 
-    /// How far `value` of the taxel `index` is from rest, in raw units, pressed being positive. In single precision's
-    /// constants, whatever the backend: all of them are to distrust the same values.
+    /// How far `value` of the taxel `index` is from rest, raw units, positive if pressed. With constants in single precision
+    /// for all backends, so that all reject the same values.
     pub(crate) fn rise(&self, index: usize, value: f64) -> f64 {
         let taxel = &self.taxels[index];
         let signed = (value - f64::from(taxel.baseline as f32)) * taxel.gain.signum();
@@ -257,13 +256,15 @@ impl Keys {
                 Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref()))
                     .at(format!("line {line}")))
             };
-        if let Some(x) = number("baseline", &self.baseline, &|x| x.abs() <= MOST, "a finite number of raw units")? {
+        if let Some(x) =
+            number("baseline", &self.baseline, &|x| x.abs() <= MAX_MAGNITUDE, "a finite number of raw units")?
+        {
             taxel.baseline = x;
         }
         if let Some(x) = number(
             "gain",
             &self.gain,
-            &|x| GAINS.contains(&x),
+            &|x| GAIN_RANGE.contains(&x),
             "over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)",
         )? {
             taxel.gain = x.copysign(taxel.gain);
@@ -271,17 +272,20 @@ impl Keys {
         if let Some(invert) = self.invert {
             taxel.gain = if invert { -taxel.gain.abs() } else { taxel.gain.abs() };
         }
-        if let Some(x) =
-            number("dead_band", &self.dead_band, &|x| (0.0..=MOST).contains(&x), "0 or more, in the unit of P")?
-        {
+        if let Some(x) = number(
+            "dead_band",
+            &self.dead_band,
+            &|x| (0.0..=MAX_MAGNITUDE).contains(&x),
+            "0 or more, in the unit of P",
+        )? {
             taxel.dead_band = x;
         }
-        if let Some(x) = number("p_max", &self.p_max, &|x| x > 0.0 && x <= MOST, "over 0, in the unit of P")? {
+        if let Some(x) = number("p_max", &self.p_max, &|x| x > 0.0 && x <= MAX_MAGNITUDE, "over 0, in the unit of P")? {
             taxel.p_max = x;
         }
         if let Some(range) = &self.raw_range {
             let [low, high] = *range.get_ref();
-            if !(low < high && low.abs() <= MOST && high.abs() <= MOST) {
+            if !(low < high && low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE) {
                 let line = line_of(text, range.span().start);
                 return Err(Error::failed(format!(
                     "`raw_range` is [{low}, {high}]; give the lowest and the highest raw value"
@@ -315,7 +319,7 @@ fn line_of(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
-/// The parser's message, with the nearest key where it met one that it does not know.
+/// The parser's message, with a suggestion for an unknown key.
 fn explain(message: &str) -> String {
     let known = [
         "body",

@@ -1,30 +1,30 @@
-//! Curves: what a sensor's raw value means where that is no straight line.
+//! Curves: non-linear conversions from raw value to pressure.
 
-use super::calibration::{GAINS, MOST};
+use super::calibration::{GAIN_RANGE, MAX_MAGNITUDE};
 use super::{FsrCircuit, FsrResponse, FsrSignal};
 use crate::error::{Error, Result};
 
-/// A monotone table from raw value to pressure: straight between its knots, held beyond its ends.
+/// A monotone table from raw value to pressure: linear between its knots, constant beyond its ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// (raw, P); raw strictly increasing, P all the way up or all the way down.
+    /// (raw, P); raw strictly increasing, P monotone.
     knots: Vec<[f32; 2]>,
-    /// The same as they are written.
+    /// The same in double precision.
     written: Vec<[f64; 2]>,
 }
 
-/// Which of a table's columns a flaw is in.
+/// A column of a curve's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Column {
     Raw,
     P,
 }
 
-/// What is wrong with a table: where, and in words.
+/// An error in a curve's table.
 #[derive(Debug)]
-pub(crate) struct Flaw {
+pub(crate) struct CurveError {
     pub(crate) column: Column,
-    /// The knot, from 0; beyond the last for what concerns the whole column.
+    /// The knot, from 0; beyond the last for an error of the whole column.
     pub(crate) knot: usize,
     pub(crate) what: String,
 }
@@ -33,29 +33,28 @@ impl Curve {
     /// The curve through the knots (`raw[i]`, `p[i]`), in single precision.
     ///
     /// # Errors
-    /// Fewer than two knots, another number of raw values than of pressures, a number that is not finite or beyond
-    /// belief, raw values that do not rise, pressures that turn back or are all the same, or a slope that would leave
-    /// single precision.
+    /// Fewer than two knots, different numbers of raw values and pressures, a number that is not finite or not credible, raw
+    /// values that do not rise, pressures that are not monotone or all equal, or a slope out of single precision.
     pub fn new(raw: &[f64], p: &[f64]) -> Result<Self> {
-        Self::sound(raw, p).map_err(|flaw| Error::failed(flaw.what))
+        Self::checked(raw, p).map_err(|error| Error::failed(error.what))
     }
 
-    /// The same, telling where the table is wrong.
-    pub(crate) fn sound(raw: &[f64], p: &[f64]) -> std::result::Result<Self, Flaw> {
-        let whole = |column, what| Err(Flaw { column, knot: usize::MAX, what });
+    /// The same, with the place of the error.
+    pub(crate) fn checked(raw: &[f64], p: &[f64]) -> std::result::Result<Self, CurveError> {
+        let int = |column, what| Err(CurveError { column, knot: usize::MAX, what });
         let (knots, pressures) = (raw.len(), p.len());
         if knots != pressures {
             let what = format!("`raw` has {knots} knots and `p` has {pressures}; give as many of one as of the other");
-            return whole(Column::P, what);
+            return int(Column::P, what);
         }
         if knots < 2 {
-            return whole(Column::Raw, format!("`raw` has {knots} of the two knots that a curve has at least"));
+            return int(Column::Raw, format!("`raw` has {knots} of the two knots that a curve has at least"));
         }
         for (column, name, values) in [(Column::Raw, "raw", raw), (Column::P, "p", p)] {
-            if let Some((knot, x)) = values.iter().enumerate().find(|(_, x)| !is_believable(**x)) {
+            if let Some((knot, x)) = values.iter().enumerate().find(|(_, x)| !is_credible(**x)) {
                 let at = knot + 1;
                 let what = format!("`{name}` is {x} at knot {at}; it must be 0, or between 1e-18 and 1e18 in size");
-                return Err(Flaw { column, knot, what });
+                return Err(CurveError { column, knot, what });
             }
         }
         let curve = Self::through(raw.iter().zip(p).map(|(&raw, &p)| [raw, p]).collect());
@@ -68,30 +67,30 @@ impl Curve {
                     "`raw` is {} at knot {at}, after {from} in single precision; it must rise from knot to knot",
                     raw[knot]
                 );
-                return Err(Flaw { column: Column::Raw, knot, what });
+                return Err(CurveError { column: Column::Raw, knot, what });
             }
             if (falls && high > low) || (!falls && high < low) {
                 let what = format!(
                     "`p` is {high} at knot {at}, after {low}: it is not monotone; it must rise all the way, or fall all \
                      the way"
                 );
-                return Err(Flaw { column: Column::P, knot, what });
+                return Err(CurveError { column: Column::P, knot, what });
             }
         }
         if curve.knots[0][1] == curve.knots[knots - 1][1] {
-            return whole(Column::P, format!("`p` is {} at every knot, so that no touch could be felt", p[0]));
+            return int(Column::P, format!("`p` is {} at every knot, so that no touch could be felt", p[0]));
         }
         match curve.steep() {
             None => Ok(curve),
             Some((knot, slope)) => {
                 let at = knot + 1;
-                let what = format!("`p` changes by {slope:e} a raw unit after knot {at}; keep it {SLOPES}");
-                Err(Flaw { column: Column::P, knot, what })
+                let what = format!("`p` changes by {slope:e} a raw unit after knot {at}; keep it {GAIN_RANGE_TEXT}");
+                Err(CurveError { column: Column::P, knot, what })
             }
         }
     }
 
-    /// What a sensor of the paper's circuit delivers, with a knot at every reading.
+    /// The curve of a sensor in the paper's circuit, with a knot at every reading.
     pub(crate) fn fsr(sensor: &FsrResponse) -> Self {
         let circuit = FsrCircuit { tap: sensor.tap };
         let signal = |counts| match sensor.signal {
@@ -123,7 +122,7 @@ impl Curve {
         match scaled.steep() {
             None => Ok(scaled),
             Some((_, slope)) => Err(Error::failed(format!(
-                "`gain` {} makes the curve change by {slope:e} a raw unit; keep it {SLOPES}",
+                "`gain` {} makes the curve change by {slope:e} a raw unit; keep it {GAIN_RANGE_TEXT}",
                 gain.abs()
             ))),
         }
@@ -146,28 +145,28 @@ impl Curve {
         self.knots[0][1] > self.knots[self.knots.len() - 1][1]
     }
 
-    /// How far the raw value `x` is from the curve's untouched end.
+    /// The distance of the raw value `x` from the curve's untouched end.
     pub(crate) fn rise(&self, x: f64) -> f64 {
         if self.falls() { f64::from(self.knots[self.knots.len() - 1][0]) - x } else { x - f64::from(self.knots[0][0]) }
     }
 
-    /// The first knot after which the slope is not 0 and beyond what single precision works with.
+    /// The first knot after which the slope is neither 0 nor within [`GAIN_RANGE`].
     fn steep(&self) -> Option<(usize, f64)> {
         let slopes = self.knots.windows(2).map(|pair| slope(pair[0], pair[1]));
-        slopes.enumerate().find(|(_, slope)| *slope != 0.0 && !GAINS.contains(&slope.abs()))
+        slopes.enumerate().find(|(_, slope)| *slope != 0.0 && !GAIN_RANGE.contains(&slope.abs()))
     }
 }
 
-const SLOPES: &str = "between 1e-12 and 1e12";
+const GAIN_RANGE_TEXT: &str = "between 1e-12 and 1e12";
 
 /// ΔP / Δraw from one knot to the next.
 pub(crate) fn slope([from, low]: [f32; 2], [to, high]: [f32; 2]) -> f64 {
     (f64::from(high) - f64::from(low)) / (f64::from(to) - f64::from(from))
 }
 
-/// Whether a backend takes `x` for what it is: see [`crate::signal::calibration`] on what is beyond belief.
-fn is_believable(x: f64) -> bool {
-    x == 0.0 || (1.0 / MOST..=MOST).contains(&x.abs())
+/// Whether backends accept `x`, see [`MAX_MAGNITUDE`].
+fn is_credible(x: f64) -> bool {
+    x == 0.0 || (1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x.abs())
 }
 
 #[cfg(test)]

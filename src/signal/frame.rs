@@ -3,10 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
 
-/// One taxel's raw value as it travels to a backend: a single-precision number, or missing, or faulty.
+/// One taxel's raw value: a single-precision number, or missing, or faulty.
 ///
-/// Kept as bits, because shader compilers may assume that NaN never occurs; each backend tells the cases apart by
-/// integer comparison.
+/// Stored as bits, because shader compilers may assume that NaN never occurs; backends compare them as integers.
 #[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct RawValue(u32);
@@ -14,14 +13,14 @@ pub struct RawValue(u32);
 impl RawValue {
     /// No value arrived.
     pub const MISSING: Self = Self(0xFFFF_FFFF);
-    /// No value arrived, and none will soon: the board that has the sensor is silent. Only for engines that heed it
-    /// ([`crate::Engine::heed_stale`]); for others it is [`RawValue::MISSING`] that says so.
+    /// No value arrived, as the sensor's board is silent. Only for engines that track it ([`crate::Engine::heed_stale`]);
+    /// others get [`RawValue::MISSING`].
     pub const STALE: Self = Self(0xFFFF_FFFE);
     /// Something arrived that is no number.
     pub const FAULTY: Self = Self(0x7FC0_0000);
 
-    /// The value `value`, rounded to single precision. NaN and infinities are faulty. What is not zero stays not zero:
-    /// an underflow becomes the smallest denormal, so that calibration can see that it alters the value.
+    /// `value` rounded to single precision. NaN and infinities become faulty. An underflow becomes the smallest denormal
+    /// instead of 0, so that calibration can detect that the value is altered.
     #[must_use]
     pub fn new(value: f64) -> Self {
         let single = value as f32;
@@ -80,14 +79,14 @@ pub struct Pose {
     pub rotation: DQuat,
 }
 
-/// The raw values of one instant. Values stand in the order of the taxel ids that source and engine agreed on.
+/// The raw values of one instant, in the order of the source's taxel ids.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
     /// Time, s.
     pub t_s: f64,
-    /// One value a taxel, [`RawValue::MISSING`] where none arrived.
+    /// One value per taxel, [`RawValue::MISSING`] where none arrived.
     pub values: Vec<RawValue>,
-    /// Poses of links by name, where the frame carries them: world_from_link.
+    /// Poses of links by name, if the frame has them: world_from_link.
     pub pose: Vec<(String, Pose)>,
 }
 

@@ -13,15 +13,15 @@
 //!
 //! **Converter**. counts = ⌊1024 · V/Vcc⌋, at most 1023: open reads 1023.
 //!
-//! **Signals**. The *logarithmic raw* signal is the reading turned round and scaled: 0 open, 1000 at 10 N and over. In
-//! between it goes about with the logarithm of the force, steepest where R(F) = R(tap). The *linearised* signal is
-//! proportional to the force that the reading stands for: 1000 at a full-scale force of the user's choice.
+//! **Signals**. The *logarithmic raw* signal is the reading inverted and scaled: 0 open, 1000 at 10 N and over. In
+//! between it is about logarithmic in the force, steepest where R(F) = R(tap). The *linearised* signal is proportional
+//! to the force of the reading: 1000 at a full-scale force of the user's choice.
 
 use libm::pow;
 
-/// Force and resistance of the line's one end.
+/// A point of the log-log line: force, N, and resistance, Ω.
 const REFERENCE: (f64, f64) = (0.2, 30_000.0);
-/// b = ln 30 / ln 50: the line's other end is 1 kΩ at 10 N.
+/// b = ln 30 / ln 50, from the line's other point, 1 kΩ at 10 N.
 const EXPONENT: f64 = 0.869_421_620_717_160_4;
 
 /// The circuit of one sensor, with its potentiometer at a tap.
@@ -34,24 +34,24 @@ pub struct FsrCircuit {
 impl FsrCircuit {
     /// Below this force the resistor is open, N.
     pub const BREAK_NEWTON: f64 = 0.1;
-    /// Over this force nothing changes any more, N.
+    /// Above this force the resistance is constant, N.
     pub const SATURATION_NEWTON: f64 = 10.0;
-    /// The potentiometer from end to end, Ω.
+    /// The potentiometer's total resistance, Ω.
     pub const POTENTIOMETER_OHM: f64 = 50_000.0;
     /// Its number of taps.
     pub const TAPS: f64 = 256.0;
-    /// Its wiper, Ω.
+    /// Its wiper's resistance, Ω.
     pub const WIPER_OHM: f64 = 52.0;
     /// Number of readings the converter has.
     pub const STEPS: f64 = 1024.0;
-    /// What an open resistor reads, the highest reading.
+    /// The reading of an open resistor, which is the highest.
     pub const OPEN_COUNTS: u16 = 1023;
     /// The tap that puts the steepest part of the response in the middle of the resistor's range.
     pub const MIDDLE_TAP: u8 = 38;
-    /// What both calibrated signals reach at full scale.
+    /// Full scale of both signals.
     pub const FULL_SIGNAL: f64 = 1000.0;
 
-    /// The resistor's resistance under `force_newton`, Ω; infinite when open, as it is for what is no force (NaN).
+    /// The resistor's resistance under `force_newton`, Ω; infinite when open, or for NaN.
     #[must_use]
     pub fn resistance_ohm(force_newton: f64) -> f64 {
         if force_newton >= Self::BREAK_NEWTON {
@@ -67,7 +67,7 @@ impl FsrCircuit {
         Self::POTENTIOMETER_OHM * f64::from(self.tap) / Self::TAPS + Self::WIPER_OHM
     }
 
-    /// The junction's voltage in counts, before the converter cuts it down to a whole number: 0..=1024.
+    /// The junction's voltage in counts before conversion to an integer: 0..=1024.
     #[must_use]
     pub fn level(self, force_newton: f64) -> f64 {
         let resistance = Self::resistance_ohm(force_newton);
@@ -78,14 +78,14 @@ impl FsrCircuit {
         }
     }
 
-    /// What the converter makes of `level`, noise and all.
+    /// The converter's reading for `level`.
     #[must_use]
     pub fn convert(level: f64) -> u16 {
-        // NaN becomes 0, as `as` has it.
+        // `as` makes NaN 0.
         level.floor().clamp(0.0, f64::from(Self::OPEN_COUNTS)) as u16
     }
 
-    /// The reading under `force_newton`: forward through the circuit.
+    /// The reading under `force_newton`.
     #[must_use]
     pub fn counts(self, force_newton: f64) -> u16 {
         Self::convert(self.level(force_newton))
@@ -98,8 +98,8 @@ impl FsrCircuit {
         force.clamp(Self::BREAK_NEWTON, Self::SATURATION_NEWTON)
     }
 
-    /// The least and the greatest force that `counts` may stand for, N. Readings that only noise can bring about, between
-    /// open and the break force or below saturation, stand for what lies there.
+    /// The range of forces that give the reading `counts`, N. Readings that only noise can cause, between open and the break
+    /// force or below saturation, get the range there.
     #[must_use]
     pub fn step_newton(self, counts: u16) -> [f64; 2] {
         let counts = counts.min(Self::OPEN_COUNTS);
@@ -112,8 +112,7 @@ impl FsrCircuit {
         [least, if saturated { f64::INFINITY } else { self.newton_at(f64::from(counts)) }]
     }
 
-    /// The force that `counts` stands for, N: the middle of its step, 0 when open, 10 N when saturated. Backward through
-    /// the circuit.
+    /// The force for the reading `counts`, N: at the middle of its step, 0 when open, 10 N when saturated.
     #[must_use]
     pub fn newton(self, counts: u16) -> f64 {
         let counts = counts.min(Self::OPEN_COUNTS);

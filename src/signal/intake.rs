@@ -1,8 +1,6 @@
-//! Intake: from a source's frames to the raw values that a plan reads, with what is missing held or left missing, and
-//! what is not to be believed marked faulty.
+//! Selects the raw values that a plan reads from a source's frames; holds missing values and marks rejected ones faulty.
 //!
-//! It runs on the host for every backend, in the order of the frames, so that all backends see the same input however a
-//! recording is cut.
+//! It runs on the host, frame by frame, so that all backends get the same input for any batch size.
 
 use super::{Calibration, Frame, RawValue};
 
@@ -10,24 +8,24 @@ use super::{Calibration, Frame, RawValue};
 #[derive(Clone, Debug)]
 pub(crate) struct Intake {
     calibration: Calibration,
-    /// Per taxel those beside it, for the check on isolated ones; empty where that is off.
+    /// Per taxel its neighbours, for the check of isolated values; empty if that is off.
     neighbours: Vec<Vec<u32>>,
     max_age_s: f64,
     /// Per value of a source's frame, the taxel it belongs to.
     taxel_of_value: Vec<usize>,
     /// Per taxel, the last value that arrived, and when.
     last: Vec<(RawValue, f64)>,
-    /// Per taxel, what this frame says.
+    /// Per taxel its value in this frame.
     now: Vec<RawValue>,
-    /// Per taxel, how far it is pressed, in raw units; only for the check on isolated ones.
+    /// Per taxel its distance from rest, raw units, for the check of isolated values.
     rise: Vec<f64>,
     frames_seen: u64,
-    /// Per frame since [`Intake::forget_stale`], the taxels that are stale in it; `None` where nobody heeds them.
+    /// Per frame since [`Intake::forget_stale`] its stale taxels; `None` if they are not tracked.
     stale: Option<Vec<Vec<usize>>>,
 }
 
 impl Intake {
-    /// For a body of as many taxels as `calibration` has, in whose order a source delivers unless told otherwise.
+    /// For the taxels of `calibration`; frames have their order until [`Intake::listen`] changes it.
     pub(crate) fn new(calibration: Calibration, neighbours: Vec<Vec<u32>>, max_age_s: f64) -> Self {
         let taxels = calibration.taxels.len();
         Self {
@@ -53,17 +51,17 @@ impl Intake {
         &self.taxel_of_value
     }
 
-    /// From now on, notes which taxels are stale.
+    /// Starts to track stale taxels.
     pub(crate) fn heed_stale(&mut self) {
         self.stale = Some(Vec::new());
     }
 
-    /// Per frame taken since [`Intake::forget_stale`], the taxels that are stale in it; none where that is not heeded.
+    /// Per frame since [`Intake::forget_stale`] its stale taxels; empty if they are not tracked.
     pub(crate) fn stale(&self) -> &[Vec<usize>] {
         self.stale.as_deref().unwrap_or_default()
     }
 
-    /// Begins a call.
+    /// Clears the list of stale taxels.
     pub(crate) fn forget_stale(&mut self) {
         self.stale.iter_mut().for_each(Vec::clear);
     }
@@ -73,7 +71,7 @@ impl Intake {
         self.taxel_of_value.len()
     }
 
-    /// Where a frame has the values of the taxels `slots`, if values pass as they are and none of these is never there.
+    /// The indices in a frame of the taxels `slots`, if values pass unchanged and the source delivers all of them.
     pub(crate) fn picks(&self, slots: &[usize]) -> Option<Vec<u32>> {
         let checks = &self.calibration.checks;
         let checked =
@@ -109,12 +107,12 @@ impl Intake {
             return;
         }
         if let Some(ratio) = self.calibration.checks.isolated_ratio {
-            self.distrust_isolated(ratio);
+            self.reject_isolated(ratio);
         }
         out.extend(slots.iter().map(|&slot| self.now[slot]));
     }
 
-    /// What is stale is missing, and noted if anybody heeds it.
+    /// Records stale values, if they are tracked, and makes them missing.
     fn note_stale(&mut self) {
         let Some(stale) = &mut self.stale else { return };
         let mut noted = Vec::new();
@@ -127,7 +125,7 @@ impl Intake {
         stale.push(noted);
     }
 
-    /// A value that is missing is the last one that arrived, while that is young enough.
+    /// Replaces missing values by the last ones that arrived within `max_age_s`.
     fn hold(&mut self, t_s: f64) {
         for (now, (last, at)) in self.now.iter_mut().zip(&mut self.last) {
             if !now.is_missing() {
@@ -138,22 +136,22 @@ impl Intake {
         }
     }
 
-    /// Whether so many values lie outside the sensor's range that the frame as a whole is garbled.
+    /// Whether too many values lie outside the sensors' range.
     fn is_broken(&self) -> bool {
         let Some(share) = self.calibration.checks.broken_frame_share else { return false };
-        let (mut there, mut beyond) = (0_u32, 0_u32);
+        let (mut present, mut outside) = (0_u32, 0_u32);
         for (value, taxel) in self.now.iter().zip(&self.calibration.taxels) {
             if !value.is_missing() && !taxel.mask {
-                there += 1;
+                present += 1;
                 let [low, high] = taxel.raw_range.map(f64::from);
-                beyond += u32::from(value.number().is_none_or(|value| !(low..=high).contains(&value)));
+                outside += u32::from(value.number().is_none_or(|value| !(low..=high).contains(&value)));
             }
         }
-        f64::from(beyond) > share * f64::from(there)
+        f64::from(outside) > share * f64::from(present)
     }
 
-    /// Marks values that rise far above all of their neighbours'.
-    fn distrust_isolated(&mut self, ratio: f64) {
+    /// Marks isolated values as faulty.
+    fn reject_isolated(&mut self, ratio: f64) {
         for (index, (rise, value)) in self.rise.iter_mut().zip(&self.now).enumerate() {
             let masked = self.calibration.taxels[index].mask;
             let number = value.number().filter(|_| !masked);

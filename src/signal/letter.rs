@@ -1,5 +1,4 @@
-//! Letters: the alphabet that single sensors are read in. A receptor says what of a sensor's pressure is looked at, a
-//! signal in which of the paper's two forms that pressure is.
+//! Letters: combinations of a receptor (the pressure itself, or its change) and one of the paper's two signals.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,14 +6,14 @@ use std::str::FromStr;
 use super::FsrSignal;
 use crate::error::{Error, Result, nearest};
 
-/// What of a sensor's pressure P a letter is.
+/// The quantity of a sensor's pressure P that a letter is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Receptor {
-    /// P itself, as Merkel discs adapt slowly and tell how deep the skin is pressed.
+    /// P itself, like slowly adapting Merkel discs.
     #[default]
     Sustained,
-    /// |P(t) − P(t − Δt)| / Δt, P per second, as Meissner corpuscles adapt rapidly and tell that something changes. Both
-    /// pressures are calibrated as the present one is.
+    /// |P(t) − P(t − Δt)| / Δt, P per second, like rapidly adapting Meissner corpuscles. Both pressures use the present
+    /// calibration.
     Change,
 }
 
@@ -47,12 +46,12 @@ impl FromStr for Receptor {
     }
 }
 
-/// A letter: every field is computed once for each that a scene asks for.
+/// A letter: every field is computed once for each letter of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Letter {
-    /// What of the pressure it is.
+    /// The quantity.
     pub receptor: Receptor,
-    /// Which signal the sensors of the paper's circuit deliver, instead of what the calibration says.
+    /// The signal of sensors in the paper's circuit; by default that of the calibration.
     pub signal: Option<FsrSignal>,
 }
 
@@ -66,7 +65,7 @@ impl Letter {
         receptors.iter().flat_map(with).collect()
     }
 
-    /// Refuses a scene's letters where there is none, or one twice.
+    /// Checks that there are letters, each once.
     pub(crate) fn check(letters: &[Self]) -> Result<()> {
         if letters.is_empty() {
             return Err(Error::usage("no letter is asked for; ask for sustained, change or both"));
@@ -80,8 +79,7 @@ impl Letter {
         }
     }
 
-    /// What has to be said of it where a run has the letters `among`: the receptor where not all of them are sustained,
-    /// the signal where there are several.
+    /// Its label among a run's letters: the receptor unless all are sustained, the signal if there are several.
     #[must_use]
     pub fn mark(self, among: &[Self]) -> Mark {
         let sustained = among.iter().all(|letter| letter.receptor == Receptor::Sustained);
@@ -90,7 +88,7 @@ impl Letter {
     }
 }
 
-/// What tells a letter from the others of a run, and from what is usual; nothing where there is nothing to tell.
+/// The label of a letter among those of a run; empty for the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mark {
     /// Its receptor.

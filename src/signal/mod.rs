@@ -1,4 +1,4 @@
-//! Signals: what arrives from the sensors, and what a robot's calibration makes of it.
+//! Signals: the sensors' raw values, and their calibration.
 
 mod calibration;
 mod curve;

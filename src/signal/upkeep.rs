@@ -1,52 +1,52 @@
-//! Upkeep: baselines that follow drift, and taxels that are found unfit. Both on a slow cadence, from raw values.
+//! Upkeep: baselines follow drift, and defective taxels are detected, both once per epoch, from raw values.
 //!
-//! Time is divided into epochs of `cadence_s` by the frames' own stamps, so that a recording has the same epochs however
-//! it is cut. At an epoch's end each taxel is judged by what it did in it, with m the mean of its raw values:
+//! Epochs of `cadence_s` are counted by the frames' times, so that they do not depend on batches. At an epoch's end each
+//! taxel is updated, with m the mean of its raw values in the epoch:
 //!
 //! **At rest**, its fields out of contact. b ← b + r·T + (1 − exp(−T/τ))·(m − b), with T the epoch's length and r the mean
-//! rate of what drifts together ([`common`]), so that b does not lag behind a drift that all have.
+//! rate of the common drift ([`common_drift`]), so that b does not lag behind it.
 //!
-//! **Held**, a field of its own in contact, and a taxel of that field with evidence of a press ([`evidence`]). Nobody can
-//! see its rest, and b follows the median drift of the untouched taxels of its board, else of its link, else of the body.
-//! A taxel that shows no press itself may drift by a quarter more or less. Where fewer than three are untouched, b stays,
-//! and after [`UNKNOWN_AFTER_S`] the drift is said to be unknown. A touch that lasts is therefore never learned away,
-//! whether it lasts seconds or days, and a robot that is switched on while it stands keeps the baselines of its file.
+//! **Held**, a field of its own in contact, and a taxel of that field with evidence of a press ([`press_evidence`]). Its rest
+//! value cannot be measured, so b follows the median drift of the untouched taxels of its board, else link, else body.
+//! A taxel without evidence of its own may differ from that drift by a quarter. With fewer than three untouched taxels, b
+//! stays, and after [`DRIFT_UNKNOWN_AFTER_S`] the drift counts as unknown. A lasting touch is therefore never learned as
+//! rest, and a robot that stands when it is switched on keeps the baselines of its file.
 //!
-//! **Left**, in contact though nothing shows a press any more: what remains after a release is what b was estimated wrong.
-//! In the first epoch that is quiet b becomes m, if they are no farther apart than the drift since the touch began, or if
-//! that is unknown. What rose slowly and farther than that is kept.
+//! **Released**, in contact without evidence of a press: the rest of the signal is the error of b. In the first quiet epoch
+//! b becomes m, if they differ by no more than the drift since the touch began, or if that is unknown. A larger, slow
+//! rise is kept as a touch.
 //!
-//! The baseline stays within `max_drift` of the file's: what drifts farther is no drift.
+//! The baseline stays within `max_drift` of the file's.
 //!
 //! **Health.** *Stuck*: off its rest by more than the dead band, and not one raw unit of change for `stuck_s`. *Noisy*: the
 //! mean step between frames is over `noisy`, not held. *Saturated*: at or beyond an end of the raw range for `saturated_s`. *Dead*: no value, or
 //! none that is a number, for `dead_s`. A taxel that is found unfit is left out of every sum, and its fields flagged
 //! `faulty_input`, from the next epoch on and until the reason is gone.
 
-mod common;
-mod evidence;
+mod common_drift;
+mod press_evidence;
 
 use std::fmt;
 
 use serde::Deserialize;
 
-use self::common::{Common, Told};
-use self::evidence::{Evidence, Sense};
+use self::common_drift::{CommonDrift, Drift};
+use self::press_evidence::{PressEvidence, TouchSense};
 use super::RawValue;
 use crate::error::{Error, Result};
 
-/// A held taxel whose drift nobody has told for so long is said to drift by nobody knows how much, s.
-const UNKNOWN_AFTER_S: f64 = 60.0;
-/// A taxel's own drift may differ from that of its group by this share of it.
-const OWN_SHARE: f64 = 0.25;
-/// The mean rate of drift is over this share of the baseline's time constant.
-const RATE_SHARE: f64 = 0.25;
+/// The drift of a held taxel counts as unknown after this time without an estimate, s.
+const DRIFT_UNKNOWN_AFTER_S: f64 = 60.0;
+/// A taxel's drift may differ from its group's by this share of it.
+const MAX_OWN_DRIFT_SHARE: f64 = 0.25;
+/// Averaging time of the drift rate, share of the baseline's time constant.
+const RATE_TIME_SHARE: f64 = 0.25;
 
-/// What is kept up, and how fast. All off by default.
+/// The settings of upkeep. All are off by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct UpkeepKeys {
-    /// Length of an epoch, s; 1 where it is not given.
+    /// Length of an epoch, s; 1 by default.
     pub cadence_s: Option<f64>,
     /// τ of the baseline, s.
     pub time_constant_s: Option<f64>,
@@ -63,7 +63,7 @@ pub struct UpkeepKeys {
 }
 
 impl UpkeepKeys {
-    /// Refuses what is no time and no distance.
+    /// Checks that all values are positive.
     pub(crate) fn check(&self) -> Result<()> {
         let keys = [
             ("cadence_s", self.cadence_s),
@@ -86,14 +86,14 @@ impl UpkeepKeys {
     }
 }
 
-/// Why a taxel is not used.
+/// The defect for which a taxel is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unfit {
     /// No numbers arrive.
     Dead,
     /// Pressed, and without any change.
     Stuck,
-    /// It jumps without being touched.
+    /// Noisy while untouched.
     Noisy,
     /// At an end of its range.
     Saturated,
@@ -110,20 +110,20 @@ impl fmt::Display for Unfit {
     }
 }
 
-/// What upkeep needs to know of a taxel.
+/// The calibration of a taxel, as far as upkeep needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kept {
     pub(crate) baseline: f32,
     pub(crate) raw_range: [f32; 2],
-    /// How far the raw value must go from the baseline for the taxel to be felt.
+    /// Change of the raw value from the baseline that counts as a touch.
     pub(crate) felt: f64,
     /// Whether the raw value falls when the taxel is pressed.
     pub(crate) falls: bool,
-    /// Whether the file says never to believe it.
+    /// Whether the file masks it.
     pub(crate) mask: bool,
 }
 
-/// Values of an epoch, or of a part of it.
+/// Sum and number of the values of an epoch, or of half of it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
     count: u32,
@@ -148,23 +148,22 @@ struct TaxelState {
     baseline: f64,
     unfit: Option<Unfit>,
     last: Option<f64>,
-    /// In this epoch: values, in its two halves too, how many were at an end of the range, and the sum of the sizes of the
-    /// steps between them.
+    /// In this epoch: the values, also by halves, how many were at an end of the range, and the sum of the absolute steps.
     all: Sum,
     halves: [Sum; 2],
     at_ends: u32,
     steps: f64,
-    /// For how long it has been without change, at an end of its range, without a number, s.
+    /// Time without a change, at an end of its range, and without a number, s.
     unchanged_s: f64,
     at_end_s: f64,
     silent_s: f64,
-    /// The mean of the epoch before.
+    /// The mean of the previous epoch.
     before: Option<f64>,
-    evidence: Evidence,
-    /// How far its baseline may be wrong, as it was only estimated: by what all have drifted since, raw units.
-    doubt: f64,
-    /// For how long nobody has told its drift, s; 0 once somebody has.
-    untold_s: f64,
+    evidence: PressEvidence,
+    /// Error bound of its estimated baseline: the sum of the drift estimates it has followed, raw units.
+    uncertainty: f64,
+    /// Time without a drift estimate, s.
+    unknown_s: f64,
 }
 
 impl TaxelState {
@@ -183,14 +182,14 @@ impl TaxelState {
             at_end_s: 0.0,
             silent_s: 0.0,
             before: None,
-            evidence: Evidence::none(baseline),
-            doubt: 0.0,
-            untold_s: 0.0,
+            evidence: PressEvidence::none(baseline),
+            uncertainty: 0.0,
+            unknown_s: 0.0,
         }
     }
 
-    fn sense(&self) -> Sense {
-        Sense { felt: self.file.felt, direction: if self.file.falls { -1.0 } else { 1.0 } }
+    fn sense(&self) -> TouchSense {
+        TouchSense { felt: self.file.felt, direction: if self.file.falls { -1.0 } else { 1.0 } }
     }
 
     /// The mean of the epoch's later half, or of all of it.
@@ -198,18 +197,18 @@ impl TaxelState {
         self.halves[1].mean().or(self.all.mean())
     }
 
-    /// Whether it stood still in the epoch.
+    /// Whether it did not change in the epoch.
     fn is_quiet(&self) -> bool {
         let change = match self.halves.map(Sum::mean) {
             [Some(early), Some(late)] => Some(late - early),
-            // Frames as rare as epochs.
+            // At most one frame per epoch.
             _ => self.all.mean().zip(self.before).map(|(now, before)| now - before),
         };
         change.is_some_and(|change| self.sense().is_slow(change))
     }
 
-    /// What is wrong with it, by what it did until now.
-    fn judge(&self, keys: &UpkeepKeys, held: bool) -> Option<Unfit> {
+    /// Its defect, if any.
+    fn check_health(&self, keys: &UpkeepKeys, held: bool) -> Option<Unfit> {
         let over = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value >= limit);
         let is_off = |last: f64| (last - self.baseline).abs() > self.file.felt;
         let mean_step = if self.all.count > 1 { self.steps / f64::from(self.all.count - 1) } else { 0.0 };
@@ -226,57 +225,57 @@ impl TaxelState {
         }
     }
 
-    /// Moves the baseline as `told`, if anybody has told how far.
-    fn follow_others(&mut self, told: Option<Told>, dt_s: f64) {
-        match told {
-            Some(told) => {
-                self.baseline += told.step;
-                self.doubt += told.step.abs();
-                self.untold_s = 0.0;
+    /// Moves the baseline by the group's drift, if known.
+    fn follow_group(&mut self, drift: Option<Drift>, dt_s: f64) {
+        match drift {
+            Some(drift) => {
+                self.baseline += drift.step;
+                self.uncertainty += drift.step.abs();
+                self.unknown_s = 0.0;
             }
-            None => self.untold_s += dt_s,
+            None => self.unknown_s += dt_s,
         }
     }
 
-    /// Moves the baseline towards `mean` by as much as its drift may differ from what was told: it is not pressed itself.
-    fn lean(&mut self, mean: f64, told: Option<Told>) {
-        let most = told.map_or(0.0, |told| OWN_SHARE * told.step.abs());
-        self.baseline += (mean - self.baseline).clamp(-most, most);
+    /// Moves the baseline towards `mean`, by no more than its drift may differ from its group's.
+    fn follow_own(&mut self, mean: f64, drift: Option<Drift>) {
+        let limit = drift.map_or(0.0, |drift| MAX_OWN_DRIFT_SHARE * drift.step.abs());
+        self.baseline += (mean - self.baseline).clamp(-limit, limit);
     }
 
-    /// How far the baseline may be wrong by now.
-    fn doubt(&self) -> f64 {
-        if self.untold_s > 0.0 { f64::INFINITY } else { self.doubt }
+    /// Error bound of the baseline, raw units.
+    fn uncertainty(&self) -> f64 {
+        if self.unknown_s > 0.0 { f64::INFINITY } else { self.uncertainty }
     }
 
-    /// Moves the baseline at the end of an epoch in which nothing held the taxel, and its mean was `mean`: a share of
-    /// `learned` of the way, beside what all drift in it.
-    fn settle(&mut self, mean: f64, contact: bool, told: Option<Told>, epoch: Epoch, learned: f64) {
+    /// Moves the baseline at the end of an epoch in which the taxel was not held: by the share `learned` towards `mean`,
+    /// beside the common drift.
+    fn relearn(&mut self, mean: f64, contact: bool, drift: Option<Drift>, epoch: Epoch, learned: f64) {
         let off = mean - self.baseline;
         let is_felt = self.sense().direction * off > self.file.felt;
-        if self.doubt() > 0.0 && self.is_quiet() && off.abs() <= self.file.felt + self.doubt() {
+        if self.uncertainty() > 0.0 && self.is_quiet() && off.abs() <= self.file.felt + self.uncertainty() {
             self.baseline = mean;
         } else if contact && is_felt {
-            // It rose slowly, farther than all have drifted: a touch, for all that is known.
-            return self.follow_others(told, epoch.dt_s);
+            // A slow rise beyond the common drift may be a touch.
+            return self.follow_group(drift, epoch.dt_s);
         } else {
-            self.baseline += told.map_or(0.0, |told| told.rate * epoch.followed_s) + learned * off;
-            if self.doubt() > 0.0 && !self.is_quiet() {
+            self.baseline += drift.map_or(0.0, |drift| drift.rate * epoch.followed_s) + learned * off;
+            if self.uncertainty() > 0.0 && !self.is_quiet() {
                 return;
             }
         }
-        (self.doubt, self.untold_s) = (0.0, 0.0);
+        (self.uncertainty, self.unknown_s) = (0.0, 0.0);
     }
 }
 
-/// When an epoch was.
+/// The times of an epoch.
 #[derive(Clone, Copy)]
 struct Epoch {
     length_s: f64,
     middle_s: f64,
-    /// From the middle of the one before to its own.
+    /// From the middle of the previous epoch to its own.
     dt_s: f64,
-    /// The same, but not over a pause: a rate is no more than a guess then.
+    /// The same, limited, as rates are not extrapolated over a pause.
     followed_s: f64,
 }
 
@@ -285,26 +284,26 @@ struct Epoch {
 pub(crate) struct Upkeep {
     keys: UpkeepKeys,
     taxels: Vec<TaxelState>,
-    common: Common,
+    common: CommonDrift,
     epoch_start_s: Option<f64>,
     last_t_s: f64,
     middle_s: Option<f64>,
 }
 
 impl Upkeep {
-    /// `None` when there is nothing to keep up. Taxels that are warmed together are in one group; of `groups`, the nearest
-    /// come first, and each has one group a taxel, or `None`.
+    /// `None` if all settings are off. Each of `groups`, the most specific first, has the group of every taxel, or `None`.
+    /// Taxels of a group share their temperature.
     pub(crate) fn new(
         keys: UpkeepKeys,
         taxels: impl IntoIterator<Item = Kept>,
         groups: Vec<Vec<Option<usize>>>,
     ) -> Option<Self> {
         let taxels = taxels.into_iter().map(TaxelState::new).collect();
-        let common = Common::new(groups);
+        let common = CommonDrift::new(groups);
         (!keys.is_off()).then_some(Self { keys, taxels, common, epoch_start_s: None, last_t_s: 0.0, middle_s: None })
     }
 
-    /// What is kept up.
+    /// The settings.
     pub(crate) fn keys(&self) -> UpkeepKeys {
         self.keys
     }
@@ -313,13 +312,13 @@ impl Upkeep {
         self.keys.cadence_s.unwrap_or(1.0)
     }
 
-    /// Whether a frame at `t_s` belongs to a new epoch, so that the one before is to be closed first.
+    /// Whether a frame at `t_s` belongs to a new epoch, so that the current one must be closed first.
     pub(crate) fn is_due(&self, t_s: f64) -> bool {
-        // A clock that jumps back ends an epoch too, or the next would never come.
+        // A time that goes back ends an epoch too.
         self.epoch_start_s.is_some_and(|start| t_s - start >= self.cadence_s() || t_s < start)
     }
 
-    /// Takes note of a frame.
+    /// Adds a frame to the epoch.
     pub(crate) fn observe(&mut self, t_s: f64, values: &[RawValue]) {
         let dt_s = if self.epoch_start_s.is_some() { (t_s - self.last_t_s).max(0.0) } else { 0.0 };
         let start_s = *self.epoch_start_s.get_or_insert(t_s);
@@ -344,40 +343,40 @@ impl Upkeep {
         }
     }
 
-    /// Ends the epoch. `contact` says of each taxel whether a field of its was in contact meanwhile; `beside`, given which
-    /// taxels are pressed, which have one in a field of theirs. Returns whether any baseline or judgement changed.
+    /// Ends the epoch. `contact` has per taxel whether one of its fields was in contact; `beside` maps which taxels are
+    /// pressed to which have a pressed one in a common field. Returns whether any baseline or defect changed.
     pub(crate) fn close(&mut self, contact: &[bool], beside: impl Fn(&[bool]) -> Vec<bool>) -> bool {
         let epoch = self.end();
-        let told = self.tell(contact, epoch);
-        let pressed: Vec<bool> = (0..self.taxels.len()).map(|index| self.is_pressed(index, contact, &told)).collect();
+        let drift = self.estimate(contact, epoch);
+        let pressed: Vec<bool> = (0..self.taxels.len()).map(|index| self.is_pressed(index, contact, &drift)).collect();
         let held = beside(&pressed);
         let keys = self.keys;
         let learned = keys.time_constant_s.map(|tau| 1.0 - libm::exp(-epoch.length_s / tau));
         let mut changed = false;
         for (index, taxel) in self.taxels.iter_mut().enumerate() {
             let was_unfit = taxel.unfit.is_some();
-            let unfit = taxel.judge(&keys, held[index]);
+            let unfit = taxel.check_health(&keys, held[index]);
             changed |= unfit != taxel.unfit;
             taxel.unfit = unfit;
             if let Some(learned) = learned {
                 let before = taxel.baseline;
                 match taxel.all.mean().filter(|_| unfit.is_none() && !was_unfit) {
-                    Some(mean) if !held[index] => taxel.settle(mean, contact[index], told[index], epoch, learned),
+                    Some(mean) if !held[index] => taxel.relearn(mean, contact[index], drift[index], epoch, learned),
                     Some(mean) => {
-                        taxel.follow_others(told[index], epoch.dt_s);
+                        taxel.follow_group(drift[index], epoch.dt_s);
                         if !pressed[index] {
-                            taxel.lean(mean, told[index]);
+                            taxel.follow_own(mean, drift[index]);
                         }
                     }
-                    // It was left out of every sum: whether it is touched was not seen, and nobody need be told.
-                    None => taxel.follow_others(told[index], 0.0),
+                    // It was left out of all sums, so whether it is touched is unknown.
+                    None => taxel.follow_group(drift[index], 0.0),
                 }
-                let (file, most) = (f64::from(taxel.file.baseline), keys.max_drift.unwrap_or(f64::INFINITY));
-                taxel.baseline = taxel.baseline.clamp(file - most, file + most);
+                let (file, max_drift) = (f64::from(taxel.file.baseline), keys.max_drift.unwrap_or(f64::INFINITY));
+                taxel.baseline = taxel.baseline.clamp(file - max_drift, file + max_drift);
                 changed |= taxel.baseline as f32 != before as f32;
             }
             if !contact[index] || was_unfit {
-                taxel.evidence = Evidence::none(taxel.baseline);
+                taxel.evidence = PressEvidence::none(taxel.baseline);
             }
             taxel.before = taxel.all.mean();
             (taxel.all, taxel.halves, taxel.at_ends, taxel.steps) = Default::default();
@@ -385,7 +384,7 @@ impl Upkeep {
         changed
     }
 
-    /// When the epoch was that ends.
+    /// The times of the epoch that ends.
     fn end(&mut self) -> Epoch {
         let start_s = self.epoch_start_s.take().unwrap_or(self.last_t_s);
         let length_s = (self.last_t_s - start_s).max(0.0);
@@ -395,32 +394,32 @@ impl Upkeep {
         Epoch { length_s, middle_s, dt_s, followed_s: dt_s.min(2.0 * self.cadence_s()) }
     }
 
-    /// The drift that each taxel is told by those that are fit, believed, within their range and untouched.
-    fn tell(&mut self, contact: &[bool], epoch: Epoch) -> Vec<Option<Told>> {
+    /// The drift of each taxel, estimated from those that are fit, not masked, within their range and untouched.
+    fn estimate(&mut self, contact: &[bool], epoch: Epoch) -> Vec<Option<Drift>> {
         let Some(tau) = self.keys.time_constant_s else { return vec![None; self.taxels.len()] };
         let level = |(taxel, &contact): (&TaxelState, &bool)| {
-            let tells = !contact && taxel.unfit.is_none() && !taxel.file.mask && taxel.at_ends == 0;
-            taxel.all.mean().filter(|_| tells).map(|mean| mean - f64::from(taxel.file.baseline))
+            let counts = !contact && taxel.unfit.is_none() && !taxel.file.mask && taxel.at_ends == 0;
+            taxel.all.mean().filter(|_| counts).map(|mean| mean - f64::from(taxel.file.baseline))
         };
         let levels: Vec<Option<f64>> = self.taxels.iter().zip(contact).map(level).collect();
-        self.common.tell(&levels, epoch.middle_s, RATE_SHARE * tau)
+        self.common.estimate(&levels, epoch.middle_s, RATE_TIME_SHARE * tau)
     }
 
-    /// Whether taxel `index` shows that it is pressed.
-    fn is_pressed(&mut self, index: usize, contact: &[bool], told: &[Option<Told>]) -> bool {
+    /// Whether there is evidence that taxel `index` is pressed.
+    fn is_pressed(&mut self, index: usize, contact: &[bool], drift: &[Option<Drift>]) -> bool {
         let taxel = &mut self.taxels[index];
         let (Some(late), true) = (taxel.late(), contact[index]) else { return false };
         let sense = taxel.sense();
-        taxel.evidence.follow(late, told[index].map_or(0.0, |told| told.step), taxel.baseline, sense);
-        taxel.unfit.is_none() && taxel.evidence.shows(sense)
+        taxel.evidence.follow(late, drift[index].map_or(0.0, |drift| drift.step), taxel.baseline, sense);
+        taxel.unfit.is_none() && taxel.evidence.is_press(sense)
     }
 
-    /// Of each taxel, whether its baseline may be wrong by nobody knows how much.
+    /// Per taxel whether its drift is unknown.
     pub(crate) fn unknown(&self) -> impl Iterator<Item = bool> + '_ {
-        self.taxels.iter().map(|taxel| taxel.untold_s >= UNKNOWN_AFTER_S)
+        self.taxels.iter().map(|taxel| taxel.unknown_s >= DRIFT_UNKNOWN_AFTER_S)
     }
 
-    /// Each taxel's baseline now, and why it is not used, if it is not.
+    /// Each taxel's present baseline, and its defect if any.
     pub(crate) fn taxels(&self) -> impl Iterator<Item = (f32, Option<Unfit>)> + '_ {
         self.taxels.iter().map(|taxel| (taxel.baseline as f32, taxel.unfit))
     }

@@ -1,6 +1,6 @@
-//! Wiring: which taxel hangs on which channel of which board. It belongs to one robot; `docs/wire.md` has the file's keys.
+//! Wiring: the taxel on each channel of each board of one robot; `docs/wire.md` has the file's keys.
 
-mod written;
+mod to_toml;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,29 +11,29 @@ use toml::Spanned;
 use crate::error::{Error, Result};
 use crate::keys::Text;
 
-/// Channels that one board has at most.
-const MOST_CHANNELS: i64 = 256;
+/// Maximum channels of one board.
+const MAX_CHANNELS: i64 = 256;
 
-/// The boards of a robot and what hangs on them.
+/// The boards of a robot and their taxels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wiring {
     boards: Vec<WiredBoard>,
 }
 
-/// A board and what hangs on it.
+/// A board and its taxels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WiredBoard {
     /// Its id, 0 to 65534.
     pub id: u16,
-    /// Bits of a value (8, 10, 12 or 16), where the file says so.
+    /// Bits of a value (8, 10, 12 or 16), if given.
     pub bits: Option<u8>,
-    /// The port it is expected on, where the file says so.
+    /// The port it is expected on, if given.
     pub port: Option<String>,
-    /// The speed of its line, where the file says so, baud.
+    /// The baud rate of its line, if given.
     pub baud: Option<u32>,
-    /// The taxel's id, one a channel; `None` for a channel on which nothing hangs.
+    /// Per channel the taxel's id; `None` for an unused channel.
     pub taxels: Vec<Option<u32>>,
-    /// The tap that its potentiometer is to have, one a channel, where the file says so.
+    /// Per channel the tap to set on its potentiometer, if given.
     pub taps: Vec<Option<u8>>,
 }
 
@@ -83,14 +83,14 @@ impl Wiring {
         let text = Text(text);
         let file: File = text.parse()?;
         let (mut boards, mut ids) = (Vec::new(), BTreeSet::new());
-        let mut hangs_on: BTreeMap<u32, (u16, usize)> = BTreeMap::new();
+        let mut channel_of: BTreeMap<u32, (u16, usize)> = BTreeMap::new();
         for keys in &file.board {
             let board = keys.read(text)?;
             if !ids.insert(board.id) {
                 return Err(text.wrong(keys.id.span(), format!("two boards have the id {}", board.id)));
             }
             for (channel, taxel) in board.taxels.iter().enumerate().filter_map(|(c, taxel)| Some((c, (*taxel)?))) {
-                if let Some((id, before)) = hangs_on.insert(taxel, (board.id, channel)) {
+                if let Some((id, before)) = channel_of.insert(taxel, (board.id, channel)) {
                     let what = format!(
                         "taxel {taxel} hangs on channel {channel} of board {}, and on channel {before} of board {id}",
                         board.id
@@ -106,14 +106,13 @@ impl Wiring {
         Ok(Self { boards })
     }
 
-    /// How many boards so many taxels need.
+    /// The minimum number of boards for `taxels` taxels.
     #[must_use]
     pub fn least_boards(taxels: usize) -> usize {
-        taxels.div_ceil(MOST_CHANNELS as usize)
+        taxels.div_ceil(MAX_CHANNELS as usize)
     }
 
-    /// The wiring that holds where none is given: `boards` boards, numbered from `first_id`, that share the `taxels` in
-    /// ascending order of their ids, each as many as the next or one more.
+    /// The default wiring: `boards` boards, numbered from `first_id`, share `taxels` evenly in ascending order of their ids.
     ///
     /// # Errors
     /// There are fewer taxels than boards, or a board would have more than 256 channels or an id over 65534.
@@ -158,7 +157,7 @@ impl Wiring {
         self.boards.iter().find(|board| board.id == id)
     }
 
-    /// The same wiring with other taps: what `tap` gives for a board's id and a channel that has a taxel.
+    /// The same wiring with the taps that `tap` gives for a board's id and a channel with a taxel.
     #[must_use]
     pub fn with_taps(&self, tap: impl Fn(u16, u16) -> Option<u8>) -> Self {
         let mut wiring = self.clone();
@@ -178,33 +177,33 @@ impl Wiring {
 
 impl BoardKeys {
     fn read(&self, text: Text<'_>) -> Result<WiredBoard> {
-        let whole = |key, value: Option<&Spanned<i64>>, range| text.whole(key, value, range);
-        let id = whole("id", Some(&self.id), 0..65535)?.unwrap_or(0) as u16;
-        let bits = whole("bits", self.bits.as_ref(), 8..17)?.map(|bits| bits as u8);
+        let int = |key, value: Option<&Spanned<i64>>, range| text.int(key, value, range);
+        let id = int("id", Some(&self.id), 0..65535)?.unwrap_or(0) as u16;
+        let bits = int("bits", self.bits.as_ref(), 8..17)?.map(|bits| bits as u8);
         if let (Some(key), Some(bits)) = (&self.bits, bits.filter(|bits| ![8, 10, 12, 16].contains(bits))) {
             return Err(text.wrong(key.span(), format!("`bits` is {bits}; it must be 8, 10, 12 or 16")));
         }
-        let baud = whole("baud", self.baud.as_ref(), 1..1_000_000_000)?;
-        let channels = whole("channels", self.channels.as_ref(), 1..MOST_CHANNELS + 1)?.map(|count| count as usize);
+        let baud = int("baud", self.baud.as_ref(), 1..1_000_000_000)?;
+        let channels = int("channels", self.channels.as_ref(), 1..MAX_CHANNELS + 1)?.map(|count| count as usize);
         let mut taxels = vec![None; channels.unwrap_or(0)];
         let mut taps = taxels.iter().map(|_| None).collect::<Vec<Option<u8>>>();
         for keys in &self.taxels {
             let run = keys.get_ref();
-            let channel = whole("channel", Some(&run.channel), 0..MOST_CHANNELS)?.unwrap_or(0) as usize;
-            let first = whole("first", run.first.as_ref(), 0..i64::from(u32::MAX))?;
+            let channel = int("channel", Some(&run.channel), 0..MAX_CHANNELS)?.unwrap_or(0) as usize;
+            let first = int("first", run.first.as_ref(), 0..i64::from(u32::MAX))?;
             let ids: Vec<u32> = match (&run.ids, first) {
                 (Some(ids), None) => {
                     text.refuse("count", run.count.as_ref(), "beside `ids`")?;
                     ids.clone()
                 }
                 (None, Some(first)) => {
-                    let count = whole("count", run.count.as_ref(), 1..MOST_CHANNELS + 1)?.unwrap_or(1);
+                    let count = int("count", run.count.as_ref(), 1..MAX_CHANNELS + 1)?.unwrap_or(1);
                     (0..count).map(|index| first.saturating_add(index)).collect()
                 }
                 _ => return Err(text.wrong(keys.span(), "give either `ids` or `first` with `count`")),
             };
             let end = channel + ids.len();
-            let most = channels.unwrap_or(MOST_CHANNELS as usize);
+            let most = channels.unwrap_or(MAX_CHANNELS as usize);
             if end > most {
                 let what = format!("this goes on to channel {}, and the board has {most} channels", end - 1);
                 return Err(text.wrong(keys.span(), what));
@@ -217,7 +216,7 @@ impl BoardKeys {
                     return Err(text.wrong(given.span(), what));
                 }
                 for (channel, tap) in (channel..).zip(given.get_ref()) {
-                    taps[channel] = whole("taps", Some(tap), 0..256)?.map(|tap| tap as u8);
+                    taps[channel] = int("taps", Some(tap), 0..256)?.map(|tap| tap as u8);
                 }
             }
             for (channel, id) in (channel..).zip(ids) {

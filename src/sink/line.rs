@@ -1,18 +1,18 @@
-//! Percepts of a frame as one line of JSON. What is absent is left out.
+//! Writes a frame's percepts as one line of JSON. Absent quantities are omitted.
 
 use serde::Serialize;
 
 use super::FieldNames;
 use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch};
 
-/// Composes lines for fields of some names.
-pub(super) struct Composer {
+/// Writes lines for fields with given names.
+pub(super) struct LineWriter {
     heads: Vec<Head>,
     flags: Vec<(Flags, String)>,
     all_fields: bool,
 }
 
-/// How a field's object begins, up to the value of `contact`.
+/// The start of a field's object, up to the value of `contact`.
 struct Head {
     in_anchor: String,
     in_world: String,
@@ -34,8 +34,8 @@ impl Head {
     }
 }
 
-impl Composer {
-    /// For fields called `names`; those without contact are listed only with `all_fields`.
+impl LineWriter {
+    /// For fields called `names`; fields without contact are listed only with `all_fields`.
     pub(super) fn new(names: &[FieldNames], all_fields: bool) -> Self {
         Self {
             heads: names.iter().map(Head::new).collect(),
@@ -48,8 +48,8 @@ impl Composer {
         self.heads.len()
     }
 
-    /// Appends the batch's frame `frame` to `line`.
-    pub(super) fn compose(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
+    /// Appends the frame `frame` of the batch to `line`.
+    pub(super) fn write(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
         let Self { heads, flags, all_fields } = self;
         line.extend_from_slice(b"{\"t\":");
         print(line, &percepts.t_s(frame));

@@ -1,14 +1,14 @@
 //! Sinks: where percepts go.
 //!
-//! A sink is told the names of the fields once and sees nothing of engines; of bodies and frames only recordings do.
+//! A sink gets the fields' names once; only recordings use bodies and frames.
 
 mod line;
 mod ndjson;
 #[cfg(feature = "mcap")]
 mod recorded;
-#[cfg(feature = "mcap")]
-mod scenery;
 mod spec;
+#[cfg(feature = "mcap")]
+mod view;
 
 pub use ndjson::NdjsonSink;
 #[cfg(feature = "mcap")]
@@ -24,7 +24,7 @@ use crate::signal::Frame;
 
 /// Something that takes percepts.
 pub trait Sink {
-    /// Takes the frames that the next percepts are made of. Sinks of percepts alone do nothing with them.
+    /// Takes the frames of the next percepts. Sinks of percepts ignore them.
     ///
     /// # Errors
     /// As [`Sink::write`].
@@ -35,24 +35,23 @@ pub trait Sink {
     /// Takes all frames of `percepts`.
     ///
     /// # Errors
-    /// They cannot be written; the message names where to.
+    /// They cannot be written; the message names the output.
     fn write(&mut self, percepts: &Percepts) -> Result<Flow>;
 
-    /// Hands on what was held back to be written together: at once, or in a recording within half a second.
+    /// Writes buffered output: at once, or in a recording within half a second.
     ///
     /// # Errors
     /// As [`Sink::write`].
     fn flush(&mut self) -> Result<Flow>;
 
-    /// Ends the output and makes it whole. A sink dropped without this leaves no file behind, except for a
-    /// recording, which stays as far as it got.
+    /// Completes the output. A sink dropped without this leaves no file, except a partial recording.
     ///
     /// # Errors
     /// As [`Sink::write`].
     fn finish(self: Box<Self>) -> Result<()>;
 }
 
-/// Whether there is still anybody at the other end.
+/// Whether the output is still open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use = "writing on after the reader has gone is wasted work"]
 pub enum Flow {
@@ -62,31 +61,31 @@ pub enum Flow {
     Closed,
 }
 
-/// What a sink calls a field.
+/// The names of a field in the output.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FieldNames {
     /// The field's name.
     pub field: String,
     /// The link in whose frame its position and normal are given: its anchor.
     pub link: String,
-    /// What its taxels are read as, where that is to be said: `sustained` or `change`.
+    /// Its letter, if the output names it: `sustained` or `change`.
     pub letter: Option<String>,
-    /// In which signal, where that is to be said: `raw` or `linear`.
+    /// Its signal, if the output names it: `raw` or `linear`.
     pub signal: Option<String>,
 }
 
-/// Frames, and what can be asked about them.
+/// Frames, and access to their pressures.
 pub struct Heard<'a> {
     /// The frames.
     pub frames: &'a [Frame],
-    /// Puts in place of what the list holds, for one of the frames, taxel ids and their pressures.
+    /// Replaces a list by the taxel ids and pressures of one of the frames.
     pub pressures: &'a Pressures<'a>,
 }
 
-/// Puts taxel ids and pressures of a frame into a list.
+/// Writes taxel ids and pressures of a frame into a list.
 pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
 
-/// What sinks are told before the first frame.
+/// What sinks get before the first frame.
 #[derive(Clone, Debug, Default)]
 pub struct Session<'a> {
     /// The names of the fields.
@@ -97,20 +96,20 @@ pub struct Session<'a> {
     pub taxels: &'a [u32],
     /// The robot.
     pub body: Option<&'a Body>,
-    /// Files that a recording is to hold: name, media type, bytes.
+    /// Files to attach to a recording: name, media type, bytes.
     pub attached: Vec<(String, String, Vec<u8>)>,
-    /// What recordings hold; none is all.
+    /// The parts that recordings hold; empty for all.
     pub parts: Vec<Part>,
 }
 
-/// What a recording can hold.
+/// A part of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Frames as they came.
+    /// Raw frames.
     Frames,
     /// Percepts, as in NDJSON.
     Percepts,
-    /// What viewers show: taxels with their pressures, touched fields, links.
+    /// What viewers show: taxels with pressures, touched fields, links.
     View,
 }
 

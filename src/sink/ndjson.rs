@@ -1,11 +1,10 @@
-//! Percepts as NDJSON, one line a frame, for programs and people with `jq`.
+//! Writes percepts as NDJSON, one line per frame.
 //!
-//! What is absent is left out. Numbers have the digits of the arithmetic that made them, the fewest that read back to
-//! the same bits.
+//! Absent quantities are omitted. Numbers have the fewest digits that read back to the same bits.
 
 use std::io::{self, BufWriter, ErrorKind, Write};
 
-use super::line::Composer;
+use super::line::LineWriter;
 use super::{FieldNames, Flow, Sink};
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, OutputPath};
@@ -14,19 +13,19 @@ use crate::percept::Percepts;
 /// Writes percepts as NDJSON.
 pub struct NdjsonSink {
     name: String,
-    writer: BufWriter<To>,
-    composer: Composer,
+    writer: BufWriter<Output>,
+    lines: LineWriter,
     line: Vec<u8>,
     closed: bool,
 }
 
-/// Where lines go.
-enum To {
+/// The destination of lines.
+enum Output {
     File(OutputFile),
     Writer(Box<dyn Write + Send>),
 }
 
-impl Write for To {
+impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Self::File(file) => file.write(bytes),
@@ -43,14 +42,14 @@ impl Write for To {
 }
 
 impl NdjsonSink {
-    /// Writes to `output`; a file is there when the sink is finished, and what was there stays until then. Fields without
-    /// contact are listed only with `all_fields`.
+    /// Writes to `output`, where the file appears or is replaced when the sink is finished. Fields without contact are
+    /// listed only with `all_fields`.
     ///
     /// # Errors
     /// The file cannot be made.
     pub fn to_file(output: OutputPath, names: &[FieldNames], all_fields: bool) -> Result<Self> {
         let name = output.name().display().to_string();
-        Ok(Self::new(name, To::File(output.begin()?), names, all_fields))
+        Ok(Self::new(name, Output::File(output.begin()?), names, all_fields))
     }
 
     /// Writes to `writer`, which messages call `name`.
@@ -61,20 +60,20 @@ impl NdjsonSink {
         names: &[FieldNames],
         all_fields: bool,
     ) -> Self {
-        Self::new(name.into(), To::Writer(Box::new(writer)), names, all_fields)
+        Self::new(name.into(), Output::Writer(Box::new(writer)), names, all_fields)
     }
 
-    fn new(name: String, to: To, names: &[FieldNames], all_fields: bool) -> Self {
+    fn new(name: String, to: Output, names: &[FieldNames], all_fields: bool) -> Self {
         Self {
             name,
             writer: BufWriter::with_capacity(1 << 16, to),
-            composer: Composer::new(names, all_fields),
+            lines: LineWriter::new(names, all_fields),
             line: Vec::new(),
             closed: false,
         }
     }
 
-    fn settle(&mut self, written: io::Result<()>) -> Result<Flow> {
+    fn flow(&mut self, written: io::Result<()>) -> Result<Flow> {
         match written {
             Ok(()) => Ok(Flow::Open),
             Err(e) if e.kind() == ErrorKind::BrokenPipe => {
@@ -88,16 +87,16 @@ impl NdjsonSink {
 
 impl Sink for NdjsonSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        assert_eq!(percepts.fields(), self.composer.fields(), "a sink is told the name of every field");
+        assert_eq!(percepts.fields(), self.lines.fields(), "a sink is told the name of every field");
         for frame in 0..percepts.frames() {
             if self.closed {
                 return Ok(Flow::Closed);
             }
             self.line.clear();
-            self.composer.compose(percepts, frame, &mut self.line);
+            self.lines.write(percepts, frame, &mut self.line);
             self.line.push(b'\n');
             let written = self.writer.write_all(&self.line);
-            if self.settle(written)? == Flow::Closed {
+            if self.flow(written)? == Flow::Closed {
                 return Ok(Flow::Closed);
             }
         }
@@ -109,14 +108,14 @@ impl Sink for NdjsonSink {
             return Ok(Flow::Closed);
         }
         let flushed = self.writer.flush();
-        self.settle(flushed)
+        self.flow(flushed)
     }
 
     fn finish(mut self: Box<Self>) -> Result<()> {
         let flow = self.flush()?;
         // Nothing is left in the buffer, or what is left has no reader.
         match self.writer.into_parts().0 {
-            To::File(file) if flow == Flow::Open => file.finish(),
+            Output::File(file) if flow == Flow::Open => file.finish(),
             _ => Ok(()),
         }
     }

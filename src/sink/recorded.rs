@@ -1,7 +1,7 @@
-//! A sink that records: frames, the percepts made of them, and what viewers show.
+//! A sink that records frames, percepts and what viewers show.
 
-use super::line::Composer;
-use super::scenery::Scenery;
+use super::line::LineWriter;
+use super::view::ViewWriter;
 use super::{Flow, Heard, Part, Session, Sink};
 use crate::error::Result;
 use crate::output::OutputPath;
@@ -12,8 +12,8 @@ use crate::recording::{PERCEPTS, Recorder};
 pub struct RecordingSink {
     recorder: Recorder,
     frames: bool,
-    percepts: Option<Composer>,
-    scenery: Option<Scenery>,
+    percepts: Option<LineWriter>,
+    view: Option<ViewWriter>,
     line: Vec<u8>,
 }
 
@@ -31,8 +31,8 @@ impl RecordingSink {
         Ok(Self {
             recorder,
             frames: holds(Part::Frames),
-            percepts: holds(Part::Percepts).then(|| Composer::new(&session.names, session.all_fields)),
-            scenery: session.body.filter(|_| holds(Part::View)).map(|body| Scenery::new(body, &session.names)),
+            percepts: holds(Part::Percepts).then(|| LineWriter::new(&session.names, session.all_fields)),
+            view: session.body.filter(|_| holds(Part::View)).map(|body| ViewWriter::new(body, &session.names)),
             line: Vec::new(),
         })
     }
@@ -45,23 +45,23 @@ impl Sink for RecordingSink {
                 self.recorder.frame(frame)?;
             }
         }
-        if let Some(scenery) = &mut self.scenery {
-            scenery.hear(heard, &mut self.recorder)?;
+        if let Some(view) = &mut self.view {
+            view.write_frames(heard, &mut self.recorder)?;
         }
         Ok(Flow::Open)
     }
 
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        if let Some(composer) = &self.percepts {
-            assert_eq!(percepts.fields(), composer.fields(), "a sink is told the name of every field");
+        if let Some(lines) = &self.percepts {
+            assert_eq!(percepts.fields(), lines.fields(), "a sink is told the name of every field");
             for frame in 0..percepts.frames() {
                 self.line.clear();
-                composer.compose(percepts, frame, &mut self.line);
+                lines.write(percepts, frame, &mut self.line);
                 self.recorder.write(PERCEPTS, percepts.t_s(frame), &self.line)?;
             }
         }
-        if let Some(scenery) = &mut self.scenery {
-            scenery.see(percepts, &mut self.recorder)?;
+        if let Some(view) = &mut self.view {
+            view.write_touches(percepts, &mut self.recorder)?;
         }
         self.recorder.tick()?;
         Ok(Flow::Open)

@@ -1,4 +1,4 @@
-//! What a person writes to name a sink.
+//! Parses the names of sinks.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -49,7 +49,7 @@ impl FromStr for SinkSpec {
 }
 
 impl SinkSpec {
-    /// Asks for its file, or for standard output, as one of a command's `outputs`.
+    /// Reserves its file or standard output among a command's `outputs`.
     ///
     /// # Errors
     /// As [`OutputPaths::add`].
@@ -65,7 +65,7 @@ impl SinkSpec {
     }
 }
 
-/// A sink that may be opened: nothing that the command reads is lost by it.
+/// A sink whose output is reserved and overwrites no input.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum SinkTarget {

@@ -1,8 +1,7 @@
 //! Recordings as CSV: a header `t,<taxel id>,<taxel id>,...`, then a row a frame.
 //!
-//! A blank cell is a missing value; `nan` and `inf` are values that a sensor got wrong. All cells are numbers, so a quote
-//! means nothing: a pair around one cell is ignored, and any other is an error in its own row. Rows are read one at a time,
-//! so memory does not grow with the length of a recording.
+//! A blank cell is a missing value; `nan` and `inf` are faulty values. A pair of quotes around a cell is ignored; any other
+//! quote is an error. Rows are read one at a time, so memory does not grow with the length of a recording.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -15,13 +14,13 @@ use super::Source;
 use crate::error::{Error, Result};
 use crate::signal::{Frame, RawValue};
 
-/// Bytes a row may have, so that what is no CSV does not fill the memory.
-const MAX_ROW: usize = 64 << 20;
+/// Longest accepted row, so that a file that is no CSV does not fill the memory.
+const MAX_ROW_BYTES: usize = 64 << 20;
 
 /// A recording read from CSV.
 pub struct CsvSource {
     name: String,
-    reader: csv::Reader<Metered>,
+    reader: csv::Reader<LimitedReader>,
     total_bytes: Option<u64>,
     row: ByteRecord,
     taxels: Vec<u32>,
@@ -53,7 +52,7 @@ impl CsvSource {
     /// Opens the recording at `path`. `rate_hz` gives the time where the file has no column `t`.
     ///
     /// # Errors
-    /// The file cannot be read or its header is not as above; a usage error when a rate is missing or one too many.
+    /// The file cannot be read or has no valid header; a usage error if `rate_hz` is missing or not allowed.
     pub fn open(path: impl AsRef<Path>, rate_hz: Option<f64>) -> Result<Self> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, &e))?;
@@ -61,7 +60,7 @@ impl CsvSource {
         Self::from_reader(path.display().to_string(), file, length, rate_hz)
     }
 
-    /// Reads a recording from `reader`, which messages call `name`. `total_bytes` is what progress is measured by.
+    /// Reads a recording from `reader`, called `name` in messages. `total_bytes` is for [`Source::progress`].
     ///
     /// # Errors
     /// As [`CsvSource::open`].
@@ -76,10 +75,10 @@ impl CsvSource {
             .has_headers(false)
             .flexible(true)
             .quoting(false)
-            // Of `\r\n` the `\r` is trimmed with other blanks: only so is it known on which line a row stands.
+            // `\r` before it is trimmed with other blanks, so that line numbers stay right.
             .terminator(csv::Terminator::Any(b'\n'))
             .buffer_capacity(1 << 16)
-            .from_reader(Metered { inner: Box::new(reader), since_row: 0, last: b'\n', ended: false });
+            .from_reader(LimitedReader { inner: Box::new(reader), row_bytes: 0, last_byte: b'\n', ended: false });
         let mut source = Self {
             name,
             reader,
@@ -121,7 +120,7 @@ impl CsvSource {
             }
             self.taxels.push(id);
         }
-        // Only now, as a file without a header at all is better told so.
+        // Checked last, so that a file without any header gets the header's message.
         if !has_time && rate_hz.is_none() {
             return Err(Error::usage("the recording has no column `t`; say how fast it was recorded with --rate HZ"));
         }
@@ -134,7 +133,7 @@ impl CsvSource {
     /// Reads the next row that is not blank. `false` at the end.
     fn read_row(&mut self) -> Result<bool> {
         loop {
-            self.reader.get_mut().since_row = 0;
+            self.reader.get_mut().row_bytes = 0;
             let read = self.reader.read_byte_record(&mut self.row).map_err(|e| match e.into_kind() {
                 ErrorKind::Io(e) if e.kind() == io::ErrorKind::IsADirectory => {
                     Error::failed("this is a folder; name a file")
@@ -148,15 +147,14 @@ impl CsvSource {
         }
     }
 
-    /// Line on which the row just read ends. Where a row begins is not asked, as blank lines before it belong to it.
+    /// The line number of the row just read; the reader counts blank lines before it as part of the row.
     fn line(&self) -> u64 {
         let read = self.reader.get_ref();
-        self.reader.position().line() - u64::from(!(read.ended && read.last != b'\n'))
+        self.reader.position().line() - u64::from(!(read.ended && read.last_byte != b'\n'))
     }
 
-    /// What is wrong with the first cell of the row just read that holds a quote and is not in a pair of them.
+    /// The error for the first cell of the current row with an unpaired quote.
     fn stray_quote(&self) -> Option<Error> {
-        // Hardly any row has one.
         if !self.row.as_slice().contains(&b'"') {
             return None;
         }
@@ -176,7 +174,7 @@ impl CsvSource {
         let at_line = |e: Error| e.at(format!("line {line}"));
         let quote = self.stray_quote();
         if found != wanted {
-            // Only a last row may be ragged: the recorder was stopped in the middle of it.
+            // Only the last row may be cut short: the recorder was stopped while writing it.
             if self.read_row()? {
                 let ragged = || {
                     Error::failed(format!(
@@ -250,8 +248,8 @@ fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
     Err(Error::failed(format!("column {column} is headed `{}`, which is no taxel id; {remedy}", shortened(&word))))
 }
 
-/// Whether `line` could be a header or a row of a recording: `t`, numbers and blanks, with commas between them.
-pub(super) fn is_row(line: &[u8]) -> bool {
+/// Whether `line` looks like CSV: `t`, numbers and blanks, separated by commas.
+pub(super) fn is_csv_row(line: &[u8]) -> bool {
     let is_cell = |cell: &[u8]| matches!(trimmed(cell), b"" | b"t") || number(trimmed(cell)).is_some();
     line.contains(&b',') && line.split(|&byte| byte == b',').all(is_cell)
 }
@@ -284,7 +282,7 @@ fn parse_value(cell: &[u8]) -> Result<RawValue> {
     })
 }
 
-/// The number that up to seven digits spell, which is what most sensors deliver: exact, and three times as fast.
+/// Parses up to seven digits: most sensor values, three times as fast as the general parser.
 fn short_count(cell: &[u8]) -> Option<u32> {
     if !(1..=7).contains(&cell.len()) {
         return None;
@@ -292,12 +290,12 @@ fn short_count(cell: &[u8]) -> Option<u32> {
     cell.iter().try_fold(0, |count, byte| byte.is_ascii_digit().then(|| count * 10 + u32::from(byte - b'0')))
 }
 
-/// The number that `word` spells. `nan`, `inf` and `-inf`, in any case, are numbers to Rust's parser too.
+/// Parses a number; `nan`, `inf` and `-inf` in any case are accepted.
 fn number(word: &[u8]) -> Option<f64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// What is in `cell`, without blanks around it, or a pair of quotes.
+/// `cell` without surrounding blanks and a pair of quotes.
 fn trimmed(cell: &[u8]) -> &[u8] {
     match cell.trim_ascii() {
         [b'"', inner @ .., b'"'] => inner.trim_ascii(),
@@ -315,26 +313,26 @@ fn shortened(word: &str) -> String {
     short
 }
 
-/// A reader that refuses rows without an end, and knows how the file ends.
-struct Metered {
+/// A reader that limits the length of rows and knows whether the file ends with a newline.
+struct LimitedReader {
     inner: Box<dyn Read + Send>,
-    since_row: usize,
-    last: u8,
+    row_bytes: usize,
+    last_byte: u8,
     ended: bool,
 }
 
-impl Read for Metered {
+impl Read for LimitedReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.since_row > MAX_ROW {
+        if self.row_bytes > MAX_ROW_BYTES {
             return Err(io::Error::other(format!(
                 "a row of over {} MiB: no CSV, or its lines have no end",
-                MAX_ROW >> 20
+                MAX_ROW_BYTES >> 20
             )));
         }
         let read = self.inner.read(buffer)?;
-        self.since_row += read;
+        self.row_bytes += read;
         match buffer[..read].last() {
-            Some(&last) => self.last = last,
+            Some(&last) => self.last_byte = last,
             None => self.ended = true,
         }
         Ok(read)

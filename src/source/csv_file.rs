@@ -1,4 +1,4 @@
-//! Frames written as a recording in CSV.
+//! Writes frames as a CSV recording.
 
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::output::{OutputFile, OutputPath};
 use crate::signal::{Frame, RawValue};
 
-/// A recording in CSV being written: there once it is finished, and not before.
+/// Writes a CSV recording; the file appears when it is finished.
 pub struct CsvFile {
     file: BufWriter<OutputFile>,
     line: String,
@@ -28,7 +28,7 @@ impl CsvFile {
         Ok(file)
     }
 
-    /// Adds a frame; its poses have no place here.
+    /// Writes a frame without its poses.
     ///
     /// # Errors
     /// It cannot be written.
@@ -41,10 +41,10 @@ impl CsvFile {
         self.write_line()
     }
 
-    /// Puts the file in its place.
+    /// Moves the finished file into place.
     ///
     /// # Errors
-    /// It cannot be written, or one came up there meanwhile.
+    /// It cannot be written, or another file has been created there meanwhile.
     pub fn finish(self) -> Result<()> {
         let name = self.file.get_ref().name().to_owned();
         self.file.into_inner().map_err(|e| Error::io(name, e.error()))?.finish()
@@ -58,7 +58,7 @@ impl CsvFile {
     }
 }
 
-/// Appends the shortest word that reads back as the same single-precision value; missing is none, faulty `nan`.
+/// Appends the shortest number that reads back as the same f32; nothing for a missing value, `nan` for a faulty one.
 pub(super) fn put_value(value: RawValue, to: &mut String) {
     let _ = match value.number() {
         Some(number) => write!(to, "{}", number as f32),

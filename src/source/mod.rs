@@ -1,6 +1,6 @@
 //! Sources: where frames come from.
 //!
-//! A source knows the taxel ids it delivers and nothing of engines; of bodies only the simulated one does.
+//! A source knows the ids of the taxels it delivers; only the simulated one knows a body.
 
 mod csv;
 mod csv_file;
@@ -14,7 +14,7 @@ mod replay;
 mod serial;
 mod simulated;
 mod spec;
-mod unknown;
+mod unknown_taxels;
 
 pub use self::csv::CsvSource;
 pub use csv_file::CsvFile;
@@ -34,42 +34,42 @@ use crate::signal::Frame;
 
 /// Something that delivers frames.
 pub trait Source {
-    /// The taxel ids whose values its frames hold, in the order of [`Frame::values`].
+    /// The ids of the frames' taxels, in the order of [`Frame::values`].
     fn taxels(&self) -> &[u32];
 
     /// Reads the next frame into `frame`, whose `values` already have the right length. `false` at the end.
     ///
     /// # Errors
-    /// What arrived cannot be understood; the message names the place.
+    /// The input is invalid; the message names the place.
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool>;
 
-    /// How much of the whole has been read, in 0..=1, where that is known.
+    /// The share of the input that has been read, 0..=1, if known.
     fn progress(&self) -> Option<f64> {
         None
     }
 
-    /// Says that nothing before `t_s` is wanted: a source that can pass over it without reading it does so.
+    /// Lets the source skip frames before `t_s`, if it can do so without reading them.
     fn skip_to(&mut self, _t_s: f64) {}
 
-    /// From now on gives what is known to be stale as [`crate::RawValue::STALE`], not as missing: for engines that heed it.
+    /// From now on delivers stale values as [`crate::RawValue::STALE`] instead of as missing, for engines that track them.
     fn tell_stale(&mut self) {}
 
-    /// Whether any value so far is stale, which an engine has to heed then.
+    /// Whether any value so far was stale.
     fn has_stale(&self) -> bool {
         false
     }
 
-    /// When the last byte of the last frame was read, where that is known; asked for once a frame.
+    /// When the last byte of the last frame was read, if known; call it once per frame.
     fn read_at(&mut self) -> Option<Instant> {
         None
     }
 
-    /// What is to be said of the frames since the last call, a line each.
+    /// Messages about the frames since the last call, a line each.
     fn notices(&mut self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What arrived and was never processed, such as a truncated last row; told to the user, exit code 3.
+    /// Input that was never processed, such as a truncated last row; reported to the user, exit code 3.
     fn losses(&self) -> Vec<String> {
         Vec::new()
     }

@@ -1,9 +1,8 @@
 //! Live frames as NDJSON, one line each:
 //! `{"t":s,"values":{"<taxel id>":raw},"pose":{"<link>":[x,y,z,qx,qy,qz,qw]}}`.
 //!
-//! A taxel that a line leaves out, or gives as `null`, is missing; `"nan"` and `"inf"` are values that a sensor got
-//! wrong. A taxel that the body does not have is named once, and its values are left out and counted. A line goes
-//! straight into the frame, without a tree of JSON values in between.
+//! A taxel that is absent or `null` is missing; `"nan"` and `"inf"` are faulty values. A taxel that the body does not
+//! have is named once, and its values are skipped and counted. Lines are parsed directly into the frame.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -13,15 +12,15 @@ use glam::{DQuat, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::Source;
-use super::csv::is_row;
-use super::unknown::Unknown;
+use super::csv::is_csv_row;
+use super::unknown_taxels::UnknownTaxels;
 use crate::error::{Error, Result};
 use crate::signal::{Frame, Pose, RawValue};
 
-/// Bytes a line may have, so that garbage does not fill the memory.
-const MAX_LINE: u64 = 64 << 20;
+/// Longest accepted line, so that invalid input does not fill the memory.
+const MAX_LINE_BYTES: u64 = 64 << 20;
 
-/// Lengths of a quaternion that is a rotation written without care; others are damage.
+/// Quaternions with lengths in this range are normalised; others are errors.
 const QUATERNION_LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
 /// Frames read from NDJSON.
@@ -34,16 +33,16 @@ pub struct NdjsonSource {
     losses: Vec<String>,
 }
 
-/// The taxels that frames may name, and on which line each was named last.
+/// The body's taxels, and the line on which each last had a value.
 struct Taxels {
     ids: Vec<u32>,
     index: HashMap<u32, usize>,
     last_line: Vec<u64>,
-    unknown: Unknown,
+    unknown: UnknownTaxels,
 }
 
 impl NdjsonSource {
-    /// Reads frames from `reader`, which messages call `name`, for a body that has the taxels `ids`.
+    /// Reads frames from `reader`, called `name` in messages, for a body with the taxels `ids`.
     #[must_use]
     pub fn new(name: impl Into<String>, reader: impl BufRead + Send + 'static, ids: Vec<u32>) -> Self {
         let index = ids.iter().enumerate().map(|(index, &id)| (id, index)).collect();
@@ -53,52 +52,52 @@ impl NdjsonSource {
             reader: Box::new(reader),
             line: Vec::new(),
             line_number: 0,
-            taxels: Taxels { ids, index, last_line, unknown: Unknown::default() },
+            taxels: Taxels { ids, index, last_line, unknown: UnknownTaxels::default() },
             losses: Vec::new(),
         }
     }
 
-    /// Reads frames from standard input, for a body that has the taxels `ids`.
+    /// Reads frames from standard input for a body with the taxels `ids`.
     #[must_use]
     pub fn stdin(ids: Vec<u32>) -> Self {
         Self::new("stdin", BufReader::with_capacity(1 << 16, std::io::stdin()), ids)
     }
 
-    /// The same, for which a taxel that the body does not have is an error.
+    /// Makes a taxel that the body does not have an error.
     #[must_use]
     pub fn strict(mut self) -> Self {
         self.taxels.unknown.refused = true;
         self
     }
 
-    /// Reads the next line that is not blank into `self.line`. `None` at the end, else whether it has its newline.
+    /// Reads the next line that is not blank into `self.line`. `None` at the end, else whether it ends with a newline.
     fn read_line(&mut self) -> Result<Option<bool>> {
         loop {
             self.line.clear();
             self.line_number += 1;
             let read = (&mut self.reader)
-                .take(MAX_LINE + 1)
+                .take(MAX_LINE_BYTES + 1)
                 .read_until(b'\n', &mut self.line)
                 .map_err(|e| Error::failed(e.to_string()))?;
             if read == 0 {
                 return Ok(None);
             }
-            if self.line.len() as u64 > MAX_LINE {
+            if self.line.len() as u64 > MAX_LINE_BYTES {
                 return Err(Error::failed(format!(
                     "a line of over {} MiB; frames are one line of JSON each",
-                    MAX_LINE >> 20
+                    MAX_LINE_BYTES >> 20
                 ))
                 .at(format!("line {}", self.line_number)));
             }
-            let whole = self.line.last() == Some(&b'\n');
+            let has_newline = self.line.last() == Some(&b'\n');
             if !self.line.trim_ascii().is_empty() {
-                return Ok(Some(whole));
+                return Ok(Some(has_newline));
             }
         }
     }
 
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        let Some(whole) = self.read_line()? else { return Ok(false) };
+        let Some(has_newline) = self.read_line()? else { return Ok(false) };
         frame.clear();
         frame.values.resize(self.taxels.ids.len(), RawValue::MISSING);
         let line = if self.line_number == 1 {
@@ -110,7 +109,7 @@ impl NdjsonSource {
         let seed = FrameSeed { frame, taxels: &mut self.taxels, line: self.line_number };
         match seed.deserialize(&mut json).and_then(|()| json.end()) {
             Ok(()) => Ok(true),
-            Err(e) if e.is_eof() && !whole => {
+            Err(e) if e.is_eof() && !has_newline => {
                 self.losses.push(format!(
                     "{}: line {}: last line truncated after {} bytes",
                     self.name,
@@ -119,7 +118,7 @@ impl NdjsonSource {
                 ));
                 Ok(false)
             }
-            Err(_) if is_row(line) => {
+            Err(_) if is_csv_row(line) => {
                 Err(Error::failed("this is CSV, and `-` reads a line of JSON a frame; say --source csv:-")
                     .at(format!("line {}", self.line_number)))
             }
@@ -148,7 +147,7 @@ impl Source for NdjsonSource {
     }
 }
 
-/// `error`, told to be where a person finds it: the parser saw one line only.
+/// `error` with the line number of the input instead of the parser's, which sees one line at a time.
 fn explained(error: &serde_json::Error, line: u64) -> Error {
     let text = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());
@@ -161,7 +160,7 @@ fn explained(error: &serde_json::Error, line: u64) -> Error {
     Error::failed(what).at(format!("line {line}, column {}", error.column()))
 }
 
-/// Puts a line's object into `frame`.
+/// Parses a line's object into `frame`.
 struct FrameSeed<'a> {
     frame: &'a mut Frame,
     taxels: &'a mut Taxels,

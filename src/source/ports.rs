@@ -1,4 +1,4 @@
-//! The serial ports of this machine, without opening any: on some boards that would pull the reset line.
+//! Lists this machine's serial ports without opening any: opening resets some boards.
 
 use std::path::{Path, PathBuf};
 
@@ -10,39 +10,39 @@ use crate::error::{Error, Result};
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PortSummary {
-    /// What to open, such as `/dev/ttyUSB0`.
+    /// The name to open, such as `/dev/ttyUSB0`.
     pub name: String,
-    /// How it is connected: bus, maker, product and serial number as far as they are known.
-    pub what: String,
-    /// A name that stays the same whichever port is plugged in first, where the system gives one.
-    pub steady: Option<PathBuf>,
-    /// Why it cannot be used now, and what to do about that.
-    pub trouble: Option<String>,
+    /// Bus, maker, product and serial number as far as known.
+    pub device: String,
+    /// A path that does not depend on the order of plugging in, if the system has one.
+    pub stable_path: Option<PathBuf>,
+    /// Why it cannot be opened, and what to do.
+    pub problem: Option<String>,
 }
 
-/// The serial ports that the system names. Pseudo-terminals are not among them; they open like all others.
+/// The serial ports that the system lists. Pseudo-terminals are not listed, but can be opened.
 ///
 /// # Errors
-/// The system does not say.
+/// The system cannot list them.
 pub fn serial_ports() -> Result<Vec<PortSummary>> {
     let mut found = serialport::available_ports()
         .map_err(|e| Error::failed(format!("the system does not say which serial ports it has: {e}")))?;
     found.sort_by(|a, b| a.port_name.cmp(&b.port_name));
-    let steady = links(Path::new("/dev/serial/by-id"));
-    Ok(found.into_iter().map(|port| summary(port, &steady)).collect())
+    let stable_path = links(Path::new("/dev/serial/by-id"));
+    Ok(found.into_iter().map(|port| summary(port, &stable_path)).collect())
 }
 
-fn summary(port: SerialPortInfo, steady: &[(PathBuf, PathBuf)]) -> PortSummary {
+fn summary(port: SerialPortInfo, stable_path: &[(PathBuf, PathBuf)]) -> PortSummary {
     let path = Path::new(&port.port_name);
     PortSummary {
-        what: what(&port.port_type),
-        steady: steady.iter().find(|(_, target)| target == path).map(|(link, _)| link.clone()),
-        trouble: trouble(path),
+        device: device(&port.port_type),
+        stable_path: stable_path.iter().find(|(_, target)| target == path).map(|(link, _)| link.clone()),
+        problem: problem(path),
         name: port.port_name,
     }
 }
 
-fn what(kind: &SerialPortType) -> String {
+fn device(kind: &SerialPortType) -> String {
     match kind {
         SerialPortType::UsbPort(usb) => {
             let mut words = vec!["USB".to_owned()];
@@ -58,7 +58,7 @@ fn what(kind: &SerialPortType) -> String {
     }
 }
 
-/// The symbolic links in `folder`, with what they lead to.
+/// The symbolic links in `folder` with their targets.
 fn links(folder: &Path) -> Vec<(PathBuf, PathBuf)> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut links: Vec<_> =
@@ -67,9 +67,9 @@ fn links(folder: &Path) -> Vec<(PathBuf, PathBuf)> {
     links
 }
 
-/// Why `port` cannot be opened for reading and writing, as far as its permissions say.
+/// Why `port`'s permissions do not allow reading and writing.
 #[cfg(unix)]
-fn trouble(port: &Path) -> Option<String> {
+fn problem(port: &Path) -> Option<String> {
     use rustix::fs::{Access, access};
     use rustix::io::Errno;
     use std::os::unix::fs::MetadataExt;
@@ -90,7 +90,7 @@ fn trouble(port: &Path) -> Option<String> {
 }
 
 #[cfg(not(unix))]
-fn trouble(_: &Path) -> Option<String> {
+fn problem(_: &Path) -> Option<String> {
     None
 }
 
@@ -99,7 +99,7 @@ fn groups() -> String {
     std::fs::read_to_string("/etc/group").unwrap_or_default()
 }
 
-/// What `groups`, a file like /etc/group, calls the group `gid`.
+/// The name of the group `gid` in `groups`, the text of /etc/group.
 #[cfg(unix)]
 fn group(groups: &str, gid: u32) -> Option<String> {
     groups.lines().find_map(|line| {
@@ -123,7 +123,7 @@ mod tests {
             manufacturer: Some("FTDI".into()),
             product: None,
         };
-        assert_eq!(what(&SerialPortType::UsbPort(usb)), "USB FTDI 0403:6001 no. A50285BI");
+        assert_eq!(device(&SerialPortType::UsbPort(usb)), "USB FTDI 0403:6001 no. A50285BI");
     }
 
     #[cfg(unix)]
@@ -138,8 +138,8 @@ mod tests {
         std::os::unix::fs::symlink("nowhere", by_id.join("gone")).unwrap();
         let info = SerialPortInfo { port_name: port.display().to_string(), port_type: SerialPortType::PciPort };
         let seen = summary(info, &links(&by_id));
-        assert_eq!((seen.steady, seen.trouble), (Some(by_id.join("usb-board")), None));
-        assert!(trouble(&by_id.join("gone")).is_some());
+        assert_eq!((seen.stable_path, seen.problem), (Some(by_id.join("usb-board")), None));
+        assert!(problem(&by_id.join("gone")).is_some());
     }
 
     #[cfg(unix)]

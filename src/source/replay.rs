@@ -1,57 +1,57 @@
-//! Part of a recording, once or again and again.
+//! Replays a part of a recording, once or repeatedly.
 
 use super::Source;
 use crate::error::{Error, Result};
 use crate::signal::Frame;
 
-/// Which part of a recording is played, and how often.
+/// The part of a recording to replay, and the number of repetitions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
-    /// From this many seconds after its first frame.
+    /// Start, s after its first frame.
     pub from_s: f64,
-    /// Up to this many, that frame not included.
+    /// End, s after its first frame, exclusive.
     pub to_s: f64,
-    /// How many times; 0 is without end.
+    /// Number of repetitions; 0 is endless.
     pub times: u64,
 }
 
 impl Cut {
-    /// All of it, once.
+    /// The whole recording, once.
     pub const WHOLE: Self = Self { from_s: 0.0, to_s: f64::INFINITY, times: 1 };
 }
 
 type Open = Box<dyn FnMut() -> Result<Box<dyn Source + Send>> + Send>;
 
-/// Plays part of a source. Time goes on where it is played again: the first frame comes as long after the last one as the
-/// last one came after the one before it.
+/// Replays a part of a source. Times continue over repetitions: the first frame follows the last one by the same step as
+/// between the last two.
 pub struct Replay {
     open: Open,
     source: Box<dyn Source + Send>,
     taxels: Vec<u32>,
     cut: Cut,
     played: u64,
-    /// When this turn's recording began.
+    /// Time of the first frame of this repetition, s.
     start_s: Option<f64>,
-    /// What is added to its times, s.
+    /// Offset added to its times, s.
     shift_s: f64,
-    /// The last frame's time as it was given, and the step that led to it, s.
+    /// The last delivered time and the step before it, s.
     last_s: Option<f64>,
     step_s: f64,
-    /// Whether this turn gave anything.
-    gave: bool,
-    /// Whether the next frame is the first of a turn that is not the first.
-    again: bool,
-    /// Whether what is stale is to be told, and whether anything was in the turns before.
-    tells_stale: bool,
+    /// Whether this repetition has delivered a frame.
+    has_delivered: bool,
+    /// Whether the next frame is the first of a repetition.
+    restarted: bool,
+    /// Whether stale values are to be marked, and whether earlier repetitions had any.
+    marks_stale: bool,
     had_stale: bool,
     losses: Vec<String>,
 }
 
 impl Replay {
-    /// Plays `cut` of the source that `open` opens, each time anew.
+    /// Replays `cut` of the source that `open` opens, once per repetition.
     ///
     /// # Errors
-    /// It cannot be opened; the part is none.
+    /// The source cannot be opened, or `cut` is empty.
     pub fn new(mut open: impl FnMut() -> Result<Box<dyn Source + Send>> + Send + 'static, cut: Cut) -> Result<Self> {
         let Cut { from_s, to_s, .. } = cut;
         if !from_s.is_finite() || from_s < 0.0 || to_s.is_nan() || to_s <= from_s {
@@ -70,31 +70,31 @@ impl Replay {
             shift_s: 0.0,
             last_s: None,
             step_s: 0.0,
-            gave: false,
-            again: false,
-            tells_stale: false,
+            has_delivered: false,
+            restarted: false,
+            marks_stale: false,
             had_stale: false,
             losses: Vec::new(),
         })
     }
 
-    /// Begins another turn, if there is to be one.
-    fn turn(&mut self) -> Result<bool> {
+    /// Starts the next repetition, if any is left.
+    fn next_repetition(&mut self) -> Result<bool> {
         for loss in self.source.losses() {
             if !self.losses.contains(&loss) {
                 self.losses.push(loss);
             }
         }
         self.played += 1;
-        if self.played == self.cut.times || !self.gave {
+        if self.played == self.cut.times || !self.has_delivered {
             return Ok(false);
         }
         self.had_stale |= self.source.has_stale();
         self.source = (self.open)()?;
-        if self.tells_stale {
+        if self.marks_stale {
             self.source.tell_stale();
         }
-        (self.start_s, self.gave, self.again) = (None, false, true);
+        (self.start_s, self.has_delivered, self.restarted) = (None, false, true);
         Ok(true)
     }
 }
@@ -107,7 +107,7 @@ impl Source for Replay {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             if !self.source.next_frame(frame)? {
-                if self.turn()? {
+                if self.next_repetition()? {
                     continue;
                 }
                 return Ok(false);
@@ -126,18 +126,18 @@ impl Source for Replay {
                 continue;
             }
             if since_s >= self.cut.to_s {
-                if self.turn()? {
+                if self.next_repetition()? {
                     continue;
                 }
-                // The rest is not wanted, so nothing of it is lost either.
+                // The rest is not requested, so it is not a loss.
                 self.cut.times = self.played;
-                self.gave = false;
+                self.has_delivered = false;
                 return Ok(false);
             }
-            if std::mem::take(&mut self.again) {
+            if std::mem::take(&mut self.restarted) {
                 self.shift_s = self.last_s.unwrap_or(0.0) + self.step_s - frame.t_s;
             }
-            // Adding nothing could still make −0 of 0.
+            // Adding 0 would turn −0 into 0.
             if self.shift_s != 0.0 {
                 frame.t_s += self.shift_s;
             }
@@ -145,7 +145,7 @@ impl Source for Replay {
                 self.step_s = frame.t_s - last_s;
             }
             self.last_s = Some(frame.t_s);
-            self.gave = true;
+            self.has_delivered = true;
             return Ok(true);
         }
     }
@@ -159,7 +159,7 @@ impl Source for Replay {
     }
 
     fn tell_stale(&mut self) {
-        self.tells_stale = true;
+        self.marks_stale = true;
         self.source.tell_stale();
     }
 

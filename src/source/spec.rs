@@ -1,4 +1,4 @@
-//! What a person writes to name a source.
+//! Parses the names of sources.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source};
 use crate::error::{Error, Result, nearest};
 
-/// How each kind of source is written.
+/// The syntax of each kind of source.
 const FORMS: [(&str, &str); 6] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
@@ -55,11 +55,10 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
-    /// The source that `text` names, which is of one of `kinds`: `csv`, `serial`, `mcap`, `sim`, `-`
-    /// and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `mcap`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
-    /// A usage error that lists how those kinds are written, and no others.
+    /// A usage error that lists the syntax of these kinds.
     pub fn one_of(text: &str, kinds: &[&str]) -> Result<Self> {
         let forms: Vec<&str> = FORMS.iter().filter(|(kind, _)| kinds.contains(kind)).map(|(_, form)| *form).collect();
         let forms = match &forms[..] {
@@ -118,7 +117,7 @@ impl SourceSpec {
     /// Opens the source. `taxels` are the ids that the body has, `rate_hz` the rate of a CSV without a column `t`.
     ///
     /// # Errors
-    /// It cannot be opened, or this build does not read it; a usage error where a rate makes no sense.
+    /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
     pub fn open(&self, taxels: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
         if rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin) {
             return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));

@@ -1,4 +1,4 @@
-//! How far percepts are off: from the reference's, and from the truth.
+//! Errors of percepts against the reference and against the truth.
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -13,14 +13,14 @@ use crate::signal::{Calibration, Letter};
 use crate::source::Truth;
 use crate::stage::angle;
 
-/// What is said of many errors.
+/// Statistics of errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
-    /// How many.
+    /// Their number.
     pub compared: u64,
     /// Root of the mean square.
     pub rms: f64,
-    /// What 1 % exceed.
+    /// The 99th percentile.
     pub p99: f64,
     /// The largest.
     pub worst: f64,
@@ -42,22 +42,22 @@ impl Errors {
     }
 }
 
-/// The least of `sorted` that a `share` of them do not exceed.
+/// The percentile `share` of `sorted`.
 pub(super) fn rank(sorted: &[f64], share: f64) -> f64 {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted[rank.clamp(1, sorted.len()) - 1]
 }
 
-/// Fields in one kind of charts, with the skin under them: it makes places of different charts comparable.
-pub(super) struct Ruler {
+/// Fields with one kind of charts and their surface, to compare points of different charts.
+pub(super) struct ChartGeometry {
     plan: Plan,
     /// Fields that could not have such a chart.
     pub(super) kept: Vec<String>,
 }
 
-impl Ruler {
-    /// For `made`, which are the body's fields in `charts`.
-    pub(super) fn new(body: &Body, options: &Options, charts: Charts, made: &Recharted) -> Result<Self> {
+impl ChartGeometry {
+    /// For `charted`, which are the body's fields in `charts`.
+    pub(super) fn new(body: &Body, options: &Options, charts: Charts, charted: &Recharted) -> Result<Self> {
         let scene = Scene {
             outputs: Outputs::CENTROID | Outputs::POSITION,
             fields: options.scene.fields.clone(),
@@ -65,12 +65,12 @@ impl Ruler {
             knobs: Knobs::default(),
             ..Scene::default()
         };
-        let plan = Plan::new(body, &made.fields, &scene, &Calibration::identity(body.taxels.len()))?;
-        let kept = made.kept.iter().map(|(name, why)| format!("{charts}: {name}: {why}")).collect();
+        let plan = Plan::new(body, &charted.fields, &scene, &Calibration::identity(body.taxels.len()))?;
+        let kept = charted.kept.iter().map(|(name, why)| format!("{charts}: {name}: {why}")).collect();
         Ok(Self { plan, kept })
     }
 
-    /// Fields in all letters count the first one's.
+    /// The field of the first letter.
     fn field(&self, field: usize) -> &PlanField {
         &self.plan.fields[field]
     }
@@ -83,25 +83,25 @@ impl Ruler {
         &self.field(field).link
     }
 
-    /// The point of the skin at `uv`, in the field's anchor, m.
+    /// The surface point at `uv`, in the field's anchor, m.
     fn point(&self, field: usize, uv: DVec2) -> Option<DVec3> {
         let field = self.field(field);
         let surface = field.surface.as_ref()?;
         Some(surface.at(uv).0)
     }
 
-    /// The direction over the skin in which a line at `angle` leads from `uv`.
+    /// The direction on the surface of a line at `angle` through `uv`.
     fn direction(&self, field: usize, uv: DVec2, angle: f64) -> Option<DVec3> {
         let step = DVec2::new(libm::cos(angle), libm::sin(angle)) * (self.reach_m(field) / 2.0);
         (self.point(field, uv + step)? - self.point(field, uv - step)?).try_normalize()
     }
 
-    /// About how far taxels lie apart, m: over less, a skin that is sampled by them has no direction.
+    /// Typical distance of taxels, m; directions on the surface are taken over it.
     fn reach_m(&self, field: usize) -> f64 {
         self.field(field).spacing * f64::from(self.field(field).unit_m)
     }
 
-    /// Whether all fields have the charts that they have in `other`.
+    /// Whether all fields have the same charts in `other`.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         (0..self.plan.fields.len()).all(|field| self.has_same_chart(other, field))
     }
@@ -111,9 +111,9 @@ impl Ruler {
     }
 }
 
-/// The errors of one combination so far.
+/// The errors of one combination.
 #[derive(Default)]
-pub(super) struct Sum {
+pub(super) struct ErrorSamples {
     /// mm, and degrees.
     pub(super) centroid: Vec<f64>,
     pub(super) orientation: Vec<f64>,
@@ -121,7 +121,7 @@ pub(super) struct Sum {
     pub(super) true_orientation: Vec<f64>,
 }
 
-/// The orientation of a percept: by second moments if `by_moments`.
+/// The orientation of a percept, by second moments if `by_moments`.
 fn orientation(percept: &Percept, by_moments: bool) -> Option<f64> {
     if by_moments { percept.axis } else { percept.orientation }
 }
@@ -131,17 +131,24 @@ fn between(a: DVec3, b: DVec3) -> f64 {
     libm::atan2(a.cross(b).length(), a.dot(b).abs()).to_degrees()
 }
 
-impl Sum {
-    /// Adds how far `got`, in the charts of `ruler`, is off from `right`, in those of `authored`.
-    pub(super) fn add(&mut self, ruler: &Ruler, authored: &Ruler, got: &Percept, right: &Percept, by_moments: bool) {
+impl ErrorSamples {
+    /// Adds the errors of `got`, in the charts of `geometry`, against `right`, in those of `authored`.
+    pub(super) fn add(
+        &mut self,
+        geometry: &ChartGeometry,
+        authored: &ChartGeometry,
+        got: &Percept,
+        right: &Percept,
+        by_moments: bool,
+    ) {
         let field = got.field;
         let (Some(at), Some(right_at)) = (got.centroid, right.centroid) else { return };
         let (at, right_at) = (DVec2::from_array(at), DVec2::from_array(right_at));
-        let same = ruler.has_same_chart(authored, field);
+        let same = geometry.has_same_chart(authored, field);
         let off = if same {
             Some(at.distance(right_at))
         } else {
-            ruler.point(field, at).zip(authored.point(field, right_at)).map(|(a, b)| a.distance(b))
+            geometry.point(field, at).zip(authored.point(field, right_at)).map(|(a, b)| a.distance(b))
         };
         self.centroid.extend(off.map(|metres| metres * 1e3));
         let tied = !by_moments && (got.flags | right.flags).contains(Flags::TIE);
@@ -149,28 +156,28 @@ impl Sum {
         let turned = if same {
             Some(angle::between_lines(a, b).to_degrees())
         } else {
-            let directions = ruler.direction(field, at, a).zip(authored.direction(field, right_at, b));
+            let directions = geometry.direction(field, at, a).zip(authored.direction(field, right_at, b));
             directions.map(|(a, b)| between(a, b))
         };
         self.orientation.extend(turned.filter(|_| !tied));
     }
 
-    /// Adds how far `got` is off from the `truth` of the one touch on its field.
+    /// Adds the errors of `got` against the `truth` of the only touch on its field.
     pub(super) fn add_truth(
         &mut self,
-        ruler: &Ruler,
-        authored: &Ruler,
+        geometry: &ChartGeometry,
+        authored: &ChartGeometry,
         got: &Percept,
         truth: &Truth,
         by_moments: bool,
     ) {
         let field = got.field;
         let Some(at) = got.centroid.map(DVec2::from_array) else { return };
-        let off = ruler.point(field, at).map(|point| point.distance(truth.position_in_link));
+        let off = geometry.point(field, at).map(|point| point.distance(truth.position_in_link));
         self.true_centroid.extend(off.map(|metres| metres * 1e3));
         let right = truth.angle.zip(truth.uv);
         let right = right.and_then(|(angle, uv)| authored.direction(field, DVec2::from_array(uv), angle));
-        let got = orientation(got, by_moments).and_then(|angle| ruler.direction(field, at, angle));
+        let got = orientation(got, by_moments).and_then(|angle| geometry.direction(field, at, angle));
         self.true_orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
     }
 }
@@ -194,11 +201,11 @@ mod tests {
     #[test]
     fn a_place_is_the_same_on_the_skin_whatever_chart_it_is_told_in() {
         let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
-        let rulers = [Charts::Plane, Charts::Geodesic].map(|charts| {
-            let made = charts.applied(&body, FieldSet::new(&body).unwrap(), &[]).unwrap();
-            Ruler::new(&body, &Options::default(), charts, &made).unwrap()
+        let geometries = [Charts::Plane, Charts::Geodesic].map(|charts| {
+            let charted = charts.applied(&body, FieldSet::new(&body).unwrap(), &[]).unwrap();
+            ChartGeometry::new(&body, &Options::default(), charts, &charted).unwrap()
         });
-        let [plane, geodesic] = &rulers;
+        let [plane, geodesic] = &geometries;
         let mut compared = 0;
         for field in 0..plane.plan.fields.len() {
             if plane.has_same_chart(geodesic, field) {

@@ -1,10 +1,10 @@
-//! Combinations of knobs, taking turns.
+//! Measures time and errors of combinations of knobs.
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use super::errors::{Errors, Ruler, Sum, rank};
+use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
 use super::{Combination, Report, Row, Way};
 use crate::backend::BackendKind;
 use crate::body::Body;
@@ -16,54 +16,54 @@ use crate::scene::{Charts, Knobs, OrientationBy, Scene};
 use crate::signal::Frame;
 use crate::source::Truth;
 
-/// Frames, and what is true in each of them where that is known.
+/// Frames, and their truth if known.
 #[derive(Clone, Debug, Default)]
 pub struct Played {
-    /// What they came from, for people.
+    /// Their source, for display.
     pub source: String,
-    /// The ids of the taxels whose values they hold.
+    /// The ids of their taxels.
     pub taxels: Vec<u32>,
     /// The frames.
     pub frames: Vec<Frame>,
-    /// Per frame; empty where nothing is known.
+    /// Per frame; empty if unknown.
     pub truth: Vec<Vec<Truth>>,
 }
 
-/// How long is measured, and what.
+/// Settings of a measurement.
 #[derive(Clone, Debug)]
 pub struct Manner {
-    /// The time that turns take together, s.
+    /// Total time of all turns, s.
     pub seconds: f64,
-    /// Frames a call, of many.
+    /// Frames per call of a batch.
     pub batch: usize,
     /// Live, in batches, or both.
     pub ways: Vec<Way>,
-    /// On what.
+    /// The backends.
     pub backends: Vec<BackendKind>,
 }
 
-/// A turn of one combination, about.
-const TURN: Duration = Duration::from_micros(1500);
-/// Rounds at least: a first one that warms up, and some that count.
-const ROUNDS: usize = 4;
+/// Time of a turn of one combination, about.
+const TURN_TIME: Duration = Duration::from_micros(1500);
+/// Minimum number of rounds; the first one warms up.
+const MIN_ROUNDS: usize = 4;
 
 /// A combination that is being measured.
 struct Trial {
     way: Way,
     combination: Combination,
     engine: Engine,
-    /// Which call is next, and how often all have been gone through.
+    /// The next call, and the number of complete passes.
     next: usize,
-    gone_through: u32,
+    passes: u32,
     times_us: Vec<f64>,
-    errors: Sum,
+    errors: ErrorSamples,
 }
 
-/// Calls, each some frames, that are gone through again and again in a time that goes on.
+/// Calls of some frames each, which are repeated with continuing times.
 struct Calls {
     calls: Vec<Vec<Frame>>,
     times_s: Vec<Vec<f64>>,
-    /// From the first frame to the first of the next time.
+    /// Time of a pass, s.
     period_s: f64,
 }
 
@@ -77,9 +77,9 @@ impl Calls {
         Self { calls, times_s, period_s: last - first + if step > 0.0 { step } else { 0.01 } }
     }
 
-    /// Call `index`, when all have been gone through so often.
-    fn at(&mut self, index: usize, gone_through: u32) -> &[Frame] {
-        let later = self.period_s * f64::from(gone_through);
+    /// Call `index` in pass `passes`.
+    fn at(&mut self, index: usize, passes: u32) -> &[Frame] {
+        let later = self.period_s * f64::from(passes);
         for (frame, t_s) in self.calls[index].iter_mut().zip(&self.times_s[index]) {
             frame.t_s = t_s + later;
         }
@@ -87,13 +87,13 @@ impl Calls {
     }
 }
 
-/// Measures all combinations of knobs that make sense for `options` on `body`, whose knobs that are turned stay as they are.
+/// Measures all combinations of knobs for `options` on `body`; knobs that `options` sets stay fixed.
 ///
-/// `progress` is told what share is done, and says whether to go on. Where it does not, what has been measured is the
-/// report, if every combination had its turn.
+/// `progress` gets the share that is done and returns whether to continue. If not, the report has what was measured so far,
+/// if every combination had a turn.
 ///
 /// # Errors
-/// No frame touches a field; the scene makes no sense; it was stopped too early.
+/// No frame touches a field; the scene is invalid; it was stopped too early.
 pub fn measure(
     body: &Body,
     options: &Options,
@@ -101,9 +101,9 @@ pub fn measure(
     manner: &Manner,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
-    // Once: on some bodies geodesic charts take seconds to lay.
-    let made = all_charts(body, options)?;
-    let rulers = rulers(body, options, &made)?;
+    // Once, as geodesic charts may take seconds.
+    let charted = all_charts(body, options)?;
+    let geometries = geometries(body, options, &charted)?;
     let mut report = Report {
         body: body.name.clone(),
         source: played.source.clone(),
@@ -112,17 +112,17 @@ pub fn measure(
         touched: 0,
         ties: 0,
         truth: false,
-        kept_charts: rulers.values().flat_map(|ruler| ruler.kept.clone()).collect(),
+        kept_charts: geometries.values().flat_map(|geometry| geometry.kept.clone()).collect(),
         left_out: Vec::new(),
         rows: Vec::new(),
     };
-    let authored = &rulers[Charts::AsAuthored.word()];
-    let another = |charts: Charts| charts == options.scene.knobs.charts || !rulers[charts.word()].is_like(authored);
-    for charts in Charts::ALL.iter().filter(|charts| rulers.contains_key(charts.word()) && !another(**charts)) {
+    let authored = &geometries[Charts::AsAuthored.word()];
+    let another = |charts: Charts| charts == options.scene.knobs.charts || !geometries[charts.word()].is_like(authored);
+    for charts in Charts::ALL.iter().filter(|charts| geometries.contains_key(charts.word()) && !another(**charts)) {
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
     }
-    const MADE: f64 = 0.1;
-    const COMPARED: f64 = 0.3;
+    const PROGRESS_BUILT: f64 = 0.1;
+    const PROGRESS_COMPARED: f64 = 0.3;
     let stopped = || Error::failed("stopped before everything had been measured once");
     let combinations: Vec<(Way, Combination)> = manner
         .ways
@@ -132,7 +132,7 @@ pub fn measure(
         .collect();
     let mut trials = Vec::new();
     for (index, &(way, combination)) in combinations.iter().enumerate() {
-        let recharted = made[combination.knobs.charts.word()].clone();
+        let recharted = charted[combination.knobs.charts.word()].clone();
         match Trial::new(body, options, played, way, combination, recharted, manner.batch) {
             Ok(trial) => trials.push(trial),
             Err(e) if combination.backend == BackendKind::Gpu => {
@@ -143,12 +143,12 @@ pub fn measure(
             }
             Err(e) => return Err(e),
         }
-        if !progress(MADE * (index + 1) as f64 / combinations.len() as f64) {
+        if !progress(PROGRESS_BUILT * (index + 1) as f64 / combinations.len() as f64) {
             return Err(stopped());
         }
     }
-    // What they are off by, once.
-    let right = Right::new(body, options, played, authored)?;
+    // Errors, once.
+    let right = ReferencePercepts::new(body, options, played, authored)?;
     (report.touched, report.ties, report.truth) = (right.touched, right.ties, right.has_truth);
     if report.touched == 0 {
         return Err(Error::failed("no field with a chart is touched in these frames; give others").at(&played.source));
@@ -156,13 +156,13 @@ pub fn measure(
     let count = trials.len();
     let mut calls = [Calls::new(&played.frames, 1), Calls::new(&played.frames, manner.batch.max(1))];
     for (index, trial) in trials.iter_mut().enumerate() {
-        let ruler = &rulers[&trial.combination.knobs.charts.word()];
-        trial.compare(&mut calls[trial.way as usize], ruler, authored, &right)?;
-        if !progress(MADE + (COMPARED - MADE) * (index + 1) as f64 / count as f64) {
+        let geometry = &geometries[&trial.combination.knobs.charts.word()];
+        trial.compare(&mut calls[trial.way as usize], geometry, authored, &right)?;
+        if !progress(PROGRESS_BUILT + (PROGRESS_COMPARED - PROGRESS_BUILT) * (index + 1) as f64 / count as f64) {
             return Err(stopped());
         }
     }
-    // What they take, in turns.
+    // Times, in turns.
     let start = Instant::now();
     let mut rounds = 0;
     loop {
@@ -174,11 +174,11 @@ pub fn measure(
             trials.iter_mut().for_each(|trial| trial.times_us.clear());
         }
         let share = (start.elapsed().as_secs_f64() / manner.seconds).min(1.0);
-        let go_on = progress(COMPARED + (1.0 - COMPARED) * share);
+        let go_on = progress(PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
         if rounds < 2 && !go_on {
             return Err(stopped());
         }
-        if !go_on || (rounds >= ROUNDS && share >= 1.0) {
+        if !go_on || (rounds >= MIN_ROUNDS && share >= 1.0) {
             break;
         }
     }
@@ -187,7 +187,7 @@ pub fn measure(
     Ok(report)
 }
 
-/// What `scene` asks for when it asks for an orientation.
+/// The method of orientation that `scene` requests.
 fn asked_by(scene: &Scene) -> OrientationBy {
     match scene.knobs.orientation_by {
         OrientationBy::AsAsked if scene.outputs.contains(Outputs::ORIENTATION) => OrientationBy::TwoPoints,
@@ -196,7 +196,7 @@ fn asked_by(scene: &Scene) -> OrientationBy {
     }
 }
 
-/// The body's fields in each kind of charts that is measured.
+/// The body's fields with each kind of charts to measure.
 fn all_charts(body: &Body, options: &Options) -> Result<BTreeMap<&'static str, Recharted>> {
     let given = options.scene.knobs.charts;
     let kinds =
@@ -204,28 +204,28 @@ fn all_charts(body: &Body, options: &Options) -> Result<BTreeMap<&'static str, R
     kinds.map(|kind| Ok((kind.word(), kind.applied(body, FieldSet::new(body)?, &options.scene.fields)?))).collect()
 }
 
-/// A ruler for each of them.
-fn rulers(
+/// Their geometries.
+fn geometries(
     body: &Body,
     options: &Options,
-    made: &BTreeMap<&'static str, Recharted>,
-) -> Result<BTreeMap<&'static str, Ruler>> {
-    let kinds = Charts::ALL.iter().filter_map(|kind| Some((kind, made.get(kind.word())?)));
-    kinds.map(|(&kind, made)| Ok((kind.word(), Ruler::new(body, options, kind, made)?))).collect()
+    charted: &BTreeMap<&'static str, Recharted>,
+) -> Result<BTreeMap<&'static str, ChartGeometry>> {
+    let kinds = Charts::ALL.iter().filter_map(|kind| Some((kind, charted.get(kind.word())?)));
+    kinds.map(|(&kind, charted)| Ok((kind.word(), ChartGeometry::new(body, options, kind, charted)?))).collect()
 }
 
-/// What the reference says of all frames.
-struct Right {
+/// The reference's percepts of all frames, and the truth.
+struct ReferencePercepts {
     percepts: Percepts,
     touched: u64,
     ties: u64,
     has_truth: bool,
-    /// Per frame, the field and the truth of it where one touch alone is on it.
+    /// Per frame the fields with a single touch, and its truth.
     truth: Vec<Vec<(usize, Truth)>>,
 }
 
-impl Right {
-    fn new(body: &Body, options: &Options, played: &Played, authored: &Ruler) -> Result<Self> {
+impl ReferencePercepts {
+    fn new(body: &Body, options: &Options, played: &Played, authored: &ChartGeometry) -> Result<Self> {
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
@@ -268,21 +268,27 @@ impl Trial {
         if backend == BackendKind::Reference {
             knobs.arithmetic = None;
         }
-        // An orientation is judged by the centroid that it is about.
+        // Orientations are compared at their centroids.
         let outputs = options.scene.outputs | Outputs::CENTROID;
         let scene = Scene { knobs, outputs, ..options.scene.clone() };
         let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
         engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
-        let (times_us, errors) = (Vec::new(), Sum::default());
-        Ok(Self { way, combination, engine, next: 0, gone_through: 0, times_us, errors })
+        let (times_us, errors) = (Vec::new(), ErrorSamples::default());
+        Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors })
     }
 
     fn by_moments(&self) -> bool {
         self.combination.knobs.orientation_by == OrientationBy::SecondMoments
     }
 
-    /// Goes through all frames once, and finds out how far percepts are off.
-    fn compare(&mut self, calls: &mut Calls, ruler: &Ruler, authored: &Ruler, right: &Right) -> Result<()> {
+    /// Processes all frames once, and collects errors.
+    fn compare(
+        &mut self,
+        calls: &mut Calls,
+        geometry: &ChartGeometry,
+        authored: &ChartGeometry,
+        right: &ReferencePercepts,
+    ) -> Result<()> {
         let by_moments = self.by_moments();
         let letters = self.engine.plan().letters().len();
         let mut frame = 0;
@@ -292,30 +298,30 @@ impl Trial {
                 for field in (0..percepts.fields()).step_by(letters) {
                     let mut got = percepts.get(index, field);
                     got.field = field / letters;
-                    self.errors.add(ruler, authored, &got, &right.percepts.get(frame, field), by_moments);
+                    self.errors.add(geometry, authored, &got, &right.percepts.get(frame, field), by_moments);
                     let truths = right.truth.get(frame).into_iter().flatten();
                     for (_, truth) in truths.filter(|(of, _)| *of == field && got.contact) {
-                        self.errors.add_truth(ruler, authored, &got, truth, by_moments);
+                        self.errors.add_truth(geometry, authored, &got, truth, by_moments);
                     }
                 }
                 frame += 1;
             }
         }
-        self.gone_through = 1;
+        self.passes = 1;
         Ok(())
     }
 
-    /// Goes on for about a turn.
+    /// Runs for about a turn.
     fn turn(&mut self, calls: &mut Calls) -> Result<()> {
         let start = Instant::now();
-        while start.elapsed() < TURN {
-            let call = calls.at(self.next, self.gone_through);
+        while start.elapsed() < TURN_TIME {
+            let call = calls.at(self.next, self.passes);
             let began = Instant::now();
             black_box(self.engine.process(black_box(call))?);
             self.times_us.push(began.elapsed().as_secs_f64() * 1e6 / call.len() as f64);
             self.next += 1;
             if self.next == calls.calls.len() {
-                (self.next, self.gone_through) = (0, self.gone_through + 1);
+                (self.next, self.passes) = (0, self.passes + 1);
             }
         }
         Ok(())

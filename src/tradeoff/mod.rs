@@ -1,14 +1,14 @@
 //! What each knob costs and gives, measured on a body, a recording and a machine; and the pick for a tolerance or a budget.
 //!
-//! Combinations of knobs take turns, so that a machine that slows down slows all of them. Each one's percepts are compared
-//! with those of the reference in the layout's own charts, and with the truth where a source knows it.
+//! Combinations of knobs take turns, so that changes of the machine's speed affect all of them. Percepts are compared with
+//! the reference in the layout's own charts, and with the truth if the source has it.
 
 mod errors;
 mod ladder;
 mod measure;
 mod plot;
 mod store;
-mod wish;
+mod target;
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub use ladder::{Rung, ladder};
 pub use measure::{Manner, Played, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
-pub use wish::{Pick, Wish, angle, length, time};
+pub use target::{Pick, Wish, angle, length, time};
 
 use crate::backend::BackendKind;
 use crate::percept::Outputs;
@@ -30,9 +30,9 @@ use crate::signal::Receptor;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Way {
-    /// One frame a call.
+    /// One frame per call.
     Live,
-    /// Many frames a call.
+    /// Many frames per call.
     Batch,
 }
 
@@ -40,7 +40,7 @@ impl Way {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Live, Self::Batch];
 
-    /// What it is called.
+    /// Its name.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -50,12 +50,12 @@ impl Way {
     }
 }
 
-/// A backend with its knobs turned some way.
+/// A backend and its knobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Combination {
-    /// What computes.
+    /// The backend.
     pub backend: BackendKind,
-    /// How.
+    /// The knobs.
     pub knobs: Knobs,
 }
 
@@ -67,7 +67,7 @@ impl fmt::Display for Combination {
 }
 
 impl Combination {
-    /// Backend, arithmetic, charts, way to orientation, coverage and cadence.
+    /// Backend, arithmetic, charts, method of orientation, coverage and cadence.
     #[must_use]
     pub fn words(&self) -> [&'static str; 6] {
         let Knobs { arithmetic, charts, orientation_by, coverage, cadence } = self.knobs;
@@ -81,8 +81,7 @@ impl Combination {
         [backend, arithmetic, charts.word(), orientation_by.word(), coverage.word(), cadence.word()]
     }
 
-    /// The combinations that make sense for `scene`, called `way`, on `backends`; knobs of `scene` that are not as they are
-    /// by default stay as they are.
+    /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed.
     #[must_use]
     pub fn all(scene: &Scene, way: Way, backends: &[BackendKind]) -> Vec<Self> {
         let given = scene.knobs;
@@ -109,7 +108,7 @@ impl Combination {
         let mut all = Vec::new();
         for &backend in backends {
             for &arithmetic in &arithmetics {
-                // Double precision is the reference's alone.
+                // Only the reference has double precision.
                 let backend = match (backend, arithmetic) {
                     (BackendKind::Cpu, Arithmetic::Double) => BackendKind::Reference,
                     (BackendKind::Gpu, Arithmetic::Double) | (BackendKind::Reference | BackendKind::Auto, _) => {
@@ -141,12 +140,12 @@ impl Combination {
     }
 }
 
-/// What a combination takes and how far it is off.
+/// Time and errors of a combination.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// How frames came.
+    /// How frames were passed.
     pub way: Way,
-    /// As [`Combination::words`]: what was measured.
+    /// The backend, as in [`Combination::words`].
     pub backend: String,
     /// See [`Arithmetic`].
     pub arithmetic: String,
@@ -158,24 +157,24 @@ pub struct Row {
     pub coverage: String,
     /// See [`Cadence`].
     pub cadence: String,
-    /// Time of a frame, µs: the median, and what 1 % exceed.
+    /// Median time of a frame, µs.
     pub p50_us: f64,
-    /// The same.
+    /// The 99th percentile, µs.
     pub p99_us: f64,
-    /// How far centroids lie from the reference's, mm.
+    /// Errors of centroids against the reference, mm.
     pub centroid_mm: Errors,
-    /// How far orientations are turned from the reference's, by the same way to them, degrees.
+    /// Errors of orientations against the reference's by the same method, degrees.
     pub orientation_deg: Errors,
-    /// The same from the truth, where the source knows it.
+    /// Errors of centroids against the truth, if known, mm.
     pub true_centroid_mm: Option<Errors>,
-    /// The same.
+    /// Errors of orientations against the truth, if known, degrees.
     pub true_orientation_deg: Option<Errors>,
-    /// Whether no other combination of the same way is both faster and at least as true in both.
+    /// Whether it is on the Pareto front of its way: no other is faster and at least as accurate.
     pub front: bool,
 }
 
 impl Row {
-    /// The combination that this is of.
+    /// The combination.
     ///
     /// # Errors
     /// Its words are of another version.
@@ -192,7 +191,7 @@ impl Row {
         })
     }
 
-    /// How far it is off, from the truth where that is known: centroid, mm, and orientation, degrees.
+    /// Its errors against the truth, or else the reference: centroid, mm, and orientation, degrees.
     #[must_use]
     pub fn judged(&self) -> [&Errors; 2] {
         [
@@ -207,17 +206,15 @@ impl Row {
 pub struct Report {
     /// Name of the body.
     pub body: String,
-    /// What frames came from.
+    /// Source of the frames.
     pub source: String,
-    /// How many frames.
+    /// Number of frames.
     pub frames: usize,
-    /// The way to orientation that the scene asks for by name, see [`OrientationBy`]: without a truth nothing tells
-    /// whether another would do.
+    /// The method of orientation that the scene requests, see [`OrientationBy`]: without a truth, methods cannot be compared.
     pub asked_by: String,
-    /// Field-frames that were compared at most, and of these how many the reference itself calls too close to call: a tie
-    /// between two orientations, which are compared by nobody.
+    /// Number of touched fields over all frames.
     pub touched: u64,
-    /// The same.
+    /// Of these, ties of two orientations in the reference, which are not compared.
     pub ties: u64,
     /// Whether the truth was known.
     pub truth: bool,
@@ -225,18 +222,18 @@ pub struct Report {
     pub kept_charts: Vec<String>,
     /// Combinations that were not measured, and why.
     pub left_out: Vec<String>,
-    /// One for each combination and way.
+    /// One per combination and way.
     pub rows: Vec<Row>,
 }
 
 impl Report {
-    /// Marks the rows that no other beats.
+    /// Marks the rows on the Pareto front.
     fn find_front(&mut self) {
         let beaten = |row: &Row, by: &Row| {
             let (a, b) = (row.judged(), by.judged());
             let no_worse = b[0].p99 <= a[0].p99 && b[1].p99 <= a[1].p99 && by.p50_us <= row.p50_us;
             let better = b[0].p99 < a[0].p99 || b[1].p99 < a[1].p99 || by.p50_us < row.p50_us;
-            // Orientations that are found otherwise are another quantity where nobody knows the truth.
+            // Without a truth, orientations of different methods cannot be compared.
             let alike = self.truth || row.orientation_by == by.orientation_by;
             row.way == by.way && alike && no_worse && better
         };
@@ -244,7 +241,7 @@ impl Report {
         self.rows.iter_mut().zip(fronts).for_each(|(row, front)| row.front = front);
     }
 
-    /// The rows of frames that came `way`, the fastest first.
+    /// The rows of `way`, the fastest first.
     #[must_use]
     pub fn of(&self, way: Way) -> Vec<&Row> {
         let mut rows: Vec<&Row> = self.rows.iter().filter(|row| row.way == way).collect();

@@ -1,4 +1,4 @@
-//! The trade as a picture: time against error, a dot a combination, and the line of those that nothing beats.
+//! Plots time against error, with a dot per combination and the Pareto front.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -12,8 +12,8 @@ use crate::ink::{self, FAMILY, cannot};
 const PANEL: (u32, u32) = (760, 560);
 const TITLE: u32 = 64;
 const LEGEND: u32 = 56;
-/// What is off by less is drawn here, mm and degrees: no skin tells it from nothing.
-const LEAST: f64 = 1e-9;
+/// Smallest error drawn, mm and degrees.
+const MIN_ERROR: f64 = 1e-9;
 const GREY: RGBColor = RGBColor(190, 190, 190);
 const COLOURS: [(&str, RGBColor); 5] = [
     ("cpu, one-pass", RGBColor(31, 119, 180)),
@@ -44,12 +44,12 @@ pub fn plot_png(report: &Report) -> Result<Vec<u8>> {
     ink::png(&pixels, [width, height])
 }
 
-/// One panel: a way, and a quantity.
+/// A panel for a way and a quantity.
 struct Panel<'a> {
     way: Way,
     what: &'static str,
     unit: &'static str,
-    /// Whether errors are from the truth.
+    /// Whether errors are against the truth.
     truth: bool,
     points: Vec<(&'a Row, &'a Errors)>,
 }
@@ -97,7 +97,7 @@ fn draw<B: DrawingBackend>(report: &Report, area: &DrawingArea<B, Shift>) -> Res
     draw_legend(report, &legend)
 }
 
-/// Names the colours that are there, in a row.
+/// Draws the legend of the used colours.
 fn draw_legend<B: DrawingBackend>(report: &Report, area: &DrawingArea<B, Shift>) -> Result<()> {
     let style = text(22, HPos::Left);
     let (mut x, y) = (80, LEGEND as i32 / 2);
@@ -132,7 +132,7 @@ fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
 impl Panel<'_> {
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
         let from = if self.truth { "from the truth" } else { "from the reference" };
-        let place = |(row, errors): &(&Row, &Errors)| (row.p50_us, errors.p99.max(LEAST));
+        let place = |(row, errors): &(&Row, &Errors)| (row.p50_us, errors.p99.max(MIN_ERROR));
         let places: Vec<(f64, f64)> = self.points.iter().map(place).collect();
         let x = decades(places.iter().map(|point| point.0));
         let y = decades(places.iter().map(|point| point.1));
@@ -154,7 +154,7 @@ impl Panel<'_> {
             .label_style((FAMILY, 20))
             .axis_desc_style((FAMILY, 22))
             .x_label_formatter(&|value| power(*value))
-            .y_label_formatter(&|value| if *value <= LEAST { "0".to_owned() } else { power(*value) })
+            .y_label_formatter(&|value| if *value <= MIN_ERROR { "0".to_owned() } else { power(*value) })
             .x_desc("a frame, median, microseconds")
             .y_desc(format!("99 % are off by no more, {}", self.unit))
             .draw()
@@ -163,7 +163,7 @@ impl Panel<'_> {
             |at: &(f64, f64)| places.iter().any(|by| by.0 <= at.0 && by.1 <= at.1 && (by.0 < at.0 || by.1 < at.1));
         let mut front: Vec<(f64, f64)> = places.iter().filter(|at| !beaten(at)).copied().collect();
         front.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // A step: what lies above and right of it is beaten.
+        // Steps: points above and right of them are dominated.
         let corners = front.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]).chain(front.last().copied());
         chart.draw_series(LineSeries::new(corners, RGBColor(110, 110, 110).stroke_width(2))).map_err(cannot)?;
         let dots = |are_beaten: bool| {

@@ -1,4 +1,4 @@
-//! Measurements that are kept, one file for each body and scene, and whether they still hold, and for what.
+//! Stores measurements, one file per body and scene, and checks whether they are still valid.
 
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::output::OutputPaths;
 use crate::scene::Knobs;
 
-/// What files are like; another is not read.
+/// Version of the files.
 const VERSION: u32 = 2;
 
 /// A folder of measurements.
@@ -21,10 +21,10 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// What a measurement hangs on.
+/// What a measurement depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Key {
-    /// Of the file.
+    /// Version of the file.
     version: u32,
     program: String,
     machine: String,
@@ -33,31 +33,31 @@ struct Key {
     scene: String,
 }
 
-/// A measurement that was kept.
+/// A stored measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stored {
     key: Key,
-    /// The recording that it was made on, as told to [`Store::keep`].
+    /// The recording it was made on, as given to [`Store::keep`].
     recording: String,
-    /// When it was made, s since 1970.
+    /// When it was made, s since 1970-01-01.
     pub taken_at_s: u64,
-    /// What was measured.
+    /// The measurement.
     pub report: Report,
 }
 
-/// What a look into a store finds.
+/// The result of a search in a store.
 #[derive(Clone, Debug)]
 pub enum Found {
-    /// One that holds.
+    /// A valid measurement.
     Fresh(Box<Stored>),
-    /// None.
+    /// No measurement.
     Nothing,
-    /// One that is of no use, and why, in words.
+    /// An invalid measurement, and why.
     Useless(String),
 }
 
 impl Store {
-    /// The user's: `somatic/tradeoff` in `$XDG_CACHE_HOME`, or in `~/.cache`. `None` where there is no such folder to be.
+    /// The user's store: `somatic/tradeoff` in `$XDG_CACHE_HOME` or `~/.cache`. `None` without such a folder.
     #[must_use]
     pub fn of_user() -> Option<Self> {
         let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
@@ -66,29 +66,28 @@ impl Store {
         Some(Self::at(cache.join("somatic").join("tradeoff")))
     }
 
-    /// The one in `folder`.
+    /// The store in `folder`.
     #[must_use]
     pub fn at(folder: PathBuf) -> Self {
         Self { folder }
     }
 
-    /// Where measurements of `options` on `body` are kept.
+    /// The file for measurements of `options` on `body`.
     #[must_use]
     pub fn file(&self, body: &Body, options: &Options) -> PathBuf {
-        self.folder.join(format!("{:016x}.json", hash(&[&body.name, &asked(options)])))
+        self.folder.join(format!("{:016x}.json", hash(&[&body.name, &requested(options)])))
     }
 
-    /// The measurement of `options` on `body`, if there is one that holds on this machine with this `driver`.
+    /// The measurement of `options` on `body` that is valid on this machine with this `driver`.
     ///
-    /// One that was made on another recording says nothing of `recording`. `None` is for frames that cannot be measured
-    /// on beforehand: any recording stands for them.
+    /// It must be of the same `recording`. `None` accepts any recording, for live frames.
     #[must_use]
     pub fn find(&self, body: &Body, options: &Options, driver: &str, recording: Option<&str>) -> Found {
         let path = self.file(body, options);
         let Ok(text) = std::fs::read_to_string(&path) else { return Found::Nothing };
         let useless = |why: &str| Found::Useless(format!("{}: kept measurements {why}", path.display()));
         let now = Key::new(body, options, driver);
-        // Another version may hold other things.
+        // Another version may have another structure.
         let version =
             serde_json::from_str::<serde_json::Value>(&text).ok().and_then(|all| all["key"]["version"].as_u64());
         if version.is_some_and(|version| version != u64::from(now.version)) {
@@ -110,7 +109,7 @@ impl Store {
         }
     }
 
-    /// Keeps `report`, which was made on `recording`, in place of any before.
+    /// Stores `report`, made on `recording`, and replaces an earlier one.
     ///
     /// # Errors
     /// It cannot be written.
@@ -123,7 +122,7 @@ impl Store {
     fn write(&self, path: &Path, stored: &impl Serialize) -> Result<()> {
         let text = serde_json::to_string_pretty(stored).map_err(|e| Error::failed(e.to_string()))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        // What is kept is this program's own.
+        // The store's files may be overwritten.
         let mut folder = OutputPaths::new(true, [""; 0]).add_folder(&self.folder, [&*name])?;
         folder.make()?;
         folder.take(&name).write(text.as_bytes())
@@ -138,7 +137,7 @@ impl Key {
     fn new(body: &Body, options: &Options, driver: &str) -> Self {
         let laid = format!("{:?} {:?} {:?}", body.taxels, body.fields, body.links);
         let calibration = options.calibration.as_ref().map(|calibration| format!("{calibration:?}"));
-        let scene = [&asked(options), calibration.as_deref().unwrap_or_default()];
+        let scene = [&requested(options), calibration.as_deref().unwrap_or_default()];
         Self {
             version: VERSION,
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -150,13 +149,13 @@ impl Key {
     }
 }
 
-/// What is asked for, but for the knobs: all of these are measured.
-fn asked(options: &Options) -> String {
+/// The requested options without knobs, as all of these are measured.
+fn requested(options: &Options) -> String {
     let scene = crate::Scene { knobs: Knobs::default(), ..options.scene.clone() };
     format!("{:?} {scene:?}", options.backend)
 }
 
-/// The processor, and how many of its threads there are.
+/// The processor and its number of threads.
 fn machine() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -165,7 +164,7 @@ fn machine() -> String {
     format!("{} {} {name} {threads}", std::env::consts::OS, std::env::consts::ARCH)
 }
 
-/// FNV-1a: it has to be the same tomorrow, and no more.
+/// FNV-1a, which is the same in every version.
 fn hash(texts: &[&str]) -> u64 {
     let bytes = texts.iter().flat_map(|text| text.bytes().chain([0xff]));
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))

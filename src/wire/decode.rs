@@ -1,34 +1,33 @@
-//! From bytes, in whatever pieces they come, to packets.
+//! Decodes packets from bytes, in pieces of any size.
 //!
-//! A [`Decoder`] takes anything: what is no packet is told as [`Event::Corrupt`] and costs no more than itself, as a zero
-//! byte ends every packet and stands nowhere else. It remembers one packet's worth of bytes and a few numbers a board,
-//! whatever comes in.
+//! Bytes that are no packet give an [`Event::Corrupt`], and the next zero byte starts a new packet: zeros only delimit
+//! packets. Memory is bounded by one packet and a few numbers per board.
 
-use super::books::{Books, Placed};
 use super::format::{
-    Answer, Bits, CHECKSUM, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, HEAD_BYTES, Head, Identity, MOST_CHANNELS,
-    MOST_ON_LINE, Status, VERSION, kind,
+    Answer, Bits, CHECKSUM, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, HEAD_BYTES, Head, Identity, MAX_CHANNELS,
+    MAX_ENCODED_BYTES, Status, VERSION, kind,
 };
+use super::frame_counts::{FrameCounts, PacketOrder};
 
-/// What came.
+/// A decoded packet, or corrupt bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<'a> {
     /// Values of a board's channels.
     Frame {
         /// Who sent it, and when.
         head: Head,
-        /// The board's clock since it was first heard or last started, unwrapped, µs, and what is missing before it.
-        placed: Placed,
+        /// Unwrapped board time and frames lost before it.
+        order: PacketOrder,
         /// The values.
         values: Values<'a>,
     },
-    /// A board says who it is.
+    /// A board's identity.
     Identity {
         /// Who sent it, and when.
         head: Head,
         /// As for a frame.
-        placed: Placed,
-        /// What it says.
+        order: PacketOrder,
+        /// Its description of itself.
         identity: Identity<'a>,
     },
     /// A board answers a command.
@@ -36,24 +35,24 @@ pub enum Event<'a> {
         /// Who sent it, and when.
         head: Head,
         /// As for a frame.
-        placed: Placed,
-        /// What it says.
+        order: PacketOrder,
+        /// The answer.
         answer: Answer,
     },
     /// A command, as boards hear it.
     Command {
-        /// To whom; [`ANY_BOARD`](super::ANY_BOARD) is to whoever hears it.
+        /// The addressed board; [`ANY_BOARD`](super::ANY_BOARD) is every board.
         board: u16,
-        /// Its number.
+        /// The request's number.
         request: u8,
-        /// What is asked.
+        /// The command.
         command: Command,
     },
     /// Bytes that are no packet.
     Corrupt {
         /// What is wrong with them.
         why: Corruption,
-        /// How many they are, the zero that ended them included.
+        /// Their number, with the final zero.
         bytes: usize,
     },
 }
@@ -61,7 +60,7 @@ pub enum Event<'a> {
 /// Why bytes are no packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Corruption {
-    /// The first bytes after listening began, which may be the end of a whole packet.
+    /// The first bytes since the line was opened, possibly the end of a valid packet.
     Joined,
     /// Fewer bytes than the shortest packet has.
     Short,
@@ -71,11 +70,11 @@ pub enum Corruption {
     Code,
     /// The checksum does not agree.
     Checksum,
-    /// A whole packet of another version of the format.
+    /// A valid packet of another format version.
     Version(u8),
-    /// A whole packet of a kind that this version does not know.
+    /// A valid packet of an unknown kind.
     Kind(u8),
-    /// A whole packet whose contents do not fit its kind.
+    /// A valid packet whose contents do not fit its kind.
     Contents,
 }
 
@@ -110,7 +109,7 @@ impl<'a> Values<'a> {
         self.bits
     }
 
-    /// Whether only some channels have a value. The others have kept what they had in the frame before.
+    /// Whether only some channels have a value; the others have kept theirs from the frame before.
     #[must_use]
     pub fn is_partial(&self) -> bool {
         self.channels.is_some()
@@ -131,9 +130,9 @@ impl<'a> Values<'a> {
         self.len() == 0
     }
 
-    /// The number of channels that the frame speaks of: one more than the last with a value.
+    /// One more than the highest channel with a value.
     #[must_use]
-    pub fn reach(&self) -> usize {
+    pub fn channel_count(&self) -> usize {
         self.iter().last().map_or(0, |(channel, _)| usize::from(channel) + 1)
     }
 
@@ -173,24 +172,25 @@ impl ChannelsOf<'_> {
 
 /// What has come so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Heard {
-    /// Bytes of any sort.
+pub struct DecoderCounts {
+    /// All bytes.
     pub bytes: u64,
-    /// Whole packets of this version that were understood.
+    /// Valid packets of this format version.
     pub packets: u64,
     /// Times that bytes were no packet, [`Corruption::Joined`] left out.
     pub corrupt: u64,
 }
 
-/// From bytes to events.
+/// Turns bytes into [`Event`]s.
 #[derive(Clone, Debug)]
 pub struct Decoder {
     waiting: Vec<u8>,
-    /// Bytes of a packet that is too long, which are forgotten until it ends.
+    /// Bytes skipped of a packet that is too long.
     skipped: usize,
+    /// Whether no packet has ended since the line was opened.
     joined: bool,
-    heard: Heard,
-    books: Books,
+    counts: DecoderCounts,
+    frame_counts: FrameCounts,
 }
 
 impl Default for Decoder {
@@ -202,35 +202,41 @@ impl Default for Decoder {
 static CHECKSUM_TABLE: crc::Crc<u32> = CHECKSUM;
 
 impl Decoder {
-    /// A decoder that begins to listen, as it may be, in the middle of a packet.
+    /// A decoder that may start in the middle of a packet.
     #[must_use]
     pub fn new() -> Self {
-        let waiting = Vec::with_capacity(MOST_ON_LINE);
-        Self { waiting, skipped: 0, joined: true, heard: Heard::default(), books: Books::default() }
+        let waiting = Vec::with_capacity(MAX_ENCODED_BYTES);
+        Self {
+            waiting,
+            skipped: 0,
+            joined: true,
+            counts: DecoderCounts::default(),
+            frame_counts: FrameCounts::default(),
+        }
     }
 
-    /// Forgets the packet that has begun, as when a line was closed; what was counted stays.
+    /// Drops a partial packet, as after a line was closed; the counts stay.
     pub fn rejoin(&mut self) {
         self.waiting.clear();
         self.skipped = 0;
         self.joined = true;
     }
 
-    /// What has come so far.
+    /// Counts since the decoder was made.
     #[must_use]
-    pub fn heard(&self) -> Heard {
-        self.heard
+    pub fn counts(&self) -> DecoderCounts {
+        self.counts
     }
 
-    /// What came of what each board sent.
+    /// Received and lost frames by board.
     #[must_use]
-    pub fn books(&self) -> &Books {
-        &self.books
+    pub fn frame_counts(&self) -> &FrameCounts {
+        &self.frame_counts
     }
 
-    /// Takes the bytes that came next and tells `on` what they bring, in order.
+    /// Decodes the next bytes and calls `on` with each event in order.
     pub fn push(&mut self, bytes: &[u8], mut on: impl FnMut(Event<'_>)) {
-        self.heard.bytes += bytes.len() as u64;
+        self.counts.bytes += bytes.len() as u64;
         let mut rest = bytes;
         while let Some(end) = rest.iter().position(|&byte| byte == 0) {
             self.take(&rest[..end]);
@@ -240,10 +246,10 @@ impl Decoder {
         self.take(rest);
     }
 
-    /// Remembers `bytes` as far as a packet can go.
+    /// Buffers `bytes`, up to the length of a packet.
     fn take(&mut self, bytes: &[u8]) {
         // The longest packet's last byte is the zero.
-        if self.skipped > 0 || self.waiting.len() + bytes.len() >= MOST_ON_LINE {
+        if self.skipped > 0 || self.waiting.len() + bytes.len() >= MAX_ENCODED_BYTES {
             self.skipped += self.waiting.len() + bytes.len();
             self.waiting.clear();
         } else {
@@ -251,25 +257,25 @@ impl Decoder {
         }
     }
 
-    /// A zero came.
+    /// Handles the zero that ends a packet.
     fn finish(&mut self, on: &mut impl FnMut(Event<'_>)) {
         let length = self.waiting.len() + self.skipped;
         let joined = std::mem::take(&mut self.joined);
         let long = std::mem::take(&mut self.skipped) > 0;
-        // A zero after a zero is an idle line, or a sender that makes sure.
+        // Repeated zeros hold no packet.
         if length == 0 {
             return;
         }
-        let understood = if long { Err(Corruption::Long) } else { understand(&mut self.waiting) };
-        match understood {
+        let parsed = if long { Err(Corruption::Long) } else { parse(&mut self.waiting) };
+        match parsed {
             Ok(packet) => {
-                self.heard.packets += 1;
-                on(self.books.enter(packet));
+                self.counts.packets += 1;
+                on(self.frame_counts.add(packet));
             }
             Err(why) => {
-                let whole = matches!(why, Corruption::Version(_) | Corruption::Kind(_) | Corruption::Contents);
-                let why = if joined && !whole { Corruption::Joined } else { why };
-                self.heard.corrupt += u64::from(why != Corruption::Joined);
+                let is_valid = matches!(why, Corruption::Version(_) | Corruption::Kind(_) | Corruption::Contents);
+                let why = if joined && !is_valid { Corruption::Joined } else { why };
+                self.counts.corrupt += u64::from(why != Corruption::Joined);
                 on(Event::Corrupt { why, bytes: length + 1 });
             }
         }
@@ -277,8 +283,8 @@ impl Decoder {
     }
 }
 
-/// The packet in `coded`, without its place in the books.
-fn understand(coded: &mut [u8]) -> Result<Event<'_>, Corruption> {
+/// The packet in `coded`, without its place in the frame_counts.
+fn parse(coded: &mut [u8]) -> Result<Event<'_>, Corruption> {
     let length = cobs::decode_in_place(coded).map_err(|_| Corruption::Code)?;
     if length < COMMAND_HEAD_BYTES + CHECKSUM_BYTES {
         return Err(Corruption::Short);
@@ -319,9 +325,9 @@ fn from_board(packet: &[u8]) -> Option<Event<'_>> {
         sequence: u32::from_le_bytes([s0, s1, s2, s3]),
         time_us: u32::from_le_bytes([t0, t1, t2, t3]),
     };
-    let placed = Placed::default();
+    let order = PacketOrder::default();
     match kind {
-        kind::FRAME | kind::PARTIAL => Some(Event::Frame { head, placed, values: values(kind, body)? }),
+        kind::FRAME | kind::PARTIAL => Some(Event::Frame { head, order, values: values(kind, body)? }),
         kind::IDENTITY => {
             let (bytes, text) = body.split_first_chunk::<13>()?;
             let &[request, running, c0, c1, bits, l0, l1, l2, l3, r0, r1, r2, r3] = bytes;
@@ -334,14 +340,14 @@ fn from_board(packet: &[u8]) -> Option<Event<'_>> {
                 rate_mhz: u32::from_le_bytes([r0, r1, r2, r3]),
                 firmware: std::str::from_utf8(text).unwrap_or(""),
             };
-            let fits = (1..=MOST_CHANNELS).contains(&usize::from(identity.channels));
-            fits.then_some(Event::Identity { head, placed, identity })
+            let fits = (1..=MAX_CHANNELS).contains(&usize::from(identity.channels));
+            fits.then_some(Event::Identity { head, order, identity })
         }
         _ => {
             let &[request, command, status, v0, v1, v2, v3] = body else { return None };
             let status = Status::of(status);
             let answer = Answer { request, command, status, value: u32::from_le_bytes([v0, v1, v2, v3]) };
-            Some(Event::Answer { head, placed, answer })
+            Some(Event::Answer { head, order, answer })
         }
     }
 }
@@ -360,7 +366,7 @@ fn values(kind: u8, body: &[u8]) -> Option<Values<'_>> {
     let values = Values { bits, channels, packed };
     let count = values.len();
     let some = channels.is_some() || count > 0;
-    let few = count <= MOST_CHANNELS && channels.is_none_or(|set| set.len() <= MOST_CHANNELS / 8);
+    let few = count <= MAX_CHANNELS && channels.is_none_or(|set| set.len() <= MAX_CHANNELS / 8);
     let spare = bits.bytes(count) * 8 - count * usize::from(bits.count());
     let padded = packed.last().is_none_or(|last| u32::from(*last) >> (8 - spare) == 0);
     (some && few && packed.len() == bits.bytes(count) && padded).then_some(values)

@@ -1,95 +1,95 @@
-//! What the host asks of a board: numbered, sent again until answered, given up in the end. No I/O, no clock: bytes to
-//! send come out, events and the time go in.
+//! Sends commands to a board, with retries and timeouts. No I/O, no clock: the caller passes events and times in, and
+//! sends the bytes that come out.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::decode::Event;
 use super::encode;
-use super::format::{ANY_BOARD, Command, MOST_ON_LINE, Status};
+use super::format::{ANY_BOARD, Command, MAX_ENCODED_BYTES, Status};
 
-/// How long an answer is waited for, and how often a command is sent.
+/// Timeout and number of tries of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
-    /// From sending to sending again.
+pub struct RetryPolicy {
+    /// Time between two tries.
     pub wait: Duration,
-    /// Times that it is sent in all.
+    /// Number of tries.
     pub tries: u32,
 }
 
-impl Default for Patience {
-    /// Five times, 300 ms apart: at 57600 baud an answer waits for at most one frame, 20 ms.
+impl Default for RetryPolicy {
+    /// Five tries, 300 ms apart: at 57600 baud an answer waits at most 20 ms for the frame being sent.
     fn default() -> Self {
         Self { wait: Duration::from_millis(300), tries: 5 }
     }
 }
 
-/// How a request ended.
+/// The result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The board did it; what is set now (0 where there is nothing to set).
+    /// The board did it.
     Done {
-        /// The rate in thousandths of a hertz, the tap, or 0.
+        /// The value that is set now: the rate in mHz, the tap, or 0.
         value: u32,
     },
-    /// The board would not.
+    /// The board refused.
     Refused(Status),
     /// No answer came.
     Unanswered,
 }
 
-/// A request that has ended.
+/// A finished request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ended {
     /// The number that [`Dialogue::ask`] gave.
     pub ticket: u64,
-    /// What was asked.
+    /// The command.
     pub command: Command,
-    /// How it ended.
+    /// Its result.
     pub outcome: Outcome,
 }
 
-/// The commands that wait: more than [`Dialogue::MOST`] are refused.
+/// A queue of commands to a board, of at most [`Dialogue::MAX_WAITING`].
 #[derive(Clone, Debug)]
 pub struct Dialogue {
     board: u16,
-    patience: Patience,
+    retry: RetryPolicy,
     waiting: VecDeque<(u64, Command)>,
-    asked: Option<Asked>,
+    pending: Option<Pending>,
     request: u8,
     tickets: u64,
-    bytes: Box<[u8; MOST_ON_LINE]>,
+    bytes: Box<[u8; MAX_ENCODED_BYTES]>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Asked {
+struct Pending {
     ticket: u64,
     command: Command,
     request: u8,
     sent: u32,
-    again_at: Duration,
+    retry_at: Duration,
 }
 
 impl Dialogue {
-    /// Commands that may wait at once.
-    pub const MOST: usize = 1024;
+    /// Maximum number of waiting commands.
+    pub const MAX_WAITING: usize = 1024;
 
-    /// A dialogue with `board`, or [`ANY_BOARD`]. `first` is the number before that of the first request: a host that
-    /// comes again should begin elsewhere than it did before, so that no late answer is taken for a new one.
+    /// A dialogue with `board`, or [`ANY_BOARD`]. The first request gets the number after `first`; a host that reconnects
+    /// should pass another number than before, so that it does not mistake a late answer for a new one.
     #[must_use]
-    pub fn new(board: u16, patience: Patience, first: u8) -> Self {
-        let bytes = Box::new([0; MOST_ON_LINE]);
-        Self { board, patience, waiting: VecDeque::new(), asked: None, request: first, tickets: 0, bytes }
+    pub fn new(board: u16, retry: RetryPolicy, first: u8) -> Self {
+        let bytes = Box::new([0; MAX_ENCODED_BYTES]);
+        Self { board, retry, waiting: VecDeque::new(), pending: None, request: first, tickets: 0, bytes }
     }
 
-    /// Whom it speaks to from now on.
-    pub fn speak_to(&mut self, board: u16) {
+    /// Sets the board that is addressed.
+    pub fn set_board(&mut self, board: u16) {
         self.board = board;
     }
 
-    /// Asks for `command` when those before are done; gives its ticket, or `None` where too many wait.
+    /// Queues `command`. Returns its ticket, or `None` if the queue is full.
     pub fn ask(&mut self, command: Command) -> Option<u64> {
-        if self.waiting.len() >= Self::MOST {
+        if self.waiting.len() >= Self::MAX_WAITING {
             return None;
         }
         self.tickets += 1;
@@ -100,45 +100,45 @@ impl Dialogue {
     /// Whether nothing waits and nothing is unanswered.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.asked.is_none() && self.waiting.is_empty()
+        self.pending.is_none() && self.waiting.is_empty()
     }
 
     /// When [`Dialogue::send`] and [`Dialogue::give_up`] next have something to do, on the clock that they are given.
     #[must_use]
     pub fn due(&self) -> Option<Duration> {
-        match &self.asked {
-            Some(asked) => Some(asked.again_at),
+        match &self.pending {
+            Some(pending) => Some(pending.retry_at),
             None => (!self.waiting.is_empty()).then_some(Duration::ZERO),
         }
     }
 
     /// The bytes to send at `now`, if there are any.
     pub fn send(&mut self, now: Duration) -> Option<&[u8]> {
-        let asked = match &mut self.asked {
-            Some(asked) if now >= asked.again_at && asked.sent < self.patience.tries => asked,
+        let pending = match &mut self.pending {
+            Some(pending) if now >= pending.retry_at && pending.sent < self.retry.tries => pending,
             Some(_) => return None,
             none => {
                 let (ticket, command) = self.waiting.pop_front()?;
-                // 0 is what boards say unasked.
+                // 0 marks unrequested packets.
                 self.request = self.request.checked_add(1).unwrap_or(1);
-                none.insert(Asked { ticket, command, request: self.request, sent: 0, again_at: now })
+                none.insert(Pending { ticket, command, request: self.request, sent: 0, retry_at: now })
             }
         };
-        asked.sent += 1;
-        asked.again_at = now + self.patience.wait;
-        let length = encode::command(&mut self.bytes[..], self.board, asked.request, asked.command)?;
+        pending.sent += 1;
+        pending.retry_at = now + self.retry.wait;
+        let length = encode::command(&mut self.bytes[..], self.board, pending.request, pending.command)?;
         Some(&self.bytes[..length])
     }
 
-    /// Gives up at `now` what has been asked often enough.
+    /// Ends the pending request if its last try has timed out at `now`.
     pub fn give_up(&mut self, now: Duration) -> Option<Ended> {
-        let over = |asked: &mut Asked| asked.sent >= self.patience.tries && now >= asked.again_at;
-        let Asked { ticket, command, .. } = self.asked.take_if(over)?;
+        let timed_out = |pending: &mut Pending| pending.sent >= self.retry.tries && now >= pending.retry_at;
+        let Pending { ticket, command, .. } = self.pending.take_if(timed_out)?;
         Some(Ended { ticket, command, outcome: Outcome::Unanswered })
     }
 
-    /// Hears `event`, which may answer what was asked.
-    pub fn hear(&mut self, event: &Event<'_>) -> Option<Ended> {
+    /// Handles `event`, which may answer the pending request.
+    pub fn receive(&mut self, event: &Event<'_>) -> Option<Ended> {
         let (board, request, kind, outcome) = match event {
             Event::Answer { head, answer, .. } => {
                 let outcome = match answer.status {
@@ -153,24 +153,24 @@ impl Dialogue {
             _ => return None,
         };
         let ours = self.board == ANY_BOARD || self.board == board;
-        let answers = |asked: &mut Asked| ours && asked.request == request && asked.command.kind() == kind;
-        let Asked { ticket, command, .. } = self.asked.take_if(answers)?;
+        let answers = |pending: &mut Pending| ours && pending.request == request && pending.command.kind() == kind;
+        let Pending { ticket, command, .. } = self.pending.take_if(answers)?;
         Some(Ended { ticket, command, outcome })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::books::Placed;
     use super::super::format::{Answer, Head};
+    use super::super::frame_counts::PacketOrder;
     use super::*;
 
-    const PATIENCE: Patience = Patience { wait: Duration::from_millis(100), tries: 3 };
+    const PATIENCE: RetryPolicy = RetryPolicy { wait: Duration::from_millis(100), tries: 3 };
 
     fn answer(board: u16, request: u8, command: Command, status: Status) -> Event<'static> {
         let head = Head { board, boot: 0, sequence: 0, time_us: 0 };
         let answer = Answer { request, command: command.kind(), status, value: 5 };
-        Event::Answer { head, placed: Placed::default(), answer }
+        Event::Answer { head, order: PacketOrder::default(), answer }
     }
 
     fn at(ms: u64) -> Duration {
@@ -192,13 +192,13 @@ mod tests {
             answer(7, 254, Command::Start, Status::Done),
             answer(7, 255, Command::Stop, Status::Done),
         ] {
-            assert_eq!(dialogue.hear(&other), None);
+            assert_eq!(dialogue.receive(&other), None);
         }
-        let ended = dialogue.hear(&answer(7, 255, Command::Start, Status::Done)).unwrap();
+        let ended = dialogue.receive(&answer(7, 255, Command::Start, Status::Done)).unwrap();
         assert_eq!((ended.ticket, ended.outcome), (first, Outcome::Done { value: 5 }));
-        assert_eq!(dialogue.hear(&answer(7, 255, Command::Start, Status::Done)), None, "once is enough");
+        assert_eq!(dialogue.receive(&answer(7, 255, Command::Start, Status::Done)), None, "once is enough");
         assert_ne!(dialogue.send(at(101)).unwrap(), sent);
-        let ended = dialogue.hear(&answer(7, 1, Command::Stop, Status::Bad)).unwrap();
+        let ended = dialogue.receive(&answer(7, 1, Command::Stop, Status::Bad)).unwrap();
         assert_eq!((ended.ticket, ended.outcome), (second, Outcome::Refused(Status::Bad)), "0 is no request");
         assert!(dialogue.is_idle());
     }
@@ -216,7 +216,7 @@ mod tests {
             }
         }
         assert!(dialogue.is_idle());
-        assert!((0..Dialogue::MOST).all(|_| dialogue.ask(Command::Start).is_some()));
+        assert!((0..Dialogue::MAX_WAITING).all(|_| dialogue.ask(Command::Start).is_some()));
         assert_eq!(dialogue.ask(Command::Start), None, "too many");
     }
 }

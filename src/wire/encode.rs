@@ -1,16 +1,16 @@
-//! Packets, written into memory that the caller brings: neither allocation nor `std`, so that firmware can have it too.
+//! Encodes packets into the caller's buffer, without allocation or `std`, so that firmware can use it too.
 //!
-//! Every function gives the number of bytes written, from the zero that begins a packet to the one that ends it, or `None` where `to` is too short
-//! ([`MOST_ON_LINE`](super::format::MOST_ON_LINE) always is long enough) or the values cannot be written.
+//! Every function returns the number of bytes written, both delimiting zeros included, or `None` if `to` is too short
+//! ([`MAX_ENCODED_BYTES`](super::format::MAX_ENCODED_BYTES) always suffices) or the values are out of range.
 
 use cobs::CobsEncoder;
 
-use super::format::{Answer, Bits, CHECKSUM, Command, Head, Identity, MOST_CHANNELS, MOST_TEXT, VERSION, kind};
+use super::format::{Answer, Bits, CHECKSUM, Command, Head, Identity, MAX_CHANNELS, MAX_FIRMWARE_BYTES, VERSION, kind};
 
-/// A full frame: `values`, at most 256, one a channel in order, each within `bits`.
+/// A full frame: `values`, at most 256, one per channel in order, each within `bits`.
 #[must_use]
 pub fn frame(to: &mut [u8], head: &Head, bits: Bits, values: &[u16]) -> Option<usize> {
-    if values.is_empty() || values.len() > MOST_CHANNELS {
+    if values.is_empty() || values.len() > MAX_CHANNELS {
         return None;
     }
     packet(to, |packet| {
@@ -20,10 +20,10 @@ pub fn frame(to: &mut [u8], head: &Head, bits: Bits, values: &[u16]) -> Option<u
     })
 }
 
-/// A partial frame: `values` has one entry a channel, at most 256, those with a value being sent.
+/// A partial frame: `values` has one entry per channel, at most 256; channels with `None` are left out.
 #[must_use]
 pub fn partial(to: &mut [u8], head: &Head, bits: Bits, values: &[Option<u16>]) -> Option<usize> {
-    if values.len() > MOST_CHANNELS {
+    if values.len() > MAX_CHANNELS {
         return None;
     }
     // Channels after the last that is sent need no bit.
@@ -39,11 +39,11 @@ pub fn partial(to: &mut [u8], head: &Head, bits: Bits, values: &[Option<u16>]) -
     })
 }
 
-/// Who the board is.
+/// The board's identity.
 #[must_use]
 pub fn identity(to: &mut [u8], head: &Head, identity: &Identity<'_>) -> Option<usize> {
     let channels = usize::from(identity.channels);
-    if channels == 0 || channels > MOST_CHANNELS || identity.firmware.len() > MOST_TEXT {
+    if channels == 0 || channels > MAX_CHANNELS || identity.firmware.len() > MAX_FIRMWARE_BYTES {
         return None;
     }
     packet(to, |packet| {
@@ -88,7 +88,7 @@ pub fn command(to: &mut [u8], board: u16, request: u8, command: Command) -> Opti
 /// The checksum's table, once in memory.
 static CHECKSUM_TABLE: crc::Crc<u32> = CHECKSUM;
 
-/// A packet being written: COBS and checksum as it goes.
+/// A packet being written, COBS-encoded and checksummed on the fly.
 struct Packet<'a> {
     cobs: CobsEncoder<'a>,
     digest: crc::Digest<'static, u32>,
@@ -131,7 +131,7 @@ impl Packet<'_> {
     fn put_values(&mut self, bits: Bits, values: impl Iterator<Item = u16>) -> Option<()> {
         let (mut waiting, mut count) = (0_u32, 0);
         for value in values {
-            if value > bits.most() {
+            if value > bits.max() {
                 return None;
             }
             waiting |= u32::from(value) << count;

@@ -1,11 +1,11 @@
-//! What packets hold, as types. Nothing here needs an allocator or `std`.
+//! The contents of packets as types. Nothing here needs an allocator or `std`.
 //!
 //! `docs/wire.md` is the specification, byte by byte.
 
-/// The version of the format that is written here.
+/// The version of the packet format.
 pub const VERSION: u8 = 1;
-/// Channels that one board has at most.
-pub const MOST_CHANNELS: usize = 256;
+/// Maximum channels of one board.
+pub const MAX_CHANNELS: usize = 256;
 /// Bytes of a packet's head from a board: version, kind, board, boot, sequence, time.
 pub const HEAD_BYTES: usize = 13;
 /// Bytes of a packet's head from the host: version, kind, board, request.
@@ -13,14 +13,14 @@ pub const COMMAND_HEAD_BYTES: usize = 5;
 /// Bytes of the checksum that ends a packet.
 pub const CHECKSUM_BYTES: usize = 4;
 /// Bytes of the longest packet before COBS: a partial frame of 256 channels of 16 bits.
-pub const MOST_PACKET: usize = HEAD_BYTES + 2 + MOST_CHANNELS / 8 + 2 * MOST_CHANNELS + CHECKSUM_BYTES;
+pub const MAX_PACKET_BYTES: usize = HEAD_BYTES + 2 + MAX_CHANNELS / 8 + 2 * MAX_CHANNELS + CHECKSUM_BYTES;
 /// Bytes of the longest packet on the line: COBS adds one for each 254 or part of them, and there is a zero at both ends.
-pub const MOST_ON_LINE: usize = MOST_PACKET + MOST_PACKET.div_ceil(254) + 2;
-/// Bytes of text that an identity has at most.
-pub const MOST_TEXT: usize = 64;
-/// A command to this board is for whichever board hears it.
+pub const MAX_ENCODED_BYTES: usize = MAX_PACKET_BYTES + MAX_PACKET_BYTES.div_ceil(254) + 2;
+/// Maximum bytes of the firmware text of an identity.
+pub const MAX_FIRMWARE_BYTES: usize = 64;
+/// The broadcast board id.
 pub const ANY_BOARD: u16 = 0xFFFF;
-/// A layout hash of a board that does not know its layout.
+/// The layout hash of a board that does not know its layout.
 pub const NO_LAYOUT: u32 = 0;
 
 /// CRC-32 as Ethernet, zlib and PNG have it: polynomial 0x04C11DB7, bits reflected, starting from and ended with all ones.
@@ -54,7 +54,7 @@ pub enum Bits {
 }
 
 impl Bits {
-    /// So many bits, where a board may have so many.
+    /// The variant with `bits` bits; `None` if boards may not have that many.
     #[must_use]
     pub const fn new(bits: u8) -> Option<Self> {
         match bits {
@@ -74,17 +74,17 @@ impl Bits {
 
     /// The highest value.
     #[must_use]
-    pub const fn most(self) -> u16 {
+    pub const fn max(self) -> u16 {
         ((1_u32 << self.count()) - 1) as u16
     }
 
-    /// The bytes that `values` values are packed into.
+    /// Bytes that `values` values occupy when packed.
     #[must_use]
     pub const fn bytes(self, values: usize) -> usize {
         (values * self.count() as usize).div_ceil(8)
     }
 
-    /// How many values are packed into `bytes` bytes. The bits left over are fewer than a value has: there is one answer.
+    /// Number of values packed into `bytes` bytes; fewer bits than a value are left over.
     pub(super) const fn values(self, bytes: usize) -> usize {
         bytes * 8 / self.count() as usize
     }
@@ -95,18 +95,18 @@ impl Bits {
 pub struct Head {
     /// Who sends, 0 to 65534.
     pub board: u16,
-    /// Another number after each start of the board, so that a sequence that begins anew is known for one.
+    /// Changes with every start of the board, so that a restarted sequence is recognised.
     pub boot: u8,
-    /// Of a frame, its number since the board started; of other packets, the number that the next frame will have.
+    /// For a frame its number since the start; for other packets the number of the next frame.
     pub sequence: u32,
     /// The board's clock when it read the first channel (of other packets: when it sent), µs, modulo 2³².
     pub time_us: u32,
 }
 
-/// What a board says of itself.
+/// A board's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity<'a> {
-    /// The request that this answers; 0 when nobody asked.
+    /// The request that this answers; 0 if unrequested.
     pub request: u8,
     /// Whether it sends frames.
     pub running: bool,
@@ -114,22 +114,22 @@ pub struct Identity<'a> {
     pub channels: u16,
     /// Bits of a value.
     pub bits: Bits,
-    /// [`layout_hash`] of the taxels it is made for; [`NO_LAYOUT`] when it does not know.
+    /// [`layout_hash`] of its taxels; [`NO_LAYOUT`] if unknown.
     pub layout: u32,
     /// Frames a second, in thousandths of a hertz; 0 is as many as the line takes.
     pub rate_mhz: u32,
-    /// Name and version of the firmware, UTF-8, at most [`MOST_TEXT`] bytes. What is no UTF-8 is read as empty.
+    /// Name and version of the firmware, at most [`MAX_FIRMWARE_BYTES`] bytes; invalid UTF-8 is read as empty.
     pub firmware: &'a str,
 }
 
-/// What the host asks of a board. Each may be repeated: the second time changes nothing.
+/// Commands from the host. All are idempotent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Say who you are.
+    /// Send your identity.
     Identify,
-    /// Send so many frames a second, in thousandths of a hertz; 0 is as many as the line takes.
+    /// Set the frame rate; 0 is as fast as the line allows.
     Rate {
-        /// 1 Hz is 1000.
+        /// Frame rate, mHz.
         rate_mhz: u32,
     },
     /// Set a channel's potentiometer.
@@ -159,7 +159,7 @@ impl Command {
     }
 }
 
-/// How a board answers what is no [`Command::Identify`].
+/// A board's answer to any command but [`Command::Identify`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The request that this answers.
@@ -172,7 +172,7 @@ pub struct Answer {
     pub value: u32,
 }
 
-/// What became of a command.
+/// The result of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// It was done.
@@ -183,7 +183,7 @@ pub enum Status {
     Bad,
     /// The board failed to do it.
     Failed,
-    /// Something of a later version.
+    /// A status of a later protocol version.
     Other(u8),
 }
 

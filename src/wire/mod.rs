@@ -1,16 +1,15 @@
-//! The wire: how boards with sensors and this host speak over a serial line.
+//! The serial protocol between sensor boards and the host.
 //!
-//! Nothing here does I/O or looks at a clock. [`encode`] writes packets into memory that the caller brings and needs
-//! neither allocation nor `std`; a [`Decoder`] turns bytes, however they come, into [`Event`]s; a [`Dialogue`] asks a
-//! board for something until it answers; [`board`] is a board made of software, to try all this with.
+//! Nothing here does I/O or reads a clock. [`encode`] writes packets into a buffer without allocation or `std`; a
+//! [`Decoder`] turns bytes into [`Event`]s; a [`Dialogue`] sends commands with retries; [`board`] is a simulated board.
 //!
-//! `docs/wire.md` specifies the format for those who write firmware, `examples/firmware/` has it in C.
+//! `docs/wire.md` specifies the format; `examples/firmware/` implements it in C.
 //!
 //! ```
 //! use somatic::wire::{Bits, Decoder, Event, Head, encode};
 //!
 //! let head = Head { board: 3, boot: 1, sequence: 0, time_us: 1000 };
-//! let mut line = [0; somatic::wire::MOST_ON_LINE];
+//! let mut line = [0; somatic::wire::MAX_ENCODED_BYTES];
 //! let length = encode::frame(&mut line, &head, Bits::Ten, &[0, 512, 1023]).unwrap();
 //!
 //! let mut decoder = Decoder::new();
@@ -22,16 +21,16 @@
 //! ```
 
 pub mod board;
-mod books;
 mod decode;
 mod dialogue;
 pub mod encode;
 mod format;
+mod frame_counts;
 
-pub use books::{Account, Books, Placed};
-pub use decode::{Corruption, Decoder, Event, Heard, Values};
-pub use dialogue::{Dialogue, Ended, Outcome, Patience};
+pub use decode::{Corruption, Decoder, DecoderCounts, Event, Values};
+pub use dialogue::{Dialogue, Ended, Outcome, RetryPolicy};
 pub use format::{
-    ANY_BOARD, Answer, Bits, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, HEAD_BYTES, Head, Identity, MOST_CHANNELS,
-    MOST_ON_LINE, MOST_PACKET, MOST_TEXT, NO_LAYOUT, Status, VERSION, layout_hash,
+    ANY_BOARD, Answer, Bits, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, HEAD_BYTES, Head, Identity, MAX_CHANNELS,
+    MAX_ENCODED_BYTES, MAX_FIRMWARE_BYTES, MAX_PACKET_BYTES, NO_LAYOUT, Status, VERSION, layout_hash,
 };
+pub use frame_counts::{BoardCounts, FrameCounts, PacketOrder};

@@ -5,7 +5,7 @@ use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use somatic::wire::{Bits, Command, Corruption, Decoder, Dialogue, Event, Outcome, Patience, Status};
+use somatic::wire::{Bits, Command, Corruption, Decoder, Dialogue, Event, Outcome, RetryPolicy, Status};
 
 use crate::{done, fails, somatic};
 
@@ -81,7 +81,7 @@ fn listen(port: &mut serialport::TTYPort, decoder: &mut Decoder, mut on: impl Fn
 
 /// Asks until it is answered.
 fn ask(port: &mut serialport::TTYPort, decoder: &mut Decoder, command: Command) -> Outcome {
-    let mut dialogue = Dialogue::new(somatic::wire::ANY_BOARD, Patience::default(), 0);
+    let mut dialogue = Dialogue::new(somatic::wire::ANY_BOARD, RetryPolicy::default(), 0);
     dialogue.ask(command).unwrap();
     let (start, mut buffer, mut ended) = (Instant::now(), [0; 4096], None);
     loop {
@@ -90,7 +90,7 @@ fn ask(port: &mut serialport::TTYPort, decoder: &mut Decoder, command: Command) 
             port.write_all(bytes).unwrap();
         }
         let count = port.read(&mut buffer).unwrap_or(0);
-        decoder.push(&buffer[..count], |event| ended = ended.or(dialogue.hear(&event)));
+        decoder.push(&buffer[..count], |event| ended = ended.or(dialogue.receive(&event)));
         if let Some(ended) = ended.or_else(|| dialogue.give_up(start.elapsed())) {
             return ended.outcome;
         }
@@ -127,9 +127,9 @@ fn a_board_says_who_it_is_obeys_and_sends_what_it_plays() {
     }));
     let sent = playing.end();
     assert_eq!((sent[0]["frames"].as_u64(), sent[0]["commands"].as_u64()), (Some(200), Some(5)));
-    let account = decoder.books().account(1).unwrap();
+    let account = decoder.frame_counts().board(1).unwrap();
     assert_eq!((account.intact, account.lost, account.restarts), (200, 0, 0));
-    assert_eq!(decoder.heard().corrupt, 0);
+    assert_eq!(decoder.counts().corrupt, 0);
     assert!(came.iter().all(|frame| rows.contains(frame)), "a frame is no row of the recording");
     assert!(came.iter().any(|frame| frame.iter().any(|&value| value > 0)));
     assert!(!link.exists() && std::fs::symlink_metadata(&link).is_err(), "the link goes with the board");
@@ -145,8 +145,8 @@ fn a_line_is_as_fast_as_its_baud_and_no_faster() {
     let begin = Instant::now();
     let mut times_us = Vec::new();
     listen(&mut port, &mut decoder, |event| {
-        if let Event::Frame { placed, .. } = event {
-            times_us.push(placed.time_us);
+        if let Event::Frame { order, .. } = event {
+            times_us.push(order.time_us);
         }
     });
     // Six frames and the identity behind them, less what one step sends at once.
@@ -175,7 +175,7 @@ fn another_speed_makes_every_byte_unreadable() {
             events += 1;
         });
     }
-    assert!(events > 0 && decoder.heard().packets == 0, "{:?}", decoder.heard());
+    assert!(events > 0 && decoder.counts().packets == 0, "{:?}", decoder.counts());
     drop(port);
     assert!(playing.end()[0]["faults"]["garbled_bytes"].as_u64() > Some(0));
 }
@@ -207,7 +207,7 @@ fn the_books_of_sixteen_bad_lines_balance() {
                 let mut decoder = Decoder::new();
                 let mut port = open(&name, 57_600);
                 // From here on each frame is either heard or counted.
-                while decoder.books().account(board).is_none() {
+                while decoder.frame_counts().board(board).is_none() {
                     ask(&mut port, &mut decoder, Command::Identify);
                 }
                 while ask(&mut port, &mut decoder, Command::Start) == Outcome::Unanswered {}
@@ -216,8 +216,8 @@ fn the_books_of_sixteen_bad_lines_balance() {
                     decoder.rejoin();
                     port = open(&name, 57_600);
                 }
-                let account = *decoder.books().account(board).unwrap();
-                (board, account, decoder.heard().corrupt)
+                let account = *decoder.frame_counts().board(board).unwrap();
+                (board, account, decoder.counts().corrupt)
             })
         })
         .collect();

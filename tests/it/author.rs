@@ -464,7 +464,7 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
             3,
             "did you mean `_DENSITY`?",
         ),
-        ("[regions.a]\nexcept = \"a\"\n[[place]]\nregion = \"a\"\ntaxels = 5\n".into(), 1, "break the ring"),
+        ("[regions.a]\nexcept = \"a\"\n[[place]]\nregion = \"a\"\ntaxels = 5\n".into(), 1, "excludes itself"),
         ("[[place]]\ntaxels = 5\ndensity = \"_HAIR\"\n".into(), 2, "no mesh has an attribute `_HAIR`"),
         ("[[place]]\ntaxels = 5\ndensity = \"COLOR_0\"\n".into(), 2, "`COLOR_0.r`"),
         ("[[place]]\ntaxels = 5\ndensity = \"COLOR_0.b\"\n".into(), 2, "0 everywhere"),

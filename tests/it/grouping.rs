@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
-use somatic::author::group::{FLAT, FieldRule, Grouping, Painted, group};
+use somatic::author::group::{FieldRule, Grouping, MAX_PLANE_DISTORTION, Painted, group};
 use somatic::author::place_evenly;
 use somatic::body::{ChartKind, FieldSpec, Glb, MeshData, Modality, Taxel};
 use somatic::field::{FieldSet, NoChart};
@@ -377,7 +377,7 @@ fn a_field_around_a_limb_is_named_split_or_refused() {
     assert!(unrolled.iter().all(|chart| chart.kind == ChartKind::Geodesic && chart.distortion < 0.01), "{unrolled:?}");
     let planes = split("plane");
     assert_eq!(planes.len(), 3);
-    assert!(planes.iter().all(|chart| chart.kind == ChartKind::Plane && chart.distortion > FLAT));
+    assert!(planes.iter().all(|chart| chart.kind == ChartKind::Plane && chart.distortion > MAX_PLANE_DISTORTION));
     assert_eq!(split("auto").len(), 2);
 
     for (chart, parts) in [("plane", "3 parts"), ("geodesic", "2 parts")] {
@@ -417,7 +417,11 @@ fn each_field_gets_the_chart_that_suits_it_and_parents_get_theirs() {
     let right = RADIUS * 7.0 / 24.0 * TAU;
     assert!((width / right - 1.0).abs() < 2e-3, "{width} {right}");
     let (flat, _) = chart("flat");
-    assert!(flat.kind == ChartKind::Plane && flat.distortion <= FLAT && flat.u_in_anchor.distance(DVec3::Y) < 1e-6);
+    assert!(
+        flat.kind == ChartKind::Plane
+            && flat.distortion <= MAX_PLANE_DISTORTION
+            && flat.u_in_anchor.distance(DVec3::Y) < 1e-6
+    );
     assert!(PI > 3.0 && arm.distortion_rms <= arm.distortion);
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use somatic::Body;
-use somatic::author::icub::{IcubFile, NormalFrom, Row};
+use somatic::author::icub::{IcubFile, IcubRow, NormalFrom};
 use somatic::body::Modality;
 use somatic::field::FieldSet;
 
@@ -34,8 +34,8 @@ fn each_file_is_read_to_its_last_row() {
         let file = IcubFile::read(&text).unwrap();
         let &(part, account) = known.get(name).unwrap_or_else(|| panic!("say in this test what is in {name}"));
         assert_eq!(file.part, part);
-        let count = |is: &dyn Fn(&Row) -> bool| file.rows.iter().filter(|row| is(row)).count();
-        let of = |modality| count(&|row| matches!(row, Row::Taxel(taxel) if taxel.modality == modality));
+        let count = |is: &dyn Fn(&IcubRow) -> bool| file.rows.iter().filter(|row| is(row)).count();
+        let of = |modality| count(&|row| matches!(row, IcubRow::Taxel(taxel) if taxel.modality == modality));
         let shared = file.shared_places();
         let scaled = file.taxels().filter(|(_, taxel)| taxel.normal == NormalFrom::Scaled).count();
         let found = [
@@ -43,10 +43,10 @@ fn each_file_is_read_to_its_last_row() {
             file.ids,
             of(Modality::Pressure),
             of(Modality::Temperature),
-            count(&|row| *row == Row::Absent),
-            count(&|row| matches!(row, Row::Unplaced(0..))),
-            count(&|row| *row == Row::Unplaced(-2)),
-            count(&|row| *row == Row::Disowned),
+            count(&|row| *row == IcubRow::Absent),
+            count(&|row| matches!(row, IcubRow::Unplaced(0..))),
+            count(&|row| *row == IcubRow::Unplaced(-2)),
+            count(&|row| *row == IcubRow::Disowned),
             shared.len(),
             shared.iter().map(Vec::len).sum(),
             scaled,

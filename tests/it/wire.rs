@@ -6,7 +6,7 @@ use std::process::Command as Process;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use somatic::wire::{
-    Answer, Bits, Command, Corruption, Decoder, Event, HEAD_BYTES, Head, Identity, MOST_ON_LINE, Status, encode,
+    Answer, Bits, Command, Corruption, Decoder, Event, HEAD_BYTES, Head, Identity, MAX_ENCODED_BYTES, Status, encode,
 };
 
 pub(crate) fn root() -> PathBuf {
@@ -51,7 +51,7 @@ impl Packet {
 
     /// The bytes on the line.
     pub(crate) fn line(&self) -> Vec<u8> {
-        let mut to = [0xAA; MOST_ON_LINE];
+        let mut to = [0xAA; MAX_ENCODED_BYTES];
         let length = match self {
             Self::Frame { head, bits, values } => encode::frame(&mut to, head, *bits, values),
             Self::Partial { head, bits, values } => {
@@ -148,7 +148,7 @@ pub(crate) fn decoded(bytes: &[u8]) -> Vec<Packet> {
 pub(crate) fn examples() -> Vec<(&'static str, Packet)> {
     let head = |sequence: u32, time_us: u32| Head { board: 3, boot: 1, sequence, time_us };
     let ramp = |count: u32, bits: Bits| -> Vec<u16> {
-        (0..count).map(|channel| (channel * 0x9E37 % (u32::from(bits.most()) + 1)) as u16).collect()
+        (0..count).map(|channel| (channel * 0x9E37 % (u32::from(bits.max()) + 1)) as u16).collect()
     };
     let frame = |sequence: u32, bits: Bits, values: Vec<u16>| Packet::Frame {
         head: head(sequence, 1_000_000 + 20_000 * sequence),
@@ -272,13 +272,13 @@ fn sixty_four_channels_of_10_bits_reach_55_frames_a_second() {
 #[test]
 fn what_cannot_be_written_is_refused_and_nothing_is_written_past_the_end() {
     let head = Head { board: 0, boot: 0, sequence: 0, time_us: 0 };
-    let mut to = [0; MOST_ON_LINE];
+    let mut to = [0; MAX_ENCODED_BYTES];
     assert_eq!(encode::frame(&mut to, &head, Bits::Ten, &[1024]), None);
     assert_eq!(encode::frame(&mut to, &head, Bits::Ten, &[]), None);
     assert_eq!(encode::frame(&mut to, &head, Bits::Ten, &[0; 257]), None);
     assert_eq!(encode::partial(&mut to, &head, Bits::Ten, &[None; 257]), None);
-    assert_eq!(encode::partial(&mut to, &head, Bits::Sixteen, &[Some(0); 256]), Some(MOST_ON_LINE - 2));
-    assert_eq!(encode::partial(&mut to, &head, Bits::Sixteen, &[Some(0x0101); 256]), Some(MOST_ON_LINE));
+    assert_eq!(encode::partial(&mut to, &head, Bits::Sixteen, &[Some(0); 256]), Some(MAX_ENCODED_BYTES - 2));
+    assert_eq!(encode::partial(&mut to, &head, Bits::Sixteen, &[Some(0x0101); 256]), Some(MAX_ENCODED_BYTES));
     for (name, packet) in examples() {
         let line = packet.line();
         for space in [0, 1, 2, line.len() / 2, line.len() - 2, line.len() - 1] {
@@ -417,11 +417,11 @@ pub(crate) fn frames_of_a_board() -> impl Strategy<Value = Vec<Packet>> {
                 let sequence = number as u32;
                 let head = Head { board: 5, boot: 9, sequence, time_us: 17_535_u32.wrapping_mul(sequence) };
                 if full {
-                    let values = values.iter().map(|value| value.unwrap_or(0) & bits.most()).collect();
+                    let values = values.iter().map(|value| value.unwrap_or(0) & bits.max()).collect();
                     Packet::Frame { head, bits, values }
                 } else {
                     let present = values.iter().zip(0..).filter_map(|(value, channel)| Some((channel, (*value)?)));
-                    let values = present.map(|(channel, value)| (channel, value & bits.most())).collect();
+                    let values = present.map(|(channel, value)| (channel, value & bits.max())).collect();
                     Packet::Partial { head, bits, values }
                 }
             })
@@ -454,7 +454,7 @@ proptest! {
             decoder.push(piece, |event| got.push(Packet::of(&event)));
             rest = after;
         }
-        let account = decoder.books().account(5).unwrap();
+        let account = decoder.frame_counts().board(5).unwrap();
         prop_assert_eq!(account.intact + account.lost, u64::from(sent));
         prop_assert_eq!(account.restarts, 0);
         let came: Vec<&Packet> =
@@ -502,10 +502,10 @@ fn the_decoder_survives_a_long_time() {
         came.retain(|packet| matches!(packet, Packet::Frame { .. } | Packet::Partial { .. }));
         assert!(came.iter().all(|packet| frames.contains(packet)), "round {rounds}: something came that was not sent");
         assert!(frames.iter().zip(whole).all(|(frame, whole)| !whole || came.contains(frame)), "round {rounds}");
-        let account = decoder.books().account(5).unwrap();
+        let account = decoder.frame_counts().board(5).unwrap();
         assert_eq!(account.intact + account.lost, sent, "round {rounds}");
         rounds += 1;
     }
-    let account = decoder.books().account(5).unwrap();
+    let account = decoder.frame_counts().board(5).unwrap();
     eprintln!("{rounds} rounds, {bytes_sent} bytes; {sent} sent = {} intact + {} lost", account.intact, account.lost);
 }

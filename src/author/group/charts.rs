@@ -1,46 +1,46 @@
-//! Charts of the fields that rules made: laid, measured, and where there can be none split or named.
+//! Charts of the fields that rules made: computed, checked, and if there is none split or reported.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::divide::numbered;
-use super::words::{self, Words};
-use super::{ChartWish, Grouping, Grower, Made, Wrap};
+use super::chart_notes::{self, ChartNotes};
+use super::{ChartWish, Grouping, Grouper, FieldDraft, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
 use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
 
-/// A plane chart whose [`crate::field::Distortion`] is at most this is let stand where either kind will do: neighbours
-/// 5 mm apart come out 0.25 mm off at worst. Around a cylinder of radius R a plane goes to θ = arccos 0.95 = 18° on each side
-/// of its middle by then. What lies that far out, Rθ, is drawn at R sin θ: 1.7 % of the way short, and a centroid by no more.
-pub const FLAT: f64 = 0.05;
+/// Maximum [`crate::field::Distortion`] at which `auto` takes a plane chart: neighbours 5 mm apart are at most 0.25 mm
+/// off. On a cylinder of radius R that allows θ = arccos 0.95 = 18° on each side of the middle; a point at Rθ is drawn at
+/// R sin θ, 1.7 % too near.
+pub const MAX_PLANE_DISTORTION: f64 = 0.05;
 
-/// A chart that is further from true than this is no good where a split can give better ones.
-pub(super) const POOR: f64 = 0.25;
+/// A chart with more distortion is split, if requested, or reported.
+pub(super) const POOR_DISTORTION: f64 = 0.25;
 
-/// A sector with fewer taxels is no part of a split: they would say little of orientation.
-const LEAST_IN_SECTOR: usize = 3;
+/// Minimum number of taxels in a sector of a split, for an orientation.
+const MIN_SECTOR_TAXELS: usize = 3;
 
-/// Sectors around a limb that are tried before it is cut across.
-const SECTORS: std::ops::RangeInclusive<usize> = 2..=4;
+/// Numbers of sectors around a limb to try before it is cut across.
+const SECTOR_COUNTS: std::ops::RangeInclusive<usize> = 2..=4;
 
-/// Parts that a field is split into at most.
-const MOST_PARTS: usize = 64;
+/// Maximum number of parts of a split.
+const MAX_PARTS: usize = 64;
 
-/// Rounds in which the patches of a split find their middles.
+/// Rounds of Lloyd's iteration for the patches of a split.
 const SPLIT_ROUNDS: usize = 4;
 
-/// Parts that are tried where a split is only to be proposed, to somebody whose field is refused.
-const MOST_PROPOSED: usize = 12;
+/// Maximum number of parts of a split that is only proposed in an error.
+const MAX_PROPOSED_PARTS: usize = 12;
 
-/// A field with the chart it gets, and the chart's distortion.
+/// A field with its chart.
 type Fitted = std::result::Result<FieldSpec, NoChart>;
 
-impl Grower<'_> {
-    /// Lays all charts.
+impl Grouper<'_> {
+    /// Computes all charts.
     ///
     /// # Errors
-    /// A field is to be refused, as it cannot have the chart it asks for; the line says what split would do. With it comes
-    /// which of the rules applied, from 0, made the field.
+    /// A field cannot have its chart and its rule says to refuse it; the message says which split would work. With it comes
+    /// the index of the rule that made the field.
     pub fn finish(mut self) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
@@ -50,64 +50,64 @@ impl Grower<'_> {
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
         let mut fields = Vec::with_capacity(specs.len());
-        let mut words = Words::default();
+        let mut notes = ChartNotes::default();
         let made = std::mem::take(&mut self.made);
         for ((made, plane), ids) in made.into_iter().zip(planes).zip(members) {
             let name = made.spec.name.clone();
             let whole = made.spec.clone().with_members(ids);
             let why = match self.fit(&made, &whole, plane.clone()) {
                 Ok(spec) => {
-                    // Where a plane does, a parent needs no members of its own for it.
+                    // With a plane chart, a parent needs no members of its own.
                     let unrolled = spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
                     fields.push(if unrolled { spec } else { FieldSpec { chart: spec.chart, ..made.spec } });
                     continue;
                 }
                 Err(why) => why,
             };
-            // What a plane could be laid for by default must say that it shall not.
+            // A field that could have a plane chart by default must state that it has none.
             let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
             let uncharted = FieldSpec { chart: plane.is_ok().then_some(none), ..made.spec.clone() };
             let parent = has_children(&name);
             match made.wrap {
                 Wrap::Refuse => {
-                    let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MOST_PROPOSED) };
-                    let advice = words::advice(&why, parts.map(|parts| parts.len()), parent, MOST_PROPOSED);
-                    let why = words::plain(&why);
+                    let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MAX_PROPOSED_PARTS) };
+                    let advice = chart_notes::advice(&why, parts.map(|parts| parts.len()), parent, MAX_PROPOSED_PARTS);
+                    let why = chart_notes::plain(&why);
                     let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
                     return Err((made.rule, Error::failed(what)));
                 }
                 Wrap::Split if !parent => {
                     fields.push(uncharted);
-                    match self.split(&made, &whole, &mut bare, MOST_PARTS) {
+                    match self.split(&made, &whole, &mut bare, MAX_PARTS) {
                         Some(parts) => {
-                            let why = words::plain(&why);
-                            words.split.push((name, parts.len(), why));
+                            let why = chart_notes::plain(&why);
+                            notes.split.push((name, parts.len(), why));
                             fields.extend(parts);
                         }
                         None => self.notes.push(format!(
-                            "field `{name}` has no chart: {}; no {MOST_PARTS} parts or fewer have one: choose fewer \
+                            "field `{name}` has no chart: {}; no {MAX_PARTS} parts or fewer have one: choose fewer \
                              taxels",
-                            words::plain(&why)
+                            chart_notes::plain(&why)
                         )),
                     }
                 }
                 _ => {
-                    // A level that nobody asked a chart of leaves that to what is below it.
+                    // A parent without a requested chart is not reported.
                     if !parent || made.chart != ChartWish::Auto {
-                        words.bare.push((name, why, parent));
+                        notes.bare.push((name, why, parent));
                     }
                     fields.push(uncharted);
                 }
             }
         }
-        words.poor = std::mem::take(&mut self.poor);
-        self.notes.extend(words.lines());
+        notes.poor = std::mem::take(&mut self.poor);
+        self.notes.extend(notes.lines());
         Ok(Grouping { fields, notes: self.notes })
     }
 
-    /// `whole`, which has all members of `made` for its own, with the chart that `made` asks for; `plane` is what a plane
-    /// chart of it would be.
-    fn fit(&mut self, made: &Made, whole: &FieldSpec, plane: std::result::Result<Chart, NoChart>) -> Fitted {
+    /// `whole`, the field `made` with all its members as own members, with the chart that `made` requests; `plane` is its
+    /// plane chart.
+    fn fit(&mut self, made: &FieldDraft, whole: &FieldSpec, plane: std::result::Result<Chart, NoChart>) -> Fitted {
         let asked = |kind, whole: &FieldSpec| {
             let chart = Some(ChartSpec { kind, origin_in_anchor: None, u_in_anchor: made.u });
             FieldSpec { chart, ..whole.clone() }
@@ -117,7 +117,7 @@ impl Grower<'_> {
             ChartWish::Plane => plane.map(|_| planar(whole.clone(), made.u)),
             ChartWish::Geodesic => self.unroller.unroll(&asked(ChartKind::Geodesic, whole)),
             ChartWish::Auto => {
-                let flat = plane.as_ref().is_ok_and(|chart| chart.distortion <= FLAT);
+                let flat = plane.as_ref().is_ok_and(|chart| chart.distortion <= MAX_PLANE_DISTORTION);
                 if flat || matches!(plane, Err(NoChart::SeveralLinks(_))) {
                     return plane.map(|_| planar(whole.clone(), made.u));
                 }
@@ -130,10 +130,10 @@ impl Grower<'_> {
                     (Err(_), Ok(plane)) => plane,
                     (Err(why), Err(_)) => return Err(why),
                 };
-                if off > POOR && made.wrap == Wrap::Split {
+                if off > POOR_DISTORTION && made.wrap == Wrap::Split {
                     return Err(NoChart::Untrue(off));
                 }
-                if off > POOR {
+                if off > POOR_DISTORTION {
                     self.poor.push((whole.name.clone(), off));
                 }
                 Ok(truer)
@@ -141,7 +141,7 @@ impl Grower<'_> {
         }
     }
 
-    /// How far the geodesic chart of `unrolled` is from true.
+    /// The distortion of the geodesic chart of `unrolled`.
     fn distortion(&self, unrolled: &FieldSpec) -> f64 {
         let of_member = |(&id, member): (&u32, &MemberSpec)| {
             let taxel = &self.body.taxels[self.body.taxel_index(id)?];
@@ -151,9 +151,9 @@ impl Grower<'_> {
         Distortion::of(&members, &places).largest
     }
 
-    /// Parts of `whole` that each have the chart that `made` asks for, at most `most`: the fewest sectors around a limb, or
-    /// else its two halves, and of each half that has no chart the same again.
-    fn split(&mut self, made: &Made, whole: &FieldSpec, bare: &mut Body, most: usize) -> Option<Vec<FieldSpec>> {
+    /// At most `most` parts of `whole` that each have the chart that `made` requests: the fewest sectors around a limb, else
+    /// two halves, which are split again if they have no chart.
+    fn split(&mut self, made: &FieldDraft, whole: &FieldSpec, bare: &mut Body, most: usize) -> Option<Vec<FieldSpec>> {
         let taxels: Vec<usize> = whole.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
         let parts = self.parts(made, whole, bare, &taxels, most);
         let mut parts = parts?;
@@ -165,20 +165,20 @@ impl Grower<'_> {
         Some(parts)
     }
 
-    /// The parts that `taxels` of `whole` are split into, without their names.
+    /// The parts into which `taxels` of `whole` are split, unnamed.
     fn parts(
         &mut self,
-        made: &Made,
+        made: &FieldDraft,
         whole: &FieldSpec,
         bare: &mut Body,
         taxels: &[usize],
         most: usize,
     ) -> Option<Vec<FieldSpec>> {
-        for count in SECTORS {
+        for count in SECTOR_COUNTS {
             let sectors = self.sectors(taxels, count);
             if sectors.len() > 1
                 && sectors.len() <= most
-                && sectors.iter().all(|sector| sector.len() >= LEAST_IN_SECTOR)
+                && sectors.iter().all(|sector| sector.len() >= MIN_SECTOR_TAXELS)
                 && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels)).collect()
             {
                 return Some(parts);
@@ -197,7 +197,7 @@ impl Grower<'_> {
     }
 
     /// The child of `whole` with `taxels`, if it has its chart.
-    fn part(&mut self, made: &Made, whole: &FieldSpec, bare: &mut Body, taxels: &[usize]) -> Option<FieldSpec> {
+    fn part(&mut self, made: &FieldDraft, whole: &FieldSpec, bare: &mut Body, taxels: &[usize]) -> Option<FieldSpec> {
         let member = |&taxel: &usize| {
             let id = self.body.taxels[taxel].id;
             (id, whole.members.get(&id).copied().unwrap_or_default())
@@ -209,7 +209,7 @@ impl Grower<'_> {
         self.fit(made, &part, plane).ok()
     }
 
-    /// `taxels` in `count` sectors by where their normals point around the axis that these are most across.
+    /// `taxels` in `count` sectors by the direction of their normals around the axis most perpendicular to them.
     fn sectors(&self, taxels: &[usize], count: usize) -> Vec<Vec<usize>> {
         let normals: Vec<DVec3> = taxels.iter().map(|&taxel| self.body.taxels[taxel].normal_in_link).collect();
         let axis = least_axis(&normals);
@@ -227,13 +227,13 @@ impl Grower<'_> {
     }
 }
 
-/// The unit vector that `normals` have least along them.
+/// The unit vector most perpendicular to `normals`.
 fn least_axis(normals: &[DVec3]) -> DVec3 {
     let products = |m: DMat3, n: &DVec3| m + DMat3::from_cols(*n * n.x, *n * n.y, *n * n.z);
     let moments = normals.iter().fold(DMat3::ZERO, products);
     let trace = moments.x_axis.x + moments.y_axis.y + moments.z_axis.z;
     let inverted = DMat3::from_diagonal(DVec3::splat(trace)) - moments;
-    // Power iteration; a start that is across none of the axes.
+    // Power iteration, from a vector that is perpendicular to no axis.
     (0..200).fold(DVec3::new(0.48, 0.6, 0.64), |axis, _| (inverted * axis).try_normalize().unwrap_or(axis))
 }
 

@@ -1,22 +1,22 @@
-//! Which taxels a rule is about.
+//! Selects the taxels of a rule.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::words::Globs;
+use super::super::recipe_values::Globs;
 use super::rule::{Each, FieldRule};
-use super::{Grower, Painted};
+use super::{Grouper, Painted};
 use crate::body::Modality;
 use crate::error::{Error, Result, nearest};
-use crate::field::Skin;
+use crate::field::LinkSurface;
 
-/// A taxel counts as painted where the attribute is over this.
+/// A taxel is selected if the attribute is above this.
 const PAINTED: f64 = 0.5;
 
-/// What a taxel sits on: a surface of its body, a triangle of that, and the weights of the triangle's corners.
-type Seat = (usize, usize, [f64; 3]);
+/// The place of a taxel: a surface of its body, a triangle of it, and the weights of the triangle's corners.
+type TaxelPlace = (usize, usize, [f64; 3]);
 
-impl Grower<'_> {
-    /// Of `among`, indices into the body's taxels, those that `rule` chooses.
+impl Grouper<'_> {
+    /// The taxels of `among`, indices into the body's taxels, that `rule` selects.
     pub(super) fn choose(&mut self, rule: &FieldRule, among: &[usize]) -> Result<Vec<usize>> {
         let mut chosen = among.to_vec();
         if let Some(lists) = &rule.taxels {
@@ -50,14 +50,17 @@ impl Grower<'_> {
         if let Some(globs) = &rule.mesh {
             known("mesh", globs, "node that shows a mesh", self.body.surfaces.iter().map(|s| s.name.as_str()))?;
             let body = self.body;
-            chosen.retain(|&taxel| self.seat(taxel).is_some_and(|(s, ..)| globs.matches(&body.surfaces[s].name)));
+            chosen
+                .retain(|&taxel| self.taxel_place(taxel).is_some_and(|(s, ..)| globs.matches(&body.surfaces[s].name)));
         }
         let painted = self.painted;
         if let Some(globs) = &rule.material {
             let names = painted.materials();
             known("material", globs, "material", names.iter().map(String::as_str))?;
             chosen.retain(|&taxel| {
-                self.seat(taxel).and_then(|(s, t, _)| painted.material(s, t)).is_some_and(|name| globs.matches(name))
+                self.taxel_place(taxel)
+                    .and_then(|(s, t, _)| painted.material(s, t))
+                    .is_some_and(|name| globs.matches(name))
             });
         }
         if let Some(name) = &rule.attribute {
@@ -66,15 +69,15 @@ impl Grower<'_> {
                 return Err(unknown("attribute", name, "painted attribute", names.iter().map(String::as_str)));
             }
             chosen.retain(|&taxel| {
-                let seat = self.seat(taxel);
-                let value = seat.and_then(|(s, t, barycentric)| painted.attribute(name, s, t, barycentric));
+                let taxel_place = self.taxel_place(taxel);
+                let value = taxel_place.and_then(|(s, t, barycentric)| painted.attribute(name, s, t, barycentric));
                 value.is_some_and(|value| value > PAINTED)
             });
         }
         Ok(chosen)
     }
 
-    /// Keeps the taxels for what `rule` asks for; unless it lists them, those for pressure, where there are any.
+    /// Keeps the taxels of the rule's modality; by default pressure taxels if there are any, unless the rule lists ids.
     fn keep_modality(&self, rule: &FieldRule, chosen: &mut Vec<usize>) -> Result<()> {
         let of = |taxel: usize| self.body.taxels[taxel].modality;
         if let Some(wanted) = &rule.modality {
@@ -89,20 +92,20 @@ impl Grower<'_> {
         Ok(())
     }
 
-    /// What taxel `taxel` sits on.
-    fn seat(&mut self, taxel: usize) -> Option<Seat> {
+    /// The place of `taxel` on the surface.
+    fn taxel_place(&mut self, taxel: usize) -> Option<TaxelPlace> {
         let (body, unroller) = (self.body, &mut self.unroller);
-        *self.seats.entry(taxel).or_insert_with(|| {
+        *self.taxel_places.entry(taxel).or_insert_with(|| {
             let taxel = &body.taxels[taxel];
-            let skin: &Skin = &unroller.surfaces().in_link(taxel.link);
-            let place = skin.locate(taxel.position_in_link, taxel.normal_in_link)?;
-            Some(skin.origin_of(&place))
+            let surface: &LinkSurface = &unroller.surfaces().in_link(taxel.link);
+            let place = surface.locate(taxel.position_in_link, taxel.normal_in_link)?;
+            Some(surface.origin_of(&place))
         })
     }
 
-    /// `chosen` by what `each` names, in the order of the names' first taxels; what has no such name is left out, and how
-    /// many those are is told.
-    pub(super) fn by_each(&mut self, each: Each, chosen: &[usize]) -> (Vec<(String, Vec<usize>)>, usize) {
+    /// Groups `chosen` by the names that `each` requests, in the order of the names' first taxels. Also returns the number of
+    /// taxels without such a name.
+    pub(super) fn group_by(&mut self, each: Each, chosen: &[usize]) -> (Vec<(String, Vec<usize>)>, usize) {
         let (body, painted) = (self.body, self.painted);
         let mut order: Vec<(String, Vec<usize>)> = Vec::new();
         let mut place_of: BTreeMap<String, usize> = BTreeMap::new();
@@ -110,14 +113,16 @@ impl Grower<'_> {
         for &taxel in chosen {
             let name = match each {
                 Each::Link => Some(body.links[body.taxels[taxel].link].name.clone()),
-                Each::Mesh => self.seat(taxel).map(|(s, ..)| body.surfaces[s].name.clone()),
-                Each::Material => self.seat(taxel).and_then(|(s, t, _)| painted.material(s, t)).map(str::to_owned),
+                Each::Mesh => self.taxel_place(taxel).map(|(s, ..)| body.surfaces[s].name.clone()),
+                Each::Material => {
+                    self.taxel_place(taxel).and_then(|(s, t, _)| painted.material(s, t)).map(str::to_owned)
+                }
             };
             let Some(name) = name else {
                 nameless += 1;
                 continue;
             };
-            // A slash would make a level.
+            // A slash would add a level.
             let name = name.replace('/', "_");
             let place = *place_of.entry(name).or_insert_with_key(|name| {
                 order.push((name.clone(), Vec::new()));
@@ -137,7 +142,7 @@ fn known<'n>(key: &str, globs: &Globs, thing: &str, names: impl Iterator<Item = 
     Err(unknown(key, &globs.text().join("`, `"), thing, names))
 }
 
-/// The error that says that `key` names no `thing` of `names`.
+/// The error that `key` matches no `thing` of `names`.
 fn unknown<'n>(key: &str, asked: &str, thing: &str, names: impl Iterator<Item = &'n str> + Clone) -> Error {
     let names: BTreeSet<&str> = names.collect();
     let hint = match nearest(asked, names.iter().copied()) {
@@ -151,7 +156,7 @@ fn unknown<'n>(key: &str, asked: &str, thing: &str, names: impl Iterator<Item = 
     Error::failed(format!("`{key}`: no {thing} matches `{asked}`: {hint}"))
 }
 
-/// What is painted on a body without anything painted on it.
+/// A body without materials and attributes.
 impl Painted for () {
     fn materials(&self) -> Vec<String> {
         Vec::new()

@@ -1,20 +1,20 @@
-//! A rule's children: one for each of something, patches, discs, rows, columns.
+//! A rule's children: one per link, mesh or material, patches, discs, rows, columns.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::Grower;
+use super::Grouper;
 use super::patches::{patches, spread};
 use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
-use super::ways::Ways;
+use super::distances::LinkDistances;
 use crate::error::{Error, Result};
 use crate::field::unions;
 
-/// Rounds after which patches are left as they are.
-const MOST_ROUNDS: usize = 12;
+/// Maximum rounds of Lloyd's iteration.
+const MAX_ROUNDS: usize = 12;
 
-/// Children by name, each with indices of its taxels in their body.
+/// Children: name and indices of taxels in the body.
 type Children = Vec<(String, Vec<usize>)>;
 
 /// The middle of a disc.
@@ -24,14 +24,14 @@ enum Seed {
     Point(DVec3),
 }
 
-impl Grower<'_> {
-    /// The children that `rule` makes of `chosen`; none where it does not divide.
+impl Grouper<'_> {
+    /// The children that `rule` makes of `chosen`; none if it does not divide.
     pub(super) fn divide(&mut self, rule: &FieldRule, chosen: &[usize]) -> Result<Children> {
         let stem = |default: &str| rule.stem.clone().unwrap_or(default.to_owned());
         if let Some(each) = rule.each {
-            let (children, nameless) = self.by_each(each, chosen);
+            let (children, nameless) = self.group_by(each, chosen);
             if nameless > 0 {
-                let what = self.call(rule);
+                let what = self.rule_name(rule);
                 let without = match each {
                     Each::Link => "link",
                     Each::Mesh => "mesh",
@@ -49,9 +49,9 @@ impl Grower<'_> {
                 Patches::Number(number) => number,
                 Patches::Of { of } => chosen.len().div_ceil(of),
             };
-            let patches = self.patches(chosen, count, MOST_ROUNDS);
+            let patches = self.patches(chosen, count, MAX_ROUNDS);
             if patches.len() != count && matches!(wanted, Patches::Number(_)) {
-                let what = self.call(rule);
+                let what = self.rule_name(rule);
                 self.notes.push(format!(
                     "{what}: {} patches instead of {count}, as a patch keeps to one link and one connected part of the \
                      surface; choose fewer links, or another number",
@@ -73,13 +73,13 @@ impl Grower<'_> {
         Ok(Vec::new())
     }
 
-    /// What a note calls `rule`.
-    fn call(&self, rule: &FieldRule) -> String {
+    /// The rule's name in notes.
+    fn rule_name(&self, rule: &FieldRule) -> String {
         rule.name.as_ref().map_or("a rule without name".to_owned(), |name| format!("rule `{name}`"))
     }
 
-    /// The ways between `chosen`, link by link.
-    fn ways(&mut self, chosen: &[usize]) -> Vec<Ways> {
+    /// The distances between `chosen`, link by link.
+    fn distances(&mut self, chosen: &[usize]) -> Vec<LinkDistances> {
         let body = self.body;
         let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for &taxel in chosen {
@@ -88,16 +88,16 @@ impl Grower<'_> {
         let of_link = |(link, taxels): (usize, Vec<usize>)| {
             let point = |&taxel: &usize| (body.taxels[taxel].position_in_link, body.taxels[taxel].normal_in_link);
             let points = taxels.iter().map(point).collect();
-            Ways::new(self.unroller.surfaces().in_link(link), taxels, points)
+            LinkDistances::new(self.unroller.surfaces().in_link(link), taxels, points)
         };
         by_link.into_iter().map(of_link).collect()
     }
 
-    /// `chosen` in `count` patches, or more where they are on more links or parts, by their lowest ids.
+    /// `chosen` in `count` patches, or more if they are on more links or surface parts, ordered by lowest id.
     pub(super) fn patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
-        let mut links = self.ways(chosen);
+        let mut links = self.distances(chosen);
         let patches = patches(&mut links, count, most_rounds);
-        self.tell_rough(&links);
+        self.note_approximate(&links);
         let taxels = |(link, patch): (usize, Vec<usize>)| patch.into_iter().map(|i| links[link].taxels[i]).collect();
         let mut patches: Vec<Vec<usize>> = patches.into_iter().map(taxels).collect();
         patches.iter_mut().for_each(|patch| patch.sort_unstable());
@@ -105,9 +105,9 @@ impl Grower<'_> {
         patches
     }
 
-    fn tell_rough(&mut self, links: &[Ways]) {
-        for ways in links.iter().filter(|ways| ways.are_rough()) {
-            let link = &self.body.links[self.body.taxels[ways.taxels[0]].link].name;
+    fn note_approximate(&mut self, links: &[LinkDistances]) {
+        for distances in links.iter().filter(|distances| distances.is_approximate()) {
+            let link = &self.body.links[self.body.taxels[distances.taxels[0]].link].name;
             let note = format!(
                 "link `{link}`: distances are measured along edges or from taxel to taxel, as its surface is missing or too \
                  rough; add or smooth the mesh for exact ones"
@@ -120,7 +120,7 @@ impl Grower<'_> {
 
     /// The discs that `rule` makes of `chosen`.
     fn discs(&mut self, rule: &FieldRule, chosen: &[usize]) -> Result<Vec<Vec<usize>>> {
-        let mut links = self.ways(chosen);
+        let mut links = self.distances(chosen);
         // Neighbours at the distance d share 2r − d of 2r.
         let radius_m = rule.radius.map(|radius| radius.metres);
         let seeds: Vec<Seed> = match (&rule.seeds, rule.overlap, radius_m) {
@@ -129,7 +129,7 @@ impl Grower<'_> {
                 let apart_m = 2.0 * radius_m * (1.0 - overlap);
                 let spread = links
                     .iter_mut()
-                    .flat_map(|ways| spread(ways, apart_m).into_iter().map(|i| ways.taxels[i]).collect::<Vec<_>>());
+                    .flat_map(|distances| spread(distances, apart_m).into_iter().map(|i| distances.taxels[i]).collect::<Vec<_>>());
                 let mut taxels: Vec<usize> = spread.collect();
                 taxels.sort_unstable();
                 taxels.into_iter().map(Seed::Taxel).collect()
@@ -138,18 +138,18 @@ impl Grower<'_> {
         };
         let mut discs = Vec::new();
         for (number, seed) in seeds.iter().enumerate() {
-            let (link, nearest, at) = self.settle_seed(seed, &links);
+            let (link, nearest, at) = self.locate_seed(seed, &links);
             let radius_m = match radius_m {
                 Some(radius_m) => radius_m,
                 None => {
                     let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
                     let all: Vec<f64> =
-                        links[link].over_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
-                    let ways = &links[link];
+                        links[link].from_taxel_to_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
+                    let distances = &links[link];
                     let distance = |&other: &usize| match seeds[other] {
-                        Seed::Taxel(taxel) => ways.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
-                        // Points stand for the taxels that are nearest to them.
-                        Seed::Point(_) => Some(self.settle_seed(&seeds[other], &links))
+                        Seed::Taxel(taxel) => distances.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
+                        // A point counts as its nearest taxel.
+                        Seed::Point(_) => Some(self.locate_seed(&seeds[other], &links))
                             .filter(|&(on, ..)| on == link)
                             .map(|(_, i, _)| all[i]),
                     };
@@ -163,10 +163,10 @@ impl Grower<'_> {
                     least / (2.0 * (1.0 - rule.overlap.unwrap_or(0.0)))
                 }
             };
-            let ways = &mut links[link];
-            let reached = from(ways, nearest, at, &mut self.unroller, radius_m);
+            let distances = &mut links[link];
+            let reached = from(distances, nearest, at, &mut self.unroller, radius_m);
             let disc: Vec<usize> =
-                (0..ways.len()).filter(|&i| reached[i] <= radius_m).map(|i| ways.taxels[i]).collect();
+                (0..distances.len()).filter(|&i| reached[i] <= radius_m).map(|i| distances.taxels[i]).collect();
             if disc.is_empty() {
                 return Err(Error::failed(format!(
                     "there is no taxel within {radius_m} m of seed {}; widen the `radius`, or move the seed",
@@ -175,10 +175,10 @@ impl Grower<'_> {
             }
             discs.push(disc);
         }
-        self.tell_rough(&links);
+        self.note_approximate(&links);
         let held: BTreeSet<usize> = discs.iter().flatten().copied().collect();
         if held.len() < chosen.len() {
-            let what = self.call(rule);
+            let what = self.rule_name(rule);
             self.notes.push(format!(
                 "{what}: {} taxels are in no disc; widen `radius`, or add seeds",
                 chosen.len() - held.len()
@@ -187,22 +187,22 @@ impl Grower<'_> {
         Ok(discs)
     }
 
-    /// The link of `links` that `seed` is on, the taxel there that is nearest to it, and its place where it is no taxel.
-    fn settle_seed(&self, seed: &Seed, links: &[Ways]) -> (usize, usize, Option<(usize, DVec3)>) {
+    /// The link of `links` that `seed` is on, the nearest taxel there, and the seed's place if it is no taxel.
+    fn locate_seed(&self, seed: &Seed, links: &[LinkDistances]) -> (usize, usize, Option<(usize, DVec3)>) {
         let body = self.body;
-        let on = |p: DVec3, ways: &Ways| {
-            body.links[body.taxels[ways.taxels[0]].link].world_from_link.inverse().transform_point3(p)
+        let on = |p: DVec3, distances: &LinkDistances| {
+            body.links[body.taxels[distances.taxels[0]].link].world_from_link.inverse().transform_point3(p)
         };
         match *seed {
             Seed::Taxel(taxel) => {
                 let find =
-                    |(link, ways): (usize, &Ways)| Some((link, ways.taxels.iter().position(|&t| t == taxel)?, None));
+                    |(link, distances): (usize, &LinkDistances)| Some((link, distances.taxels.iter().position(|&t| t == taxel)?, None));
                 links.iter().enumerate().find_map(find).unwrap_or((0, 0, None))
             }
             Seed::Point(p) => {
-                let all = links.iter().enumerate().flat_map(|(link, ways)| {
-                    let p = on(p, ways);
-                    (0..ways.len()).map(move |i| (link, i, p, ways.points[i].0.distance_squared(p)))
+                let all = links.iter().enumerate().flat_map(|(link, distances)| {
+                    let p = on(p, distances);
+                    (0..distances.len()).map(move |i| (link, i, p, distances.points[i].0.distance_squared(p)))
                 });
                 let nearest = all.min_by(|a, b| a.3.total_cmp(&b.3));
                 let (link, i, p, _) = nearest.unwrap_or((0, 0, p, 0.0));
@@ -211,7 +211,7 @@ impl Grower<'_> {
         }
     }
 
-    /// The seeds that a rule names.
+    /// The seeds of a rule.
     fn seeds(&self, seeds: &Seeds, chosen: &[usize]) -> Result<Vec<Seed>> {
         let body = self.body;
         match seeds {
@@ -247,7 +247,7 @@ impl Grower<'_> {
         }
     }
 
-    /// The taxel nearest to the mean of `taxels`, among those that face as they do.
+    /// The taxel nearest to the mean of `taxels`, preferably with a normal like theirs.
     fn middle(&self, taxels: &[usize]) -> Option<usize> {
         let at = |taxel: usize| {
             let taxel = &self.body.taxels[taxel];
@@ -264,7 +264,7 @@ impl Grower<'_> {
         (0..taxels.len()).min_by(|&a, &b| off(a).total_cmp(&off(b))).map(|i| taxels[i])
     }
 
-    /// Runs of ids, or with `by_row` false the places in them.
+    /// Rows of ids, or columns if `by_row` is false.
     fn runs(&self, chosen: &[usize], rows: Rows, stem: &str, by_row: bool) -> Children {
         let id = |taxel: usize| self.body.taxels[taxel].id;
         let first = rows.first.or(chosen.iter().map(|&taxel| id(taxel)).min()).unwrap_or(0);
@@ -277,34 +277,34 @@ impl Grower<'_> {
             }
         }
         let width = width_of(runs.keys().last().map_or(0, |&last| last as usize + 1));
-        // A row that has no taxel still has its number.
+        // Empty rows count.
         runs.into_iter().map(|(run, taxels)| (format!("{stem}_{:0width$}", run + 1), taxels)).collect()
     }
 }
 
-/// Distances from a seed to the taxels of `ways`.
+/// Distances from a seed to the taxels of `distances`.
 fn from(
-    ways: &mut Ways,
+    distances: &mut LinkDistances,
     nearest: usize,
     at: Option<(usize, DVec3)>,
     unroller: &mut crate::field::Unroller<'_>,
     limit_m: f64,
 ) -> Vec<f64> {
-    let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, ways.points[nearest].1));
+    let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, distances.points[nearest].1));
     let reached = match place {
-        Some(place) => ways.over_place(&place, nearest, limit_m),
-        None => ways.over(nearest, limit_m),
+        Some(place) => distances.from_place(&place, nearest, limit_m),
+        None => distances.from_taxel(nearest, limit_m),
     };
     reached.into_iter().map(|reach| reach.distance_m).collect()
 }
 
-/// Names from 1, all of one length.
+/// Children numbered from 1 with a fixed number of digits.
 pub(super) fn numbered(stem: &str, lists: Vec<Vec<usize>>) -> Children {
     let width = width_of(lists.len());
     lists.into_iter().zip(1..).map(|(taxels, number)| (format!("{stem}_{number:0width$}"), taxels)).collect()
 }
 
-/// Digits of the largest number, two at least.
+/// Digits of the largest number, at least two.
 fn width_of(largest: usize) -> usize {
     largest.to_string().len().max(2)
 }

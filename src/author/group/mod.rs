@@ -1,27 +1,27 @@
-//! Fields made by rules: which taxels go together, under which names, with which charts.
+//! Groups taxels into fields by rules.
 //!
-//! Rules are applied in order, each to the taxels of a body and the fields that those before it made; [`FieldRule`] says
-//! what they can ask for. What comes out can be written into the body's file as it is.
+//! Rules are applied in order, each to the taxels of a body and the fields of earlier rules; see [`FieldRule`]. The result
+//! can be written into the body's file.
 
+mod chart_notes;
 mod charts;
 mod choose;
+mod distances;
 mod divide;
 pub(super) mod painted;
 mod patches;
 mod rule;
-mod ways;
-mod words;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-pub use charts::FLAT;
+pub use charts::MAX_PLANE_DISTORTION;
 pub use rule::{ChartWish, Each, FieldRule, Patches, Rows, Seeds, Wrap};
 
 use crate::body::{Body, FieldSpec, MemberSpec};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Unroller, unions};
 
-/// What a body's surface carries beyond its shape. Surfaces and triangles are counted as in [`Body::surfaces`].
+/// Materials and painted attributes of a body's surfaces. Surfaces and triangles are numbered as in [`Body::surfaces`].
 pub trait Painted {
     /// The names of all materials.
     fn materials(&self) -> Vec<String>;
@@ -29,10 +29,10 @@ pub trait Painted {
     /// The material of `triangle`.
     fn material(&self, surface: usize, triangle: usize) -> Option<&str>;
 
-    /// The names of all painted attributes that hold one number a vertex, as a recipe has them.
+    /// The names of all painted attributes with one number per vertex, as in a recipe.
     fn attributes(&self) -> Vec<String>;
 
-    /// Attribute `name` at `barycentric` of `triangle`; `None` where the surface does not carry it.
+    /// Attribute `name` at `barycentric` of `triangle`; `None` if the surface does not have it.
     fn attribute(&self, name: &str, surface: usize, triangle: usize, barycentric: [f64; 3]) -> Option<f64>;
 }
 
@@ -41,7 +41,7 @@ pub trait Painted {
 pub struct Grouping {
     /// The fields, a parent before its children.
     pub fields: Vec<FieldSpec>,
-    /// What a person should know: what was split, left out, or has no chart, and why. A line each.
+    /// Notes for the user, a line each: what was split, left out, or has no chart, and why.
     pub notes: Vec<String>,
 }
 
@@ -58,10 +58,10 @@ pub struct Grouping {
 /// ```
 ///
 /// # Errors
-/// A rule contradicts itself, names what is not there, or asks to be refused a field that cannot have its chart. The number
-/// of the rule, from 1, stands before it.
+/// A rule is inconsistent, names something that does not exist, or refuses a field that cannot have its chart. The message
+/// begins with the number of the rule, from 1.
 pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<Grouping> {
-    let mut grower = Grower::new(body, painted);
+    let mut grower = Grouper::new(body, painted);
     for (rule, number) in rules.iter().zip(1..) {
         grower.apply(rule).map_err(|e| e.at(format!("field rule {number}")))?;
     }
@@ -71,45 +71,45 @@ pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<
     grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
 
-/// A field on its way, with what is asked of its chart.
+/// A field before its chart is computed.
 #[derive(Clone)]
-struct Made {
+struct FieldDraft {
     spec: FieldSpec,
     chart: ChartWish,
     wrap: Wrap,
     u: Option<[f64; 3]>,
-    /// Whether only a longer name asked for it.
+    /// Whether it exists only as a level of a longer name.
     is_level: bool,
-    /// Which of the rules applied, from 0, made it.
+    /// Index of the rule that made it.
     rule: usize,
 }
 
-/// Applies rules one by one, so that whoever has them can say which of them is wrong.
-pub struct Grower<'a> {
+/// Applies rules one by one, so that the caller can tell which one fails.
+pub struct Grouper<'a> {
     body: &'a Body,
     painted: &'a dyn Painted,
     unroller: Unroller<'a>,
-    /// Per taxel that was looked at what it sits on.
-    seats: BTreeMap<usize, Option<(usize, usize, [f64; 3])>>,
+    /// Cached places of taxels on the surface.
+    taxel_places: BTreeMap<usize, Option<(usize, usize, [f64; 3])>>,
     /// A parent before its children.
-    made: Vec<Made>,
+    made: Vec<FieldDraft>,
     index_of: HashMap<String, usize>,
     notes: Vec<String>,
-    /// Fields whose charts are far from true, and how far.
+    /// Fields with distorted charts, and their distortion.
     poor: Vec<(String, f64)>,
     /// Rules applied so far.
     applied: usize,
 }
 
-impl<'a> Grower<'a> {
-    /// For `body`, on which `painted` is painted. The fields that the body has already mean nothing.
+impl<'a> Grouper<'a> {
+    /// For `body` with the materials and attributes `painted`. The body's own fields are ignored.
     #[must_use]
     pub fn new(body: &'a Body, painted: &'a dyn Painted) -> Self {
         Self {
             body,
             painted,
             unroller: Unroller::new(body),
-            seats: BTreeMap::new(),
+            taxel_places: BTreeMap::new(),
             made: Vec::new(),
             index_of: HashMap::new(),
             notes: Vec::new(),
@@ -121,7 +121,7 @@ impl<'a> Grower<'a> {
     /// Makes the fields of `rule`.
     ///
     /// # Errors
-    /// The rule contradicts itself, names what is not there, chooses no taxel, or makes a field of a name that is taken.
+    /// The rule is inconsistent, names something that does not exist, selects no taxel, or makes a field whose name is taken.
     pub fn apply(&mut self, rule: &FieldRule) -> Result<()> {
         check(rule)?;
         let mut any = false;
@@ -137,7 +137,7 @@ impl<'a> Grower<'a> {
             };
             let children = self.divide(rule, &chosen)?;
             if let (Some(name), Some(_)) = (&prefix, &rule.name) {
-                // What its children hold is its own without saying, but for a weight.
+                // The children's taxels are members without being listed, unless they have a weight.
                 let below: BTreeSet<usize> = children.iter().flat_map(|(_, taxels)| taxels).copied().collect();
                 let own = chosen.iter().copied().filter(|taxel| rule.weight.is_some() || !below.contains(taxel));
                 self.add(name, &own.collect::<Vec<_>>(), rule)?;
@@ -155,7 +155,7 @@ impl<'a> Grower<'a> {
         }
     }
 
-    /// The fields that `rule` is applied in, each with its taxels; or all taxels.
+    /// The fields to which `rule` is applied, with their taxels; or all taxels.
     fn hosts(&self, rule: &FieldRule) -> Result<Vec<(Option<String>, Vec<usize>)>> {
         let Some(globs) = &rule.within else {
             return Ok(vec![(None, (0..self.body.taxels.len()).collect())]);
@@ -189,8 +189,14 @@ impl<'a> Grower<'a> {
         let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
         let chart = rule.chart.unwrap_or_default();
         let named = if matches!(chart, ChartWish::Auto | ChartWish::None) { Wrap::Bare } else { Wrap::Refuse };
-        let made =
-            Made { spec, chart, wrap: rule.wrap.unwrap_or(named), u: rule.u, is_level: false, rule: self.applied };
+        let made = FieldDraft {
+            spec,
+            chart,
+            wrap: rule.wrap.unwrap_or(named),
+            u: rule.u,
+            is_level: false,
+            rule: self.applied,
+        };
         match self.index_of.get(name) {
             Some(&there) if self.made[there].is_level => {
                 let above = self.made[there].spec.parent.take();
@@ -207,7 +213,7 @@ impl<'a> Grower<'a> {
         Ok(())
     }
 
-    /// What the topmost level of `name` stands below, which is made if it is not there.
+    /// The parent of the topmost level of `name`, which is added if it does not exist.
     fn top(&mut self, name: &str, rule: &FieldRule) -> Result<Option<String>> {
         let Some(parent) = &rule.parent else { return Ok(None) };
         let top = name.split('/').next().unwrap_or(name);
@@ -228,7 +234,7 @@ impl<'a> Grower<'a> {
         Ok(Some(parent.clone()))
     }
 
-    /// Adds what stands above `name` by its slashes, the topmost below `above`; what `name` itself stands below.
+    /// Adds the levels above `name`, the topmost below `above`. Returns the parent of `name`.
     fn add_levels(&mut self, name: &str, above: Option<String>) -> Option<String> {
         let mut parent = above;
         for level in name.match_indices('/').map(|(end, _)| &name[..end]) {
@@ -238,28 +244,28 @@ impl<'a> Grower<'a> {
         parent
     }
 
-    /// Adds the field `name`, which holds what is below it, unless there is one.
+    /// Adds the field `name` without members of its own, unless it exists.
     fn add_level(&mut self, name: &str, parent: Option<String>) {
         if self.index_of.contains_key(name) {
             return;
         }
         let spec = FieldSpec { name: name.to_owned(), parent, ..FieldSpec::default() };
         let (chart, wrap) = (ChartWish::Auto, Wrap::Bare);
-        self.push(Made { spec, chart, wrap, u: None, is_level: true, rule: self.applied });
+        self.push(FieldDraft { spec, chart, wrap, u: None, is_level: true, rule: self.applied });
     }
 
-    fn push(&mut self, made: Made) {
+    fn push(&mut self, made: FieldDraft) {
         self.index_of.insert(made.spec.name.clone(), self.made.len());
         self.made.push(made);
     }
 }
 
-/// What is wrong with `rule` whatever body it is for.
+/// Checks that `rule` is consistent by itself.
 fn check(rule: &FieldRule) -> Result<()> {
     let wrong = |what: &str| Err(Error::failed(what));
     let discs = rule.radius.is_some() || rule.seeds.is_some() || rule.overlap.is_some();
-    let ways = [rule.each.is_some(), rule.patches.is_some(), discs, rule.rows.is_some(), rule.columns.is_some()];
-    let divides = ways.into_iter().filter(|&way| way).count();
+    let divisions = [rule.each.is_some(), rule.patches.is_some(), discs, rule.rows.is_some(), rule.columns.is_some()];
+    let divides = divisions.into_iter().filter(|&given| given).count();
     if divides > 1 {
         return wrong(
             "it divides in several ways: keep one of `each`, `patches`, `radius` with `seeds` or `overlap`, `rows` and \

@@ -1,18 +1,18 @@
-//! What a file has painted on its surfaces, for rules.
+//! Materials and painted attributes of a body's file, for rules.
 
 use super::Painted;
 use crate::body::{Body, Details};
 
-/// What is painted on a body, by its file.
-pub(in crate::author) struct Paints<'a> {
+/// Materials and painted attributes from the body's file.
+pub(in crate::author) struct FilePaint<'a> {
     pub(in crate::author) body: &'a Body,
     pub(in crate::author) details: &'a Details,
 }
 
-/// Names of the numbers of a colour.
+/// Names of the channels of a colour.
 const CHANNELS: [&str; 4] = ["r", "g", "b", "a"];
 
-impl Painted for Paints<'_> {
+impl Painted for FilePaint<'_> {
     fn materials(&self) -> Vec<String> {
         self.details.parts.iter().filter_map(|part| part.material.clone()).collect()
     }

@@ -1,24 +1,24 @@
-//! Patches and discs, by distance along the skin.
+//! Patches and discs by distance along the surface.
 
 use glam::DVec2;
 
-use super::ways::{Reach, Ways};
+use super::distances::{LinkDistances, TaxelDistance};
 
-/// How often ways are followed twice as far because a taxel was not reached.
-const MOST_RAISED: u32 = 8;
+/// How often the distance limit is doubled if a taxel is not reached.
+const MAX_DOUBLINGS: u32 = 8;
 
-/// Seeds among the taxels of one link, and how far each taxel is from the nearest of them.
+/// Seeds among the taxels of one link, and each taxel's distance to the nearest seed.
 struct Seeding {
     seeds: Vec<usize>,
     nearest_m: Vec<f64>,
 }
 
 impl Seeding {
-    fn new(ways: &Ways) -> Self {
-        Self { seeds: Vec::new(), nearest_m: vec![f64::INFINITY; ways.len()] }
+    fn new(distances: &LinkDistances) -> Self {
+        Self { seeds: Vec::new(), nearest_m: vec![f64::INFINITY; distances.len()] }
     }
 
-    /// The taxel that is farthest from every seed, and how far; the first of equals.
+    /// The taxel farthest from all seeds, and its distance; the first of equals.
     fn farthest(&self) -> (usize, f64) {
         let mut best = (0, f64::NEG_INFINITY);
         for (i, &distance) in self.nearest_m.iter().enumerate() {
@@ -29,19 +29,19 @@ impl Seeding {
         best
     }
 
-    /// Takes the farthest taxel for a seed. On a part of the surface that has none yet, it is one at its rim.
-    fn add(&mut self, ways: &mut Ways) {
+    /// Adds the farthest taxel as a seed; on a surface part without seeds, one at its rim.
+    fn add(&mut self, distances: &mut LinkDistances) {
         let (mut seed, limit_m) = self.farthest();
         let is_first = limit_m == f64::INFINITY;
         if is_first {
-            let from_here = ways.over_all(seed);
-            let finite = |reach: &&(usize, &Reach)| reach.1.distance_m < f64::INFINITY;
+            let from_here = distances.from_taxel_to_all(seed);
+            let finite = |reach: &&(usize, &TaxelDistance)| reach.1.distance_m < f64::INFINITY;
             let rim = from_here.iter().enumerate();
             let rim =
                 rim.filter(|r| finite(&r)).max_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0)));
             seed = rim.map_or(seed, |(i, _)| i);
         }
-        let reached = if is_first { ways.over_all(seed) } else { ways.over(seed, limit_m) };
+        let reached = if is_first { distances.from_taxel_to_all(seed) } else { distances.from_taxel(seed, limit_m) };
         for (nearest, reach) in self.nearest_m.iter_mut().zip(&reached) {
             *nearest = nearest.min(reach.distance_m);
         }
@@ -49,12 +49,12 @@ impl Seeding {
     }
 }
 
-/// Splits all taxels of `links` into `count` compact patches, or more where they are on more parts of the surface: each a
-/// list of indices into its link's taxels. Patches keep to one link and one connected part.
+/// Splits all taxels of `links` into `count` compact patches, or more if there are more surface parts: each a list of
+/// indices into its link's taxels. A patch is on one link and one connected part.
 ///
 /// Seeds are taken each as far along the surface as possible from those before it (Gonzalez 1985), then moved to the middles
 /// of what is nearest to them (Lloyd) until they rest, or `most_rounds` times.
-pub(super) fn patches(links: &mut [Ways], count: usize, most_rounds: usize) -> Vec<(usize, Vec<usize>)> {
+pub(super) fn patches(links: &mut [LinkDistances], count: usize, most_rounds: usize) -> Vec<(usize, Vec<usize>)> {
     let mut seedings: Vec<Seeding> = links.iter().map(Seeding::new).collect();
     let mut taken = 0;
     loop {
@@ -62,7 +62,7 @@ pub(super) fn patches(links: &mut [Ways], count: usize, most_rounds: usize) -> V
         let Some((link, distance)) = farthest.reduce(|best, next| if next.1 > best.1 { next } else { best }) else {
             break;
         };
-        // Where all lie on seeds, more seeds would get nothing.
+        // If all taxels are at seeds, further seeds would have no taxels.
         if distance <= 0.0 || (taken >= count && distance < f64::INFINITY) {
             break;
         }
@@ -70,25 +70,29 @@ pub(super) fn patches(links: &mut [Ways], count: usize, most_rounds: usize) -> V
         taken += 1;
     }
     let mut patches = Vec::new();
-    for (link, (ways, seeding)) in links.iter_mut().zip(seedings).enumerate() {
-        patches.extend(settle(ways, seeding, most_rounds).into_iter().map(|patch| (link, patch)));
+    for (link, (distances, seeding)) in links.iter_mut().zip(seedings).enumerate() {
+        patches.extend(refine(distances, seeding, most_rounds).into_iter().map(|patch| (link, patch)));
     }
     patches
 }
 
 /// Lloyd's iteration from `seeding`.
-fn settle(ways: &mut Ways, seeding: Seeding, most_rounds: usize) -> Vec<Vec<usize>> {
+fn refine(distances: &mut LinkDistances, seeding: Seeding, most_rounds: usize) -> Vec<Vec<usize>> {
     let Seeding { mut seeds, nearest_m } = seeding;
     if seeds.len() < 2 {
-        return if ways.len() == 0 { Vec::new() } else { vec![(0..ways.len()).collect()] };
+        return if distances.len() == 0 { Vec::new() } else { vec![(0..distances.len()).collect()] };
     }
     let mut limit_m = nearest_m.iter().copied().fold(0.0, f64::max);
     let mut patches = Vec::new();
     for _ in 0..most_rounds.max(1) {
         let (maps, widest_m);
-        (patches, maps, widest_m) = assign(ways, &seeds, limit_m);
-        let moved: Vec<usize> =
-            patches.iter().zip(&maps).zip(&seeds).map(|((patch, map), &seed)| middle(ways, patch, map, seed)).collect();
+        (patches, maps, widest_m) = assign(distances, &seeds, limit_m);
+        let moved: Vec<usize> = patches
+            .iter()
+            .zip(&maps)
+            .zip(&seeds)
+            .map(|((patch, map), &seed)| middle(distances, patch, map, seed))
+            .collect();
         if moved == seeds {
             break;
         }
@@ -100,18 +104,22 @@ fn settle(ways: &mut Ways, seeding: Seeding, most_rounds: usize) -> Vec<Vec<usiz
     patches
 }
 
-/// Each taxel to the nearest of `seeds`, the ways from those, and the length of the longest that a taxel takes.
+/// Assigns each taxel to the nearest of `seeds`. Returns the patches, the distances from each seed, and the longest one.
 ///
-/// No taxel should be further than `limit_m` from its seed, but where lengths along a net have taken the place of exact
-/// ones; then the limit is raised.
-fn assign(ways: &mut Ways, seeds: &[usize], mut limit_m: f64) -> (Vec<Vec<usize>>, Vec<Vec<Reach>>, f64) {
+/// No taxel should be further than `limit_m` from its seed, unless distances are approximate; then the limit is raised.
+fn assign(
+    distances: &mut LinkDistances,
+    seeds: &[usize],
+    mut limit_m: f64,
+) -> (Vec<Vec<usize>>, Vec<Vec<TaxelDistance>>, f64) {
     let mut raised = 0;
     loop {
-        // Another way to the same place may be longer by rounding.
-        let maps: Vec<Vec<Reach>> = seeds.iter().map(|&seed| ways.over(seed, limit_m * (1.0 + 1e-9))).collect();
+        // Another path to the same place may be longer by rounding.
+        let maps: Vec<Vec<TaxelDistance>> =
+            seeds.iter().map(|&seed| distances.from_taxel(seed, limit_m * (1.0 + 1e-9))).collect();
         let mut patches = vec![Vec::new(); seeds.len()];
         let (mut widest_m, mut out): (f64, bool) = (0.0, false);
-        for i in 0..ways.len() {
+        for i in 0..distances.len() {
             let mut own = 0;
             for (k, map) in maps.iter().enumerate() {
                 if map[i].distance_m < maps[own][i].distance_m {
@@ -124,15 +132,15 @@ fn assign(ways: &mut Ways, seeds: &[usize], mut limit_m: f64) -> (Vec<Vec<usize>
             }
             patches[own].push(i);
         }
-        if !out || raised == MOST_RAISED {
+        if !out || raised == MAX_DOUBLINGS {
             return (patches, maps, widest_m);
         }
         (limit_m, raised) = (2.0 * limit_m, raised + 1);
     }
 }
 
-/// The taxel of `patch` nearest to its mean, in the coordinates of `map` about its seed, or in place where there are none.
-fn middle(ways: &Ways, patch: &[usize], map: &[Reach], seed: usize) -> usize {
+/// The taxel of `patch` nearest to its mean, in the coordinates of `map` around its seed, or else in space.
+fn middle(distances: &LinkDistances, patch: &[usize], map: &[TaxelDistance], seed: usize) -> usize {
     let count = patch.len() as f64;
     let uv: Option<Vec<DVec2>> = patch.iter().map(|&i| map[i].uv).collect();
     let off: Vec<f64> = match uv {
@@ -141,7 +149,7 @@ fn middle(ways: &Ways, patch: &[usize], map: &[Reach], seed: usize) -> usize {
             uv.iter().map(|uv| uv.distance_squared(mean)).collect()
         }
         None => {
-            let at = |&i: &usize| ways.points[i].0;
+            let at = |&i: &usize| distances.points[i].0;
             let mean = patch.iter().map(at).sum::<glam::DVec3>() / count;
             patch.iter().map(|i| at(i).distance_squared(mean)).collect()
         }
@@ -150,12 +158,12 @@ fn middle(ways: &Ways, patch: &[usize], map: &[Reach], seed: usize) -> usize {
     nearest.map_or(seed, |(&i, _)| i)
 }
 
-/// Seeds spread over the taxels of `ways` so that each taxel is less than `apart_m` from one, and no two are nearer than
+/// Seeds spread over the taxels of `distances` so that each taxel is less than `apart_m` from one, and no two are nearer than
 /// that to each other.
-pub(super) fn spread(ways: &mut Ways, apart_m: f64) -> Vec<usize> {
-    let mut seeding = Seeding::new(ways);
+pub(super) fn spread(distances: &mut LinkDistances, apart_m: f64) -> Vec<usize> {
+    let mut seeding = Seeding::new(distances);
     while seeding.farthest().1 >= apart_m {
-        seeding.add(ways);
+        seeding.add(distances);
     }
     seeding.seeds
 }

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::super::words::{Globs, Ids, Length};
+use super::super::recipe_values::{Globs, Ids, Length};
 
 /// One rule: which taxels, and what fields they make. As a table of a recipe:
 ///

@@ -1,4 +1,4 @@
-//! The checks, one a function.
+//! The checks, one per function.
 
 use std::collections::BTreeMap;
 
@@ -6,27 +6,26 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::super::ground::Ground;
+use super::super::surface_search::SurfaceSearch;
 use super::{Finding, FindingKind, listed};
 use crate::body::{Body, ChartKind, FieldSpec, Taxel};
 use crate::field::{Field, Unroller};
 
-/// Fewer taxels than this leave orientation and axis little to say.
-const FEW: usize = 3;
+/// Minimum number of taxels of a field for orientation and axis.
+const MIN_FIELD_TAXELS: usize = 3;
 
-/// Taxels nearer than this to each other are at one place, m.
-const ONE_PLACE_M: f64 = 1e-6;
+/// Taxels nearer to each other than this are coincident, m.
+const COINCIDENT_M: f64 = 1e-6;
 
-/// A taxel is isolated where its nearest neighbour is over so many times as far as is usual.
-const ISOLATED: f64 = 5.0;
+/// A taxel is isolated if its nearest neighbour is over this many times the median distance away.
+const ISOLATED_RATIO: f64 = 5.0;
 
-/// A stored normal is current within this of the surface's, rad.
-const CURRENT_RAD: f64 = 1e-5;
+/// Maximum angle of a current normal from the surface's, rad.
+const NORMAL_TOLERANCE_RAD: f64 = 1e-5;
 
-/// A stored (u, v) is current within this, m, and this part of its distance from the origin: four roundings to single
-/// precision along the way.
-const CURRENT_M: f64 = 1e-6;
-const CURRENT_PART: f64 = 1e-5;
+/// Maximum error of a current (u, v), m, and as a share of its distance from the origin: four roundings to single precision.
+const UV_TOLERANCE_M: f64 = 1e-6;
+const UV_TOLERANCE_SHARE: f64 = 1e-5;
 
 impl Finding {
     fn of_taxels(kind: FindingKind, taxels: Vec<u32>, what: String) -> Self {
@@ -61,11 +60,11 @@ pub(super) fn empty(body: &Body) -> Vec<Finding> {
 }
 
 pub(super) fn small(fields: &[Field]) -> Option<Finding> {
-    let small: Vec<&Field> = fields.iter().filter(|field| field.members.len() < FEW).collect();
+    let small: Vec<&Field> = fields.iter().filter(|field| field.members.len() < MIN_FIELD_TAXELS).collect();
     let least = small.iter().min_by_key(|field| field.members.len())?;
     let names: Vec<String> = small.iter().map(|field| field.name.clone()).collect();
     let fields = count(names.len(), "field");
-    let what = format!("{fields} with under {FEW} taxels, too few for orientation: {}", listed(&names));
+    let what = format!("{fields} with under {MIN_FIELD_TAXELS} taxels, too few for orientation: {}", listed(&names));
     let place = Some(format!("field `{}`", least.name));
     let worst = Some(least.members.len() as f64);
     Some(Finding { worst, place, ..Finding::of_fields(FindingKind::SmallField, names, what) })
@@ -99,13 +98,13 @@ pub(super) fn crowding(body: &Body) -> Vec<Finding> {
     for (index, place) in places.iter().enumerate() {
         let others =
             tree.nearest_neighbor_iter_with_distance_2(place.to_array()).filter(|(other, _)| other.data != index);
-        // Enough of them to see past a few at one place.
+        // Enough neighbours to skip a few coincident ones.
         for (other, squared) in others.take(16) {
-            if squared > ONE_PLACE_M * ONE_PLACE_M {
+            if squared > COINCIDENT_M * COINCIDENT_M {
                 gaps.push((squared.sqrt(), index));
                 break;
             }
-            // What measures something else may well sit there too.
+            // Taxels of different modalities may share a place.
             let (one, other) = (&body.taxels[index], &body.taxels[other.data]);
             if one.modality == other.modality {
                 coincident.entry(one.id).or_insert(other.id);
@@ -121,12 +120,12 @@ pub(super) fn crowding(body: &Body) -> Vec<Finding> {
     }
     gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(&(usual, _)) = gaps.get(gaps.len() / 2) else { return findings };
-    let far = &gaps[gaps.partition_point(|&(gap, _)| gap <= ISOLATED * usual)..];
+    let far = &gaps[gaps.partition_point(|&(gap, _)| gap <= ISOLATED_RATIO * usual)..];
     if let Some(&(gap, index)) = far.last() {
         let mut ids: Vec<u32> = far.iter().map(|&(_, index)| body.taxels[index].id).collect();
         ids.sort_unstable();
         let what = format!(
-            "{} over {ISOLATED} times as far from any other as is usual, {:.1} mm: {}; farthest {}, {:.1} mm",
+            "{} over {ISOLATED_RATIO} times as far from any other as is usual, {:.1} mm: {}; farthest {}, {:.1} mm",
             count(ids.len(), "taxel"),
             usual * 1e3,
             listed(&ids),
@@ -139,8 +138,8 @@ pub(super) fn crowding(body: &Body) -> Vec<Finding> {
     findings
 }
 
-/// How a taxel stands to the surface beneath it.
-pub(in super::super) struct Footing {
+/// Distance and angle of a taxel to the surface below it.
+pub(in super::super) struct SurfaceFit {
     /// Distance from the surface, m.
     pub(in super::super) off_m: f64,
     /// Angle of its normal with the nearest triangle normal there, rad.
@@ -149,46 +148,47 @@ pub(in super::super) struct Footing {
     pub(in super::super) normal_in_link: DVec3,
 }
 
-impl Footing {
-    pub(in super::super) fn of(body: &Body, ground: &Ground<'_>, taxel: &Taxel) -> Option<Self> {
+impl SurfaceFit {
+    pub(in super::super) fn of(body: &Body, surface_search: &SurfaceSearch<'_>, taxel: &Taxel) -> Option<Self> {
         let world_from_link = body.links[taxel.link].world_from_link;
         let p = world_from_link.transform_point3(taxel.position_in_link);
         let normal = world_from_link.transform_vector3(taxel.normal_in_link);
-        let hit = ground.nearest(taxel.link, p)?;
-        // On an edge both sides are right.
-        let around = ground.normals_at(taxel.link, hit.position).map(|normal_there| angle(normal, normal_there));
+        let hit = surface_search.nearest(taxel.link, p)?;
+        // On an edge the normals of both triangles count.
+        let around =
+            surface_search.normals_at(taxel.link, hit.position).map(|normal_there| angle(normal, normal_there));
         let tilt_rad = around.fold(angle(normal, hit.normal), f64::min);
         let normal_in_link = world_from_link.inverse().transform_vector3(hit.normal);
         Some(Self { off_m: hit.position.distance(p), tilt_rad, normal_in_link })
     }
 
-    /// Whether the normal is no more what the surface gives.
+    /// Whether the normal differs from the surface's.
     pub(in super::super) fn is_stale(&self) -> bool {
-        self.tilt_rad > CURRENT_RAD
+        self.tilt_rad > NORMAL_TOLERANCE_RAD
     }
 }
 
-/// The angle between two unit vectors; by the sine too, as the cosine of a small one says nothing.
+/// The angle between two unit vectors, accurate for small angles.
 fn angle(a: DVec3, b: DVec3) -> f64 {
     libm::atan2(a.cross(b).length(), a.dot(b))
 }
 
 /// Taxels off the surface, with normals that point inward, and with normals that are not the surface's.
 pub(super) fn against_surface(body: &Body) -> Vec<Finding> {
-    let ground = Ground::of(body);
-    if ground.is_empty() {
+    let surface_search = SurfaceSearch::of(body);
+    if surface_search.is_empty() {
         return Vec::new();
     }
     let (mut off, mut inward, mut stale) = (Worst::default(), Worst::default(), Worst::default());
     for taxel in &body.taxels {
-        let Some(footing) = Footing::of(body, &ground, taxel) else { continue };
-        if footing.off_m > ground.tolerance_m() {
-            off.take(taxel, footing.off_m);
+        let Some(fit) = SurfaceFit::of(body, &surface_search, taxel) else { continue };
+        if fit.off_m > surface_search.tolerance_m() {
+            off.take(taxel, fit.off_m);
         }
-        if footing.tilt_rad > std::f64::consts::FRAC_PI_2 {
-            inward.take(taxel, footing.tilt_rad);
-        } else if footing.is_stale() {
-            stale.take(taxel, footing.tilt_rad);
+        if fit.tilt_rad > std::f64::consts::FRAC_PI_2 {
+            inward.take(taxel, fit.tilt_rad);
+        } else if fit.is_stale() {
+            stale.take(taxel, fit.tilt_rad);
         }
     }
     let degrees = |angle: f64| format!("{:.3}°", angle.to_degrees());
@@ -203,7 +203,7 @@ pub(super) fn against_surface(body: &Body) -> Vec<Finding> {
     .collect()
 }
 
-/// Taxels with something the matter, and the one that has most of it.
+/// Taxels with the same problem, and the worst of them.
 #[derive(Default)]
 struct Worst<'a> {
     ids: Vec<u32>,
@@ -227,7 +227,7 @@ impl<'a> Worst<'a> {
     }
 }
 
-/// Fields whose stored (u, v) are not what laying the chart anew gives, or that can no longer have one.
+/// Fields whose stored (u, v) differ from a newly computed chart, or that cannot have one any more.
 pub(super) fn stale_charts(body: &Body) -> Option<Finding> {
     let mut unroller = Unroller::new(body);
     let mut stale: Vec<String> = Vec::new();
@@ -253,10 +253,10 @@ pub(super) fn stale_charts(body: &Body) -> Option<Finding> {
     Some(Finding { worst, place, ..Finding::of_fields(FindingKind::StaleChart, stale, what) })
 }
 
-/// How far the stored (u, v) of `spec`, which has a geodesic chart, lie from what the surface gives, m; 0 where all are
-/// current, `None` where some are missing or the surface gives none.
+/// The error of the stored (u, v) of `spec`, which has a geodesic chart, m; 0 if all are current, `None` if some are
+/// missing or the chart cannot be computed.
 pub(in super::super) fn drift(unroller: &mut Unroller<'_>, spec: &FieldSpec) -> Option<f64> {
-    // A parent that lists no taxels of its own has nothing to be stale.
+    // A parent without taxels of its own has no (u, v).
     if spec.members.is_empty() {
         return Some(0.0);
     }
@@ -265,7 +265,7 @@ pub(in super::super) fn drift(unroller: &mut Unroller<'_>, spec: &FieldSpec) -> 
     for (stored, current) in spec.members.values().zip(anew.members.values()) {
         let ([u, v], [x, y]) = (stored.uv?, current.uv?);
         let (off, distance) = (libm::hypot(u - x, v - y), libm::hypot(x, y));
-        if off > CURRENT_M + CURRENT_PART * distance {
+        if off > UV_TOLERANCE_M + UV_TOLERANCE_SHARE * distance {
             most = f64::max(most, off);
         }
     }

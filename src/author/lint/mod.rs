@@ -1,4 +1,4 @@
-//! What is wrong with a layout that can be read: looked for one thing at a time, each told with its place and remedy.
+//! Finds problems of a valid layout, each with its place and remedy.
 
 pub(super) mod checks;
 
@@ -7,10 +7,10 @@ use std::fmt;
 use crate::body::Body;
 use crate::field::Field;
 
-/// Ids and names that a finding's line lists.
-const MOST_LISTED: usize = 8;
+/// Maximum number of ids and names listed in a message.
+const MAX_LISTED: usize = 8;
 
-/// What kind of thing is odd.
+/// The kind of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FindingKind {
@@ -22,7 +22,7 @@ pub enum FindingKind {
     SmallField,
     /// A taxel is in no field.
     UnusedTaxel,
-    /// Taxels lie at one place.
+    /// Taxels are coincident.
     CoincidentTaxels,
     /// A taxel lies off the surface.
     OffSurface,
@@ -80,18 +80,18 @@ impl FindingKind {
     }
 }
 
-/// One thing that is odd, everywhere it was found.
+/// One kind of problem, with all its places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What.
+    /// The kind.
     pub kind: FindingKind,
     /// Ids of the taxels concerned, ascending.
     pub taxels: Vec<u32>,
     /// Names of the fields concerned.
     pub fields: Vec<String>,
-    /// How bad it is at its worst, in [`FindingKind::unit`].
+    /// The worst value, in [`FindingKind::unit`].
     pub worst: Option<f64>,
-    /// Where that is: a taxel and its link, or a field.
+    /// The place of the worst value: a taxel and its link, or a field.
     pub place: Option<String>,
     what: String,
 }
@@ -110,11 +110,10 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Everything odd about the layout of `body`, whose fields are `fields`.
+/// All problems of the layout of `body`, whose fields are `fields`.
 ///
-/// A taxel is held against the body's surface at rest; a skinned one against the mesh at bind. It is on the surface where
-/// it lies within 1 µm of it, beside what single precision loses of its coordinates, and its normal is current within
-/// 10⁻⁵ rad of that of a triangle there.
+/// A taxel is compared with the body's surface at rest, a skinned one with the mesh at bind. It is on the surface within
+/// 1 µm, beside rounding to single precision; its normal is current within 10⁻⁵ rad of a triangle's there.
 #[must_use]
 pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -127,10 +126,10 @@ pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
     findings
 }
 
-/// `words`, or the first of them and how many more there are.
+/// The first of `words`, and the number of the others.
 pub(super) fn listed<T: fmt::Display>(words: &[T]) -> String {
-    let first: Vec<String> = words.iter().take(MOST_LISTED).map(ToString::to_string).collect();
-    match words.len().saturating_sub(MOST_LISTED) {
+    let first: Vec<String> = words.iter().take(MAX_LISTED).map(ToString::to_string).collect();
+    match words.len().saturating_sub(MAX_LISTED) {
         0 => first.join(", "),
         more => format!("{} and {more} more", first.join(", ")),
     }

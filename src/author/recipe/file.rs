@@ -1,4 +1,4 @@
-//! A recipe's file: its keys, and what they may not say.
+//! Reads and checks a recipe's file.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{How, Origin, Place, Recipe, SKIN, WITHIN_M, check_count, metres, unit_metres};
+use super::{DEFAULT_WITHIN_M, Origin, PlaceSpec, Placement, Recipe, SKIN, check_count, metres, unit_metres};
 use crate::author::glob::Globs;
 use crate::author::group::FieldRule;
 use crate::author::region::Region;
@@ -104,15 +104,15 @@ enum LengthKey {
     Text(String),
 }
 
-/// A recipe's text and what it is called.
+/// A recipe's text and its name in messages.
 #[derive(Clone, Copy)]
-struct Page<'a> {
+struct RecipeText<'a> {
     name: &'a str,
     text: Text<'a>,
 }
 
-impl Page<'_> {
-    /// Where `value` stands.
+impl RecipeText<'_> {
+    /// The place of `value`.
     fn origin<T>(self, value: &Spanned<T>) -> Origin {
         Origin { file: self.name.to_owned(), line: format!("line {}", self.text.line(value.span().start)) }
     }
@@ -143,15 +143,15 @@ impl Page<'_> {
 }
 
 pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Recipe> {
-    let page = Page { name, text: Text(text) };
-    let file: File = page.text.parse().map_err(|e| e.at(name))?;
+    let recipe_text = RecipeText { name, text: Text(text) };
+    let file: File = recipe_text.text.parse().map_err(|e| e.at(name))?;
     let mut recipe = Recipe { keeps_existing: file.existing == Existing::Keep, seed: file.seed, ..Recipe::none() };
     if let Some(unit) = &file.unit {
-        let metres = unit_metres(unit.get_ref()).map_err(|what| page.origin(unit).wrong(what))?;
+        let metres = unit_metres(unit.get_ref()).map_err(|what| recipe_text.origin(unit).wrong(what))?;
         recipe.unit = Some((unit.get_ref().clone(), metres));
     }
     for (name, keys) in &file.regions {
-        recipe.regions.insert(name.get_ref().clone(), region(page, name, keys)?);
+        recipe.regions.insert(name.get_ref().clone(), region(recipe_text, name, keys)?);
     }
     let known = &recipe.regions;
     let check = |names: &[String], at: &Origin| {
@@ -165,26 +165,27 @@ pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Recipe> {
     for region in known.values() {
         check(&region.except, &region.at)?;
     }
-    recipe.bare = file.bare.iter().map(|name| (name.get_ref().clone(), page.origin(name))).collect();
+    recipe.bare = file.bare.iter().map(|name| (name.get_ref().clone(), recipe_text.origin(name))).collect();
     for (name, at) in &recipe.bare {
         check(std::slice::from_ref(name), at)?;
     }
     for keys in &file.place {
-        let place = place(page, keys, folder)?;
-        let at = keys.get_ref().region.as_ref().map_or_else(|| place.at.clone(), |region| page.origin(region));
+        let place = place(recipe_text, keys, folder)?;
+        let at = keys.get_ref().region.as_ref().map_or_else(|| place.at.clone(), |region| recipe_text.origin(region));
         check(&place.regions, &at)?;
         if recipe.places.iter().any(|other| other.name == place.name) {
-            let at = keys.get_ref().name.as_ref().map_or_else(|| place.at.clone(), |name| page.origin(name));
+            let at = keys.get_ref().name.as_ref().map_or_else(|| place.at.clone(), |name| recipe_text.origin(name));
             return Err(at.wrong(format!("two places are called `{}`; give one another `name`", place.name)));
         }
         recipe.places.push(place);
     }
-    check_first_ids(page, &file.place, &recipe.places)?;
-    recipe.fields = file.fields.into_iter().map(|table| (table.get_ref().clone(), page.origin(&table))).collect();
+    check_first_ids(recipe_text, &file.place, &recipe.places)?;
+    recipe.fields =
+        file.fields.into_iter().map(|table| (table.get_ref().clone(), recipe_text.origin(&table))).collect();
     Ok(recipe)
 }
 
-fn region(page: Page<'_>, name: &Spanned<String>, keys: &RegionKeys) -> Result<Region> {
+fn region(recipe_text: RecipeText<'_>, name: &Spanned<String>, keys: &RegionKeys) -> Result<Region> {
     let bounds = match &keys.bounds {
         None => None,
         Some(bounds) => {
@@ -192,48 +193,50 @@ fn region(page: Page<'_>, name: &Spanned<String>, keys: &RegionKeys) -> Result<R
             if !(low.cmple(high).all() && low.is_finite() && high.is_finite()) {
                 let what =
                     "`box` has its lower corner over its upper; give [[x, y, z], [x, y, z]], the smaller numbers first";
-                return Err(page.origin(bounds).wrong(what));
+                return Err(recipe_text.origin(bounds).wrong(what));
             }
             Some([low, high])
         }
     };
     Ok(Region {
-        node: page.globs(keys.node.as_ref())?,
-        material: page.globs(keys.material.as_ref())?,
+        node: recipe_text.globs(keys.node.as_ref())?,
+        material: recipe_text.globs(keys.material.as_ref())?,
         attribute: keys.attribute.as_ref().map(|attribute| attribute.get_ref().clone()),
         bounds,
         except: keys.except.as_ref().map_or_else(Vec::new, |names| names.get_ref().list()),
-        at: keys.attribute.as_ref().map_or_else(|| page.origin(name), |attribute| page.origin(attribute)),
+        at: keys.attribute.as_ref().map_or_else(|| recipe_text.origin(name), |attribute| recipe_text.origin(attribute)),
     })
 }
 
-fn place(page: Page<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path) -> Result<Place> {
+fn place(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path) -> Result<PlaceSpec> {
     let keys = spanned.get_ref();
-    let at = page.origin(spanned);
-    let (how, at) = how(page, keys, &at, folder)?;
+    let at = recipe_text.origin(spanned);
+    let (how, at) = how(recipe_text, keys, &at, folder)?;
     let regions = keys.region.as_ref().map_or_else(Vec::new, |names| names.get_ref().list());
     let default_name = || regions.first().cloned().unwrap_or_else(|| SKIN.to_owned());
     let first_id = match &keys.first_id {
         None => 0,
         Some(id) if how.has_ids() => {
-            return Err(page.origin(id).wrong("`first_id` means nothing where the table has ids; remove it"));
+            return Err(recipe_text.origin(id).wrong("`first_id` means nothing where the table has ids; remove it"));
         }
         Some(id) => u32::try_from(*id.get_ref()).ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
-            page.origin(id).wrong(format!("`first_id` is {}; ids lie between 0 and {MAX_TAXEL_ID}", id.get_ref()))
+            recipe_text
+                .origin(id)
+                .wrong(format!("`first_id` is {}; ids lie between 0 and {MAX_TAXEL_ID}", id.get_ref()))
         })?,
     };
-    Ok(Place {
+    Ok(PlaceSpec {
         name: keys.name.as_ref().map_or_else(default_name, |name| name.get_ref().clone()),
         regions,
         seed: keys.seed,
         first_id,
-        modality: keys.modality.as_ref().map_or(Ok(Modality::Pressure), |name| modality(page, name))?,
+        modality: keys.modality.as_ref().map_or(Ok(Modality::Pressure), |name| modality(recipe_text, name))?,
         how,
         at,
     })
 }
 
-fn modality(page: Page<'_>, name: &Spanned<String>) -> Result<Modality> {
+fn modality(recipe_text: RecipeText<'_>, name: &Spanned<String>) -> Result<Modality> {
     let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity];
     let found = known.into_iter().find(|modality| modality.name() == *name.get_ref());
     let names = known.map(Modality::name);
@@ -242,19 +245,19 @@ fn modality(page: Page<'_>, name: &Spanned<String>) -> Result<Modality> {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("it is one of {}", names.join(", ")),
         };
-        page.origin(name).wrong(format!("there is no modality `{}`; {hint}", name.get_ref()))
+        recipe_text.origin(name).wrong(format!("there is no modality `{}`; {hint}", name.get_ref()))
     })
 }
 
-/// How a place is to be filled, and where that is said.
-fn how(page: Page<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(How, Origin)> {
+/// How taxels are placed, and the place of that key.
+fn how(recipe_text: RecipeText<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(Placement, Origin)> {
     let ways = [
-        ("taxels", keys.taxels.as_ref().map(|key| page.origin(key))),
-        ("spacing", keys.spacing.as_ref().map(|key| page.origin(key))),
-        ("grid", keys.grid.as_ref().map(|key| page.origin(key))),
-        ("points", keys.points.as_ref().map(|key| page.origin(key))),
-        ("csv", keys.csv.as_ref().map(|key| page.origin(key))),
-        ("icub", keys.icub.as_ref().map(|key| page.origin(key))),
+        ("taxels", keys.taxels.as_ref().map(|key| recipe_text.origin(key))),
+        ("spacing", keys.spacing.as_ref().map(|key| recipe_text.origin(key))),
+        ("grid", keys.grid.as_ref().map(|key| recipe_text.origin(key))),
+        ("points", keys.points.as_ref().map(|key| recipe_text.origin(key))),
+        ("csv", keys.csv.as_ref().map(|key| recipe_text.origin(key))),
+        ("icub", keys.icub.as_ref().map(|key| recipe_text.origin(key))),
     ];
     let mut given = ways.into_iter().filter_map(|(name, at)| Some((name, at?)));
     let Some((way, way_at)) = given.next() else {
@@ -265,69 +268,71 @@ fn how(page: Page<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(
     {
         return Err(other_at.wrong(format!("a place has one way: remove `{other}` or `{way}`")));
     }
-    // What each way has a use for, beside itself.
+    // Optional keys, and the key that each belongs to.
     let extras = [
-        ("density", keys.density.as_ref().map(|key| page.origin(key)), "taxels"),
-        ("pitch", keys.pitch.as_ref().map(|key| page.origin(key)), "grid"),
-        ("origin", keys.origin.as_ref().map(|key| page.origin(key)), "grid"),
-        ("u", keys.u.as_ref().map(|key| page.origin(key)), "grid"),
+        ("density", keys.density.as_ref().map(|key| recipe_text.origin(key)), "taxels"),
+        ("pitch", keys.pitch.as_ref().map(|key| recipe_text.origin(key)), "grid"),
+        ("origin", keys.origin.as_ref().map(|key| recipe_text.origin(key)), "grid"),
+        ("u", keys.u.as_ref().map(|key| recipe_text.origin(key)), "grid"),
         (
             "within",
-            keys.within.as_ref().map(|key| page.origin(key)),
+            keys.within.as_ref().map(|key| recipe_text.origin(key)),
             if ["csv", "icub"].contains(&way) { way } else { "points" },
         ),
-        ("link", keys.link.as_ref().map(|key| page.origin(key)), "icub"),
+        ("link", keys.link.as_ref().map(|key| recipe_text.origin(key)), "icub"),
     ];
     if let Some((name, at, _)) = extras.into_iter().filter_map(|(n, at, of)| Some((n, at?, of))).find(|e| e.2 != way) {
         return Err(at.wrong(format!("`{name}` means nothing beside `{way}`; remove it")));
     }
-    let spacing_m = keys.spacing.as_ref().map(|key| page.length("spacing", key)).transpose()?;
-    let within_m = keys.within.as_ref().map_or(Ok(WITHIN_M), |key| page.length("within", key))?;
+    let spacing_m = keys.spacing.as_ref().map(|key| recipe_text.length("spacing", key)).transpose()?;
+    let within_m = keys.within.as_ref().map_or(Ok(DEFAULT_WITHIN_M), |key| recipe_text.length("within", key))?;
     let how = if let Some(taxels) = &keys.taxels {
         let count =
             u64::try_from(*taxels.get_ref()).map_err(|_| way_at.wrong("there are no negative numbers of taxels"));
         let count = check_count(count?).map_err(|e| way_at.put(e))?;
         match (&keys.density, spacing_m) {
             (Some(density), Some(_)) => {
-                return Err(page.origin(density).wrong("a place has `density` or `spacing`, not both; remove one"));
+                return Err(recipe_text
+                    .origin(density)
+                    .wrong("a place has `density` or `spacing`, not both; remove one"));
             }
-            (Some(density), None) => How::Density { count, attribute: density.get_ref().clone() },
-            (None, apart_m) => How::Evenly { count, apart_m },
+            (Some(density), None) => Placement::Density { count, attribute: density.get_ref().clone() },
+            (None, apart_m) => Placement::Evenly { count, apart_m },
         }
     } else if let Some(spacing_m) = spacing_m {
-        How::Apart { spacing_m }
+        Placement::Apart { spacing_m }
     } else if let Some(grid) = &keys.grid {
         let pitch =
             keys.pitch.as_ref().ok_or_else(|| way_at.wrong("a grid needs its `pitch`, as in `pitch = \"5 mm\"`"))?;
-        How::Grid {
+        Placement::Grid {
             hexagonal: *grid.get_ref() == GridName::Hexagonal,
-            pitch_m: page.length("pitch", pitch)?,
-            origin: keys.origin.as_ref().map(|origin| page.point("origin", origin)).transpose()?,
-            u: keys.u.as_ref().map(|u| page.point("u", u)).transpose()?,
+            pitch_m: recipe_text.length("pitch", pitch)?,
+            origin: keys.origin.as_ref().map(|origin| recipe_text.point("origin", origin)).transpose()?,
+            u: keys.u.as_ref().map(|u| recipe_text.point("u", u)).transpose()?,
         }
     } else if let Some(icub) = &keys.icub {
         let link = keys.link.as_ref().map(|link| link.get_ref().clone());
-        How::Icub { path: folder.join(icub.get_ref()), link, within_m }
+        Placement::Icub { path: folder.join(icub.get_ref()), link, within_m }
     } else if let Some(csv) = &keys.csv {
-        How::Table { path: folder.join(csv.get_ref()), within_m }
-    } else if let Some(names) = page.globs(keys.points.as_ref())? {
-        How::Marks { names, within_m }
+        Placement::Table { path: folder.join(csv.get_ref()), within_m }
+    } else if let Some(names) = recipe_text.globs(keys.points.as_ref())? {
+        Placement::Marks { names, within_m }
     } else {
         return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points`, `csv` or `icub`"));
     };
     Ok((how, way_at))
 }
 
-/// Refuses several places that count ids and do not say from where.
-fn check_first_ids(page: Page<'_>, keys: &[Spanned<PlaceKeys>], places: &[Place]) -> Result<()> {
+/// Checks that each of several places that number their taxels has a `first_id`.
+fn check_first_ids(recipe_text: RecipeText<'_>, keys: &[Spanned<PlaceKeys>], places: &[PlaceSpec]) -> Result<()> {
     let counting: Vec<usize> = (0..places.len()).filter(|&i| !places[i].how.has_ids()).collect();
     if places.len() < 2 {
         return Ok(());
     }
     let Some(&without) = counting.iter().find(|&&i| keys[i].get_ref().first_id.is_none()) else { return Ok(()) };
-    // Room to grow: ranges of a power of ten that twice the largest number asked for fits in.
+    // Ranges of a power of ten, at least twice the largest number of taxels, leave room to grow.
     let most = places.iter().map(|place| match place.how {
-        How::Evenly { count, .. } | How::Density { count, .. } => 2 * count,
+        Placement::Evenly { count, .. } | Placement::Density { count, .. } => 2 * count,
         _ => 1000,
     });
     let most = most.max().unwrap_or(1000);
@@ -338,7 +343,7 @@ fn check_first_ids(page: Page<'_>, keys: &[Spanned<PlaceKeys>], places: &[Place]
     let given: BTreeMap<usize, u32> =
         counting.iter().filter(|&&i| keys[i].get_ref().first_id.is_some()).map(|&i| (i, places[i].first_id)).collect();
     let free = (0..).map(|n| n * step).find(|n| !given.values().any(|&id| id as usize / step == n / step));
-    Err(page.origin(&keys[without]).wrong(format!(
+    Err(recipe_text.origin(&keys[without]).wrong(format!(
         "place `{}` needs a `first_id`, so that its ids stay when other places come or go; write `first_id = {}`",
         places[without].name,
         free.unwrap_or(0)

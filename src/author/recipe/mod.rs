@@ -1,4 +1,4 @@
-//! Recipes: what a person asks of a layout, read and checked before a mesh is looked at.
+//! Recipes: a requested layout, read and checked before the mesh.
 
 mod file;
 
@@ -14,10 +14,10 @@ use crate::body::Modality;
 use crate::error::{Error, Result};
 use crate::length::{self, Length};
 
-/// How far a place that was given may lie from the surface where nothing else is said, m.
-const WITHIN_M: f64 = 0.01;
+/// Default maximum distance of a given place from the surface, m.
+const DEFAULT_WITHIN_M: f64 = 0.01;
 
-/// Where something was asked for, for messages: `recipe.toml: line 12`, or a flag.
+/// The place of a key in messages: `recipe.toml: line 12`, or a flag.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Origin {
     file: String,
@@ -29,19 +29,19 @@ impl Origin {
         Self { file: String::new(), line: name.to_owned() }
     }
 
-    /// The error that `what` is wrong with what was asked for.
+    /// The error `what` at this place.
     pub(super) fn wrong(&self, what: impl Into<String>) -> Error {
         self.put(Error::failed(what))
     }
 
-    /// `error`, told to be here.
+    /// `error` with this place.
     pub(super) fn put(&self, error: Error) -> Error {
         let error = if self.line.is_empty() { error } else { error.at(&self.line) };
         if self.file.is_empty() { error } else { error.at(&self.file) }
     }
 }
 
-/// What is to be placed on a body, and how it is grouped.
+/// Which taxels to place on a body, and how to group them.
 ///
 /// In a file it is TOML; a length is a number of metres or a text like `"8 mm"`.
 ///
@@ -100,52 +100,52 @@ pub struct Recipe {
     /// Whether taxels that the file has stay.
     pub(super) keeps_existing: bool,
     pub(super) regions: BTreeMap<String, Region>,
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<PlaceSpec>,
     pub(super) fields: Vec<(FieldRule, Origin)>,
     seed: u64,
 }
 
 /// Taxels of one kind on some regions.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(super) struct PlaceSpec {
     pub(super) name: String,
     /// Names of regions; none means all of the skin.
     pub(super) regions: Vec<String>,
-    /// A seed of its own instead of the recipe's.
+    /// Its own seed, instead of the recipe's.
     pub(super) seed: Option<u64>,
     /// The first of its ids, which count up.
     pub(super) first_id: u32,
     pub(super) modality: Modality,
-    pub(super) how: How,
+    pub(super) how: Placement,
     pub(super) at: Origin,
 }
 
 /// How taxels are placed.
 #[derive(Clone, Debug)]
-pub(super) enum How {
-    /// So many, as blue noise, with a least spacing if one is given.
+pub(super) enum Placement {
+    /// `count` as blue noise, with a minimum spacing if given.
     Evenly { count: usize, apart_m: Option<f64> },
-    /// So many, by a painted density.
+    /// `count` by a painted density.
     Density { count: usize, attribute: String },
     /// As many as fit with a spacing.
     Apart { spacing_m: f64 },
     /// On a grid in a geodesic chart.
     Grid { hexagonal: bool, pitch_m: f64, origin: Option<DVec3>, u: Option<DVec3> },
-    /// Where somebody put empties or points with these names.
+    /// At empties or points with these names.
     Marks { names: Globs, within_m: f64 },
-    /// Where a table says.
+    /// At the places of a table.
     Table { path: PathBuf, within_m: f64 },
-    /// Where a position file of the iCub says, in the frame of `link`, or of the one that the file names.
+    /// At the places of an iCub position file, in the frame of `link`, or of the link that the file names.
     Icub { path: PathBuf, link: Option<String>, within_m: f64 },
 }
 
-impl How {
-    /// Whether ids come with the places.
+impl Placement {
+    /// Whether the places have ids.
     pub(super) fn has_ids(&self) -> bool {
         matches!(self, Self::Table { .. })
     }
 
-    /// Whether it finds places of its own, which bare regions are kept from.
+    /// Whether places are sampled, which excludes bare regions.
     pub(super) fn samples(&self) -> bool {
         !matches!(self, Self::Marks { .. } | Self::Table { .. } | Self::Icub { .. })
     }
@@ -174,13 +174,13 @@ impl Recipe {
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let named = self.places.iter().filter_map(|place| match &place.how {
-            How::Table { path, .. } | How::Icub { path, .. } => Some(path.clone()),
+            Placement::Table { path, .. } | Placement::Icub { path, .. } => Some(path.clone()),
             _ => None,
         });
         named.collect()
     }
 
-    /// No taxels: those that the body has are grouped.
+    /// A recipe without taxels: the body's own are grouped.
     #[must_use]
     pub fn none() -> Self {
         Self {
@@ -194,11 +194,11 @@ impl Recipe {
         }
     }
 
-    /// So many taxels as blue noise (`taxels`), a given spacing (such as `8 mm`), or so many no closer than that, on the
-    /// nodes, meshes or links whose names match one of `nodes`; without any, on all of the skin.
+    /// A number of taxels as blue noise (`taxels`), a spacing (such as `8 mm`), or both, on the nodes, meshes or links whose
+    /// names match one of `nodes`; without any, on the whole surface.
     ///
     /// # Errors
-    /// Neither number nor spacing is given, or one that makes no sense.
+    /// Neither number nor spacing is given, or one is invalid.
     pub fn simple(taxels: Option<u64>, spacing: Option<&str>, nodes: &[String]) -> Result<Self> {
         let mut recipe = Self::none();
         let flag = |name: &str| Origin::flag(name);
@@ -206,9 +206,9 @@ impl Recipe {
             spacing.map(|text| metres(text).map_err(|what| Error::usage(what).at("--spacing"))).transpose()?;
         let how = match (taxels, spacing_m) {
             (Some(count), apart_m) => {
-                How::Evenly { count: check_count(count).map_err(|e| flag("--taxels").put(e))?, apart_m }
+                Placement::Evenly { count: check_count(count).map_err(|e| flag("--taxels").put(e))?, apart_m }
             }
-            (None, Some(spacing_m)) => How::Apart { spacing_m },
+            (None, Some(spacing_m)) => Placement::Apart { spacing_m },
             (None, None) => return Err(Error::usage("say how many taxels (--taxels) or how far apart (--spacing)")),
         };
         let mut regions = Vec::new();
@@ -219,7 +219,7 @@ impl Recipe {
             recipe.regions.insert(nodes.join(", "), region);
             regions.push(nodes.join(", "));
         }
-        recipe.places.push(Place {
+        recipe.places.push(PlaceSpec {
             name: regions.first().cloned().unwrap_or_else(|| SKIN.to_owned()),
             regions,
             seed: None,
@@ -245,8 +245,8 @@ impl Recipe {
         Ok(Self { unit: Some((unit.to_owned(), unit_metres(unit).map_err(Error::usage)?)), ..self })
     }
 
-    /// The seed that `place` samples with: made of its own or the recipe's, and of its name, so that no other place counts.
-    pub(super) fn seed_of(&self, place: &Place) -> u64 {
+    /// The seed of `place`, from its own or the recipe's seed and its name, so that it does not depend on other places.
+    pub(super) fn seed_of(&self, place: &PlaceSpec) -> u64 {
         // FNV-1a.
         let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3);
         let name = place.name.bytes().fold(0xCBF2_9CE4_8422_2325, step);
@@ -254,7 +254,7 @@ impl Recipe {
     }
 }
 
-/// What a place is called that is on all of the skin.
+/// Default name of a place on the whole surface.
 const SKIN: &str = "skin";
 
 fn check_count(count: u64) -> Result<usize> {
@@ -264,7 +264,7 @@ fn check_count(count: u64) -> Result<usize> {
     }
 }
 
-/// The length over 0 that `text` says, m.
+/// Parses a length over 0, m.
 fn metres(text: &str) -> Result<f64, String> {
     let length = Length::parse(text.trim())?.ok_or("a length is missing; write one like 8mm")?;
     let unit = length.unit_m.ok_or_else(|| format!("`{text}` has no unit; write one like 8mm"))?;
@@ -277,7 +277,7 @@ fn unit_metres(unit: &str) -> Result<f64, String> {
     length::unit(unit).ok_or_else(|| format!("there is no unit `{unit}`; it is um, mm, cm or m"))
 }
 
-/// `metres` as a person says it.
+/// `metres` as text.
 pub(super) fn shown(metres: f64) -> String {
     if metres < 1.0 { format!("{:.1} mm", metres * 1e3) } else { format!("{metres:.2} m") }
 }

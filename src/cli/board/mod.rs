@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use somatic::output::OutputLink;
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec};
-use somatic::wire::board::{Faults, Make, Potentiometers, VirtualBoard};
+use somatic::wire::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
 use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
@@ -285,9 +285,9 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
         let count = arguments.bits.or(wired.bits).unwrap_or(10);
         let bits = Bits::new(count)
             .ok_or_else(|| Error::usage(format!("--bits {count} is not possible; give 8, 10, 12 or 16")))?;
-        most = most.max(bits.most());
+        most = most.max(bits.max());
         let place = |taxel: &Option<u32>| taxels.iter().position(|id| Some(id) == taxel.as_ref());
-        let make = Make {
+        let make = BoardConfig {
             board: wired.id,
             channels: wired.taxels.len() as u16,
             bits,

@@ -62,7 +62,7 @@ impl Pty {
 
     /// The speed that the other side has set, over `baud`: 1 within the 2 % that a UART bears. With another parity,
     /// number of bits or of stop bits, it is not 1.
-    pub(super) fn heard_at(&self, baud: u32) -> f64 {
+    pub(super) fn baud_ratio(&self, baud: u32) -> f64 {
         let Ok(set) = tcgetattr(&self.end) else { return 1.0 };
         let ratio = f64::from(set.output_speed()) / f64::from(baud);
         let framing = set.control_modes & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);

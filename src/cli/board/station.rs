@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use somatic::Result;
 use somatic::output::OutputLink;
-use somatic::wire::board::{BadLine, Faults, VirtualBoard, Window};
+use somatic::wire::board::{Faults, FaultyLine, VirtualBoard, Window};
 
 use super::pty::Pty;
 
@@ -27,8 +27,8 @@ pub(super) struct Station {
     pub(super) places: Vec<Option<usize>>,
     pub(super) plug: Option<Pty>,
     pub(super) link: Option<OutputLink>,
-    to_host: BadLine,
-    from_host: BadLine,
+    to_host: FaultyLine,
+    from_host: FaultyLine,
     /// Bytes that the line has had time for.
     credit: f64,
     row: u64,
@@ -54,8 +54,8 @@ impl Station {
             places,
             plug: None,
             link,
-            to_host: BadLine::new(seed),
-            from_host: BadLine::new(!seed),
+            to_host: FaultyLine::new(seed),
+            from_host: FaultyLine::new(!seed),
             credit: 0.0,
             row: 0,
             resets: 0,
@@ -85,7 +85,7 @@ impl Station {
 
     /// Whether it has sent all that it will.
     pub(super) fn is_done(&mut self, common: &Common) -> bool {
-        self.board.frames() >= common.frames && self.board.leaving().is_empty()
+        self.board.frames() >= common.frames && self.board.outgoing().is_empty()
     }
 
     /// Does what happens between `now` − `step` and `now`. `row` numbers the `readings`.
@@ -108,21 +108,21 @@ impl Station {
         }
         if begun(&faults.reset) > self.resets {
             self.resets = begun(&faults.reset);
-            self.board.start_again(now);
+            self.board.restart(now);
         }
-        let heard_at = self.plug.as_ref().filter(|plug| plug.is_open()).map(|plug| plug.heard_at(common.baud));
-        if let (Some(plug), Some(heard_at)) = (&self.plug, heard_at) {
+        let baud_ratio = self.plug.as_ref().filter(|plug| plug.is_open()).map(|plug| plug.baud_ratio(common.baud));
+        if let (Some(plug), Some(baud_ratio)) = (&self.plug, baud_ratio) {
             let (mut buffer, mut arrives) = ([0; 1024], Vec::new());
             for &byte in plug.read(&mut buffer) {
-                self.from_host.pass(byte, faults, 1.0 / heard_at, &mut arrives);
+                self.from_host.pass(byte, faults, 1.0 / baud_ratio, &mut arrives);
             }
-            self.board.hear(&arrives, now);
+            self.board.receive(&arrives, now);
         }
         self.credit += step.min(MOST_AT_ONCE).as_secs_f64() * f64::from(common.baud) / 10.0;
         let (silent, mut arrives) = (lasts(&faults.silence), Vec::new());
         while self.credit >= 1.0 {
-            if self.board.leaving().is_empty() {
-                let fresh = row > self.row || (row > 0 && !self.board.has_no_rate());
+            if self.board.outgoing().is_empty() {
+                let fresh = row > self.row || (row > 0 && !self.board.is_unthrottled());
                 let may = !silent && fresh && self.board.frames() < common.frames;
                 if !may || !self.board.is_due(now) {
                     self.credit = 0.0;
@@ -132,11 +132,11 @@ impl Station {
                 self.board.send(&own, now);
                 self.row = row;
             }
-            let Some(byte) = self.board.leaving().pop_front() else { break };
+            let Some(byte) = self.board.outgoing().pop_front() else { break };
             self.credit -= 1.0;
             self.bytes += 1;
-            match heard_at {
-                Some(heard_at) => self.to_host.pass(byte, faults, heard_at, &mut arrives),
+            match baud_ratio {
+                Some(baud_ratio) => self.to_host.pass(byte, faults, baud_ratio, &mut arrives),
                 None => self.unheard += 1,
             }
         }

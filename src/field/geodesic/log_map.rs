@@ -1,4 +1,4 @@
-//! Windows, the queue that they wait in, and what they say of a place.
+//! Windows, their priority queue, and the shortest paths that they give.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -6,27 +6,27 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
-use super::Place;
+use super::SurfacePlace;
 use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result};
 
-/// Windows after which a surface counts as too rough.
-const MOST_WINDOWS: usize = 2_000_000;
+/// Number of windows at which a surface counts as too rough.
+const MAX_WINDOWS: usize = 2_000_000;
 
-/// A way is shorter than another only by more than this part of it: rounding along a row of unfolded triangles.
+/// Relative tolerance in comparing lengths: rounding over a sequence of unfolded triangles.
 const ROUNDING: f64 = 1e-12;
 
-/// Windows narrower than this part of their edge are rounding.
-const LEAST_WIDTH: f64 = 1e-12;
+/// Windows narrower than this share of their edge are rounding errors.
+const MIN_WINDOW_WIDTH: f64 = 1e-12;
 
-/// Ways to one place that leave further apart than this are two ways, 20°.
-const APART: f64 = PI / 9.0;
+/// Paths to one point are different if their departures are further apart than this, 20°.
+const MIN_RIVAL_ANGLE: f64 = PI / 9.0;
 
-/// What straight lines from a source reach of an edge.
+/// The part of an edge that straight lines from a source reach.
 #[derive(Clone, Copy, Debug)]
 struct Window {
-    /// The edge, as that of the triangle that is entered through it.
+    /// The edge, as half-edge of the triangle that is entered.
     edge: u32,
     /// Index of the source.
     source: u32,
@@ -36,7 +36,7 @@ struct Window {
     part: [f64; 2],
     /// The angle of the x-axis at the source, rad.
     base_rad: f64,
-    /// The window before it in the list of those that enter its triangle.
+    /// The previous window that enters the same triangle.
     before: u32,
 }
 
@@ -54,45 +54,45 @@ impl Window {
     }
 }
 
-/// What waits its turn: sixteen bytes, as a queue of whole windows takes most of the time to keep in order.
-struct Waiting {
+/// An entry of the queue; small, as a queue of windows themselves is slow.
+struct QueueEntry {
     distance_m: f64,
-    /// Makes the order total and the same on every machine.
+    /// Sequence number, which makes the order total.
     turn: u32,
-    /// Index of a window; or with [`VERTEX`] set, of a vertex.
+    /// Index of a window; or with [`VERTEX_FLAG`] set, of a vertex.
     what: u32,
 }
 
-/// Marks what waits as a vertex.
-const VERTEX: u32 = 1 << 31;
+/// Flag of an entry for a vertex.
+const VERTEX_FLAG: u32 = 1 << 31;
 
-impl Ord for Waiting {
+impl Ord for QueueEntry {
     fn cmp(&self, other: &Self) -> Ordering {
         other.distance_m.total_cmp(&self.distance_m).then(other.turn.cmp(&self.turn))
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for QueueEntry {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Waiting {
+impl PartialEq for QueueEntry {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Waiting {}
+impl Eq for QueueEntry {}
 
-/// The best way known to a vertex.
+/// The shortest known path to a vertex.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     distance_m: f64,
     angle_rad: f64,
     bend_rad: f64,
-    /// An edge that leaves the vertex, and the angle from it to where the way came from.
+    /// An edge that starts at the vertex, and the angle from it to the arriving path.
     edge: u32,
     back_rad: f64,
 }
@@ -100,30 +100,29 @@ struct Arrival {
 const UNKNOWN: Arrival =
     Arrival { distance_m: f64::INFINITY, angle_rad: 0.0, bend_rad: 0.0, edge: NONE, back_rad: 0.0 };
 
-/// Where the shortest way to a place leads.
+/// The shortest path to a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// (u, v), m: the way's length in the direction of its departure.
+    /// (u, v), m: the path's length in its initial direction.
     pub uv: DVec2,
-    /// Length of the way, m.
+    /// Length of the path, m.
     pub distance_m: f64,
-    /// How much the way bends at most at one point, rad: over 0 behind a hole, around the surface's edge or, by little, on
-    /// a surface that is bent like a saddle.
+    /// The largest bend of the path at one point, rad: over 0 around a hole or the surface's edge and, slightly, on a saddle.
     pub bend_rad: f64,
-    /// Another way that cannot be shortened and leaves over 20° apart, if one was met: the shortest of those.
+    /// The shortest other geodesic that departs over 20° apart, if any was found.
     pub rival: Option<Rival>,
 }
 
-/// A way to a place that was looked at.
+/// A candidate path to a place.
 struct Way {
     distance_m: f64,
     angle_rad: f64,
     bend_rad: f64,
-    /// Whether it is straight where it passes its last window: one that is not can be shortened.
+    /// Whether it is straight through its last window; else it can be shortened.
     is_straight: bool,
 }
 
-/// A second way to a place.
+/// A second path to a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rival {
     /// Its length, m.
@@ -132,29 +131,29 @@ pub struct Rival {
     pub apart_rad: f64,
 }
 
-/// Shortest ways from one point of a surface to all others up to some length.
+/// Shortest paths from one point of a surface to all others up to a length.
 pub struct LogMap<'a> {
     topology: &'a Topology,
     start: Start,
     limit_m: f64,
     sources: Vec<Source>,
     arrivals: Vec<Arrival>,
-    /// All that were ever put on the queue, followed or not.
+    /// All windows, followed or not.
     windows: Vec<Window>,
     followed: usize,
-    /// Per triangle the last of the windows that enter it.
+    /// Per triangle the last window that enters it.
     entering: Vec<u32>,
-    queue: BinaryHeap<Waiting>,
+    queue: BinaryHeap<QueueEntry>,
     turn: u32,
 }
 
 impl<'a> LogMap<'a> {
-    /// Follows all shortest ways from `place` up to the length `limit_m`; +u is along `u` as far as that is tangential,
-    /// and angles run counter-clockwise seen from outside. At a vertex they are evened out so that they go once round.
+    /// Computes all shortest paths from `place` up to the length `limit_m`; +u is along the tangential part of `u`, angles are
+    /// counter-clockwise seen from outside. At a vertex angles are scaled to a full turn.
     ///
     /// # Errors
-    /// `place` is on no triangle, or the surface is so rough that the ways are too many to follow.
-    pub fn new(topology: &'a Topology, place: Place, u: DVec3, limit_m: f64) -> Result<Self> {
+    /// `place` is on no triangle, or the surface is too rough, with too many windows.
+    pub fn new(topology: &'a Topology, place: SurfacePlace, u: DVec3, limit_m: f64) -> Result<Self> {
         if place.triangle as usize >= topology.triangles.len() {
             return Err(Error::failed("the chart's origin is on no triangle of the surface"));
         }
@@ -176,12 +175,12 @@ impl<'a> LogMap<'a> {
             map.arrivals[map.start.vertex as usize].distance_m = 0.0;
         }
         for wedge in map.start.wedges.clone() {
-            map.leave(&wedge, 0);
+            map.start_windows(&wedge, 0);
         }
         while let Some(waiting) = map.queue.pop() {
-            match waiting.what & VERTEX {
-                0 => map.enter(waiting.what)?,
-                _ => map.bend_at(waiting.what & !VERTEX, waiting.distance_m),
+            match waiting.what & VERTEX_FLAG {
+                0 => map.follow(waiting.what)?,
+                _ => map.start_at_vertex(waiting.what & !VERTEX_FLAG, waiting.distance_m),
             }
         }
         Ok(map)
@@ -194,15 +193,15 @@ impl<'a> LogMap<'a> {
         [position, u, normal.cross(u), normal]
     }
 
-    /// How many windows were followed.
+    /// Number of followed windows.
     #[must_use]
     pub fn windows(&self) -> usize {
         self.followed
     }
 
-    /// Where the shortest way to `place` leads; `None` beyond the limit, and on a part that the start is not on.
+    /// The shortest path to `place`; `None` beyond the limit, and on another part of the surface.
     #[must_use]
-    pub fn reach(&self, place: &Place) -> Option<Reached> {
+    pub fn reach(&self, place: &SurfacePlace) -> Option<Reached> {
         let mut ways: Vec<Way> = Vec::new();
         for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
             let at = mix(wedge.corners, place.barycentric);
@@ -233,15 +232,15 @@ impl<'a> LogMap<'a> {
             let apart = (self.start.in_plane(other.angle_rad) - angle_rad).abs();
             apart.min(2.0 * PI - apart)
         };
-        let rival = ways.iter().filter(|way| way.is_straight && apart(way) > APART).min_by(shortest);
+        let rival = ways.iter().filter(|way| way.is_straight && apart(way) > MIN_RIVAL_ANGLE).min_by(shortest);
         let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
         Some(Reached { uv: towards(angle_rad) * distance_m, distance_m, bend_rad, rival })
     }
 
-    /// The way through `window` to the unfolded point `to`.
+    /// The path through `window` to the unfolded point `to`.
     fn way(&self, window: &Window, to: DVec2) -> Way {
         let [a, b] = window.part.map(|t| window.at(t));
-        // A point beside the lines through the window is reached around its end.
+        // A point beside the window's cone is reached around the window's end.
         let (first, rest) = if a.perp_dot(to) > 0.0 {
             (a, a.distance(to))
         } else if b.perp_dot(to) < 0.0 {
@@ -259,7 +258,7 @@ impl<'a> LogMap<'a> {
         }
     }
 
-    /// Where the third corner of the triangle beyond the window unfolds to.
+    /// The unfolded third corner of the triangle beyond the window.
     fn third(&self, window: &Window) -> DVec2 {
         let corner = |edge: u32| self.topology.positions[self.topology.ends(edge).0 as usize];
         let (a, b, c) = (corner(window.edge), corner(next(window.edge)), corner(next(next(window.edge))));
@@ -271,43 +270,43 @@ impl<'a> LogMap<'a> {
         p + along + (q - p).perp() * (edge.cross(far).length() / squared)
     }
 
-    fn wait(&mut self, distance_m: f64, what: u32) {
+    fn enqueue(&mut self, distance_m: f64, what: u32) {
         self.turn += 1;
-        self.queue.push(Waiting { distance_m, turn: self.turn, what });
+        self.queue.push(QueueEntry { distance_m, turn: self.turn, what });
     }
 
-    /// Lets lines start over `wedge` from source `source`.
-    fn leave(&mut self, wedge: &Wedge, source: u32) {
+    /// Starts the windows over `wedge` from source `source`.
+    fn start_windows(&mut self, wedge: &Wedge, source: u32) {
         let sides = wedge.apex.map_or(0..3, |apex| (apex + 1) % 3..(apex + 1) % 3 + 1);
         for side in sides {
             let edge = 3 * wedge.triangle + side;
             let [p, q] = [side as usize, (side as usize + 1) % 3].map(|corner| wedge.corners[corner]);
-            self.offer(edge, [q, p], [0.0, 1.0], source, wedge.base_rad);
+            self.add_window(edge, [q, p], [0.0, 1.0], source, wedge.base_rad);
         }
         for corner in (0..3).filter(|&corner| Some(corner) != wedge.apex) {
             let at = wedge.corners[corner as usize];
             let onward = wedge.corners[(corner as usize + 1) % 3] - at;
             let own = wedge.base_rad + angle(at);
-            self.arrive(3 * wedge.triangle + corner, at, onward, source, own);
+            self.update_vertex(3 * wedge.triangle + corner, at, onward, source, own);
         }
     }
 
-    /// Puts on the queue what lines from `source` reach of the other side of edge `edge`.
-    fn offer(&mut self, edge: u32, ends: [DVec2; 2], part: [f64; 2], source: u32, base_rad: f64) {
+    /// Queues the window of `source` on the other side of edge `edge`.
+    fn add_window(&mut self, edge: u32, ends: [DVec2; 2], part: [f64; 2], source: u32, base_rad: f64) {
         let beyond = self.topology.across[edge as usize];
-        if beyond == NONE || part[1] - part[0] <= LEAST_WIDTH {
+        if beyond == NONE || part[1] - part[0] <= MIN_WINDOW_WIDTH {
             return;
         }
         let window = Window { edge: beyond, source, ends, part, base_rad, before: NONE };
         let distance_m = self.sources[source as usize].distance_m + window.nearest();
         if distance_m <= self.limit_m {
-            self.wait(distance_m, self.windows.len() as u32);
+            self.enqueue(distance_m, self.windows.len() as u32);
             self.windows.push(window);
         }
     }
 
-    /// Notes the way from `source` to the vertex where `edge` starts, unfolded at `at`; `onward` is that edge, unfolded.
-    fn arrive(&mut self, edge: u32, at: DVec2, onward: DVec2, source: u32, own_rad: f64) {
+    /// Updates the path from `source` to the vertex where `edge` starts, unfolded at `at`; `onward` is that edge, unfolded.
+    fn update_vertex(&mut self, edge: u32, at: DVec2, onward: DVec2, source: u32, own_rad: f64) {
         let vertex = self.topology.ends(edge).0 as usize;
         let from = &self.sources[source as usize];
         let distance_m = from.distance_m + at.length();
@@ -316,30 +315,30 @@ impl<'a> LogMap<'a> {
             let back_rad = angle(DVec2::new(onward.dot(-at), onward.perp_dot(-at)));
             self.arrivals[vertex] = Arrival { distance_m, angle_rad, bend_rad: from.bend(own_rad), edge, back_rad };
             if distance_m <= self.limit_m {
-                self.wait(distance_m, vertex as u32 | VERTEX);
+                self.enqueue(distance_m, vertex as u32 | VERTEX_FLAG);
             }
         }
     }
 
-    /// Whether a way through the end `t` of `window` is longer than one by way of the vertex where `edge` starts.
-    fn is_beaten(&self, window: &Window, t: f64, edge: u32, unfolded: DVec2) -> bool {
+    /// Whether the path through the end `t` of `window` is longer than that via the vertex where `edge` starts.
+    fn is_longer_than_via(&self, window: &Window, t: f64, edge: u32, unfolded: DVec2) -> bool {
         let known = self.arrivals[self.topology.ends(edge).0 as usize].distance_m;
         let end = window.at(t);
         let own = self.sources[window.source as usize].distance_m + end.length();
         known + unfolded.distance(end) < own * (1.0 - ROUNDING)
     }
 
-    /// Takes window `index` into its triangle, and on to the two edges beyond.
-    fn enter(&mut self, index: u32) -> Result<()> {
+    /// Propagates window `index` through its triangle to the two edges beyond.
+    fn follow(&mut self, index: u32) -> Result<()> {
         let window = self.windows[index as usize];
         let [p, q] = window.ends;
-        // Any way through it is longer than one by way of an end of its edge (Xin and Wang 2009).
-        if self.is_beaten(&window, window.part[1], window.edge, p)
-            || self.is_beaten(&window, window.part[0], next(window.edge), q)
+        // Any path through it is longer than one via an end of its edge (Xin and Wang 2009).
+        if self.is_longer_than_via(&window, window.part[1], window.edge, p)
+            || self.is_longer_than_via(&window, window.part[0], next(window.edge), q)
         {
             return Ok(());
         }
-        if self.followed == MOST_WINDOWS {
+        if self.followed == MAX_WINDOWS {
             return Err(Error::failed(format!(
                 "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
                 self.limit_m
@@ -352,7 +351,7 @@ impl<'a> LogMap<'a> {
         let third = self.third(&window);
         let [a, b] = window.part.map(|t| window.at(t));
         let (right_of_a, left_of_b) = (a.perp_dot(third) <= 0.0, b.perp_dot(third) >= 0.0);
-        // Where the line through `ray` meets the edge from `from` to `to`.
+        // The intersection of the line through `ray` with the edge from `from` to `to`.
         let met = |ray: DVec2, from: DVec2, to: DVec2| {
             let (before, after) = (ray.perp_dot(from), ray.perp_dot(to));
             let t = before / (before - after);
@@ -362,34 +361,34 @@ impl<'a> LogMap<'a> {
         if right_of_a && left_of_b {
             let onward = p - third;
             let own = window.base_rad + angle(third);
-            self.arrive(left, third, onward, window.source, own);
+            self.update_vertex(left, third, onward, window.source, own);
         }
         if left_of_b {
-            // The way to the right edge: from the third corner, or where the leftmost line meets it, to the rightmost.
+            // The part of the right edge: from the third corner, or the leftmost line, to the rightmost.
             let from = if right_of_a { 0.0 } else { met(a, third, q) };
             let child = Window { ends: [third, q], part: [from, met(b, third, q)], ..window };
-            if !self.is_beaten(&child, child.part[1], window.edge, p) {
-                self.offer(right, child.ends, child.part, child.source, child.base_rad);
+            if !self.is_longer_than_via(&child, child.part[1], window.edge, p) {
+                self.add_window(right, child.ends, child.part, child.source, child.base_rad);
             }
         }
         if right_of_a {
             let to = if left_of_b { 1.0 } else { met(b, p, third) };
             let child = Window { ends: [p, third], part: [met(a, p, third), to], ..window };
-            if !self.is_beaten(&child, child.part[0], right, q) {
-                self.offer(left, child.ends, child.part, child.source, child.base_rad);
+            if !self.is_longer_than_via(&child, child.part[0], right, q) {
+                self.add_window(left, child.ends, child.part, child.source, child.base_rad);
             }
         }
         Ok(())
     }
 
-    /// Where straight lines past `vertex` leave a gap behind it, lets new ones start there.
-    fn bend_at(&mut self, vertex: u32, distance_m: f64) {
+    /// Starts new windows at `vertex` into the gap that straight lines leave behind it.
+    fn start_at_vertex(&mut self, vertex: u32, distance_m: f64) {
         let arrival = self.arrivals[vertex as usize];
         if arrival.distance_m < distance_m || arrival.edge == NONE {
             return;
         }
         let fan = Fan::new(self.topology, arrival.edge);
-        // Angles are counted from the fan's first edge; those of the new source from where its way came.
+        // Angles are measured from the fan's first edge; those of the new source from its arriving path.
         let start =
             fan.wedges.iter().find(|wedge| wedge.apex == Some(arrival.edge % 3) && wedge.triangle == arrival.edge / 3);
         let Some(back_rad) = start.map(|wedge| wedge.base_rad + arrival.back_rad) else { return };
@@ -403,7 +402,7 @@ impl<'a> LogMap<'a> {
         for (index, wedge) in fan.wedges.iter().enumerate() {
             let end = fan.wedges.get(index + 1).map_or(fan.angle_rad, |wedge| wedge.base_rad);
             let (from, to) = (wedge.base_rad - back_rad, end - back_rad);
-            // In the gap, the way turns by π or more on both sides. All turns are within ±around.
+            // In the gap, the path turns by π or more on both sides. All turns are within ±around.
             let turned = |turn: f64| if fan.closed { turn.rem_euclid(fan.angle_rad) } else { turn };
             let in_gap = match fan.closed {
                 true => {
@@ -419,7 +418,7 @@ impl<'a> LogMap<'a> {
                 is_one = true;
                 self.sources.push(Source { distance_m, angle_rad, bend_rad, around_rad, bends: true });
             }
-            self.leave(&Wedge { base_rad: turned(from), ..*wedge }, source);
+            self.start_windows(&Wedge { base_rad: turned(from), ..*wedge }, source);
         }
     }
 }

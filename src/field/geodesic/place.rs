@@ -6,21 +6,21 @@ use crate::body::Topology;
 
 /// A point of a [`Topology`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct SurfacePlace {
     /// Index of the triangle.
     pub triangle: u32,
     /// Weights of its three corners, from 0 up, summing to 1.
     pub barycentric: [f64; 3],
 }
 
-impl Place {
-    /// The point of `triangle` that is nearest to `p`, m, which lies on it but for rounding.
+impl SurfacePlace {
+    /// The point of `triangle` nearest to `p`, m, which is on it up to rounding.
     #[must_use]
     pub fn in_triangle(topology: &Topology, triangle: u32, p: DVec3) -> Self {
         Self { triangle, barycentric: barycentric(topology.corners(triangle), p) }
     }
 
-    /// Where it is, m.
+    /// Its position, m.
     #[must_use]
     pub fn position(&self, topology: &Topology) -> DVec3 {
         let [a, b, c] = topology.corners(self.triangle);

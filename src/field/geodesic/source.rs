@@ -1,32 +1,32 @@
-//! Where ways start: the point that is asked about, and the vertices at which ways bend.
+//! Sources of straight lines: the start point, and vertices at which paths bend.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::Place;
+use super::SurfacePlace;
 use crate::body::{NONE, Topology, next};
 
-/// A point this near to a corner, in barycentric weight, is the corner.
-const AT_CORNER: f64 = 1.0 - 1e-9;
+/// A point with at least this barycentric weight is the corner.
+const CORNER_WEIGHT: f64 = 1.0 - 1e-9;
 
-/// A point from which straight lines start, at the origin of the planes that triangles are unfolded into.
+/// A point from which straight lines start, at the origin of the unfolded planes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
-    /// The way's length up to here, m; 0 at the start of all.
+    /// Length of the path to here, m; 0 at the start.
     pub(super) distance_m: f64,
-    /// The direction in which the way here left the start, before the tangent plane is evened out, rad.
+    /// Initial direction of the path to here, before scaling to a full turn, rad.
     pub(super) angle_rad: f64,
-    /// How much the way bent at most before it came here, rad.
+    /// The largest bend of the path before here, rad.
     pub(super) bend_rad: f64,
-    /// The angle of all the surface around here, rad; infinite where the surface ends.
+    /// The total angle of the surface around here, rad; infinite at the surface's edge.
     pub(super) around_rad: f64,
-    /// Whether lines from here keep the direction `angle_rad`, as behind a bend, or have their own.
+    /// Whether lines from here have the initial direction `angle_rad`, as behind a bend, or their own.
     pub(super) bends: bool,
 }
 
 impl Source {
-    /// How much a way bends that comes in and goes on `turn_rad` further round, rad.
+    /// The bend of a path that continues `turn_rad` from its arrival, rad.
     pub(super) fn bend(&self, turn_rad: f64) -> f64 {
         if !self.bends {
             return 0.0;
@@ -44,34 +44,34 @@ pub(super) struct Wedge {
     pub(super) corners: [DVec2; 3],
     /// The angle of the x-axis, rad.
     pub(super) base_rad: f64,
-    /// The source's corner, where it is one.
+    /// The source's corner, if the source is a vertex.
     pub(super) apex: Option<u32>,
 }
 
-/// The surface around a start: its tangent frame, and how angles on it become angles in the tangent plane.
+/// The start point: its tangent frame, and the map from angles on the surface to the tangent plane.
 pub(super) struct Start {
     pub(super) position: DVec3,
     pub(super) u: DVec3,
     pub(super) normal: DVec3,
     pub(super) wedges: Vec<Wedge>,
-    /// The angle on the surface at which +u is.
+    /// The angle on the surface of +u.
     pub(super) zero_rad: f64,
-    /// What angles on the surface are multiplied by so that they go once round.
+    /// Factor that scales angles on the surface to a full turn.
     pub(super) scale: f64,
-    /// The vertex that it is, or [`NONE`].
+    /// The start's vertex, or [`NONE`].
     pub(super) vertex: u32,
 }
 
 impl Start {
-    /// The start at `place`, with +u along `u` as far as that is tangential.
-    pub(super) fn new(topology: &Topology, place: Place, u: DVec3) -> Self {
-        match (0..3).find(|&corner| place.barycentric[corner] >= AT_CORNER) {
+    /// The start at `place`, with +u along the tangential part of `u`.
+    pub(super) fn new(topology: &Topology, place: SurfacePlace, u: DVec3) -> Self {
+        match (0..3).find(|&corner| place.barycentric[corner] >= CORNER_WEIGHT) {
             Some(corner) => Self::at_vertex(topology, 3 * place.triangle + corner as u32, u),
             None => Self::inside(topology, place, u),
         }
     }
 
-    fn inside(topology: &Topology, place: Place, u: DVec3) -> Self {
+    fn inside(topology: &Topology, place: SurfacePlace, u: DVec3) -> Self {
         let corners = topology.corners(place.triangle);
         let normal = normal_of(corners);
         let position = place.position(topology);
@@ -95,7 +95,7 @@ impl Start {
             let offset = topology.positions[to as usize] - position;
             angle(DVec2::new(offset.dot(u), offset.dot(v)))
         };
-        // +u lies in one of the wedges as they are seen along the normal, at some part of its angle.
+        // Find the wedge that contains +u, seen along the normal, and the share of its angle.
         let holds_u = fan.wedges.iter().find_map(|wedge| {
             let apex = 3 * wedge.triangle + wedge.apex?;
             let (right, left) = (seen(topology.ends(next(apex)).0), seen(topology.ends(next(apex)).1));
@@ -151,12 +151,12 @@ fn wedge_angle(wedge: &Wedge) -> f64 {
     angle(far)
 }
 
-/// The direction of `p`, rad in (−π, π]: the same bits on every machine.
+/// The direction of `p`, rad in (−π, π].
 pub(super) fn angle(p: DVec2) -> f64 {
     libm::atan2(p.y, p.x)
 }
 
-/// The unit vector in the direction `angle_rad`: the same bits on every machine.
+/// The unit vector in the direction `angle_rad`.
 pub(super) fn towards(angle_rad: f64) -> DVec2 {
     let (sin, cos) = libm::sincos(angle_rad);
     DVec2::new(cos, sin)

@@ -2,7 +2,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{LogMap, Place};
+use super::{LogMap, SurfacePlace};
 use crate::body::Topology;
 
 /// A sheet of `columns` × `rows` squares over [0, 1]², two triangles each with diagonals that alternate, bent by `shape`.
@@ -76,9 +76,9 @@ fn icosphere(cuts: u32) -> Topology {
 }
 
 /// Each vertex as a place in one of its triangles.
-fn vertices(topology: &Topology) -> impl Iterator<Item = (u32, Place)> {
+fn vertices(topology: &Topology) -> impl Iterator<Item = (u32, SurfacePlace)> {
     let mut seen = vec![false; topology.positions.len()];
-    let all: Vec<(u32, Place)> = topology
+    let all: Vec<(u32, SurfacePlace)> = topology
         .triangles
         .iter()
         .enumerate()
@@ -87,29 +87,35 @@ fn vertices(topology: &Topology) -> impl Iterator<Item = (u32, Place)> {
         .map(|(t, corner, v)| {
             let mut barycentric = [0.0; 3];
             barycentric[corner] = 1.0;
-            (v, Place { triangle: t as u32, barycentric })
+            (v, SurfacePlace { triangle: t as u32, barycentric })
         })
         .collect();
     all.into_iter()
 }
 
 /// Places all over the surface, three a triangle.
-fn places(topology: &Topology) -> impl Iterator<Item = Place> {
+fn places(topology: &Topology) -> impl Iterator<Item = SurfacePlace> {
     (0..topology.triangles.len() as u32).flat_map(|triangle| {
-        [[0.6, 0.3, 0.1], [0.1, 0.6, 0.3], [1.0 / 3.0; 3]].map(|barycentric| Place { triangle, barycentric })
+        [[0.6, 0.3, 0.1], [0.1, 0.6, 0.3], [1.0 / 3.0; 3]].map(|barycentric| SurfacePlace { triangle, barycentric })
     })
 }
 
-fn find(topology: &Topology, p: DVec3) -> Place {
+fn find(topology: &Topology, p: DVec3) -> SurfacePlace {
     (0..topology.triangles.len() as u32)
-        .map(|t| Place::in_triangle(topology, t, p))
+        .map(|t| SurfacePlace::in_triangle(topology, t, p))
         .min_by(|a, b| a.position(topology).distance(p).total_cmp(&b.position(topology).distance(p)))
         .unwrap()
 }
 
 /// The largest distance between the (u, v) that come out and those that `right` gives for a place, over where the
 /// geodesic is no longer than `up_to`.
-fn worst(topology: &Topology, start: DVec3, u: DVec3, up_to: f64, right: impl Fn(DVec3, &Place) -> DVec2) -> f64 {
+fn worst(
+    topology: &Topology,
+    start: DVec3,
+    u: DVec3,
+    up_to: f64,
+    right: impl Fn(DVec3, &SurfacePlace) -> DVec2,
+) -> f64 {
     let map = LogMap::new(topology, find(topology, start), u, up_to).unwrap();
     let mut worst: f64 = 0.0;
     let mut compared = 0;
@@ -150,7 +156,7 @@ fn a_rolled_sheet_unrolls_to_rounding() {
     // The unrolled sheet has the same triangles.
     let flat = sheet(columns, rows, |p| DVec3::new(p.x * f64::from(columns) * side, p.y, 0.0));
     let start = 401;
-    let place = Place { triangle: start, barycentric: [0.5, 0.2, 0.3] };
+    let place = SurfacePlace { triangle: start, barycentric: [0.5, 0.2, 0.3] };
     let origin = place.position(&flat).truncate();
     let map = LogMap::new(&topology, place, DVec3::Y, 9.0).unwrap();
     for place in places(&topology) {
@@ -175,7 +181,7 @@ fn a_cone_unrolls_to_rounding() {
     // Sides of a polygon take the angle of their chord.
     let unrolled_step = 2.0 * (0.5 * (step / 2.0).sin()).asin();
     let start = find(&topology, DVec3::new(-0.4, 0.75_f64.sqrt() * 0.8, 0.01));
-    let unroll = |place: &Place| {
+    let unroll = |place: &SurfacePlace| {
         let triangle = topology.triangles[place.triangle as usize];
         let column = triangle
             .map(|v| topology.positions[v as usize])
@@ -291,6 +297,6 @@ fn what_is_out_of_reach_is_told_apart() {
     let map = LogMap::new(&topology, at(0.05, 0.05), DVec3::X, 0.2).unwrap();
     assert!(map.reach(&at(0.95, 0.95)).is_none());
     assert!(map.reach(&at(0.1, 0.1)).is_some());
-    let nowhere = Place { triangle: 900, barycentric: [1.0, 0.0, 0.0] };
+    let nowhere = SurfacePlace { triangle: 900, barycentric: [1.0, 0.0, 0.0] };
     assert!(LogMap::new(&topology, nowhere, DVec3::X, 1.0).is_err());
 }

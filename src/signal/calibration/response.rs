@@ -1,5 +1,5 @@
-//! The part of a calibration that says what stands between raw value and pressure: the keys `sensor`, `curve`, `tap`,
-//! `signal`, `full_scale_newton`, and what the keys together must not say.
+//! The conversion from raw value to pressure: the keys `sensor`, `curve`, `tap`, `signal` and `full_scale_newton`, and the
+//! check that keys fit together.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use crate::error::{Error, Result, nearest};
 use crate::signal::FsrCircuit;
 use crate::signal::curve::{Column, Curve};
 
-/// What stands between a taxel's raw value and its pressure.
+/// The conversion from a taxel's raw value to its pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Response {
     /// A straight line: P = gain · (raw − baseline).
@@ -48,9 +48,9 @@ impl Default for FsrResponse {
 /// The paper's two signals, both from 0 to 1000.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FsrSignal {
-    /// The reading, turned round: about logarithmic in the force.
+    /// The inverted reading: about logarithmic in the force.
     Raw,
-    /// Proportional to the force that the reading stands for.
+    /// Proportional to the force.
     #[default]
     Linear,
 }
@@ -90,21 +90,21 @@ impl CurveKeys {
         let numbers = |column: &Spanned<Vec<Spanned<f64>>>| -> Vec<f64> {
             column.get_ref().iter().map(|x| *x.get_ref()).collect()
         };
-        Curve::sound(&numbers(&self.raw), &numbers(&self.p)).map_err(|flaw| {
-            let column = if flaw.column == Column::Raw { &self.raw } else { &self.p };
-            let span = column.get_ref().get(flaw.knot).map_or(column.span(), Spanned::span);
-            Error::failed(flaw.what).at(format!("[curve.{name}]")).at(format!("line {}", line_of(text, span.start)))
+        Curve::checked(&numbers(&self.raw), &numbers(&self.p)).map_err(|error| {
+            let column = if error.column == Column::Raw { &self.raw } else { &self.p };
+            let span = column.get_ref().get(error.knot).map_or(column.span(), Spanned::span);
+            Error::failed(error.what).at(format!("[curve.{name}]")).at(format!("line {}", line_of(text, span.start)))
         })
     }
 }
 
-/// A taxel's calibration while keys are still to come.
+/// A taxel's calibration while its keys are read.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Draft {
     pub(super) taxel: TaxelCalibration,
     kind: Kind,
     fsr: FsrResponse,
-    /// The lines of keys that are judged together with others in the end.
+    /// Lines of keys that are checked together with others at the end.
     baseline_line: Option<usize>,
     gain_line: Option<usize>,
     range_given: bool,
@@ -119,11 +119,11 @@ enum Kind {
 }
 
 impl Draft {
-    /// Takes over what `keys` say of the response; `curves` are the file's, by name.
+    /// Applies the keys of the response; `curves` are the names of the file's curves.
     pub(super) fn take(&mut self, keys: &Keys, curves: &[&str], text: &str) -> Result<()> {
         let line = |start: usize| format!("line {}", line_of(text, start));
         if let (Some(curve), Some(_)) = (&keys.curve, &keys.sensor) {
-            let what = "`curve` and `sensor` both say what the raw value means; keep one of them";
+            let what = "`curve` and `sensor` both define the response; keep one of them";
             return Err(Error::failed(what).at(line(curve.span().start)));
         }
         if let Some(curve) = &keys.curve {
@@ -177,7 +177,7 @@ impl Draft {
         self.kind == Kind::Fsr
     }
 
-    /// The finished calibration, if its keys go together.
+    /// The finished calibration, if its keys fit together.
     pub(super) fn finish(self, curves: &[Curve]) -> Result<TaxelCalibration> {
         let mut taxel = self.taxel;
         match self.kind {
@@ -196,7 +196,7 @@ impl Draft {
         Ok(taxel)
     }
 
-    /// A baseline that leaves nothing to be felt is a slip.
+    /// Rejects a baseline at which no touch can be measured.
     fn check_baseline(&self) -> Result<()> {
         let Some(line) = self.baseline_line else { return Ok(()) };
         let TaxelCalibration { baseline, gain, p_max, raw_range: [low, high], .. } = self.taxel;
@@ -216,7 +216,7 @@ impl Draft {
     }
 }
 
-/// Refuses keys of the circuit where `is_fsr` says that no sensor has it.
+/// Rejects keys of the circuit for other sensors.
 pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: &str) -> Result<()> {
     let starts = [
         ("tap", keys.tap.as_ref().map(Spanned::span)),

@@ -1,12 +1,11 @@
-//! The part of a calibration that says when a field counts as touched, and which changes count at all: the tables
-//! `[contact]` and `[change]`.
+//! The thresholds of contact and change: the tables `[contact]` and `[change]`.
 
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{MOST, line_of};
+use super::{MAX_MAGNITUDE, line_of};
 use crate::error::{Error, Result};
 
 /// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
@@ -18,12 +17,12 @@ pub struct ContactThresholds {
     pub off: f64,
 }
 
-/// What holds for the letter [`crate::signal::Receptor::Change`] of every taxel and field, in P per second.
+/// The thresholds of the letter [`crate::signal::Receptor::Change`] for all taxels and fields, P per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChangeCalibration {
     /// Changes up to this one count as 0.
     pub dead_band: f64,
-    /// When a field counts as touched by what changes in it.
+    /// Contact thresholds of the change.
     pub contact: ContactThresholds,
 }
 
@@ -51,12 +50,12 @@ pub(super) struct ChangeKeys {
     off: Option<Spanned<f64>>,
 }
 
-/// What thresholds of contact are given in.
+/// Units of contact thresholds.
 const OF_SUMS: &str = "in the unit of S";
 const OF_CHANGES: &str = "in P per second";
 
 impl ContactKeys {
-    /// What holds for all fields, and what for single ones by name.
+    /// The thresholds for all fields, and those of single fields by name.
     pub(super) fn read(self, text: &str) -> Result<(ContactThresholds, BTreeMap<String, ContactThresholds>)> {
         let all = thresholds(self.on.as_ref(), self.off.as_ref(), OF_SUMS, text)?;
         let one = |keys: FieldContactKeys| thresholds(Some(&keys.on), keys.off.as_ref(), OF_SUMS, text);
@@ -69,7 +68,7 @@ impl ChangeKeys {
     pub(super) fn read(&self, text: &str) -> Result<ChangeCalibration> {
         let dead_band = self.dead_band.as_ref().map_or(0.0, |band| *band.get_ref());
         match &self.dead_band {
-            Some(band) if !(0.0..=MOST).contains(&dead_band) => {
+            Some(band) if !(0.0..=MAX_MAGNITUDE).contains(&dead_band) => {
                 let line = line_of(text, band.span().start);
                 Err(Error::failed(format!("`dead_band` is {dead_band}; it must be 0 or more, {OF_CHANGES}"))
                     .at(format!("line {line}")))
@@ -96,7 +95,7 @@ fn thresholds(
     let on_value = on.map_or(0.0, |on| *on.get_ref());
     let off_value = off.map_or(on_value, |off| *off.get_ref());
     match (on, off) {
-        (Some(on), _) if !(0.0..=MOST).contains(&on_value) => wrong("on", on, &format!("0 or more, {unit}")),
+        (Some(on), _) if !(0.0..=MAX_MAGNITUDE).contains(&on_value) => wrong("on", on, &format!("0 or more, {unit}")),
         (_, Some(off)) if !(0.0..=on_value).contains(&off_value) => wrong("off", off, "between 0 and `on`"),
         _ => Ok(ContactThresholds { on: on_value, off: off_value }),
     }

@@ -1,47 +1,46 @@
-//! A board's clock, told in the host's time.
+//! Converts a board's time to the host's time.
 //!
-//! A frame that the board reads at x on its clock arrives at y ≥ (1 + b)·x + a here: the delay of line, adapter and
-//! scheduler only ever adds. The line under all points (x, y) that lies nearest to them, which is the edge of their lower
-//! hull beneath the mean of x (Moon, Skelly and Towsley, *Estimation and removal of clock skew from network delay
-//! measurements*, 1999), so is the board's clock but for the shortest delay, however the delays are spread. It is drawn
-//! under the earliest arrival of every half second of the last two minutes.
+//! A frame read at board time x arrives at host time y ≥ (1 + b)·x + a, as delays are never negative. The best line below
+//! all points (x, y) is the edge of their lower hull under the mean of x (Moon, Skelly and Towsley, *Estimation and
+//! removal of clock skew from network delay measurements*, 1999); it gives the board's clock up to the shortest delay.
+//! The points are the earliest arrivals of each half second of the last two minutes.
 
 use std::collections::VecDeque;
 
-/// Of each so long, on the board's clock, the earliest arrival counts, s.
+/// Length of a bucket, of which the earliest arrival counts, s of board time.
 const BUCKET_S: f64 = 0.5;
-/// How many of these are remembered.
+/// Number of buckets kept.
 const BUCKETS: usize = 240;
-/// Before so much has been seen, s, both clocks are taken to run alike.
-const SHORTEST_S: f64 = 1.0;
-/// Before so much has been seen, s, a drift is not worth telling.
-const TELLING_S: f64 = 30.0;
-/// A board's clock that is off by more, s, was set, and is learnt anew.
+/// The drift is assumed to be 0 for less data than this, s.
+const FIT_DRIFT_S: f64 = 1.0;
+/// The drift is reported from this much data on, s.
+const REPORT_DRIFT_S: f64 = 30.0;
+/// A larger offset means that the board's clock was set; it is then estimated anew, s.
 const JUMP_S: f64 = 2.0;
 
-/// What is known of a board's clock.
+/// The estimate of a board's clock.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clock {
     first_us: Option<u64>,
-    /// Board's time x since the first frame, s, and y − x, s.
+    /// Earliest arrivals: board time x since the first frame, s, and y − x, s.
     buckets: VecDeque<(f64, f64)>,
     offset_s: f64,
-    /// b: how much faster the host's clock runs, as a part of one.
+    /// b: relative rate of the host's clock against the board's.
     slope: f64,
-    /// The last frame, on both clocks.
+    /// The last frame's board time and host time, s.
     last: Option<(f64, f64)>,
 }
 
 impl Clock {
-    /// When, in the host's time, the board read a frame that its clock says was at `board_us`, and that arrived at
-    /// `arrived_s`. Never before the frames before it; never after it arrived, if those did not.
-    pub(super) fn place(&mut self, board_us: u64, arrived_s: f64) -> f64 {
+    /// The host time, s, of a frame read at board time `board_us` that arrived at `arrived_s`. Never before earlier frames,
+    /// nor after its arrival.
+    pub(super) fn host_time_s(&mut self, board_us: u64, arrived_s: f64) -> f64 {
         let x = self.since_first_s(board_us);
         let y = arrived_s - x;
         let known = self.offset_s + self.slope * x;
         if self.last.is_some_and(|(last_x, _)| x < last_x || (y - known).abs() > JUMP_S) {
             *self = Self::default();
-            return self.place(board_us, arrived_s);
+            return self.host_time_s(board_us, arrived_s);
         }
         let lower = match self.buckets.back_mut() {
             Some((at, least)) if (*at / BUCKET_S).floor() == (x / BUCKET_S).floor() => {
@@ -60,10 +59,10 @@ impl Clock {
             self.buckets.pop_front();
         }
         if lower {
-            self.draw();
+            self.fit();
         }
         let mut host_s = x + (self.offset_s + self.slope * x).min(y);
-        // A line drawn anew must not turn two frames round, nor squeeze the time between them to nothing.
+        // A new fit must not reorder frames, nor shrink the time between them to 0.
         if let Some((last_x, last_s)) = self.last {
             host_s = host_s.max(last_s + 0.5 * (x - last_x)).min(arrived_s.max(last_s));
         }
@@ -71,10 +70,10 @@ impl Clock {
         host_s
     }
 
-    /// How much faster the board's clock runs, as a part of one, once that is known.
+    /// Relative error of the board's clock, positive if fast, once known.
     pub(super) fn drift(&self) -> Option<f64> {
         let (first, last) = (self.buckets.front()?.0, self.buckets.back()?.0);
-        (last - first >= TELLING_S).then(|| (1.0 + self.slope).recip() - 1.0)
+        (last - first >= REPORT_DRIFT_S).then(|| (1.0 + self.slope).recip() - 1.0)
     }
 
     fn since_first_s(&mut self, board_us: u64) -> f64 {
@@ -82,10 +81,10 @@ impl Clock {
         board_us.wrapping_sub(first) as i64 as f64 * 1e-6
     }
 
-    /// Draws the line under the buckets.
-    fn draw(&mut self) {
+    /// Fits the line below the buckets.
+    fn fit(&mut self) {
         let (first, last) = (self.buckets[0].0, self.buckets[self.buckets.len() - 1].0);
-        if last - first < SHORTEST_S {
+        if last - first < FIT_DRIFT_S {
             let least = self.buckets.iter().map(|&(_, y)| y).fold(f64::INFINITY, f64::min);
             (self.offset_s, self.slope) = (least, 0.0);
             return;
@@ -128,7 +127,7 @@ mod tests {
             let read_s = 5.0 + 0.02 * f64::from(frame);
             let late = if random(&mut state) < 0.05 { 0.05 } else { 0.0 };
             let arrived_s = read_s + 0.003 + jitter_s * random(&mut state) + late;
-            let host_s = clock.place((read_s * (1.0 + drift) * 1e6) as u64, arrived_s);
+            let host_s = clock.host_time_s((read_s * (1.0 + drift) * 1e6) as u64, arrived_s);
             assert!(host_s <= arrived_s);
             if read_s > from_s {
                 worst = worst.max((host_s - read_s - 0.003).abs());
@@ -158,11 +157,11 @@ mod tests {
     fn a_clock_that_was_set_is_learnt_anew() {
         let mut clock = Clock::default();
         for frame in 0..100_u32 {
-            clock.place(u64::from(frame) * 20_000, 1.0 + 0.02 * f64::from(frame));
+            clock.host_time_s(u64::from(frame) * 20_000, 1.0 + 0.02 * f64::from(frame));
         }
-        assert_eq!(clock.place(90_000_000, 3.02), 3.02, "ahead");
-        assert_eq!(clock.place(5, 3.04), 3.04, "back");
-        assert!((clock.place(20_005, 3.07) - 3.06).abs() < 1e-9, "late, and known to be");
+        assert_eq!(clock.host_time_s(90_000_000, 3.02), 3.02, "ahead");
+        assert_eq!(clock.host_time_s(5, 3.04), 3.04, "back");
+        assert!((clock.host_time_s(20_005, 3.07) - 3.06).abs() < 1e-9, "late, and known to be");
     }
 
     #[test]
@@ -172,7 +171,7 @@ mod tests {
         // A shorter delay bends the line until most of what is remembered is later than it.
         for frame in 0..1000_u32 {
             let delay = if frame < 200 { 0.1 } else { 0.001 };
-            let at = clock.place(u64::from(frame) * 20_000, 0.02 * f64::from(frame) + delay);
+            let at = clock.host_time_s(u64::from(frame) * 20_000, 0.02 * f64::from(frame) + delay);
             assert!(at >= last, "{frame}: {at} {last}");
             last = at;
         }

@@ -1,4 +1,4 @@
-//! What reading threads and the reader of frames share, and what anyone may know of the lines.
+//! State shared by the port threads and the consumer of frames, and the public view of the lines.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -10,30 +10,30 @@ use super::taps::{self, ChannelTap};
 use crate::error::Error;
 use crate::signal::Wiring;
 
-/// Frames of boards that wait at most, a line.
-const MOST_WAITING: usize = 64;
-/// Things said that wait at most for somebody who wants to know.
-const MOST_NOTICES: usize = 256;
-/// How long lines may take to close.
-const CLOSING: Duration = Duration::from_millis(300);
+/// Maximum number of queued frames per line.
+const MAX_QUEUED_FRAMES: usize = 64;
+/// Maximum number of queued notices.
+const MAX_NOTICES: usize = 256;
+/// Timeout for closing the lines.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(300);
 
-/// How a board is.
+/// The state of a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BoardState {
-    /// Not heard yet.
+    /// It has not been found yet.
     #[default]
     Awaited,
     /// It sends frames.
     Speaking,
-    /// Its line is there, and no frame comes.
+    /// Its line is open, but no frames come.
     Silent,
-    /// Its port has gone.
+    /// Its port is gone.
     Unplugged,
 }
 
 impl BoardState {
-    /// In a word.
+    /// The state's name.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -45,45 +45,45 @@ impl BoardState {
     }
 }
 
-/// What became of a board's frames since it was first known: it sent `delivered + lost`.
+/// Frame counts and state of a board since it was found; it has sent `delivered + lost` frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BoardAccount {
     /// Its id.
     pub board: u16,
-    /// The port where it was heard last.
+    /// The port it was last found on.
     pub port: Option<String>,
-    /// Bits of its values, once it has said so.
+    /// Bits of its values, once it has been identified.
     pub bits: Option<u8>,
-    /// How it is.
+    /// Its state.
     pub state: BoardState,
-    /// Frames that came intact.
+    /// Frames received intact.
     pub delivered: u64,
-    /// Frames that it sent and that did not come intact, by their sequence numbers.
+    /// Frames lost on the line, from gaps in their sequence numbers.
     pub lost: u64,
-    /// Of those delivered, how many nobody took in time: the oldest were left out.
+    /// Delivered frames that were dropped because the consumer was too slow.
     pub dropped: u64,
-    /// Of those delivered, how many a later one of the same board replaced before a frame of the skin was put together.
+    /// Delivered frames that were replaced by a later one of the same board before they were merged.
     pub replaced: u64,
-    /// Times that bytes on its line were no packet.
+    /// Corrupt packets on its line.
     pub corrupt: u64,
-    /// Times that it started again. What it sent before and did not come then is not known.
+    /// Restarts; frames lost right before a restart are not counted.
     pub restarts: u64,
-    /// Times that its port was gone.
+    /// Times that it was unplugged.
     pub unplugs: u64,
-    /// How much faster its clock runs than this machine's, as a part of one, once that is known.
+    /// Relative error of its clock against this machine's, positive if fast, once known.
     pub drift: Option<f64>,
     /// Frames a second, Hz.
     pub rate_hz: Option<f64>,
 }
 
-/// Something that is to be said of a line.
+/// A message about a line.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Notice {
-    /// When it happened, s since the lines were opened: the clock of the frames.
+    /// Time since the lines were opened, as in frames, s.
     pub at_s: f64,
-    /// What happened, one line that begins with the port.
+    /// What happened: one line that begins with the port.
     pub text: String,
 }
 
@@ -93,27 +93,27 @@ impl fmt::Display for Notice {
     }
 }
 
-/// What is to be known of serial lines while they are read, from any thread.
+/// Access to the state of serial lines from any thread while they are read.
 #[derive(Clone)]
 pub struct Lines(pub(super) Arc<Shared>);
 
 impl Lines {
-    /// What was said since the last call.
+    /// The notices since the last call.
     #[must_use]
     pub fn notices(&self) -> Vec<Notice> {
         self.0.lock().notices.drain(..).collect()
     }
 
-    /// One account a board, in the order of the wiring.
+    /// One account per board, in the order of the wiring.
     #[must_use]
     pub fn accounts(&self) -> Vec<BoardAccount> {
         self.0.lock().accounts.clone()
     }
 
-    /// What arrived and was never processed, or was sent and did not arrive, a line for each board that this is so of.
+    /// Lost and dropped frames, a line for each board with any.
     #[must_use]
     pub fn losses(&self) -> Vec<String> {
-        let told = |account: &BoardAccount| {
+        let losses = |account: &BoardAccount| {
             let sent = account.delivered + account.lost;
             let mut parts = Vec::new();
             if account.lost > 0 {
@@ -124,15 +124,15 @@ impl Lines {
             }
             (!parts.is_empty()).then(|| format!("board {}: {}", account.board, parts.join(", ")))
         };
-        self.0.lock().accounts.iter().filter_map(told).collect()
+        self.0.lock().accounts.iter().filter_map(losses).collect()
     }
 
-    /// Ends the source: boards that were started are stopped, ports closed. Waits for that, but not for long.
+    /// Ends the source: stops the boards that it started and closes the ports, waiting a limited time.
     pub fn close(&self) {
         let mut state = self.0.lock();
         state.closed = true;
         self.0.arrived.notify_all();
-        let until = Instant::now() + CLOSING;
+        let until = Instant::now() + CLOSE_TIMEOUT;
         while state.readers > 0
             && let Some(left) = until.checked_duration_since(Instant::now())
         {
@@ -141,25 +141,25 @@ impl Lines {
     }
 }
 
-/// What became of a line at the start.
+/// The result of looking for a board on a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Verdict {
     Pending,
-    /// A board of the wiring has spoken on it.
+    /// A board of the wiring was found.
     Good,
-    /// It cannot be used as it is.
+    /// The line cannot be used.
     Bad(Error),
 }
 
 pub(super) struct State {
     pub(super) queue: VecDeque<(BoardFrame, Instant)>,
     pub(super) accounts: Vec<BoardAccount>,
-    /// One a channel, board by board.
+    /// One per channel, board by board.
     pub(super) taps: Vec<Vec<ChannelTap>>,
     start: Instant,
     notices: VecDeque<Notice>,
     verdicts: Vec<Verdict>,
-    /// Per board, the line that it was heard on.
+    /// Per board, the line it was found on.
     owners: Vec<Option<usize>>,
     /// Per board, frames dropped since the last that was kept.
     gaps: Vec<u32>,
@@ -193,22 +193,22 @@ impl Shared {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, State> {
-        // Whoever broke down left nothing half done.
+        // A thread that panicked has left the state valid.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hands `frame` on. Where nobody takes frames, the oldest goes.
+    /// Queues `frame`; drops the oldest one if the queue is full.
     pub(super) fn deliver(&self, frame: BoardFrame, read_at: Instant) {
         let mut state = self.lock();
         let account = &mut state.accounts[frame.board];
         account.delivered += 1;
         account.state = BoardState::Speaking;
         state.queue.push_back((frame, read_at));
-        if state.queue.len() > MOST_WAITING * self.lines
+        if state.queue.len() > MAX_QUEUED_FRAMES * self.lines
             && let Some((oldest, _)) = state.queue.pop_front()
         {
             state.accounts[oldest.board].dropped += 1;
-            // What comes next of this board must know that something is missing before it.
+            // The next frame of this board must count the dropped one as lost before it.
             let gap = oldest.lost + 1;
             match state.queue.iter_mut().find(|(frame, _)| frame.board == oldest.board) {
                 Some((next, _)) => {
@@ -231,25 +231,25 @@ impl State {
         Some((frame, read_at))
     }
 
-    pub(super) fn say(&mut self, text: String) {
-        if self.notices.len() < MOST_NOTICES {
+    pub(super) fn notify(&mut self, text: String) {
+        if self.notices.len() < MAX_NOTICES {
             self.notices.push_back(Notice { at_s: self.start.elapsed().as_secs_f64(), text });
         }
     }
 
-    /// Takes `board` for the line `line`; the line that has it already, if another does.
+    /// Assigns `board` to the line `line`. Returns the line that has it already, if another does.
     pub(super) fn claim(&mut self, board: usize, line: usize) -> Option<usize> {
         let owner = self.owners[board].get_or_insert(line);
         (*owner != line).then_some(*owner)
     }
 
-    /// Gives back what `line` has claimed.
+    /// Releases the boards of `line`.
     pub(super) fn release(&mut self, line: usize) {
         self.owners.iter_mut().filter(|owner| **owner == Some(line)).for_each(|owner| *owner = None);
     }
 
-    /// Notes what became of a line. A reason is said, except where it ends all.
-    pub(super) fn judge(&mut self, line: usize, verdict: Verdict) {
+    /// Sets the result of a line. An error gives a notice, unless it ends the source.
+    pub(super) fn set_verdict(&mut self, line: usize, verdict: Verdict) {
         if self.verdicts[line] != Verdict::Good {
             self.verdicts[line] = verdict.clone();
         }
@@ -257,12 +257,12 @@ impl State {
         if let Verdict::Bad(error) = verdict
             && !ends_all
         {
-            self.say(error.to_string());
+            self.notify(error.to_string());
         }
     }
 
-    /// The error that ends all, where no line can be used.
-    pub(super) fn hopeless(&self) -> Option<Error> {
+    /// The error that ends the source, if no line can be used.
+    pub(super) fn fatal_error(&self) -> Option<Error> {
         let bad = self.verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Bad(_))).count();
         match &self.verdicts[..] {
             [Verdict::Bad(error)] => Some(error.clone()),

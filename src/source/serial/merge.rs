@@ -1,31 +1,29 @@
-//! Boards' frames put together into frames of the whole skin. No I/O, no clock: times are given, in seconds of the host's.
+//! Merges the boards' frames into frames of the whole skin. No I/O, no clock: the caller passes host times, s.
 //!
-//! A channel's value is as old as the last frame of its board that confirmed it: one that holds it, or a partial one that
-//! leaves it out as unchanged, where nothing was lost in between. What is too old is missing, and what belongs to a board
-//! that is silent is stale; neither is ever taken for zero.
+//! A channel's value is confirmed by a frame with it, or by a partial frame that omits it as unchanged, if no frame
+//! was lost in between. Values that are too old are missing, values of a silent board are stale; neither is zero.
 
 use crate::signal::{Frame, RawValue};
 
 use super::clock::Clock;
 
-/// Frames of a board that may be missing before its values count as missing, unless the user says how long.
-const PERIODS: f64 = 3.0;
-/// As USB adapters and schedulers hold frames up, values are believed at least so long, s.
-const LEAST_AGE_S: f64 = 0.05;
-/// The period of a board that has not shown its own, s.
-const UNKNOWN_PERIOD_S: f64 = 0.1;
-/// While no board speaks, a frame without values comes so often, s.
-const HEARTBEAT_S: f64 = 0.1;
-/// A board takes over the pace only when it is so much faster.
-const FASTER: f64 = 0.8;
+/// Default maximum age of a value, periods of its board.
+const MAX_AGE_PERIODS: f64 = 3.0;
+/// Minimum of the maximum age, since USB adapters and schedulers delay frames, s.
+const MIN_MAX_AGE_S: f64 = 0.05;
+/// The assumed period of a board before it is measured, s.
+const DEFAULT_PERIOD_S: f64 = 0.1;
+/// Period of frames without values while all boards are silent, s.
+const SILENT_PERIOD_S: f64 = 0.1;
+/// A board takes over the pace if its period is below this share of the leader's.
+const TAKEOVER_SHARE: f64 = 0.8;
 
-/// A frame of the skin waits for boards as fast as the one that sets the pace, where they are about to send: so long at
-/// most, s, and this share of the period. Without, boards that send together come now before and now after it, and of two
-/// frames one is never seen.
-const GRACE_S: f64 = 0.005;
-const GRACE_PERIODS: f64 = 0.25;
+/// A merged frame waits for other boards of the same rate that are about to send, at most this long, s, and this share of
+/// the period. Otherwise a board that sends at the same time would sometimes miss a frame and lose it to its next one.
+const MAX_WAIT_S: f64 = 0.005;
+const MAX_WAIT_PERIODS: f64 = 0.25;
 
-/// When a frame is put together.
+/// When frames are merged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pace {
     /// At each frame of the fastest board.
@@ -36,10 +34,10 @@ pub(super) enum Pace {
     Every(f64),
 }
 
-/// A frame of a board, as it came.
+/// A frame of one board.
 #[derive(Clone, Debug)]
 pub(super) struct BoardFrame {
-    /// Which of the wiring's boards.
+    /// Index of the board in the wiring.
     pub(super) board: usize,
     /// The board's clock, unwrapped, µs.
     pub(super) board_us: u64,
@@ -47,61 +45,61 @@ pub(super) struct BoardFrame {
     pub(super) arrived_s: f64,
     /// Frames before it that were lost.
     pub(super) lost: u32,
-    /// Whether the board's clock has begun anew.
+    /// Whether the board's clock has restarted.
     pub(super) restarted: bool,
-    /// Whether what it leaves out is as before.
+    /// Whether omitted channels are unchanged.
     pub(super) partial: bool,
     /// Channels and their values.
     pub(super) values: Vec<(u16, u16)>,
 }
 
-/// What a channel said.
+/// The last value of a channel.
 #[derive(Clone, Copy)]
 struct Known {
     value: u16,
-    /// The last frame that confirmed it, s.
+    /// Time of the last frame that confirmed it, s.
     confirmed_s: f64,
-    /// Whether nothing was lost since that may have changed it.
+    /// Whether no frame was lost since.
     sure: bool,
 }
 
-/// What is known of a board.
+/// The state of a board.
 struct Board {
-    /// Per channel, its taxel's place in a frame's values.
+    /// Per channel, the index of its taxel in a frame's values.
     places: Vec<Option<usize>>,
     /// Per channel.
     known: Vec<Option<Known>>,
     clock: Clock,
     period_s: f64,
-    /// The last frame: when it was read in the board's time, µs, and in the host's, s.
+    /// When the last frame was read: board time, µs, and host time, s.
     last: Option<(u64, f64)>,
-    /// When that arrived, s.
+    /// When it arrived, s.
     arrived_s: f64,
-    /// Whether its last frame is in no frame of the skin yet.
+    /// Whether its last frame is not merged yet.
     waiting: bool,
     replaced: u64,
 }
 
 impl Board {
-    fn most_age_s(&self, asked: Option<f64>) -> f64 {
-        asked.unwrap_or((PERIODS * self.period_s).max(LEAST_AGE_S))
+    fn max_age_s(&self, asked: Option<f64>) -> f64 {
+        asked.unwrap_or((MAX_AGE_PERIODS * self.period_s).max(MIN_MAX_AGE_S))
     }
 
-    fn speaks(&self, now_s: f64, asked: Option<f64>) -> bool {
-        self.last.is_some_and(|(_, at)| now_s - at <= self.most_age_s(asked))
+    fn is_sending(&self, now_s: f64, asked: Option<f64>) -> bool {
+        self.last.is_some_and(|(_, at)| now_s - at <= self.max_age_s(asked))
     }
 
-    /// Takes what `frame` says; when it was read, in the host's time.
+    /// Takes over `frame`'s values. Returns when it was read, host time, s.
     fn take(&mut self, frame: &BoardFrame) -> f64 {
         if frame.restarted {
             (self.clock, self.last) = (Clock::default(), None);
             self.known.fill(None);
         }
-        let at = self.clock.place(frame.board_us, frame.arrived_s);
+        let at = self.clock.host_time_s(frame.board_us, frame.arrived_s);
         if let Some((before_us, _)) = self.last {
             let frames = f64::from(frame.lost) + 1.0;
             let step = frame.board_us.saturating_sub(before_us) as f64 * 1e-6 / frames;
-            // A pause says nothing of a period.
+            // A pause is not a period.
             if step > 0.0 && step < 8.0 * self.period_s {
                 self.period_s += 0.1 * (step - self.period_s);
             }
@@ -124,28 +122,28 @@ impl Board {
     }
 }
 
-/// Boards on their way to frames.
+/// Merges frames of boards.
 pub(super) struct Merge {
     boards: Vec<Board>,
     pace: Pace,
     max_age_s: Option<f64>,
-    /// Which board sets the pace.
+    /// The board that sets the pace.
     leader: Option<usize>,
     last_s: f64,
-    /// When a frame is due by itself.
+    /// When a frame is due without input, s.
     due_s: Option<f64>,
-    /// A frame that waits for boards about to send: when it is to be, and until when it waits, s.
+    /// A frame that waits for other boards: its time and its deadline, s.
     held_s: Option<(f64, f64)>,
 }
 
 impl Merge {
-    /// For boards whose channels have these places in a frame's values.
+    /// `boards` has per board and channel the index in a frame's values.
     pub(super) fn new(boards: Vec<Vec<Option<usize>>>, pace: Pace, max_age_s: Option<f64>) -> Self {
         let board = |places: Vec<Option<usize>>| Board {
             known: vec![None; places.len()],
             places,
             clock: Clock::default(),
-            period_s: UNKNOWN_PERIOD_S,
+            period_s: DEFAULT_PERIOD_S,
             last: None,
             arrived_s: 0.0,
             waiting: false,
@@ -155,7 +153,7 @@ impl Merge {
         Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None, held_s: None }
     }
 
-    /// Takes a board's frame; when the frame of the skin is to be that this brings about, if it brings one.
+    /// Takes a board's frame. Returns the time of the merged frame that is now due, if any.
     pub(super) fn take(&mut self, frame: &BoardFrame) -> Option<f64> {
         let at = self.boards.get_mut(frame.board)?.take(frame);
         if let Pace::Every(period_s) = self.pace {
@@ -163,42 +161,41 @@ impl Merge {
             return None;
         }
         if self.pace == Pace::Fastest && self.lead(frame.board, at) != frame.board {
-            let over = self.held_s.is_some_and(|(_, until)| !self.awaits(frame.arrived_s, until));
+            let over = self.held_s.is_some_and(|(_, until)| !self.expects_frame(frame.arrived_s, until));
             return self.held_s.take_if(|_| over).map(|(at, _)| at);
         }
-        // While nobody speaks, frames come by themselves: from when this board's values are too old.
-        let longest = self.boards.iter().map(|board| board.most_age_s(self.max_age_s)).fold(0.0, f64::max);
-        self.due_s = Some(frame.arrived_s + longest + HEARTBEAT_S);
-        let until = frame.arrived_s + (GRACE_PERIODS * self.boards[frame.board].period_s).min(GRACE_S);
-        // A frame that waits has waited long enough when the next one comes.
-        let holds = self.held_s.take().is_none() && at > self.last_s && self.awaits(frame.arrived_s, until);
-        self.held_s = holds.then_some((at, until));
-        (at > self.last_s && !holds).then_some(at)
+        // While all boards are silent, frames come without input once the values are too old.
+        let longest = self.boards.iter().map(|board| board.max_age_s(self.max_age_s)).fold(0.0, f64::max);
+        self.due_s = Some(frame.arrived_s + longest + SILENT_PERIOD_S);
+        let until = frame.arrived_s + (MAX_WAIT_PERIODS * self.boards[frame.board].period_s).min(MAX_WAIT_S);
+        // The next frame ends the wait for the one before.
+        let is_waiting = self.held_s.take().is_none() && at > self.last_s && self.expects_frame(frame.arrived_s, until);
+        self.held_s = is_waiting.then_some((at, until));
+        (at > self.last_s && !is_waiting).then_some(at)
     }
 
-    /// Whether a board that sends as fast as the one that sets the pace, and has sent nothing since the last frame, should be
-    /// heard by `until`.
-    fn awaits(&self, now_s: f64, until_s: f64) -> bool {
+    /// Whether a board as fast as the leader that has sent nothing since the last merged frame is due by `until_s`.
+    fn expects_frame(&self, now_s: f64, until_s: f64) -> bool {
         let Some(leader) = self.leader.filter(|_| self.pace == Pace::Fastest) else { return false };
         let period_s = self.boards[leader].period_s;
         self.boards.iter().enumerate().any(|(index, board)| {
-            let is_as_fast = FASTER * board.period_s < period_s;
+            let is_as_fast = TAKEOVER_SHARE * board.period_s < period_s;
             let is_due = board.arrived_s + board.period_s <= until_s;
-            index != leader && !board.waiting && is_as_fast && is_due && board.speaks(now_s, self.max_age_s)
+            index != leader && !board.waiting && is_as_fast && is_due && board.is_sending(now_s, self.max_age_s)
         })
     }
 
-    /// Whether a frame waits for boards that are about to send.
-    pub(super) fn holds(&self) -> bool {
+    /// Whether a frame waits for other boards.
+    pub(super) fn is_waiting(&self) -> bool {
         self.held_s.is_some()
     }
 
-    /// Which board sets the pace, now that `board` has spoken.
+    /// The board that sets the pace after a frame of `board`.
     fn lead(&mut self, board: usize, now_s: f64) -> usize {
         let leads = match self.leader {
-            Some(leader) if self.boards[leader].speaks(now_s, self.max_age_s) => {
+            Some(leader) if self.boards[leader].is_sending(now_s, self.max_age_s) => {
                 let (own, theirs) = (self.boards[board].period_s, self.boards[leader].period_s);
-                if own < FASTER * theirs { board } else { leader }
+                if own < TAKEOVER_SHARE * theirs { board } else { leader }
             }
             _ => board,
         };
@@ -206,7 +203,7 @@ impl Merge {
         leads
     }
 
-    /// Whether frames come at a rate of their own.
+    /// Whether frames have a fixed rate.
     pub(super) fn is_timed(&self) -> bool {
         matches!(self.pace, Pace::Every(_))
     }
@@ -217,39 +214,38 @@ impl Merge {
         held.into_iter().chain(self.due_s).reduce(f64::min)
     }
 
-    /// When the frame of the skin is to be that is due at `now_s`, if one is.
+    /// The time of the merged frame that is due at `now_s`, if any.
     pub(super) fn tick(&mut self, now_s: f64) -> Option<f64> {
         if let Some((at, _)) = self.held_s.take_if(|(_, until)| now_s >= *until) {
             return (at > self.last_s).then_some(at);
         }
         let due = self.due_s.filter(|due| now_s >= *due)?;
-        let period_s = if let Pace::Every(period_s) = self.pace { period_s } else { HEARTBEAT_S };
-        // What could not be kept up with is not made up for.
+        let period_s = if let Pace::Every(period_s) = self.pace { period_s } else { SILENT_PERIOD_S };
+        // Missed frames are not made up for.
         let next = due + period_s;
         self.due_s = Some(if next < now_s { now_s + period_s } else { next });
         (now_s > self.last_s).then_some(now_s)
     }
 
-    /// Puts together what is known at `at_s`.
+    /// Fills `frame` with the values valid at `at_s`.
     pub(super) fn fill(&mut self, at_s: f64, frame: &mut Frame) {
         frame.clear();
         frame.t_s = at_s;
         self.last_s = at_s;
         for board in &mut self.boards {
             board.waiting = false;
-            let most = board.most_age_s(self.max_age_s);
-            let absent = if board.speaks(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
+            let max_age_s = board.max_age_s(self.max_age_s);
+            let absent = if board.is_sending(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
             for (place, known) in board.places.iter().zip(&board.known) {
                 let Some(place) = *place else { continue };
-                let young = known.filter(|known| at_s - known.confirmed_s <= most);
+                let young = known.filter(|known| at_s - known.confirmed_s <= max_age_s);
                 frame.values[place] = young.map_or(absent, |known| RawValue::new(known.value.into()));
             }
         }
     }
 
-    /// Of the board `board`: frames that a later one replaced before a frame of the skin had them, the drift of its clock,
-    /// and frames a second.
-    pub(super) fn about(&self, board: usize) -> (u64, Option<f64>, Option<f64>) {
+    /// The board's frames replaced before they were merged, its clock's drift and its rate, Hz.
+    pub(super) fn board_statistics(&self, board: usize) -> (u64, Option<f64>, Option<f64>) {
         let board = &self.boards[board];
         (board.replaced, board.clock.drift(), board.last.map(|_| board.period_s.recip()))
     }
@@ -295,7 +291,12 @@ mod tests {
         assert!(came.iter().filter(|(tick, _)| (105..).contains(tick)).all(|&(_, board)| board == 0));
         assert!(came.iter().filter(|(tick, _)| *tick >= 110).count() == 45, "every frame of the other");
         // Board 1 is known to be faster after three frames of the other. Board 0 takes over when 50 ms are over.
-        assert!(merge.about(0).0 <= 4 && merge.about(1).0 <= 5, "{} {}", merge.about(0).0, merge.about(1).0);
+        assert!(
+            merge.board_statistics(0).0 <= 4 && merge.board_statistics(1).0 <= 5,
+            "{} {}",
+            merge.board_statistics(0).0,
+            merge.board_statistics(1).0
+        );
     }
 
     /// Boards that send 50 times a second, the second `late_s` after the first and now a millisecond sooner, now later:
@@ -313,12 +314,12 @@ mod tests {
         let twice = arrivals.windows(2).filter(|pair| (pair[0].0, pair[1].0) == (1, 1)).count();
         let (mut longest_s, mut came_s, mut skin) = (0.0_f64, 0.0, Frame::missing(0.0, 3));
         for (board, read_s, arrived_s) in arrivals {
-            while let Some(due_s) = merge.due_s().filter(|due| *due < arrived_s && merge.holds()) {
+            while let Some(due_s) = merge.due_s().filter(|due| *due < arrived_s && merge.is_waiting()) {
                 let at = merge.tick(due_s).unwrap();
                 longest_s = longest_s.max(due_s - came_s);
                 merge.fill(at, &mut skin);
             }
-            let held = merge.holds();
+            let held = merge.is_waiting();
             let frame = BoardFrame { arrived_s, ..frame(board, read_s, &[(1, 1)]) };
             if let Some(at) = merge.take(&frame) {
                 longest_s = longest_s.max(if held { arrived_s - came_s } else { 0.0 });
@@ -327,7 +328,7 @@ mod tests {
                 came_s = arrived_s;
             }
         }
-        (merge.about(0).0 + merge.about(1).0, twice, longest_s)
+        (merge.board_statistics(0).0 + merge.board_statistics(1).0, twice, longest_s)
     }
 
     #[test]
@@ -335,7 +336,7 @@ mod tests {
         for (late_s, least) in [(0.0, 50), (0.0005, 50), (0.002, 0)] {
             let (replaced, twice, longest_s) = together(late_s);
             assert!(twice >= least, "{late_s}: {twice} are to be mended");
-            assert!(replaced <= 20 && longest_s <= GRACE_S + 1e-9, "{late_s}: {replaced}, {longest_s}");
+            assert!(replaced <= 20 && longest_s <= MAX_WAIT_S + 1e-9, "{late_s}: {replaced}, {longest_s}");
         }
         // What is not about to come is not waited for.
         let (replaced, _, longest_s) = together(0.01);

@@ -1,8 +1,8 @@
 //! Boards on serial lines, many at once, as one source of frames.
 //!
-//! A thread a port reads and decodes ([`crate::wire`]) and never waits for whoever takes the frames: what nobody takes is
-//! dropped, oldest first, and counted. Frames of boards are put together into frames of the skin, each channel with its
-//! age. `docs/live.md` says what is told of lines and what each message means.
+//! One thread per port reads and decodes ([`crate::wire`]) without waiting for the consumer; when the queue is full, the
+//! oldest frames are dropped and counted. Frames of boards are merged into frames of the skin. `docs/live.md`
+//! explains the messages.
 
 mod clock;
 mod lines;
@@ -22,34 +22,33 @@ pub use taps::{ChannelTap, TapTrouble};
 
 use self::lines::Shared;
 use self::merge::{Merge, Pace};
-use self::session::{Session, Task};
+use self::session::{LineConfig, Session};
 use super::Source;
 use crate::error::{Error, Result};
 use crate::signal::{Frame, Wiring};
 
-/// The speed of a line for which nobody says another, baud.
-const USUAL_BAUD: u32 = 57_600;
-/// The longest wait between two looks at whether the lines are closed.
-const LONGEST_WAIT: Duration = Duration::from_millis(50);
+/// The default speed of a line, baud.
+const DEFAULT_BAUD: u32 = 57_600;
+/// How often to check whether the lines are closed.
+const CLOSE_POLL: Duration = Duration::from_millis(50);
 
 /// How boards on serial lines are read.
 #[derive(Clone, Debug, Default)]
 pub struct SerialOptions {
-    /// Which taxel hangs on which channel of which board. Without one, as many boards as ports, numbered from 1, share the
-    /// body's taxels in ascending order of their ids ([`Wiring::in_order`]).
+    /// The taxel on each channel of each board. Without one, as many boards as ports, numbered from 1, share the body's
+    /// taxels in ascending order of their ids ([`Wiring::in_order`]).
     pub wiring: Option<Wiring>,
-    /// Frames of the skin a second, Hz; 0 for one at each frame of any board. Without one, one at each frame of the fastest
-    /// board.
+    /// Rate of merged frames, Hz; 0 for one at each frame of any board. By default one at each frame of the fastest board.
     pub live_rate_hz: Option<f64>,
-    /// Frames a second that boards are told to send, Hz; 0 is as many as the line takes. Without one, they send as they do.
+    /// Frame rate to set on the boards, Hz; 0 is as fast as the line allows. By default their rate is left as it is.
     pub board_rate_hz: Option<f64>,
-    /// How old a value may be, s; without one, three frames of its board, and 50 ms at least.
+    /// Maximum age of a value, s; by default three periods of its board, at least 50 ms.
     pub max_age_s: Option<f64>,
 }
 
 /// Frames of boards on serial lines.
 ///
-/// Times count from when it was opened, s. What is missing because its whole board is silent is [`crate::RawValue::STALE`].
+/// Times count from its opening, s. Values of a silent board are [`crate::RawValue::STALE`].
 pub struct SerialSource {
     lines: Lines,
     merge: Merge,
@@ -62,8 +61,8 @@ pub struct SerialSource {
 impl SerialSource {
     /// Starts to read `ports`, each with its speed in baud where one is given, for a body whose taxels have `ids`.
     ///
-    /// It is open at once: whether boards answer is said while it is read ([`Lines::notices`]), and is an error of
-    /// [`Source::next_frame`] where no line can be used.
+    /// It returns at once. Whether boards answer is reported by [`Lines::notices`], and by an error of
+    /// [`Source::next_frame`] if no line can be used.
     ///
     /// # Errors
     /// A port is named twice; the wiring has taxels that the body does not have; a rate or an age makes no sense.
@@ -85,8 +84,8 @@ impl SerialSource {
         let start = Instant::now();
         let shared = Arc::new(Shared::new(&wiring, ports.len(), start));
         for (line, (port, baud)) in ports.iter().enumerate() {
-            let usual = || wired_baud(&wiring, port).unwrap_or(USUAL_BAUD);
-            let session = Session::new(Task {
+            let usual = || wired_baud(&wiring, port).unwrap_or(DEFAULT_BAUD);
+            let session = Session::new(LineConfig {
                 line,
                 port: port.clone(),
                 baud: baud.unwrap_or_else(usual),
@@ -104,20 +103,20 @@ impl SerialSource {
         Ok(Self { lines: Lines(shared), merge, taxels, wiring, start, read_at: None })
     }
 
-    /// Which taxel hangs on which channel of which board.
+    /// The taxel on each channel of each board.
     #[must_use]
     pub fn wiring(&self) -> &Wiring {
         &self.wiring
     }
 
-    /// What is to be known of the lines, for whoever shows it.
+    /// State and messages of the lines, for display.
     #[must_use]
     pub fn lines(&self) -> Lines {
         self.lines.clone()
     }
 }
 
-/// The speed that the wiring has for the board that it expects on `port`, or for all boards.
+/// The wiring's speed for the board expected on `port`, or the speed that all boards share.
 fn wired_baud(wiring: &Wiring, port: &str) -> Option<u32> {
     let boards = wiring.boards();
     let own = boards.iter().find(|board| board.port.as_deref() == Some(port)).and_then(|board| board.baud);
@@ -129,7 +128,7 @@ fn check(ports: &[(String, Option<u32>)], ids: &[u32], wiring: &Wiring) -> Resul
     for (port, _) in ports {
         let same = Path::new(port).canonicalize().unwrap_or_else(|_| port.into());
         if !named.insert(same) {
-            return Err(Error::usage("this port is named twice; name each once").at(port));
+            return Err(Error::usage("this port is given twice; give each once").at(port));
         }
     }
     let there: HashSet<u32> = ids.iter().copied().collect();
@@ -176,17 +175,17 @@ impl Source for SerialSource {
             let due = match state.take() {
                 Some((came, read_at)) => {
                     let due = self.merge.take(&came);
-                    let (replaced, drift, rate_hz) = self.merge.about(came.board);
+                    let (replaced, drift, rate_hz) = self.merge.board_statistics(came.board);
                     let account = &mut state.accounts[came.board];
                     (account.replaced, account.drift, account.rate_hz) = (replaced, drift, rate_hz);
                     self.read_at = Some(read_at);
                     due
                 }
                 None => {
-                    // A frame that says that nobody speaks is made of no bytes.
-                    let of_bytes = self.merge.is_timed() || self.merge.holds();
+                    // A frame of silent boards has no time of reading.
+                    let has_read_time = self.merge.is_timed() || self.merge.is_waiting();
                     let due = self.merge.tick(self.start.elapsed().as_secs_f64());
-                    self.read_at = self.read_at.filter(|_| due.is_none() || of_bytes);
+                    self.read_at = self.read_at.filter(|_| due.is_none() || has_read_time);
                     due
                 }
             };
@@ -199,18 +198,16 @@ impl Source for SerialSource {
             if !state.queue.is_empty() {
                 continue;
             }
-            if let Some(error) = state.hopeless() {
+            if let Some(error) = state.fatal_error() {
                 return Err(error);
             }
             let until_due = |due_s: f64| Duration::try_from_secs_f64(due_s - self.start.elapsed().as_secs_f64());
-            let wait =
-                self.merge.due_s().map_or(LONGEST_WAIT, |due| until_due(due).unwrap_or_default().min(LONGEST_WAIT));
+            let wait = self.merge.due_s().map_or(CLOSE_POLL, |due| until_due(due).unwrap_or_default().min(CLOSE_POLL));
             state = shared.arrived.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
     fn read_at(&mut self) -> Option<Instant> {
-        // A frame that nobody's bytes brought about has none.
         self.read_at.take()
     }
 

@@ -1,4 +1,4 @@
-//! A thread a port: it opens, reads and writes, and waits for nothing else. The only user of serial ports.
+//! The thread of a port, which opens, reads and writes it. The only user of serial ports.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::thread;
@@ -9,44 +9,44 @@ use serialport::SerialPort;
 use super::session::Session;
 use crate::error::Error;
 
-/// How long a read waits for bytes: how soon what is due is done.
-const READING: Duration = Duration::from_millis(15);
-/// Between two tries to open a port that is not there.
-const REOPENING: Duration = Duration::from_millis(100);
-/// Bytes read at once, at most: a tenth of a second at 400,000 baud.
-const AT_ONCE: usize = 4096;
+/// Timeout of a read, and so the resolution of other deadlines.
+const READ_TIMEOUT: Duration = Duration::from_millis(15);
+/// Time between two tries to open a port.
+const REOPEN_INTERVAL: Duration = Duration::from_millis(100);
+/// Size of the read buffer: a tenth of a second at 400,000 baud.
+const READ_BYTES: usize = 4096;
 
 /// Reads the port of `session` until its lines are closed. Times count from `start`.
 pub(super) fn read(mut session: Session, start: Instant) {
-    let is_closed = |session: &Session| session.task().shared.lock().closed;
+    let is_closed = |session: &Session| session.config().shared.lock().closed;
     while !is_closed(&session) {
         match open(&session) {
             Ok(port) => {
                 session.opened(start.elapsed());
                 if let Err(error) = serve(&mut session, port, start) {
-                    let error = Error::failed(error.to_string()).at(&session.task().port);
+                    let error = Error::failed(error.to_string()).at(&session.config().port);
                     session.gone(start.elapsed(), || error);
                 }
             }
             Err(error) => {
-                let name = session.task().port.clone();
+                let name = session.config().port.clone();
                 session.gone(start.elapsed(), || explained(&name, &error));
             }
         }
         if !is_closed(&session) {
-            thread::sleep(REOPENING);
+            thread::sleep(REOPEN_INTERVAL);
         }
     }
-    let shared = &session.task().shared;
+    let shared = &session.config().shared;
     shared.lock().readers -= 1;
     shared.arrived.notify_all();
 }
 
 fn open(session: &Session) -> serialport::Result<Box<dyn SerialPort>> {
-    serialport::new(&session.task().port, session.baud()).timeout(READING).open()
+    serialport::new(&session.config().port, session.baud()).timeout(READ_TIMEOUT).open()
 }
 
-/// What opening the port `name` failed on, and what to do.
+/// Why the port `name` could not be opened, and what to do.
 fn explained(name: &str, error: &serialport::Error) -> Error {
     let what = match error.kind {
         serialport::ErrorKind::Io(ErrorKind::NotFound) => format!("there is no such port; {}", ports()),
@@ -59,7 +59,7 @@ fn explained(name: &str, error: &serialport::Error) -> Error {
     Error::failed(what).at(name)
 }
 
-/// The serial ports of this machine, in words.
+/// A list of this machine's serial ports for a message.
 pub(super) fn ports() -> String {
     let names: Vec<String> =
         serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect();
@@ -69,23 +69,23 @@ pub(super) fn ports() -> String {
 /// Serves an open port until its lines are closed, or it is gone.
 fn serve(session: &mut Session, mut port: Box<dyn SerialPort>, start: Instant) -> std::io::Result<()> {
     let mut baud = session.baud();
-    let mut buffer = [0; AT_ONCE];
+    let mut buffer = [0; READ_BYTES];
     loop {
-        if session.task().shared.lock().closed {
-            if let Some(bytes) = session.farewell(start.elapsed()) {
-                // Whoever has gone needs no farewell.
+        if session.config().shared.lock().closed {
+            if let Some(bytes) = session.stop_command(start.elapsed()) {
+                // A board that is gone need not be stopped.
                 let _ = port.write_all(bytes);
             }
             return Ok(());
         }
-        session.tend(start.elapsed());
+        session.poll(start.elapsed());
         if session.baud() != baud {
             baud = session.baud();
             port.set_baud_rate(baud)?;
         }
         if let Some(bytes) = session.send(start.elapsed()) {
             match port.write_all(bytes) {
-                // A line that takes nothing is asked again later.
+                // The dialogue sends it again later.
                 Err(error) if error.kind() == ErrorKind::TimedOut => {}
                 other => other?,
             }
@@ -94,7 +94,7 @@ fn serve(session: &mut Session, mut port: Box<dyn SerialPort>, start: Instant) -
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(count) => {
                 let read_at = Instant::now();
-                session.hear(&buffer[..count], read_at - start, read_at);
+                session.receive(&buffer[..count], read_at - start, read_at);
                 if session.baud() != baud {
                     baud = session.baud();
                     port.set_baud_rate(baud)?;

@@ -1,5 +1,5 @@
-//! What is said and heard on one line: who is there, at which speed, whether it is the board that the wiring has, and what
-//! is wrong where it is not. No I/O, no clock.
+//! The state machine of one line: finds the board and its speed, checks it against the wiring, and reports problems.
+//! No I/O, no clock.
 
 mod board;
 mod taps;
@@ -11,48 +11,49 @@ use super::lines::{BoardState, Shared, Verdict};
 use super::merge::BoardFrame;
 use crate::error::Error;
 use crate::signal::Wiring;
-use crate::wire::{ANY_BOARD, Command, Corruption, Decoder, Dialogue, Event, Outcome, Patience, Status};
+use crate::wire::{ANY_BOARD, Command, Corruption, Decoder, Dialogue, Event, Outcome, RetryPolicy, Status};
 
-/// The speeds that a line is tried at, baud, the likeliest first.
-const USUAL: [u32; 10] = [57_600, 115_200, 921_600, 230_400, 1_000_000, 460_800, 2_000_000, 38_400, 19_200, 9_600];
-/// How long a board may take to answer at the speed that it should have, and how long between two askings of its name.
-const ASKING: Duration = Duration::from_millis(400);
-/// At each other speed: so long, and the time that a frame under way and an answer take on the line.
-const PROBING: Duration = Duration::from_millis(70);
-/// Bits on the line of a frame under way and an answer.
-const PROBED_BITS: u32 = 1500;
-/// After so long, a line on which nobody was understood is tried anew.
-const AGAIN: Duration = Duration::from_secs(5);
-/// A board that sends nothing for so long is silent.
-const SILENCE: Duration = Duration::from_secs(1);
-/// A board that sends frames and answers nothing for so long is taken as it is.
-const UNHEARD: Duration = Duration::from_millis(1500);
-/// An answer is waited for so long before a command is sent again.
-const PATIENCE: Patience = Patience { wait: Duration::from_millis(120), tries: 4 };
+/// The baud rates to try, most likely first.
+const COMMON_BAUDS: [u32; 10] =
+    [57_600, 115_200, 921_600, 230_400, 1_000_000, 460_800, 2_000_000, 38_400, 19_200, 9_600];
+/// Timeout of an answer at the expected baud rate, and interval of identification requests.
+const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(400);
+/// Timeout at other baud rates, beside the line time of [`PROBE_BITS`].
+const PROBE_TIMEOUT: Duration = Duration::from_millis(70);
+/// Bits on the line of a frame being sent and an answer.
+const PROBE_BITS: u32 = 1500;
+/// Time after which a line without a board is probed again.
+const PROBE_INTERVAL: Duration = Duration::from_secs(5);
+/// A board that sends no frames for this long is silent.
+const SILENT_AFTER: Duration = Duration::from_secs(1);
+/// A board that sends frames but does not answer for this long is accepted without identification.
+const ACCEPT_AFTER: Duration = Duration::from_millis(1500);
+/// Retries of commands.
+const RETRY: RetryPolicy = RetryPolicy { wait: Duration::from_millis(120), tries: 4 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    /// At the speed that it should have.
-    Asking,
-    /// At the n-th usual speed.
+    /// Asking for the identity at the expected baud rate.
+    Identifying,
+    /// Probing the n-th common baud rate.
     Probing(usize),
-    /// Nobody was understood.
-    GivenUp,
-    /// Packets of a board come.
+    /// No board was found at any baud rate.
+    NothingFound,
+    /// A board sends packets.
     Speaking,
 }
 
-/// What a session is to do.
-pub(super) struct Task {
+/// The settings of a line.
+pub(super) struct LineConfig {
     /// The line's number.
     pub(super) line: usize,
     /// The port's name, for messages.
     pub(super) port: String,
-    /// The speed that it should have, baud.
+    /// Expected baud rate.
     pub(super) baud: u32,
-    /// Whether the user said so; else another is taken where a board speaks at it.
+    /// Whether the user has set the baud rate; if not, another one is accepted.
     pub(super) fixed: bool,
-    /// The rate that boards are to send at, thousandths of a hertz.
+    /// The frame rate to set, mHz.
     pub(super) rate_mhz: Option<u32>,
     pub(super) wiring: Arc<Wiring>,
     pub(super) shared: Arc<Shared>,
@@ -60,46 +61,46 @@ pub(super) struct Task {
 
 pub(super) struct Session {
     decoder: Decoder,
-    talk: Talk,
+    line: LineState,
 }
 
-struct Talk {
-    task: Task,
+struct LineState {
+    config: LineConfig,
     dialogue: Dialogue,
-    /// What the line is set to, baud.
+    /// Current baud rate.
     baud: u32,
     stage: Stage,
     /// When the stage began.
     since: Duration,
-    /// Bytes since the line was opened that were no echo.
+    /// Bytes since the line was opened, without echoes.
     bytes: u64,
     version: Option<u8>,
-    /// What was said last of a line on which nobody is understood.
+    /// The last message about a line without a usable board.
     said: Option<String>,
-    /// The board whose identity is known to be right, by its place in the wiring.
+    /// The identified board, as an index in the wiring.
     board: Option<usize>,
-    /// The board that has an account, whether or not its identity is known at the moment, and its id.
+    /// The board whose frames are counted, even while its identity is to be confirmed, and its id.
     joined: Option<(usize, u16)>,
     started: bool,
-    /// Whether it is to be started once its taps are set.
+    /// Whether to start it once its taps are set.
     starts: bool,
     stopped: bool,
     silent: bool,
     last_frame: Duration,
     unplugged: Option<Duration>,
     asked: Duration,
-    clock_begins: bool,
+    clock_restarted: bool,
     lost: u32,
 }
 
 impl Session {
-    pub(super) fn new(task: Task) -> Self {
-        let baud = task.baud;
-        let talk = Talk {
-            task,
-            dialogue: Dialogue::new(ANY_BOARD, PATIENCE, 0),
+    pub(super) fn new(config: LineConfig) -> Self {
+        let baud = config.baud;
+        let line = LineState {
+            config,
+            dialogue: Dialogue::new(ANY_BOARD, RETRY, 0),
             baud,
-            stage: Stage::Asking,
+            stage: Stage::Identifying,
             since: Duration::ZERO,
             bytes: 0,
             version: None,
@@ -113,122 +114,122 @@ impl Session {
             last_frame: Duration::ZERO,
             unplugged: None,
             asked: Duration::ZERO,
-            clock_begins: false,
+            clock_restarted: false,
             lost: 0,
         };
-        Self { decoder: Decoder::new(), talk }
+        Self { decoder: Decoder::new(), line }
     }
 
-    pub(super) fn task(&self) -> &Task {
-        &self.talk.task
+    pub(super) fn config(&self) -> &LineConfig {
+        &self.line.config
     }
 
-    /// The speed that the line is to have, baud.
+    /// The baud rate to use.
     pub(super) fn baud(&self) -> u32 {
-        self.talk.baud
+        self.line.baud
     }
 
-    /// The line was opened.
+    /// Call it after the port was opened.
     pub(super) fn opened(&mut self, now: Duration) {
         self.decoder.rejoin();
-        let talk = &mut self.talk;
-        (talk.bytes, talk.version, talk.board, talk.starts) = (0, None, None, false);
-        talk.last_frame = now;
-        talk.turn(Stage::Asking, talk.task.baud, now);
+        let line = &mut self.line;
+        (line.bytes, line.version, line.board, line.starts) = (0, None, None, false);
+        line.last_frame = now;
+        line.set_stage(Stage::Identifying, line.config.baud, now);
     }
 
-    /// The line has gone, or cannot be opened, which is only said once: `why`.
+    /// Call it when the port is gone or cannot be opened; `why` is reported once.
     pub(super) fn gone(&mut self, now: Duration, why: impl FnOnce() -> Error) {
-        let talk = &mut self.talk;
-        if talk.unplugged.is_some() {
+        let line = &mut self.line;
+        if line.unplugged.is_some() {
             return;
         }
-        talk.unplugged = Some(now);
+        line.unplugged = Some(now);
         let why = why();
-        let mut state = talk.task.shared.lock();
-        state.release(talk.task.line);
-        match talk.joined {
+        let mut state = line.config.shared.lock();
+        state.release(line.config.line);
+        match line.joined {
             Some((board, _)) => {
                 state.accounts[board].state = BoardState::Unplugged;
                 state.accounts[board].unplugs += 1;
-                state.say(format!("{}: unplugged; waiting for it to come back", talk.task.port));
+                state.notify(format!("{}: unplugged; waiting for it to come back", line.config.port));
             }
-            None => state.judge(talk.task.line, Verdict::Bad(why)),
+            None => state.set_verdict(line.config.line, Verdict::Bad(why)),
         }
         drop(state);
-        talk.task.shared.arrived.notify_all();
+        line.config.shared.arrived.notify_all();
     }
 
-    /// Bytes came, the last of them read at `read_at`, which is `now`.
-    pub(super) fn hear(&mut self, bytes: &[u8], now: Duration, read_at: Instant) {
-        self.talk.bytes += bytes.len() as u64;
-        let baud = self.talk.baud;
-        self.decoder.push(bytes, |event| self.talk.on(&event, now, read_at));
-        if self.talk.baud != baud {
+    /// Handles bytes, the last of them read at `read_at`, which is `now`.
+    pub(super) fn receive(&mut self, bytes: &[u8], now: Duration, read_at: Instant) {
+        self.line.bytes += bytes.len() as u64;
+        let baud = self.line.baud;
+        self.decoder.push(bytes, |event| self.line.on(&event, now, read_at));
+        if self.line.baud != baud {
             self.decoder.rejoin();
         }
     }
 
-    /// Does what is due at `now`. The speed may be another then.
-    pub(super) fn tend(&mut self, now: Duration) {
-        let baud = self.talk.baud;
-        self.talk.tend(now);
-        if self.talk.baud != baud {
+    /// Does what is due at `now`; the baud rate may change.
+    pub(super) fn poll(&mut self, now: Duration) {
+        let baud = self.line.baud;
+        self.line.poll(now);
+        if self.line.baud != baud {
             self.decoder.rejoin();
         }
     }
 
     /// The bytes to send at `now`.
     pub(super) fn send(&mut self, now: Duration) -> Option<&[u8]> {
-        self.talk.dialogue.send(now)
+        self.line.dialogue.send(now)
     }
 
-    /// The bytes that end it: a board that was started is stopped.
-    pub(super) fn farewell(&mut self, now: Duration) -> Option<&[u8]> {
-        let talk = &mut self.talk;
-        if !(talk.started && talk.board.is_some()) {
+    /// The command that stops a board that was started.
+    pub(super) fn stop_command(&mut self, now: Duration) -> Option<&[u8]> {
+        let line = &mut self.line;
+        if !(line.started && line.board.is_some()) {
             return None;
         }
-        talk.dialogue = Dialogue::new(ANY_BOARD, PATIENCE, talk.request(now));
-        talk.dialogue.ask(Command::Stop);
-        talk.dialogue.send(now)
+        line.dialogue = Dialogue::new(ANY_BOARD, RETRY, line.request(now));
+        line.dialogue.ask(Command::Stop);
+        line.dialogue.send(now)
     }
 }
 
-impl Talk {
-    /// Another number for requests to begin with, so that no late answer is taken for a new one.
+impl LineState {
+    /// The first request number, which varies so that a late answer is not mistaken for a new one.
     fn request(&self, now: Duration) -> u8 {
         (now.as_millis() / 10) as u8
     }
 
-    fn turn(&mut self, stage: Stage, baud: u32, now: Duration) {
+    fn set_stage(&mut self, stage: Stage, baud: u32, now: Duration) {
         (self.stage, self.baud, self.since) = (stage, baud, now);
-        self.dialogue = Dialogue::new(ANY_BOARD, PATIENCE, self.request(now));
-        if stage != Stage::GivenUp {
+        self.dialogue = Dialogue::new(ANY_BOARD, RETRY, self.request(now));
+        if stage != Stage::NothingFound {
             self.ask(Command::Identify, now);
         }
     }
 
     fn ask(&mut self, command: Command, now: Duration) {
         self.asked = now;
-        // More than a dialogue holds are never asked.
+        // The dialogue's queue is never full.
         self.dialogue.ask(command);
     }
 
     fn bad(&mut self, why: String) {
         if self.said.as_ref() != Some(&why) {
-            let error = Error::failed(why.clone()).at(&self.task.port);
-            self.task.shared.lock().judge(self.task.line, Verdict::Bad(error));
-            self.task.shared.arrived.notify_all();
+            let error = Error::failed(why.clone()).at(&self.config.port);
+            self.config.shared.lock().set_verdict(self.config.line, Verdict::Bad(error));
+            self.config.shared.arrived.notify_all();
             self.said = Some(why);
         }
     }
 
-    fn say(&self, what: &str) {
-        self.task.shared.lock().say(format!("{}: {what}", self.task.port));
+    fn notify(&self, what: &str) {
+        self.config.shared.lock().notify(format!("{}: {what}", self.config.port));
     }
 
-    fn tend(&mut self, now: Duration) {
+    fn poll(&mut self, now: Duration) {
         if let Some(ended) = self.dialogue.give_up(now)
             && ended.command != Command::Identify
             && self.stage == Stage::Speaking
@@ -236,35 +237,35 @@ impl Talk {
             if matches!(ended.command, Command::Tap { .. }) {
                 return self.tap_ended(ended);
             }
-            self.say(&format!("the board does not answer `{}`", word(ended.command)));
+            self.notify(&format!("the board does not answer `{}`", word(ended.command)));
         }
         let over = |span: Duration| now >= self.since + span;
         match self.stage {
-            Stage::Asking if over(ASKING) => self.probe(0, now),
-            Stage::Probing(index) if over(PROBING + bits_take(self.baud)) => self.probe(index + 1, now),
-            Stage::GivenUp if over(AGAIN) => self.turn(Stage::Asking, self.task.baud, now),
+            Stage::Identifying if over(IDENTIFY_TIMEOUT) => self.probe(0, now),
+            Stage::Probing(index) if over(PROBE_TIMEOUT + bits_duration(self.baud)) => self.probe(index + 1, now),
+            Stage::NothingFound if over(PROBE_INTERVAL) => self.set_stage(Stage::Identifying, self.config.baud, now),
             Stage::Speaking => {
-                self.tune(now);
+                self.set_taps(now);
                 self.watch(now);
             }
             _ => {}
         }
     }
 
-    /// Tries the next usual speed, from the n-th on; gives up after the last.
+    /// Probes the next common baud rate, from the n-th on; stops after the last.
     fn probe(&mut self, from: usize, now: Duration) {
-        match (from..USUAL.len()).find(|&index| USUAL[index] != self.task.baud) {
-            Some(index) => self.turn(Stage::Probing(index), USUAL[index], now),
+        match (from..COMMON_BAUDS.len()).find(|&index| COMMON_BAUDS[index] != self.config.baud) {
+            Some(index) => self.set_stage(Stage::Probing(index), COMMON_BAUDS[index], now),
             None => {
-                self.turn(Stage::GivenUp, self.task.baud, now);
-                self.nobody();
+                self.set_stage(Stage::NothingFound, self.config.baud, now);
+                self.report_nothing_found();
             }
         }
     }
 
-    /// Nobody is understood at any speed.
-    fn nobody(&mut self) {
-        let baud = self.task.baud;
+    /// Reports that no board was found at any baud rate.
+    fn report_nothing_found(&mut self) {
+        let baud = self.config.baud;
         if let Some(version) = self.version {
             self.bad(format!("the board speaks version {version} of the protocol; this program speaks version 1"));
         } else if self.bytes > 0 {
@@ -273,36 +274,36 @@ impl Talk {
                  is it another device?"
             ));
         } else {
-            // It may be without power yet: not an end, even where it is the only one.
+            // The board may not be powered yet, so this is no error.
             let why = format!(
                 "nothing answers at {baud} baud or any usual rate; is the board powered, and the cable right? Waiting for it"
             );
             if self.said.as_ref() != Some(&why) {
-                self.say(&why);
+                self.notify(&why);
                 self.said = Some(why);
             }
         }
     }
 
-    /// A board is there: whether it still sends.
+    /// Checks whether the board still sends.
     fn watch(&mut self, now: Duration) {
-        let waits = now.saturating_sub(self.asked) >= ASKING && self.dialogue.is_idle();
+        let waits = now.saturating_sub(self.asked) >= IDENTIFY_TIMEOUT && self.dialogue.is_idle();
         if self.board.is_none() {
             if waits {
                 self.ask(Command::Identify, now);
             }
             return;
         }
-        // A board that is started once its taps are set has nothing to send yet.
-        if now < self.last_frame + SILENCE || self.stopped || self.starts {
+        // A board that waits for its taps has nothing to send yet.
+        if now < self.last_frame + SILENT_AFTER || self.stopped || self.starts {
             return;
         }
         if !self.silent {
             self.silent = true;
             if let Some((board, id)) = self.joined {
-                let mut state = self.task.shared.lock();
+                let mut state = self.config.shared.lock();
                 state.accounts[board].state = BoardState::Silent;
-                state.say(format!("{}: board {id} sends no frames", self.task.port));
+                state.notify(format!("{}: board {id} sends no frames", self.config.port));
             }
         }
         if waits {
@@ -319,28 +320,28 @@ impl Talk {
                 if let Some((board, _)) = self.joined
                     && *why != Corruption::Joined
                 {
-                    self.task.shared.lock().accounts[board].corrupt += 1;
+                    self.config.shared.lock().accounts[board].corrupt += 1;
                 }
             }
-            // What we say ourselves, from a line that echoes.
+            // An echo of the host's own command.
             Event::Command { .. } => self.bytes = 0,
-            Event::Frame { head, placed, .. }
-            | Event::Identity { head, placed, .. }
-            | Event::Answer { head, placed, .. } => {
-                if !self.understood(now) {
+            Event::Frame { head, order, .. }
+            | Event::Identity { head, order, .. }
+            | Event::Answer { head, order, .. } => {
+                if !self.accept_baud(now) {
                     return;
                 }
-                self.enter(head, placed, now);
+                self.count_losses(head, order, now);
                 if let Event::Identity { identity, .. } = event {
-                    self.identified(head, placed, identity, now);
+                    self.identified(head, order, identity, now);
                 }
                 if let Event::Frame { values, .. } = event {
-                    if self.board.is_none() && now >= self.since + UNHEARD {
-                        self.take_as_it_is(head, values.reach(), values.is_partial());
+                    if self.board.is_none() && now >= self.since + ACCEPT_AFTER {
+                        self.accept_unidentified(head, values.channel_count(), values.is_partial());
                     }
                     let frame = BoardFrame {
                         board: 0,
-                        board_us: placed.time_us,
+                        board_us: order.time_us,
                         arrived_s: now.as_secs_f64(),
                         lost: 0,
                         restarted: false,
@@ -349,7 +350,7 @@ impl Talk {
                     };
                     self.frame(head, frame, now, read_at);
                 }
-                let ended = self.dialogue.hear(event);
+                let ended = self.dialogue.receive(event);
                 if let Some(ended) = ended.filter(|ended| matches!(ended.command, Command::Tap { .. })) {
                     self.tap_ended(ended);
                 } else if let Some((ended, Outcome::Refused(status))) = ended.map(|ended| (ended, ended.outcome)) {
@@ -357,26 +358,26 @@ impl Talk {
                         Status::Unknown => "does not know",
                         _ => "refuses",
                     };
-                    self.say(&format!("board {} {why} `{}`", head.board, word(ended.command)));
+                    self.notify(&format!("board {} {why} `{}`", head.board, word(ended.command)));
                 }
             }
         }
     }
 
-    /// A packet of a board came. Whether it counts.
-    fn understood(&mut self, now: Duration) -> bool {
-        if self.baud != self.task.baud {
-            let (found, own) = (self.baud, self.task.baud);
-            if self.task.fixed {
+    /// Handles the baud rate at which a packet came. Returns whether to use the packet.
+    fn accept_baud(&mut self, now: Duration) -> bool {
+        if self.baud != self.config.baud {
+            let (found, own) = (self.baud, self.config.baud);
+            if self.config.fixed {
                 self.bad(format!(
                     "the board speaks at {found} baud, not {own}; write serial:{}@{found}",
-                    self.task.port
+                    self.config.port
                 ));
-                self.turn(Stage::GivenUp, own, now);
+                self.set_stage(Stage::NothingFound, own, now);
                 return false;
             }
-            self.task.baud = found;
-            self.say(&format!("the board speaks at {found} baud; taken instead of {own}"));
+            self.config.baud = found;
+            self.notify(&format!("the board speaks at {found} baud; taken instead of {own}"));
         }
         if self.stage != Stage::Speaking {
             (self.stage, self.since) = (Stage::Speaking, now);
@@ -385,8 +386,8 @@ impl Talk {
     }
 }
 
-fn bits_take(baud: u32) -> Duration {
-    Duration::from_secs(1) * PROBED_BITS / baud.max(1)
+fn bits_duration(baud: u32) -> Duration {
+    Duration::from_secs(1) * PROBE_BITS / baud.max(1)
 }
 
 fn word(command: Command) -> &'static str {
@@ -405,7 +406,7 @@ mod tests {
 
     #[test]
     fn every_speed_is_tried_within_two_seconds() {
-        let probing: Duration = USUAL.iter().map(|&baud| PROBING + bits_take(baud)).sum();
-        assert!(ASKING + probing < Duration::from_millis(1800), "{:?}", ASKING + probing);
+        let probing: Duration = COMMON_BAUDS.iter().map(|&baud| PROBE_TIMEOUT + bits_duration(baud)).sum();
+        assert!(IDENTIFY_TIMEOUT + probing < Duration::from_millis(1800), "{:?}", IDENTIFY_TIMEOUT + probing);
     }
 }

@@ -1,4 +1,4 @@
-//! The taps of boards' potentiometers: what they are to be, and what boards have confirmed.
+//! The taps of the boards' potentiometers: requested and confirmed.
 
 use super::lines::{Lines, State};
 use crate::signal::Wiring;
@@ -7,11 +7,11 @@ use crate::signal::Wiring;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ChannelTap {
-    /// The tap that it is to have, where somebody says so: the wiring, or [`Lines::set_tap`].
+    /// The tap requested by the wiring or [`Lines::set_tap`].
     pub wanted: Option<u8>,
-    /// The tap that the board has confirmed since its last start.
+    /// The tap confirmed by the board since its last start.
     pub set: Option<u8>,
-    /// Why it is not as wanted.
+    /// Why it is not as requested.
     pub trouble: Option<TapTrouble>,
 }
 
@@ -26,7 +26,7 @@ pub enum TapTrouble {
 }
 
 impl TapTrouble {
-    /// In words, of a board.
+    /// The problem as a predicate of the board.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -37,37 +37,37 @@ impl TapTrouble {
 }
 
 impl ChannelTap {
-    /// The tap to ask for next, if it is not as wanted, and there is hope.
+    /// The tap to request, unless it is set or the board has refused it.
     pub(super) fn due(self) -> Option<u8> {
         self.wanted.filter(|_| self.wanted != self.set && self.trouble.is_none())
     }
 
-    /// Whether what the channel reads cannot be understood yet: it is to have a tap, and may have any.
+    /// Whether the channel's readings are still invalid: a tap is requested, and the present one is unknown.
     pub(super) fn is_unknown(self) -> bool {
         self.due().is_some() && self.set.is_none()
     }
 
-    /// Its board has started again.
+    /// Forgets the tap after its board has restarted.
     pub(super) fn forget(&mut self) {
         (self.set, self.trouble) = (None, None);
     }
 }
 
-/// What `wiring` wants, board by board.
+/// The taps requested by `wiring`, board by board.
 pub(super) fn wanted(wiring: &Wiring) -> Vec<Vec<ChannelTap>> {
     let tap = |wanted: &Option<u8>| ChannelTap { wanted: *wanted, ..ChannelTap::default() };
     wiring.boards().iter().map(|board| board.taps.iter().map(tap).collect()).collect()
 }
 
 impl Lines {
-    /// The potentiometers, one a channel, board by board in the order of the wiring.
+    /// The potentiometers, one per channel, board by board in the order of the wiring.
     #[must_use]
     pub fn taps(&self) -> Vec<Vec<ChannelTap>> {
         self.0.lock().taps.clone()
     }
 
-    /// Wants the tap `tap` on a channel of the wiring's board number `board`, now and whenever the board starts again. What
-    /// becomes of it stands in [`Lines::taps`]. What is not there is not set.
+    /// Requests `tap` on a channel of the wiring's board at index `board`, now and after every restart of the board;
+    /// [`Lines::taps`] has the result. Does nothing if there is no such channel.
     pub fn set_tap(&self, board: usize, channel: usize, tap: u8) {
         let mut state = self.0.lock();
         if let Some(channel) = state.taps.get_mut(board).and_then(|channels| channels.get_mut(channel)) {
@@ -78,12 +78,12 @@ impl Lines {
 
 impl State {
     /// The next channel of `board` to set, and its tap.
-    pub(super) fn due_tap(&self, board: usize) -> Option<(u16, u8)> {
+    pub(super) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
         (0..).zip(&self.taps[board]).find_map(|(channel, tap)| Some((channel, tap.due()?)))
     }
 
-    /// Leaves all potentiometers of `board` as they are; how many are not as wanted.
-    pub(super) fn give_taps_up(&mut self, board: usize, why: TapTrouble) -> usize {
+    /// Stops requesting taps of `board`. Returns the number of channels without the requested tap.
+    pub(super) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
         let due = self.taps[board].iter_mut().filter(|tap| tap.due().is_some());
         due.map(|tap| tap.trouble = Some(why)).count()
     }

@@ -1,11 +1,11 @@
-//! The calibration of simulated sensors: what stands between force and raw value is known, and so is what is broken.
+//! The exact calibration of simulated sensors; faulty ones are masked.
 
 use std::fmt::Write as _;
 
 use super::sensor::{FsrOutput, Kind, Sensor};
 use crate::signal::FsrCircuit;
 
-/// A dead band is this many standard deviations of the noise: one value in a thousand million is beyond it.
+/// Width of a dead band, standard deviations of the noise: one value in 10⁹ exceeds it.
 const DEAD_BAND_SIGMAS: f64 = 6.0;
 
 impl Sensor {
@@ -22,7 +22,7 @@ impl Sensor {
         text
     }
 
-    /// What holds for every sensor.
+    /// The keys for all sensors.
     fn keys(&self) -> Vec<(&'static str, String)> {
         let noise = DEAD_BAND_SIGMAS * self.noise_sigma;
         match self.kind {
@@ -37,7 +37,7 @@ impl Sensor {
                 ]
             }
             Kind::Fsr { circuit, output } => {
-                // The lowest reading that noise makes of an open sensor.
+                // The lowest reading of an open sensor with noise.
                 let open = FsrCircuit::convert(FsrCircuit::STEPS - noise);
                 let dead_band = match output {
                     FsrOutput::Counts => return counts_keys(circuit, open),
@@ -53,7 +53,7 @@ impl Sensor {
 /// For readings of the paper's circuit, of which `open` is the lowest of an open sensor.
 fn counts_keys(circuit: FsrCircuit, open: u16) -> Vec<(&'static str, String)> {
     let linear = |counts| circuit.linearised(counts, FsrCircuit::SATURATION_NEWTON);
-    // The linear signal needs hardly any; the raw one's costs it nothing below the least press that there is.
+    // The raw signal needs the wider dead band; it is used for both if it ends below the smallest force.
     let raw = circuit.logarithmic(open);
     let dead_band = if raw < linear(circuit.counts(FsrCircuit::BREAK_NEWTON)) { raw } else { linear(open) };
     vec![("sensor", "\"fsr\"".to_owned()), ("tap", circuit.tap.to_string()), ("dead_band", dead_band.to_string())]

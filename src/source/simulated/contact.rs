@@ -4,7 +4,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// What touches. Lengths in metres.
+/// The touching object. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Indenter {
     /// A rigid cylinder lying on the skin.
@@ -13,14 +13,14 @@ pub(super) enum Indenter {
     Ball { radius_m: f64 },
     /// The pad of a human finger: a soft ball.
     Fingertip { radius_m: f64 },
-    /// The flat end of a stamp: even pressure over a disc.
+    /// The flat end of a cylinder: even pressure over a disc.
     Flat { radius_m: f64 },
     /// A blade, without width.
     Edge { length_m: f64 },
 }
 
 impl Indenter {
-    /// Of a grown-up's finger.
+    /// Default radius of a fingertip.
     pub(super) const FINGERTIP_RADIUS_M: f64 = 0.008;
 
     /// Whether it has a direction.
@@ -58,13 +58,13 @@ impl Skin {
 }
 
 /// Reduced modulus of a fingertip: 1 N then presses a disc of 5 mm radius, as fingers do.
-const FINGERTIP_PA: f64 = 50e3;
-/// No footprint is sharper, so that nothing is divided by zero.
-const SHARPEST_M: f64 = 1e-6;
-/// Beyond so many standard deviations there is no pressure: a share of 10⁻¹⁵ is cut off.
-const FAR: f64 = 8.0;
-/// How far below the contact's tangent plane a taxel may lie, beside the footprint's own size.
-const DEPTH_M: f64 = 5e-3;
+const FINGERTIP_STIFFNESS_PA: f64 = 50e3;
+/// Minimum standard deviation of a footprint, which avoids division by zero.
+const MIN_SIGMA_M: f64 = 1e-6;
+/// Pressure farther out than this many standard deviations is ignored: a share of 10⁻¹⁵.
+const CUTOFF_SIGMAS: f64 = 8.0;
+/// Maximum distance of a taxel from the contact's tangent plane, beside the footprint's size.
+const MAX_DEPTH_M: f64 = 5e-3;
 
 /// A line load along the indenter.
 #[derive(Clone, Copy, Debug)]
@@ -72,11 +72,11 @@ struct Strip {
     across_m: f64,
     /// Half its length; 0 for a point.
     half_m: f64,
-    /// Its part of the force.
+    /// Its share of the force.
     part: f64,
 }
 
-/// The pressure under an indenter, per newton, in its own two directions.
+/// The pressure under an indenter, per newton, along and across it.
 #[derive(Clone, Debug)]
 pub(super) struct Footprint {
     strips: Vec<Strip>,
@@ -87,9 +87,9 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Of `indenter` pressed with `force_newton` on `skin`.
+    /// The footprint of `indenter` pressed with `force_newton` on `skin`.
     pub(super) fn new(indenter: &Indenter, skin: &Skin, force_newton: f64) -> Self {
-        let layer = skin.sigma_m().max(SHARPEST_M);
+        let layer = skin.sigma_m().max(MIN_SIGMA_M);
         let widened = |variance: f64| (layer * layer + variance).sqrt();
         let point = |half_m: f64| vec![Strip { across_m: 0.0, half_m, part: 1.0 }];
         let line = |half_m: f64, sigma_across_m: f64| Self {
@@ -108,7 +108,7 @@ impl Footprint {
             Indenter::Edge { length_m } => line(length_m / 2.0, layer),
             Indenter::Ball { radius_m } => Self::round(&widened, radius_m, force_newton * skin.compliance(0.0)),
             Indenter::Fingertip { radius_m } => {
-                Self::round(&widened, radius_m, force_newton * skin.compliance(1.0 / FINGERTIP_PA))
+                Self::round(&widened, radius_m, force_newton * skin.compliance(1.0 / FINGERTIP_STIFFNESS_PA))
             }
             Indenter::Flat { radius_m } => Self::disc(radius_m, layer),
         }
@@ -150,17 +150,17 @@ impl Footprint {
         }
     }
 
-    /// How far below the tangent plane a taxel still feels it.
+    /// Maximum distance from the tangent plane at which a taxel is touched, m.
     pub(super) fn depth_m(&self) -> f64 {
-        DEPTH_M + self.half_across_m + FAR / 2.0 * self.sigma_across_m
+        MAX_DEPTH_M + self.half_across_m + CUTOFF_SIGMAS / 2.0 * self.sigma_across_m
     }
 
-    /// The part of the force that a square taxel with sides of `side_m` feels, whose middle lies `across` and `along` from
-    /// the middle of the indenter: the integral of the pressure over it.
-    pub(super) fn part_on(&self, across_m: f64, along_m: f64, side_m: f64) -> f64 {
+    /// The share of the force on a square taxel with sides of `side_m` whose middle lies `across_m` and `along_m` from the
+    /// middle of the indenter: the integral of the pressure over it.
+    pub(super) fn share_on(&self, across_m: f64, along_m: f64, side_m: f64) -> f64 {
         let margin = side_m / 2.0;
-        if across_m.abs() > self.half_across_m + margin + FAR * self.sigma_across_m
-            || along_m.abs() > self.half_along_m + margin + FAR * self.sigma_along_m
+        if across_m.abs() > self.half_across_m + margin + CUTOFF_SIGMAS * self.sigma_across_m
+            || along_m.abs() > self.half_along_m + margin + CUTOFF_SIGMAS * self.sigma_along_m
         {
             return 0.0;
         }
@@ -187,7 +187,7 @@ fn normal_integral(z: f64) -> f64 {
 
 /// The mass of a Gaussian about 0 in x ± `margin`.
 fn mass_of_point(x: f64, margin: f64, sigma: f64) -> f64 {
-    // From the side on which both tails are small, where their difference is exact.
+    // On the side where both tails are small, their difference is exact.
     let x = -x.abs();
     normal((x + margin) / sigma) - normal((x - margin) / sigma)
 }
@@ -225,7 +225,7 @@ mod tests {
                 let at = |i: i32| 0.37 * pitch + f64::from(i) * pitch;
                 let sum: f64 = (-steps..=steps)
                     .flat_map(|i| (-steps..=steps).map(move |j| (i, j)))
-                    .map(|(i, j)| footprint.part_on(at(i), at(j), pitch))
+                    .map(|(i, j)| footprint.share_on(at(i), at(j), pitch))
                     .sum();
                 // Masses telescope over the tiles: what is left is rounding, magnified in a line's double difference by
                 // |x|/margin, and the cut tails.
@@ -254,7 +254,7 @@ mod tests {
             let (mut got_across, mut got_along) = (0.0, 0.0);
             for (i, j) in (-70..=70).flat_map(|i| (-70..=70).map(move |j| (f64::from(i) * pitch, f64::from(j) * pitch)))
             {
-                let part = footprint.part_on(i, j, pitch);
+                let part = footprint.share_on(i, j, pitch);
                 got_across += part * i * i;
                 got_along += part * j * j;
             }
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn a_larger_force_presses_a_larger_patch_up_to_the_indenters_size() {
         for indenter in &ALL[..3] {
-            let peak = |force: f64| Footprint::new(indenter, &SKIN, force).part_on(0.0, 0.0, 1e-3);
+            let peak = |force: f64| Footprint::new(indenter, &SKIN, force).share_on(0.0, 0.0, 1e-3);
             assert!(peak(1.0) > peak(10.0));
             assert_eq!(peak(1e6), peak(1e7));
         }
@@ -278,7 +278,7 @@ mod tests {
     fn a_point_force_has_boussinesqs_peak() {
         let ball = Indenter::Ball { radius_m: 1e-9 };
         let (side, z) = (1e-5, SKIN.thickness_m);
-        let peak = Footprint::new(&ball, &SKIN, 1.0).part_on(0.0, 0.0, side) / (side * side);
+        let peak = Footprint::new(&ball, &SKIN, 1.0).share_on(0.0, 0.0, side) / (side * side);
         let right = 3.0 / (2.0 * PI * z * z);
         assert!((peak / right - 1.0).abs() < 1e-6, "{peak} {right}");
     }
@@ -289,9 +289,9 @@ mod tests {
         let side = 2e-3;
         let even = side * side / (PI * 0.02 * 0.02);
         for (x, y) in [(0.0, 0.0), (0.01, 0.003), (-0.005, 0.012)] {
-            let felt = bare.part_on(x, y, side);
+            let felt = bare.share_on(x, y, side);
             assert!((felt / even - 1.0).abs() < 1e-4, "{felt} {even}");
         }
-        assert_eq!(bare.part_on(0.024, 0.0, side), 0.0);
+        assert_eq!(bare.share_on(0.024, 0.0, side), 0.0);
     }
 }

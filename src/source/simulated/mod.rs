@@ -1,7 +1,6 @@
-//! Simulated touches: indenters moved over a body's surface, the frames its sensors then deliver, and the truth.
+//! Simulated touches: indenters move over a body's surface; the source delivers the sensors' frames and the truth.
 //!
-//! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine: nothing
-//! depends on the clock, on the order in which frames are asked for, or on a machine's own arithmetic.
+//! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine.
 
 mod calibration;
 mod contact;
@@ -36,7 +35,7 @@ use crate::field::FieldSet;
 use crate::keys::Text;
 use crate::signal::{Frame, RawValue};
 
-/// Frames made by simulated touches.
+/// A source of frames of simulated touches.
 pub struct SimulatedSource {
     name: String,
     body: Body,
@@ -47,14 +46,14 @@ pub struct SimulatedSource {
     /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
     ids: Vec<u32>,
     taxels: Vec<(usize, f64)>,
-    touches: Vec<Scenario>,
+    touches: Vec<LinkTouch>,
     next: u64,
     truth: Vec<Truth>,
     forces_newton: Vec<f64>,
 }
 
-/// A touch and the taxels, (position, normal) in its link's frame.
-struct Scenario {
+/// A touch, and the taxels' (position, normal) in its link's frame.
+struct LinkTouch {
     touch: Touch,
     link: String,
     taxels: Vec<(DVec3, DVec3)>,
@@ -72,7 +71,7 @@ impl SimulatedSource {
         Self::from_text(&path.display().to_string(), &text, folder)
     }
 
-    /// The files that the simulation at `path` is read from, as far as it can be read: its own and its body's.
+    /// The files that the simulation at `path` reads: itself and its body's files, as far as they can be found.
     #[must_use]
     pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
         let path = path.as_ref();
@@ -84,7 +83,7 @@ impl SimulatedSource {
         files
     }
 
-    /// The simulation in `text`, called `name` in messages, whose body is bundled or a file named as from `folder`.
+    /// The simulation in `text`, called `name` in messages, whose body is bundled or a file relative to `folder`.
     ///
     /// # Errors
     /// As [`SimulatedSource::open`].
@@ -97,7 +96,7 @@ impl SimulatedSource {
         opened.map_err(|e| e.at(name))
     }
 
-    /// The simulation in `text`, called `name` in messages, on `body`, whatever body the text names.
+    /// The simulation in `text`, called `name` in messages, on `body` instead of the body that the text names.
     ///
     /// # Errors
     /// As [`SimulatedSource::open`].
@@ -143,7 +142,7 @@ impl SimulatedSource {
                 (link_from_taxel.transform_point3(taxel.position_in_link), normal)
             });
             let places = places.collect();
-            touches.push(Scenario { link: body.links[touch.link].name.clone(), touch, taxels: places });
+            touches.push(LinkTouch { link: body.links[touch.link].name.clone(), touch, taxels: places });
         }
         Ok(Self {
             name: name.to_owned(),
@@ -179,7 +178,7 @@ impl SimulatedSource {
         self.frames
     }
 
-    /// What is true in the frame read last: one entry a touch that presses, in the file's order.
+    /// The truth of the last frame: one entry per touch that presses, in the file's order.
     #[must_use]
     pub fn truth(&self) -> &[Truth] {
         &self.truth
@@ -214,10 +213,10 @@ impl SimulatedSource {
         frame as f64 / self.rate_hz
     }
 
-    /// Adds a touch's part to the forces, and says what is true of it.
+    /// Adds a touch's forces and its truth.
     fn press(&mut self, index: usize, frame: u64) -> Result<()> {
         let t_s = self.time(frame);
-        let Scenario { touch, link, taxels } = &self.touches[index];
+        let LinkTouch { touch, link, taxels } = &self.touches[index];
         let Some(force_newton) = touch.force(t_s) else { return Ok(()) };
         let Some(place) = touch.path.place(t_s) else { return Err(Error::failed(touch.leaves_surface(t_s))) };
         let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
@@ -227,7 +226,7 @@ impl SimulatedSource {
         for ((force, (position, normal)), (_, side_m)) in self.forces_newton.iter_mut().zip(taxels).zip(&self.taxels) {
             let offset = *position - place.position_in_link;
             if normal.dot(place.normal_in_link) > 0.0 && offset.dot(place.normal_in_link).abs() <= footprint.depth_m() {
-                *force += force_newton * footprint.part_on(offset.dot(across), offset.dot(along), *side_m);
+                *force += force_newton * footprint.share_on(offset.dot(across), offset.dot(along), *side_m);
             }
         }
         let before = frame.checked_sub(1).map(|frame| self.time(frame)).filter(|&t_s| touch.force(t_s).is_some());
@@ -245,7 +244,7 @@ impl SimulatedSource {
             position_in_link: place.position_in_link,
             normal_in_link: place.normal_in_link,
             uv: place.uv,
-            angle: angle.map(of_line),
+            angle: angle.map(line_angle),
             velocity_in_link,
             velocity_uv,
             speed: velocity_in_link.map(DVec3::length),
@@ -287,8 +286,8 @@ impl Source for SimulatedSource {
     }
 }
 
-/// An angle as a line's: in [0, π).
-fn of_line(angle: f64) -> f64 {
+/// The angle of a line, in [0, π).
+fn line_angle(angle: f64) -> f64 {
     let turned = angle.rem_euclid(PI);
     if turned < PI { turned } else { 0.0 }
 }

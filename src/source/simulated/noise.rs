@@ -1,7 +1,6 @@
-//! Noise that depends on nothing but its place: seed, frame and taxel. A frame's noise is the same in whatever order
-//! frames are made, and on every machine.
+//! Noise as a function of seed, frame and taxel, so that it does not depend on the order of frames or on the machine.
 
-/// The finalizer of SplitMix64: each bit of the result depends on all bits of `x`.
+/// The finalizer of SplitMix64.
 fn mixed(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

@@ -1,4 +1,4 @@
-//! Where a touch is over time: waypoints, and the surface under them.
+//! The path of a touch: waypoints over time, projected to the surface.
 
 use std::sync::Arc;
 
@@ -7,18 +7,18 @@ use glam::{DVec2, DVec3};
 use crate::body::SurfaceIndex;
 use crate::field::{Chart, Lift};
 
-/// A waypoint in a link's frame may lie so far off the surface, and a chart's surface so far beyond its members' depth.
-const REACH_M: f64 = 0.02;
-/// Distance between the places at which a path is tried before it is taken.
+/// Maximum distance of a waypoint in a link's frame from the surface, and of a chart's surface beyond its members' depth.
+const MAX_SURFACE_DISTANCE_M: f64 = 0.02;
+/// Distance of the points at which a path is checked.
 const STEP_M: f64 = 5e-4;
-/// Most places tried between two waypoints.
-const MOST_STEPS: f64 = 20_000.0;
-/// cos 10°: how near the normal may come to the link's +x before +z takes its place.
-const NEARLY_PARALLEL: f64 = 0.984_807_753_012_208;
+/// Maximum number of points checked between two waypoints.
+const MAX_STEPS: f64 = 20_000.0;
+/// cos 10°: if the normal is nearer to the link's +x, +z is used instead.
+const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
 
-/// In what coordinates the waypoints are.
+/// The coordinates of the waypoints.
 #[derive(Clone, Debug)]
-pub(super) enum Ground {
+pub(super) enum PathFrame {
     /// (u, v, 0) in a field's chart, taken along its normal to the surface.
     Chart { chart: Chart, origin_in_link: DVec3, reach_m: f64 },
     /// (u, v, 0) in a field's geodesic chart, taken to the surface as percepts' positions are.
@@ -27,33 +27,33 @@ pub(super) enum Ground {
     Link,
 }
 
-impl Ground {
-    /// Of a field whose members lie up to `deepest_m` from its chart's plane.
+impl PathFrame {
+    /// For a field whose members lie up to `deepest_m` from its chart's plane.
     pub(super) fn of_field(chart: Chart, origin_in_link: DVec3, deepest_m: f64) -> Self {
-        Self::Chart { chart, origin_in_link, reach_m: 2.0 * deepest_m + REACH_M }
+        Self::Chart { chart, origin_in_link, reach_m: 2.0 * deepest_m + MAX_SURFACE_DISTANCE_M }
     }
 }
 
-/// A point of the surface.
+/// A point on the surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct ContactPoint {
     pub(super) position_in_link: DVec3,
     pub(super) normal_in_link: DVec3,
     pub(super) uv: Option<[f64; 2]>,
 }
 
-/// Waypoints and the times at which they are passed; before the first and after the last the touch rests there.
+/// Waypoints and their times; before the first and after the last the touch does not move.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
-    pub(super) ground: Ground,
+    pub(super) frame: PathFrame,
     pub(super) surface: Arc<SurfaceIndex>,
     pub(super) waypoints: Vec<DVec3>,
-    /// One a waypoint, increasing, s.
+    /// One per waypoint, increasing, s.
     pub(super) times_s: Vec<f64>,
 }
 
 impl Path {
-    /// The waypoint's coordinates at `t_s`, before they are taken to the surface.
+    /// The interpolated waypoint at `t_s`, before projection to the surface.
     pub(super) fn waypoint(&self, t_s: f64) -> DVec3 {
         let next = self.times_s.partition_point(|&t| t <= t_s);
         if next == 0 {
@@ -65,43 +65,45 @@ impl Path {
     }
 
     /// The point of the surface at `t_s`; `None` where there is none.
-    pub(super) fn place(&self, t_s: f64) -> Option<Place> {
+    pub(super) fn place(&self, t_s: f64) -> Option<ContactPoint> {
         let waypoint = self.waypoint(t_s);
-        match &self.ground {
-            Ground::Chart { chart, origin_in_link, reach_m } => {
+        match &self.frame {
+            PathFrame::Chart { chart, origin_in_link, reach_m } => {
                 let above = *origin_in_link + chart.unproject(waypoint);
                 let hit = self.surface.along(above, chart.normal_in_anchor, *reach_m)?;
                 let uv = Some([waypoint.x, waypoint.y]);
-                Some(Place { position_in_link: hit.position, normal_in_link: hit.normal, uv })
+                Some(ContactPoint { position_in_link: hit.position, normal_in_link: hit.normal, uv })
             }
-            Ground::Curved { chart, origin_in_link, lift } => {
+            PathFrame::Curved { chart, origin_in_link, lift } => {
                 let (point, _) = lift.covers(waypoint.truncate()).then(|| lift.at(waypoint.truncate()))?;
                 let hit = self.surface.nearest(*origin_in_link + chart.unproject(point))?;
                 let uv = Some([waypoint.x, waypoint.y]);
-                Some(Place { position_in_link: hit.position, normal_in_link: hit.normal, uv })
+                Some(ContactPoint { position_in_link: hit.position, normal_in_link: hit.normal, uv })
             }
-            Ground::Link => {
+            PathFrame::Link => {
                 let hit = self.surface.nearest(waypoint)?;
-                let near = hit.position.distance(waypoint) <= REACH_M;
-                near.then_some(Place { position_in_link: hit.position, normal_in_link: hit.normal, uv: None })
+                let near = hit.position.distance(waypoint) <= MAX_SURFACE_DISTANCE_M;
+                near.then_some(ContactPoint { position_in_link: hit.position, normal_in_link: hit.normal, uv: None })
             }
         }
     }
 
-    /// In the tangent plane at `place`, the direction at `angle` from +u to +v: seen along the chart's normal it lies at
-    /// that angle in the chart; in a geodesic chart it leads where a small step at that angle does. A link's +u is its +x, or +z where that is within 10° of the normal.
-    pub(super) fn direction(&self, place: &Place, angle: f64) -> DVec3 {
+    /// The direction in the tangent plane at `place` that is at `angle` from +u to +v in the chart, seen along the chart's
+    /// normal; in a geodesic chart that of a small step. A link's +u is its +x, or +z if +x is within 10° of the normal.
+    pub(super) fn direction(&self, place: &ContactPoint, angle: f64) -> DVec3 {
         let normal = place.normal_in_link;
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-        let (flat, upward) = match &self.ground {
-            Ground::Chart { chart, .. } => (chart.u_in_anchor * cos + chart.v_in_anchor * sin, chart.normal_in_anchor),
-            Ground::Curved { chart, lift, .. } => {
+        let (flat, upward) = match &self.frame {
+            PathFrame::Chart { chart, .. } => {
+                (chart.u_in_anchor * cos + chart.v_in_anchor * sin, chart.normal_in_anchor)
+            }
+            PathFrame::Curved { chart, lift, .. } => {
                 let at = place.uv.map_or(DVec2::ZERO, DVec2::from_array);
                 let ahead = at + DVec2::new(cos, sin) * STEP_M;
                 (chart.unproject(lift.at(ahead).0 - lift.at(at).0), normal)
             }
-            Ground::Link => {
-                let u = if normal.x.abs() > NEARLY_PARALLEL { DVec3::Z } else { DVec3::X };
+            PathFrame::Link => {
+                let u = if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X };
                 let u = (u - normal * u.dot(normal)).normalize();
                 (u * cos + normal.cross(u) * sin, normal)
             }
@@ -110,10 +112,10 @@ impl Path {
         direction.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())
     }
 
-    /// Times that leave no more than half a millimetre of path between them, s, and the waypoints' own.
-    pub(super) fn times_to_try(&self) -> impl Iterator<Item = f64> + '_ {
+    /// Times at most half a millimetre of path apart, s, and the waypoints' times.
+    pub(super) fn times_to_check(&self) -> impl Iterator<Item = f64> + '_ {
         let between = self.times_s.windows(2).zip(self.waypoints.windows(2)).flat_map(|(times, ends)| {
-            let steps = (ends[0].distance(ends[1]) / STEP_M).clamp(1.0, MOST_STEPS) as u32 + 1;
+            let steps = (ends[0].distance(ends[1]) / STEP_M).clamp(1.0, MAX_STEPS) as u32 + 1;
             let (from, to) = (times[0], times[1]);
             (0..steps).map(move |step| from + (to - from) * (f64::from(step) / f64::from(steps)))
         });
@@ -126,10 +128,10 @@ mod tests {
     use super::*;
     use crate::body::ChartKind;
 
-    fn path(ground: Ground) -> Path {
+    fn path(frame: PathFrame) -> Path {
         let flat = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let surface = Arc::new(SurfaceIndex::of_triangles([flat]));
-        Path { ground, surface, waypoints: vec![DVec3::ZERO, DVec3::X], times_s: vec![1.0, 2.0] }
+        Path { frame, surface, waypoints: vec![DVec3::ZERO, DVec3::X], times_s: vec![1.0, 2.0] }
     }
 
     #[test]
@@ -142,18 +144,18 @@ mod tests {
             distortion: 0.0,
             distortion_rms: 0.0,
         };
-        let on_chart = path(Ground::of_field(chart.clone(), DVec3::ZERO, 0.0));
+        let on_chart = path(PathFrame::of_field(chart.clone(), DVec3::ZERO, 0.0));
         let normal_in_link = DVec3::new(0.5, -0.3, 0.7).normalize();
-        let slope = Place { position_in_link: DVec3::ZERO, normal_in_link, uv: None };
+        let slope = ContactPoint { position_in_link: DVec3::ZERO, normal_in_link, uv: None };
         for degrees in [0.0_f64, 30.0, 90.0, 135.0, 179.0] {
             let direction = on_chart.direction(&slope, degrees.to_radians());
             assert!(direction.dot(normal_in_link).abs() < 1e-15 && (direction.length() - 1.0).abs() < 1e-15);
             let seen = chart.project(direction);
             assert!((seen.y.atan2(seen.x).to_degrees() - degrees).abs() < 1e-12);
         }
-        let on_link = path(Ground::Link);
+        let on_link = path(PathFrame::Link);
         let along = |normal: DVec3, degrees: f64| {
-            let place = Place { position_in_link: DVec3::ZERO, normal_in_link: normal, uv: None };
+            let place = ContactPoint { position_in_link: DVec3::ZERO, normal_in_link: normal, uv: None };
             on_link.direction(&place, degrees.to_radians())
         };
         assert!(along(DVec3::Y, 0.0).distance(DVec3::X) < 1e-15);
@@ -163,10 +165,10 @@ mod tests {
 
     #[test]
     fn it_rests_before_and_after_and_moves_evenly_between() {
-        let path = path(Ground::Link);
+        let path = path(PathFrame::Link);
         let x = |t_s: f64| path.waypoint(t_s).x;
         assert_eq!([0.0, 1.0, 1.25, 2.0, 9.0].map(x), [0.0, 0.0, 0.25, 1.0, 1.0]);
-        let tried: Vec<f64> = path.times_to_try().collect();
+        let tried: Vec<f64> = path.times_to_check().collect();
         assert!(tried.windows(2).all(|pair| pair[1] > pair[0] && x(pair[1]) - x(pair[0]) <= STEP_M));
         assert_eq!((tried[0], tried[tried.len() - 1]), (1.0, 2.0));
     }

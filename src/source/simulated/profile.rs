@@ -1,4 +1,4 @@
-//! A number over time, linear between given points: force, or an indenter's angle.
+//! A piecewise linear function of time: force, or an indenter's angle.
 
 /// Points (t in s, value) with times that increase.
 #[derive(Clone, Debug, PartialEq)]
@@ -6,7 +6,7 @@ pub(super) struct Profile {
     points: Vec<(f64, f64)>,
 }
 
-/// Pieces that a tap's bell is made of.
+/// Linear pieces of a tap's bell.
 const BELL_PIECES: u32 = 16;
 
 impl Profile {
@@ -20,8 +20,8 @@ impl Profile {
         Self { points: vec![(0.0, value)] }
     }
 
-    /// A bell (a raised cosine) of height `peak` and length `lasts_s` from each of `starts_s` on, 0 in between. They
-    /// increase, and do not overlap.
+    /// A bell (a raised cosine) of height `peak` and length `lasts_s` at each of `starts_s`, which increase without overlap;
+    /// 0 in between.
     pub(super) fn bells(starts_s: &[f64], peak: f64, lasts_s: f64) -> Self {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for &start in starts_s {
@@ -40,7 +40,7 @@ impl Profile {
         Self { points }
     }
 
-    /// The value at `t_s`, where that lies within the points.
+    /// The value at `t_s`, if it lies within the points.
     pub(super) fn within(&self, t_s: f64) -> Option<f64> {
         let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
         if !(first.0..=last.0).contains(&t_s) {
@@ -60,7 +60,7 @@ impl Profile {
         self.within(t_s).unwrap_or(if t_s < first.0 { first.1 } else { last.1 })
     }
 
-    /// The times at which it bends, s.
+    /// The times of its points, s.
     pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.points.iter().map(|&(t_s, _)| t_s)
     }

@@ -1,4 +1,4 @@
-//! A simulation written down: its frames as a recording, and the truth beside them.
+//! Writes a simulation's frames as a recording, and its truth to a second file.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ const COLUMNS: [&str; 22] = [
     "vz", "vu", "vv", "speed", "force",
 ];
 
-/// Writes all frames of `simulation`, from its first, as CSV to `frames`, and what is true in them to `truth`: both files
-/// complete, or neither. Returns the number of frames.
+/// Writes all frames of `simulation` as CSV to `frames` and their truth to `truth`: both files or neither. Returns the
+/// number of frames.
 ///
 /// The truth has a row for each frame and touch that presses; `docs/simulation.md` lists its columns.
 ///
@@ -27,7 +27,7 @@ pub fn write_recording(simulation: &mut SimulatedSource, frames: OutputPath, tru
     let (mut frames, mut truth) = (frames.begin()?, truth.begin()?);
     simulation.seek(0);
     write(simulation, &mut frames, &mut truth)?;
-    // Frames without their truth would look like a recording of their own.
+
     frames.finish_with(truth)?;
     Ok(simulation.frames())
 }

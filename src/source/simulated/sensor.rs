@@ -1,9 +1,9 @@
-//! From the force on a taxel to the raw value it delivers: circuit, noise, drift, and what is broken.
+//! Converts the force on a taxel to a raw value: circuit, noise, drift and faults.
 
 use super::noise;
 use crate::signal::FsrCircuit;
 
-/// What an `fsr` sensor delivers.
+/// The output of an `fsr` sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FsrOutput {
     /// The converter's reading, which falls when pressed.
@@ -14,10 +14,10 @@ pub(super) enum FsrOutput {
     Linearised { full_scale_newton: f64 },
 }
 
-/// How a force becomes a number.
+/// The conversion of a force to a raw value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
-    /// Newton, as they are.
+    /// The force itself, N.
     Ideal,
     /// The paper's circuit.
     Fsr { circuit: FsrCircuit, output: FsrOutput },
@@ -25,10 +25,10 @@ pub(super) enum Kind {
     Linear { offset: f64, gain: f64, bits: Option<u32> },
 }
 
-/// What is wrong with a taxel.
+/// A fault of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fault {
-    /// It always reads what an untouched one does.
+    /// It always reads as if untouched.
     Dead,
     /// It always reads this.
     Stuck(f64),
@@ -36,16 +36,16 @@ pub(super) enum Fault {
     Noisy(f64),
 }
 
-/// All sensors of a simulation, alike but for their faults.
+/// The sensors of a simulation, equal except for faults.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sensor {
     pub(super) kind: Kind,
     pub(super) seed: u64,
     /// Standard deviation before rounding, in counts (an ideal sensor's: N).
     pub(super) noise_sigma: f64,
-    /// What all readings gain in a minute, in the same unit.
+    /// Drift of all readings per minute, in the same unit.
     pub(super) drift_per_minute: f64,
-    /// One a taxel.
+    /// One per taxel.
     pub(super) faults: Vec<Option<Fault>>,
 }
 
@@ -75,7 +75,7 @@ impl Sensor {
 }
 
 impl Kind {
-    /// The raw value at `force_newton`, `disturbed` in counts on the way to the converter.
+    /// The raw value at `force_newton` with `disturbed` counts added before the converter.
     fn value(&self, force_newton: f64, disturbed: f64) -> f64 {
         match *self {
             Self::Ideal => force_newton + disturbed,
@@ -90,7 +90,7 @@ impl Kind {
             Self::Linear { offset, gain, bits } => {
                 let level = offset + gain * force_newton + disturbed;
                 match bits {
-                    // Halves go up, whatever the sign.
+                    // Halves round up.
                     Some(bits) => (level + 0.5).floor().clamp(0.0, f64::from((1_u32 << bits) - 1)),
                     None => level,
                 }

@@ -1,4 +1,4 @@
-//! From the file's `[sensor]` to sensors.
+//! Builds the sensors from the file's `[sensor]`.
 
 use toml::Spanned;
 
@@ -54,7 +54,7 @@ fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {
     Ok(match keys.kind {
         SensorName::Ideal => Kind::Ideal,
         SensorName::Fsr => {
-            let tap = text.whole("tap", keys.tap.as_ref(), 0..256)?;
+            let tap = text.int("tap", keys.tap.as_ref(), 0..256)?;
             let circuit = tap.map_or_else(FsrCircuit::default, |tap| FsrCircuit { tap: tap as u8 });
             let output = keys.output.as_ref().map_or(OutputName::Counts, |output| *output.get_ref());
             if output != OutputName::Linearised {
@@ -78,7 +78,7 @@ fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {
             Kind::Linear {
                 offset: keys.offset.as_ref().map_or(Ok(0.0), |offset| text.finite("offset", offset))?,
                 gain: if inverted { -gain } else { gain },
-                bits: text.whole("bits", keys.bits.as_ref(), 1..25)?,
+                bits: text.int("bits", keys.bits.as_ref(), 1..25)?,
             }
         }
     })

@@ -1,4 +1,4 @@
-//! From the file's keys to touches on a body's surface and sensors over it, everything checked.
+//! Checks the file's keys and builds the touches on the body's surface.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,14 +8,14 @@ use toml::Spanned;
 
 use super::contact::{Indenter, Skin};
 use super::file::{AngleKeys, IndenterName, SkinKeys, TouchKeys};
-use super::path::{Ground, Path};
+use super::path::{Path, PathFrame};
 use super::profile::Profile;
 use crate::body::{Body, ChartKind, SurfaceIndex};
 use crate::error::Result;
 use crate::field::{FieldSet, Lift};
 use crate::keys::Text;
 
-/// One touch, ready to be asked where it is and how hard it presses.
+/// One touch: its path and force over time.
 pub(super) struct Touch {
     pub(super) name: String,
     pub(super) link: usize,
@@ -28,23 +28,25 @@ pub(super) struct Touch {
 }
 
 impl Touch {
-    /// The force at `t_s` where the touch presses.
+    /// The force at `t_s`, if the touch presses.
     pub(super) fn force(&self, t_s: f64) -> Option<f64> {
         self.force_newton.within(t_s).filter(|&force| force > 0.0)
     }
 
-    /// That there is no surface at `t_s`.
+    /// The message that the path is off the surface at `t_s`.
     pub(super) fn leaves_surface(&self, t_s: f64) -> String {
         let place = self.path.waypoint(t_s);
-        let at = match self.path.ground {
-            Ground::Chart { .. } | Ground::Curved { .. } => format!("(u, v) = ({:.4}, {:.4}) m", place.x, place.y),
-            Ground::Link => format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z),
+        let at = match self.path.frame {
+            PathFrame::Chart { .. } | PathFrame::Curved { .. } => {
+                format!("(u, v) = ({:.4}, {:.4}) m", place.x, place.y)
+            }
+            PathFrame::Link => format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z),
         };
         format!("`path` leaves the surface at {t_s:.3} s, at {at}; keep it on the body, or the force at 0 there")
     }
 }
 
-/// Looks things up in a body for a file.
+/// Builds touches from keys for a body.
 pub(super) struct Setup<'a> {
     pub(super) text: Text<'a>,
     pub(super) body: &'a Body,
@@ -69,7 +71,7 @@ impl Setup<'_> {
     pub(super) fn touch(&mut self, index: usize, keys: &TouchKeys) -> Result<Touch> {
         let indenter = self.indenter(keys)?;
         let (in_chart, waypoints) = self.waypoints(keys)?;
-        let (link, field, ground) = if in_chart { self.on_field(keys)? } else { self.on_link(keys)? };
+        let (link, field, frame) = if in_chart { self.on_field(keys)? } else { self.on_link(keys)? };
         let surface = self.surfaces.entry(link).or_insert_with(|| Arc::new(self.body.surface_in_link(link, None)));
         let surface = Arc::clone(surface);
         if surface.is_empty() {
@@ -82,10 +84,10 @@ impl Setup<'_> {
             field,
             indenter,
             angle: self.angle(keys, &indenter)?,
-            path: Path { ground, surface, waypoints, times_s },
+            path: Path { frame, surface, waypoints, times_s },
             force_newton: self.force(keys)?,
         };
-        let times = touch.path.times_to_try().chain(touch.force_newton.times());
+        let times = touch.path.times_to_check().chain(touch.force_newton.times());
         let mut pressed = times.filter(|&t_s| t_s <= self.duration_s && touch.force(t_s).is_some());
         let off_surface = pressed.find(|&t_s| touch.path.place(t_s).is_none());
         drop(pressed);
@@ -122,7 +124,7 @@ impl Setup<'_> {
         }
     }
 
-    /// Whether the places are (u, v) rather than (x, y, z), and the places.
+    /// Whether the waypoints are (u, v) rather than (x, y, z), and the waypoints.
     fn waypoints(&self, keys: &TouchKeys) -> Result<(bool, Vec<DVec3>)> {
         let path = keys.path.get_ref();
         let wanted = path.first().map_or(0, |first| first.get_ref().len());
@@ -143,7 +145,7 @@ impl Setup<'_> {
         Ok((wanted == 2, points.collect::<Result<_>>()?))
     }
 
-    fn on_field(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, Ground)> {
+    fn on_field(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, PathFrame)> {
         let on = keys.on.get_ref();
         let Some(field) = self.fields.fields.iter().find(|field| field.name == *on) else {
             if self.body.link_index(on).is_some() {
@@ -156,12 +158,12 @@ impl Setup<'_> {
             (Ok(chart), Some(link)) if chart.kind == ChartKind::Geodesic => {
                 let lift = Lift::new(self.body, field).expect("it has a chart");
                 let (chart, origin_in_link) = (chart.clone(), field.origin_in_anchor);
-                Ok((link, Some(on.clone()), Ground::Curved { chart, origin_in_link, lift: Box::new(lift) }))
+                Ok((link, Some(on.clone()), PathFrame::Curved { chart, origin_in_link, lift: Box::new(lift) }))
             }
             (Ok(chart), Some(link)) => {
                 let deepest_m = field.members.iter().map(|member| member.place.z.abs()).fold(0.0, f64::max);
-                let ground = Ground::of_field(chart.clone(), field.origin_in_anchor, deepest_m);
-                Ok((link, Some(on.clone()), ground))
+                let frame = PathFrame::of_field(chart.clone(), field.origin_in_anchor, deepest_m);
+                Ok((link, Some(on.clone()), frame))
             }
             (chart, _) => {
                 let why = chart.as_ref().err().map(ToString::to_string).unwrap_or_default();
@@ -171,10 +173,10 @@ impl Setup<'_> {
         }
     }
 
-    fn on_link(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, Ground)> {
+    fn on_link(&self, keys: &TouchKeys) -> Result<(usize, Option<String>, PathFrame)> {
         let on = keys.on.get_ref();
         match self.body.link_index(on) {
-            Some(link) => Ok((link, None, Ground::Link)),
+            Some(link) => Ok((link, None, PathFrame::Link)),
             None if self.fields.fields.iter().any(|field| field.name == *on) => {
                 let what = format!("`{on}` is a field, not a link; give its `path` as [u, v]");
                 Err(self.text.wrong(keys.on.span(), what))
@@ -183,7 +185,7 @@ impl Setup<'_> {
         }
     }
 
-    /// What can be touched.
+    /// The names of fields and links that can be touched.
     fn names(&self) -> impl Iterator<Item = &str> {
         let fields = self.fields.fields.iter().map(|field| field.name.as_str());
         fields.chain(self.body.links.iter().map(|link| link.name.as_str()))

@@ -1,17 +1,17 @@
-//! What is true in a frame.
+//! The truth of a simulated frame.
 
 use glam::DVec3;
 
-/// What is true of one touch in one frame.
+/// The true state of one touch in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
     /// Index of the touch in the file.
     pub touch: usize,
     /// Its name; `touch 1` and so on where the file gives none.
     pub name: String,
-    /// The link whose frame positions are in: the one that the file names, or the field's anchor.
+    /// The link of the positions: the one that the file names, or the field's anchor.
     pub link: String,
-    /// The field whose chart (u, v) and the angle are in, where the file names one.
+    /// The field whose chart has (u, v) and the angle, if the file names one.
     pub field: Option<String>,
     /// Middle of the contact on the body's surface, m.
     pub position_in_link: DVec3,
@@ -19,7 +19,7 @@ pub struct Truth {
     pub normal_in_link: DVec3,
     /// The same point in the field's chart, m.
     pub uv: Option<[f64; 2]>,
-    /// Direction of a rod or an edge, rad in [0, π): in the chart, or from the link's +x in the tangent plane.
+    /// Direction of a rod or an edge in the chart, or from the link's +x in the tangent plane, rad in [0, π).
     pub angle: Option<f64>,
     /// Mean velocity since the frame before, m/s; absent in a touch's first frame.
     pub velocity_in_link: Option<DVec3>,

@@ -1,48 +1,48 @@
-//! Faults on demand: what a bad cable, a bad clock and a loose plug do.
+//! Faults of a simulated board: line noise, clock drift, unplugging, silence, resets.
 
 use std::str::FromStr;
 use std::time::Duration;
 
 use crate::error::{Error, Result, nearest};
 
-/// What goes wrong, as written `noise=1e-4,drop=1e-4,flip=1e-5,silence=2s@10s,unplug=1s/20s,reset@30s,drift=50ppm`.
+/// The faults to inject, written `noise=1e-4,drop=1e-4,flip=1e-5,silence=2s@10s,unplug=1s/20s,reset@30s,drift=50ppm`.
 ///
 /// `@10s` is once, 10 s after the start; `/20s` is every 20 s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// The chance of a byte of noise before each byte.
+    /// Probability of an extra random byte before each byte.
     pub noise: f64,
-    /// The chance that a byte does not arrive.
+    /// Probability that a byte is lost.
     pub drop: f64,
-    /// The chance that a bit is turned.
+    /// Probability that a bit is flipped.
     pub flip: f64,
-    /// How much faster the board's clock runs, as a part of one.
+    /// Relative error of the board's clock; positive runs fast.
     pub drift: f64,
     /// When the board sends no frames.
     pub silence: Vec<Window>,
-    /// When its plug is out.
+    /// When the board is unplugged.
     pub unplug: Vec<Window>,
-    /// When it starts again.
+    /// When the board restarts.
     pub reset: Vec<Window>,
 }
 
-/// A time at which something lasts.
+/// A time span, once or repeated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     lasts_s: f64,
     at_s: f64,
-    again: bool,
+    repeats: bool,
 }
 
 impl Window {
-    /// How often it has begun by `now`, and whether it lasts.
+    /// How often it has begun by `now`, and whether it is active.
     #[must_use]
     pub fn at(&self, now: Duration) -> (u64, bool) {
         let since = now.as_secs_f64() - self.at_s;
         if since < 0.0 {
             return (0, false);
         }
-        if !self.again {
+        if !self.repeats {
             return (1, since < self.lasts_s);
         }
         let times = (since / self.at_s).floor();
@@ -78,8 +78,8 @@ impl Faults {
             "flip" => self.flip = chance()?,
             "drift" => {
                 let parts = value.strip_suffix("ppm").and_then(|number| number.parse::<f64>().ok());
-                let believable = parts.filter(|ppm| ppm.abs() <= 100_000.0);
-                self.drift = believable.ok_or("write millionths, up to 100000ppm, such as drift=50ppm")? * 1e-6;
+                let in_range = parts.filter(|ppm| ppm.abs() <= 100_000.0);
+                self.drift = in_range.ok_or("write millionths, up to 100000ppm, such as drift=50ppm")? * 1e-6;
             }
             "silence" => {
                 self.silence.push(window(value).ok_or("write silence=2s@10s, or silence=2s/10s for every 10 s")?);
@@ -98,9 +98,9 @@ impl Faults {
     }
 }
 
-/// `2s@10s` or `2s/10s`; `@10s` lasts no time.
+/// Parses `2s@10s` or `2s/10s`; `@10s` has no duration.
 fn window(text: &str) -> Option<Window> {
-    let (lasts, at, again) = match (text.split_once('@'), text.split_once('/')) {
+    let (lasts, at, repeats) = match (text.split_once('@'), text.split_once('/')) {
         (Some((lasts, at)), None) => (lasts, at, false),
         (None, Some((lasts, at))) => (lasts, at, true),
         _ => return None,
@@ -108,35 +108,35 @@ fn window(text: &str) -> Option<Window> {
     let seconds = |text: &str| text.strip_suffix('s')?.parse().ok().filter(|s| (0.0..=1e9).contains(s));
     let lasts_s = if lasts.is_empty() { 0.0 } else { seconds(lasts)? };
     let at_s = seconds(at)?;
-    (!again || at_s > lasts_s).then_some(Window { lasts_s, at_s, again })
+    (!repeats || at_s > lasts_s).then_some(Window { lasts_s, at_s, repeats })
 }
 
-/// What was done to bytes.
+/// Counts of injected faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Done {
-    /// Bytes of noise put in.
+pub struct FaultCounts {
+    /// Random bytes inserted.
     pub noise_bytes: u64,
-    /// Bytes left out.
+    /// Bytes dropped.
     pub dropped_bytes: u64,
-    /// Bits turned.
+    /// Bits flipped.
     pub flipped_bits: u64,
-    /// Bytes made unreadable, as the other side listens at another speed.
+    /// Bytes garbled because the receiver uses another baud rate.
     pub garbled_bytes: u64,
 }
 
-/// A line that does to bytes what [`Faults`] say, the same for the same seed.
+/// A line that applies [`Faults`] to bytes; the same seed gives the same faults.
 #[derive(Clone, Debug)]
-pub struct BadLine {
+pub struct FaultyLine {
     state: u64,
-    /// What was done so far.
-    pub done: Done,
+    /// Faults injected so far.
+    pub done: FaultCounts,
 }
 
-impl BadLine {
-    /// A line with its own luck.
+impl FaultyLine {
+    /// A line with its own random sequence.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self { state: seed, done: Done::default() }
+        Self { state: seed, done: FaultCounts::default() }
     }
 
     /// SplitMix64 (Steele, Lea and Flood 2014).
@@ -151,12 +151,12 @@ impl BadLine {
         of > 0.0 && (self.random() >> 11) as f64 / (1_u64 << 53) as f64 <= of
     }
 
-    /// Puts what arrives of `byte` into `arrives`. `heard_at` is the speed at which the other side listens, over the speed
-    /// at which the byte was sent: at any but 1 it samples at the wrong moments, and reads other bytes, more or fewer.
-    pub fn pass(&mut self, byte: u8, faults: &Faults, heard_at: f64, arrives: &mut Vec<u8>) {
-        if heard_at != 1.0 {
+    /// Appends what the receiver gets for `byte` to `arrives`. `baud_ratio` is the receiver's baud rate over the sender's;
+    /// any ratio but 1 gives random bytes, more or fewer than were sent.
+    pub fn pass(&mut self, byte: u8, faults: &Faults, baud_ratio: f64, arrives: &mut Vec<u8>) {
+        if baud_ratio != 1.0 {
             self.done.garbled_bytes += 1;
-            let (whole, part) = (heard_at.min(4.0).floor(), heard_at.min(4.0).fract());
+            let (whole, part) = (baud_ratio.min(4.0).floor(), baud_ratio.min(4.0).fract());
             let count = whole as u32 + u32::from(self.chance(part));
             for _ in 0..count {
                 arrives.push(self.random() as u8);
@@ -208,9 +208,9 @@ mod tests {
     #[test]
     fn a_line_does_what_it_counts_and_the_same_again() {
         let faults: Faults = "noise=0.01,drop=0.01,flip=0.001".parse().unwrap();
-        let pass = |seed, heard_at| {
-            let (mut line, mut out) = (BadLine::new(seed), Vec::new());
-            (0..100_000).for_each(|_| line.pass(0x55, &faults, heard_at, &mut out));
+        let pass = |seed, baud_ratio| {
+            let (mut line, mut out) = (FaultyLine::new(seed), Vec::new());
+            (0..100_000).for_each(|_| line.pass(0x55, &faults, baud_ratio, &mut out));
             (line.done, out)
         };
         let (done, out) = pass(1, 1.0);

@@ -1,4 +1,4 @@
-//! What a potentiometer's tap does to a reading that was taken at another.
+//! Converts a reading from one potentiometer tap to another.
 //!
 //! The sensor R and the potentiometer D(tap) = 50 kΩ · tap/256 + 52 Ω divide the supply. With x the reading over full
 //! scale and r = D(tap)/D(38), for readings that rise when pressed x = D/(D + R), and
@@ -10,26 +10,26 @@
 
 use super::super::format::Bits;
 
-/// The tap that recordings are taken to be made at.
+/// The tap at which recordings are assumed to be made.
 pub const RECORDED_TAP: u8 = 38;
 
 fn divider_ohm(tap: u8) -> f64 {
     50_000.0 * f64::from(tap) / 256.0 + 52.0
 }
 
-/// The reading at `tap` of what reads `recorded` at tap 38.
+/// The reading at `tap` of a sensor that reads `recorded` at tap 38.
 pub(super) fn at_tap(recorded: u16, bits: Bits, tap: u8, falls: bool) -> u16 {
-    let most = bits.most();
-    let open = if falls { most } else { 0 };
+    let max = bits.max();
+    let open = if falls { max } else { 0 };
     if tap == RECORDED_TAP || recorded == open {
-        return recorded.min(most);
+        return recorded.min(max);
     }
-    let full = f64::from(most) + 1.0;
-    let x = (f64::from(recorded.min(most)) + 0.5) / full;
+    let full = f64::from(max) + 1.0;
+    let x = (f64::from(recorded.min(max)) + 0.5) / full;
     let ratio = divider_ohm(tap) / divider_ohm(RECORDED_TAP);
     let moved = if falls { x / (x + (1.0 - x) * ratio) } else { x * ratio / (x * ratio + 1.0 - x) };
     // In 0..full, as x is inside 0..1.
-    ((moved * full) as u16).min(most)
+    ((moved * full) as u16).min(max)
 }
 
 #[cfg(test)]

@@ -1,42 +1,42 @@
-//! Whether who speaks on a line is the board that the wiring has, and what becomes of its frames.
+//! Checks the board on a line against the wiring, and forwards its frames.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{Talk, Task};
+use super::{LineConfig, LineState};
 use crate::signal::WiredBoard;
 use crate::source::serial::lines::{BoardState, Verdict};
 use crate::source::serial::merge::BoardFrame;
 use crate::source::serial::taps::ChannelTap;
-use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, Placed, layout_hash};
+use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, PacketOrder, layout_hash};
 
-impl Talk {
-    /// Counts what was lost before a packet of the board that has an account.
-    pub(super) fn enter(&mut self, head: &Head, placed: &Placed, now: Duration) {
+impl LineState {
+    /// Counts the frames lost before a packet.
+    pub(super) fn count_losses(&mut self, head: &Head, order: &PacketOrder, now: Duration) {
         let Some((board, id)) = self.joined.filter(|(_, id)| *id == head.board) else { return };
-        let mut state = self.task.shared.lock();
-        state.accounts[board].lost += u64::from(placed.lost);
-        self.lost += placed.lost;
-        if placed.restarted {
+        let mut state = self.config.shared.lock();
+        state.accounts[board].lost += u64::from(order.lost);
+        self.lost += order.lost;
+        if order.restarted {
             state.taps[board].iter_mut().for_each(ChannelTap::forget);
             state.accounts[board].restarts += 1;
-            state.say(format!("{}: board {id} has started again", self.task.port));
+            state.notify(format!("{}: board {id} has started again", self.config.port));
             drop(state);
-            self.clock_begins = true;
-            self.doubt(now);
+            self.clock_restarted = true;
+            self.reset_identity(now);
         }
     }
 
-    /// Who is there must be asked for again.
-    fn doubt(&mut self, now: Duration) {
+    /// The board must be identified again.
+    fn reset_identity(&mut self, now: Duration) {
         (self.board, self.since) = (None, now);
     }
 
-    /// A board says who it is: whether the wiring has it so, and what it is to do.
-    pub(super) fn identified(&mut self, head: &Head, placed: &Placed, identity: &Identity<'_>, now: Duration) {
-        let wiring = Arc::clone(&self.task.wiring);
+    /// Checks a board's identity against the wiring and configures the board.
+    pub(super) fn identified(&mut self, head: &Head, order: &PacketOrder, identity: &Identity<'_>, now: Duration) {
+        let wiring = Arc::clone(&self.config.wiring);
         let Some(board) = wiring.boards().iter().position(|board| board.id == head.board) else {
-            return self.stranger(head.board);
+            return self.unknown_board(head.board);
         };
         if let Err(why) = fits(&wiring.boards()[board], identity) {
             self.board = None;
@@ -45,38 +45,38 @@ impl Talk {
         if !self.join(board, head.board) {
             return;
         }
-        // A board that stops unasked, and did not start again, was told so by somebody else, or has nothing more to say.
-        let stops = identity.request == 0 && !identity.running && self.started && !placed.restarted;
+        // A board that stops without a request or restart was stopped by another host, or has ended.
+        let stops = identity.request == 0 && !identity.running && self.started && !order.restarted;
         if stops {
             if !std::mem::replace(&mut self.stopped, true) {
-                self.task.shared.lock().accounts[board].state = BoardState::Silent;
-                self.say(&format!("board {} has stopped", head.board));
+                self.config.shared.lock().accounts[board].state = BoardState::Silent;
+                self.notify(&format!("board {} has stopped", head.board));
             }
             return;
         }
         self.stopped = false;
-        let rate = self.task.rate_mhz.filter(|rate| *rate != identity.rate_mhz);
+        let rate = self.config.rate_mhz.filter(|rate| *rate != identity.rate_mhz);
         if let Some(rate_mhz) = rate {
             self.ask(Command::Rate { rate_mhz }, now);
         }
-        self.task.shared.lock().accounts[board].bits = Some(identity.bits.count());
+        self.config.shared.lock().accounts[board].bits = Some(identity.bits.count());
         // Taps come before frames.
         (self.starts, self.started) = (!identity.running, self.started || !identity.running);
     }
 
-    fn stranger(&mut self, id: u16) {
+    fn unknown_board(&mut self, id: u16) {
         self.board = None;
-        let ids: Vec<String> = self.task.wiring.boards().iter().map(|board| board.id.to_string()).collect();
+        let ids: Vec<String> = self.config.wiring.boards().iter().map(|board| board.id.to_string()).collect();
         let known =
             if ids.len() == 1 { format!("has board {}", ids[0]) } else { format!("has boards {}", ids.join(", ")) };
         self.bad(format!("board {id} is here, and the wiring {known}; give --wiring a file that has it"));
     }
 
-    /// A board that sends frames and answers nothing is believed as far as its frames go.
-    pub(super) fn take_as_it_is(&mut self, head: &Head, reach: usize, partial: bool) {
-        let wiring = Arc::clone(&self.task.wiring);
+    /// Accepts a board that sends frames but does not answer, if its channels fit.
+    pub(super) fn accept_unidentified(&mut self, head: &Head, reach: usize, partial: bool) {
+        let wiring = Arc::clone(&self.config.wiring);
         let Some(board) = wiring.boards().iter().position(|board| board.id == head.board) else {
-            return self.stranger(head.board);
+            return self.unknown_board(head.board);
         };
         let wired = wiring.boards()[board].taxels.len();
         if !partial && reach < wired {
@@ -84,76 +84,76 @@ impl Talk {
         }
         if self.join(board, head.board) {
             let what = "sends frames but answers nothing, so its layout is not checked; does the line lead to it, too?";
-            self.say(&format!("board {} {what}", head.board));
+            self.notify(&format!("board {} {what}", head.board));
         }
     }
 
-    /// The board is right, and heard on this line alone.
+    /// Assigns the board to this line. Returns false if another line has it.
     fn join(&mut self, board: usize, id: u16) -> bool {
-        let Task { line, port, shared, .. } = &self.task;
+        let LineConfig { line, port, shared, .. } = &self.config;
         let mut state = shared.lock();
         if let Some(other) = state.claim(board, *line) {
             drop(state);
             self.bad(format!("board {id} is here and on line {} as well; give one of them another id", other + 1));
             return false;
         }
-        state.judge(*line, Verdict::Good);
+        state.set_verdict(*line, Verdict::Good);
         let account = &mut state.accounts[board];
         account.port = Some(port.clone());
         let (was_away, was_bad) = (self.unplugged.take().is_some(), self.said.take().is_some());
         if was_away {
-            // Its line is there again; it speaks once a frame comes.
+            // It is silent until a frame comes.
             account.state = BoardState::Silent;
         }
         if was_away && self.joined == Some((board, id)) {
-            // Its clock went on, or it says that it has started again.
-            state.say(format!("{port}: board {id} is back"));
+            // Its clock has gone on, unless a packet says that it has restarted.
+            state.notify(format!("{port}: board {id} is back"));
         } else if was_away || was_bad {
-            state.say(format!("{port}: board {id} is there"));
+            state.notify(format!("{port}: board {id} is there"));
         }
         if self.joined != Some((board, id)) {
             if let Some((other, _)) = self.joined {
                 state.accounts[other].state = BoardState::Silent;
             }
-            // What came before is not in its account, and its taps may be any.
+            // Its count begins here, and its taps are unknown.
             state.taps[board].iter_mut().for_each(ChannelTap::forget);
-            (self.joined, self.lost, self.clock_begins) = (Some((board, id)), 0, true);
+            (self.joined, self.lost, self.clock_restarted) = (Some((board, id)), 0, true);
         }
         drop(state);
         self.board = Some(board);
         true
     }
 
-    /// Hands a frame on, if its board is known.
+    /// Forwards a frame, if its board is identified.
     pub(super) fn frame(&mut self, head: &Head, frame: BoardFrame, now: Duration, read_at: Instant) {
         let Some((board, id)) = self.joined.filter(|(_, id)| *id == head.board) else {
             if self.board.is_some() {
                 // Another board on this line.
-                self.doubt(now);
+                self.reset_identity(now);
             }
             return;
         };
         if self.board != Some(board) {
-            // It came, and was not used: lost.
+            // A frame that is not used counts as lost.
             self.lost += 1;
-            self.task.shared.lock().accounts[board].lost += 1;
+            self.config.shared.lock().accounts[board].lost += 1;
             return;
         }
         if std::mem::take(&mut self.silent) {
-            self.task.shared.lock().say(format!("{}: board {id} sends frames again", self.task.port));
+            self.config.shared.lock().notify(format!("{}: board {id} sends frames again", self.config.port));
         }
         (self.last_frame, self.stopped) = (now, false);
         let mut frame = frame;
         {
-            let taps = &self.task.shared.lock().taps[board];
+            let taps = &self.config.shared.lock().taps[board];
             frame.values.retain(|(channel, _)| !taps.get(usize::from(*channel)).is_some_and(|tap| tap.is_unknown()));
         }
-        let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_begins));
-        self.task.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);
+        let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_restarted));
+        self.config.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);
     }
 }
 
-/// Whether `identity` is that of the board that the wiring has.
+/// Whether `identity` fits the wiring's board.
 fn fits(wired: &WiredBoard, identity: &Identity<'_>) -> Result<(), String> {
     let (channels, taxels) = (usize::from(identity.channels), &wired.taxels);
     if channels < taxels.len() {

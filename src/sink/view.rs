@@ -1,5 +1,4 @@
-//! What viewers show of a recording: the taxels with their pressures, the touched fields, where links are; as often as an
-//! eye can follow.
+//! Writes what viewers show of a recording, at a rate for the eye: taxels with pressures, touched fields, link poses.
 
 use std::collections::HashMap;
 
@@ -12,31 +11,31 @@ use crate::percept::Percepts;
 use crate::recording::{Arrow, Cloud, LINKS, Recorder, Scene, TAXELS, TOUCHES, Transforms, nanoseconds};
 use crate::signal::Frame;
 
-/// Between two pictures of all taxels, s.
-const TAXELS_EVERY_S: f64 = 0.1;
-/// Between two pictures of the touches, or of links that move, s.
-const TOUCHES_EVERY_S: f64 = 0.04;
-/// Between two tellings of where links at rest are, s, so that a viewer that jumps into a recording soon knows.
-const LINKS_EVERY_S: f64 = 1.0;
-/// The sphere of a touch whose area is not known is this wide, m.
-const USUAL_WIDTH_M: f64 = 0.01;
-/// The arrow of the strongest touch yet is this long, and none is shorter than a fifth of it, m.
-const LONGEST_ARROW_M: f64 = 0.06;
+/// Period of the taxels' messages, s.
+const TAXELS_PERIOD_S: f64 = 0.1;
+/// Period of the messages of touches and of moving links, s.
+const TOUCHES_PERIOD_S: f64 = 0.04;
+/// Period of the messages of links at rest, s: a viewer that seeks needs them soon.
+const LINKS_PERIOD_S: f64 = 1.0;
+/// Diameter of the sphere of a touch without an area, m.
+const DEFAULT_DIAMETER_M: f64 = 0.01;
+/// Length of the arrow of the strongest touch so far, m; the shortest is a fifth of it.
+const MAX_ARROW_M: f64 = 0.06;
 
-/// When something is due again.
-struct Pace {
-    every_s: f64,
+/// A periodic task.
+struct Timer {
+    period_s: f64,
     last_s: Option<f64>,
 }
 
-impl Pace {
-    fn new(every_s: f64) -> Self {
-        Self { every_s, last_s: None }
+impl Timer {
+    fn new(period_s: f64) -> Self {
+        Self { period_s, last_s: None }
     }
 
-    fn is_due(&mut self, t_s: f64, every_s: f64) -> bool {
-        // A little early is better than one frame late; where time goes back, it begins anew.
-        let due = self.last_s.is_none_or(|last_s| t_s < last_s || t_s - last_s >= 0.999 * every_s);
+    fn is_due_after(&mut self, t_s: f64, period_s: f64) -> bool {
+        // A tolerance avoids being one frame late; a time that goes back restarts the period.
+        let due = self.last_s.is_none_or(|last_s| t_s < last_s || t_s - last_s >= 0.999 * period_s);
         if due {
             self.last_s = Some(t_s);
         }
@@ -44,7 +43,7 @@ impl Pace {
     }
 
     fn due(&mut self, t_s: f64) -> bool {
-        self.is_due(t_s, self.every_s)
+        self.is_due_after(t_s, self.period_s)
     }
 }
 
@@ -55,25 +54,25 @@ struct Link {
     parent_from_link: DAffine3,
 }
 
-pub(super) struct Scenery {
+pub(super) struct ViewWriter {
     links: Vec<Link>,
     index_of: HashMap<String, usize>,
-    /// Per link, where it is now.
+    /// Per link its present pose.
     world: Vec<DAffine3>,
-    /// Per taxel id, its link and its place there, m.
+    /// Per taxel id, its link and position in it, m.
     taxels: HashMap<u32, (usize, DVec3)>,
     fields: Vec<(String, String)>,
     cloud: Cloud,
     pressures: Vec<(u32, f64)>,
-    strongest: f64,
-    /// The highest pressure of a taxel yet.
-    highest: f64,
+    max_total: f64,
+    /// The highest pressure of a taxel so far.
+    max_pressure: f64,
     shown: bool,
-    paces: [Pace; 3],
+    timers: [Timer; 3],
     message: Vec<u8>,
 }
 
-impl Scenery {
+impl ViewWriter {
     pub(super) fn new(body: &Body, names: &[FieldNames]) -> Self {
         let links: Vec<Link> = body
             .links
@@ -100,20 +99,20 @@ impl Scenery {
             fields: names.iter().map(field).collect(),
             cloud: Cloud::default(),
             pressures: Vec::new(),
-            strongest: 0.0,
-            highest: 0.0,
+            max_total: 0.0,
+            max_pressure: 0.0,
             shown: false,
-            paces: [Pace::new(TAXELS_EVERY_S), Pace::new(TOUCHES_EVERY_S), Pace::new(LINKS_EVERY_S)],
+            timers: [Timer::new(TAXELS_PERIOD_S), Timer::new(TOUCHES_PERIOD_S), Timer::new(LINKS_PERIOD_S)],
             message: Vec::new(),
         }
     }
 
-    /// Shows links and taxels.
-    pub(super) fn hear(&mut self, heard: &Heard<'_>, recorder: &mut Recorder) -> Result<()> {
+    /// Writes links and taxels.
+    pub(super) fn write_frames(&mut self, heard: &Heard<'_>, recorder: &mut Recorder) -> Result<()> {
         for frame in heard.frames {
-            let [taxels, _, links] = &mut self.paces;
-            let every_s = if frame.pose.is_empty() { LINKS_EVERY_S } else { TOUCHES_EVERY_S };
-            let (links_due, taxels_due) = (links.is_due(frame.t_s, every_s), taxels.due(frame.t_s));
+            let [taxels, _, links] = &mut self.timers;
+            let period_s = if frame.pose.is_empty() { LINKS_PERIOD_S } else { TOUCHES_PERIOD_S };
+            let (links_due, taxels_due) = (links.is_due_after(frame.t_s, period_s), taxels.due(frame.t_s));
             if links_due || (taxels_due && !frame.pose.is_empty()) {
                 self.pose(frame);
             }
@@ -128,13 +127,15 @@ impl Scenery {
             }
             if taxels_due {
                 (heard.pressures)(frame, &mut self.pressures);
-                self.highest =
-                    self.pressures.iter().fold(self.highest, |highest, (_, pressure)| highest.max(*pressure));
-                let highest = self.highest.max(f64::MIN_POSITIVE);
+                self.max_pressure = self
+                    .pressures
+                    .iter()
+                    .fold(self.max_pressure, |max_pressure, (_, pressure)| max_pressure.max(*pressure));
+                let max_pressure = self.max_pressure.max(f64::MIN_POSITIVE);
                 for (id, pressure) in &self.pressures {
                     if let Some((link, place)) = self.taxels.get(id) {
                         let place = self.world[*link].transform_point3(*place);
-                        self.cloud.push(place, *pressure, pressure / highest);
+                        self.cloud.push(place, *pressure, pressure / max_pressure);
                     }
                 }
                 self.message.clear();
@@ -145,7 +146,7 @@ impl Scenery {
         Ok(())
     }
 
-    /// Moves links as `frame` says: those that it poses, and what hangs on them as at rest; all others are at rest.
+    /// Updates the links' poses: those in `frame`, and their descendants; all others are at rest.
     fn pose(&mut self, frame: &Frame) {
         let mut posed = vec![false; self.links.len()];
         for (index, link) in self.links.iter().enumerate() {
@@ -160,11 +161,11 @@ impl Scenery {
         }
     }
 
-    /// Shows the touched fields.
-    pub(super) fn see(&mut self, percepts: &Percepts, recorder: &mut Recorder) -> Result<()> {
+    /// Writes the touched fields.
+    pub(super) fn write_touches(&mut self, percepts: &Percepts, recorder: &mut Recorder) -> Result<()> {
         for frame in 0..percepts.frames() {
             let t_s = percepts.t_s(frame);
-            if !self.paces[1].due(t_s) {
+            if !self.timers[1].due(t_s) {
                 continue;
             }
             self.message.clear();
@@ -174,20 +175,20 @@ impl Scenery {
                 let Some(position) = percept.position else { continue };
                 let (field, link) = &self.fields[percept.field];
                 let pressed = percept.total.or(percept.peak);
-                self.strongest = self.strongest.max(pressed.unwrap_or(0.0));
-                let share = pressed.map_or(1.0, |pressed| pressed / self.strongest.max(f64::MIN_POSITIVE));
+                self.max_total = self.max_total.max(pressed.unwrap_or(0.0));
+                let share = pressed.map_or(1.0, |pressed| pressed / self.max_total.max(f64::MIN_POSITIVE));
                 let area = percept.area.filter(|&area| area > 0.0);
                 scene.push(&Arrow {
                     field,
                     link: if percept.in_world { "world" } else { link },
                     position,
                     normal: percept.normal,
-                    diameter_m: area.map_or(USUAL_WIDTH_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt()),
-                    length_m: LONGEST_ARROW_M * share.clamp(0.2, 1.0),
+                    diameter_m: area.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt()),
+                    length_m: MAX_ARROW_M * share.clamp(0.2, 1.0),
                 });
                 any = true;
             }
-            // That nothing is touched any more is shown once.
+            // The end of all touches is written once.
             if any || self.shown {
                 recorder.write(TOUCHES, t_s, &self.message)?;
             }

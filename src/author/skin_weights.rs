@@ -1,9 +1,9 @@
-//! What carries a point of a skinned surface.
+//! Joints and weights of points on a skinned surface.
 
 use crate::body::Skinning;
 
-/// What carries the point at `barycentric` of the triangle `corners`: its corners' joints and weights, blended, as
-/// [`heaviest_four`] gives them.
+/// The joints and weights of the point at `barycentric` of the triangle `corners`: those of its corners, blended, and
+/// reduced by [`heaviest_four`].
 ///
 /// # Panics
 /// A corner is no vertex of `skinning`.
@@ -23,8 +23,8 @@ pub fn blend_skinning(skinning: &Skinning, corners: [u32; 3], barycentric: [f64;
     heaviest_four(carriers)
 }
 
-/// The four heaviest of `carriers` (joint, weight), heaviest first and made to sum to 1, as a row of [`Skinning`].
-/// Places left over hold joint 0 with weight 0.
+/// The four largest weights of `carriers` (joint, weight), in descending order and normalised to the sum 1, as a row of
+/// [`Skinning`]. Unused entries are joint 0 with weight 0.
 #[must_use]
 pub fn heaviest_four(mut carriers: Vec<(u16, f64)>) -> ([u16; 4], [f32; 4]) {
     carriers.retain(|(_, weight)| *weight > 0.0);

@@ -1,5 +1,5 @@
-//! What an editor does to a layout that its author did not mean: ids copied with their points, members deleted under
-//! their fields, attributes not exported. It is put right where there is one way to, and said.
+//! Repairs and reports what editors do to a layout: duplicate ids of copied points, members of deleted taxels, attributes
+//! that were not exported.
 
 use std::collections::BTreeSet;
 
@@ -12,22 +12,22 @@ use super::read::is_taxels;
 use super::{Body, FieldSpec, MAX_TAXEL_ID};
 use crate::error::{Error, Result};
 
-/// Ids and names that a finding lists.
-const MOST_LISTED: usize = 8;
+/// Maximum number of ids and names listed in a finding.
+const MAX_LISTED: usize = 8;
 
-/// Sorts taxels by id, and gives new ids to those whose id an earlier one in the file has.
+/// Sorts taxels by id, and gives new ids to duplicates, except the first in the file.
 ///
-/// New ids count up from the highest in use, in the order of the old ones; where that would pass [`MAX_TAXEL_ID`] the
-/// lowest free ones are taken. The new taxels are in no field: what was made by duplicating a point lies elsewhere.
+/// New ids follow the highest in use, in the order of the old ones; if that would exceed [`MAX_TAXEL_ID`], the lowest free
+/// ones are used. Renumbered taxels are in no field, as copied points are elsewhere.
 ///
-/// Gives per taxel which it was before, if they were not in this order.
+/// Returns per taxel its previous index, if the order has changed.
 pub(super) fn renumber(body: &mut Body) -> Result<Option<Vec<usize>>> {
-    // Strictly ascending, as most files have them, is all that is asked.
+    // Most files are sorted already.
     if body.taxels.is_sorted_by(|a, b| a.id < b.id) {
         return Ok(None);
     }
     let mut order: Vec<usize> = (0..body.taxels.len()).collect();
-    // Stable: of two the first in the file keeps its id, and editors append what they copy.
+    // Stable sort: the first in the file keeps its id, as editors append copies.
     order.sort_by_key(|&index| body.taxels[index].id);
     body.taxels.sort_by_key(|taxel| taxel.id);
     let later: Vec<usize> =
@@ -58,8 +58,8 @@ pub(super) fn renumber(body: &mut Body) -> Result<Option<Vec<usize>>> {
     Ok(Some(by_id.into_iter().map(|index| order[index]).collect()))
 }
 
-/// Takes members that the body does not have out of `fields`, as when somebody deleted their taxels in an editor.
-pub(super) fn forget_absent(body: &mut Body, fields: &mut [FieldSpec]) {
+/// Removes members that the body does not have from `fields`, as after taxels were deleted in an editor.
+pub(super) fn remove_absent_members(body: &mut Body, fields: &mut [FieldSpec]) {
     if body.taxels.is_empty() {
         return;
     }
@@ -79,8 +79,8 @@ pub(super) fn forget_absent(body: &mut Body, fields: &mut [FieldSpec]) {
     }
 }
 
-/// Says which of Blender's export options were off, where that shows.
-pub(super) fn name_what_was_not_exported(document: &Document, body: &mut Body) {
+/// Suggests Blender's export options that seem to have been off.
+pub(super) fn suggest_export_options(document: &Document, body: &mut Body) {
     let generator = document.root.asset.generator.as_deref().unwrap_or_default();
     let from_blender = generator.contains("Blender");
     let primitives = || document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -106,14 +106,14 @@ pub(super) fn name_what_was_not_exported(document: &Document, body: &mut Body) {
         ),
         _ => return,
     };
-    // It is the cause of most else that is odd.
+    // First, as it is the cause of most other findings.
     body.findings.insert(0, finding);
 }
 
 fn listed(words: &[String]) -> String {
-    match words.get(..MOST_LISTED) {
-        Some(first) if words.len() > MOST_LISTED => {
-            format!("{} and {} more", first.join(", "), words.len() - MOST_LISTED)
+    match words.get(..MAX_LISTED) {
+        Some(first) if words.len() > MAX_LISTED => {
+            format!("{} and {} more", first.join(", "), words.len() - MAX_LISTED)
         }
         _ => words.join(", "),
     }

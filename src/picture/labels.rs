@@ -1,4 +1,4 @@
-//! Words over the pixels: title, captions, legend, and a bar that says how large things are.
+//! Labels of a picture: title, captions, legend and scale bar.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -9,28 +9,27 @@ use crate::ink::{self, FAMILY, cannot};
 
 const INK: RGBColor = RGBColor(0x2A, 0x2A, 0x2C);
 const FAINT: RGBColor = RGBColor(0x6A, 0x6A, 0x6E);
-/// Up to this width of the picture words are as large as they must be to be read, pixels; beyond, they grow with it. All
-/// lengths below are those up to this width.
-const READABLE: f64 = 1000.0;
-/// Height of a row of the legend, and of the words in it and in the title, pixels.
+/// Width of a picture up to which labels have the sizes below, pixels; in wider ones they scale with it.
+const BASE_WIDTH: f64 = 1000.0;
+/// Height of a row of the legend, of its text and of the title, pixels.
 const ROW: u32 = 26;
 const SIZE: u32 = 16;
 const TITLE_SIZE: u32 = 22;
-/// The smallest that a title is made to fit, pixels.
-const LEAST_SIZE: u32 = 10;
+/// Minimum size of a title, pixels.
+const MIN_TITLE_SIZE: u32 = 10;
 /// Pixels above the views for the title, and above each for its name.
 const TITLE: u32 = 44;
 const CAPTION: u32 = 26;
-/// Left and right of the words.
+/// Margins left and right of labels.
 const SIDE: u32 = 20;
 /// Pixels of a swatch with the gap behind it, and of the gap between two entries.
 const SWATCH: u32 = 22;
 const GAP: u32 = 24;
-/// Of the width that the bar keeps free at the right of the last row.
+/// Width reserved for the scale bar at the right of the last row.
 const BAR: u32 = 220;
 
-/// Everything that is written into a picture.
-pub(super) struct Words {
+/// The labels of a picture.
+pub(super) struct Labels {
     title: String,
     /// Pixels across the picture.
     width: u32,
@@ -42,29 +41,29 @@ pub(super) struct Words {
     axes: Option<[f64; 2]>,
 }
 
-impl Words {
+impl Labels {
     /// For a picture of `width` pixels.
     pub(super) fn new(title: &str, width: u32) -> Self {
         Self { title: title.to_owned(), width, key: Vec::new(), captions: Vec::new(), scale: None, axes: None }
     }
 
-    /// `pixels` of a picture that is just readable, in this one.
-    fn grown(&self, pixels: u32) -> u32 {
-        (f64::from(pixels) * (f64::from(self.width) / READABLE).max(1.0)).round() as u32
+    /// `pixels` scaled to this picture's width.
+    fn scaled(&self, pixels: u32) -> u32 {
+        (f64::from(pixels) * (f64::from(self.width) / BASE_WIDTH).max(1.0)).round() as u32
     }
 
     /// Pixels above the views, for the title.
     pub(super) fn above(&self) -> u32 {
-        self.grown(TITLE)
+        self.scaled(TITLE)
     }
 
     /// Pixels above each view, for its name.
     pub(super) fn above_view(&self) -> u32 {
-        self.grown(CAPTION)
+        self.scaled(CAPTION)
     }
 
-    /// Sets what the legend has, colours and names, and gives the pixels that it takes. One that would take over a third
-    /// of a picture of `size` only says how many there are.
+    /// Sets the legend's colours and names, and returns its height, pixels. A legend of over a third of a picture of `size` is
+    /// replaced by the number of fields.
     pub(super) fn key(&mut self, key: Vec<(Option<[u8; 3]>, String)>, size: [u32; 2]) -> u32 {
         let named = key.len();
         self.key = key;
@@ -75,28 +74,28 @@ impl Words {
     }
 
     fn legend_height(&self) -> u32 {
-        self.grown(ROW) * (self.bar_row() + 1) + self.grown(12)
+        self.scaled(ROW) * (self.bar_row() + 1) + self.scaled(12)
     }
 
-    /// The row of the bar: the last, or one of its own where a name is so long that it takes the bar's place.
+    /// The row of the scale bar: the last, or a new one if a name needs the bar's place.
     fn bar_row(&self) -> u32 {
         let rows = self.rows();
         let (Some(&(x, row)), Some((_, name))) = (rows.last(), self.key.last()) else { return 0 };
         row + u32::from(x + self.wide(name) > self.end())
     }
 
-    /// Where the bar's place begins.
+    /// Left end of the bar's place, pixels.
     fn end(&self) -> u32 {
-        self.width.saturating_sub(self.grown(SIDE + BAR)).max(self.grown(SIDE) + 1)
+        self.width.saturating_sub(self.scaled(SIDE + BAR)).max(self.scaled(SIDE) + 1)
     }
 
-    /// Pixels of an entry of the legend.
+    /// Width of an entry of the legend, pixels.
     fn wide(&self, name: &str) -> u32 {
-        // What cannot be measured cannot be written either, and that is told there.
-        self.grown(SWATCH) + ink::width(name, self.grown(SIZE)).unwrap_or_default()
+        // An error is reported when the text is drawn.
+        self.scaled(SWATCH) + ink::width(name, self.scaled(SIZE)).unwrap_or_default()
     }
 
-    /// `text` with its middle at `at`.
+    /// Adds `text` centred at `at`.
     pub(super) fn caption(&mut self, text: &str, at: [u32; 2]) {
         self.captions.push((text.to_owned(), at));
     }
@@ -109,9 +108,9 @@ impl Words {
         self.axes = Some(origin);
     }
 
-    /// Left and row of each entry of the legend; every row keeps the bar's place free.
+    /// Left end and row of each entry of the legend; the bar's place stays free.
     fn rows(&self) -> Vec<(u32, u32)> {
-        let (side, end) = (self.grown(SIDE), self.end());
+        let (side, end) = (self.scaled(SIDE), self.end());
         let (mut x, mut row) = (side, 0);
         let mut places = Vec::with_capacity(self.key.len());
         for (_, name) in &self.key {
@@ -120,20 +119,20 @@ impl Words {
                 (x, row) = (side, row + 1);
             }
             places.push((x, row));
-            x += wide + self.grown(GAP);
+            x += wide + self.scaled(GAP);
         }
         places
     }
 
-    /// How large the title is written so that it fits, pixels.
+    /// Size at which the title fits, pixels.
     fn title_size(&self) -> u32 {
-        let room = self.width.saturating_sub(2 * self.grown(SIDE));
-        let sizes = (LEAST_SIZE..=self.grown(TITLE_SIZE)).rev();
+        let room = self.width.saturating_sub(2 * self.scaled(SIDE));
+        let sizes = (MIN_TITLE_SIZE..=self.scaled(TITLE_SIZE)).rev();
         let mut fitting = sizes.filter(|&size| ink::width(&self.title, size).is_ok_and(|wide| wide <= room));
-        fitting.next().unwrap_or(LEAST_SIZE)
+        fitting.next().unwrap_or(MIN_TITLE_SIZE)
     }
 
-    /// Writes everything into `pixels`.
+    /// Draws the labels into `pixels`.
     pub(super) fn draw(&self, pixels: &mut [u8], size: [u32; 2]) -> Result<()> {
         ink::font()?;
         let [width, height] = size;
@@ -142,33 +141,33 @@ impl Words {
             (FAMILY, pixels).into_font().color(&colour).pos(Pos::new(side, VPos::Center))
         };
         let place = |x: u32, y: u32| (x as i32, y as i32);
-        let grown = |pixels: u32| self.grown(pixels);
-        let (side, size) = (grown(SIDE), grown(SIZE));
+        let scaled = |pixels: u32| self.scaled(pixels);
+        let (side, size) = (scaled(SIDE), scaled(SIZE));
         let title = text(self.title_size(), INK, HPos::Left);
-        area.draw_text(&self.title, &title, place(side, grown(24))).map_err(cannot)?;
+        area.draw_text(&self.title, &title, place(side, scaled(24))).map_err(cannot)?;
         for (caption, [x, y]) in &self.captions {
             area.draw_text(caption, &text(size, FAINT, HPos::Center), place(*x, *y)).map_err(cannot)?;
         }
-        let top = height.saturating_sub(self.legend_height()) + grown(ROW) / 2;
+        let top = height.saturating_sub(self.legend_height()) + scaled(ROW) / 2;
         let style = text(size, INK, HPos::Left);
         for ((colour, name), (x, row)) in self.key.iter().zip(self.rows()) {
-            let middle = top + grown(ROW) * row;
+            let middle = top + scaled(ROW) * row;
             let mut left = x;
             if let Some([r, g, b]) = *colour {
                 let dot = |radius: u32, colour: RGBColor| {
-                    Circle::new(place(x + grown(7), middle), grown(radius) as i32, colour.filled())
+                    Circle::new(place(x + scaled(7), middle), scaled(radius) as i32, colour.filled())
                 };
                 area.draw(&dot(8, INK)).and_then(|()| area.draw(&dot(7, RGBColor(r, g, b)))).map_err(cannot)?;
-                left += grown(SWATCH);
+                left += scaled(SWATCH);
             }
             area.draw_text(name, &style, place(left, middle)).map_err(cannot)?;
         }
         if let Some(scale) = self.scale {
-            let (metres, name) = round_length(f64::from(grown(BAR - 100)) / scale);
-            let (right, y) = (width - side, height.saturating_sub(grown(ROW / 2 + 12)));
+            let (metres, name) = round_length(f64::from(scaled(BAR - 100)) / scale);
+            let (right, y) = (width - side, height.saturating_sub(scaled(ROW / 2 + 12)));
             let left = right - (metres * scale).round() as u32;
-            let end = grown(5);
-            let stroke = |from, to| PathElement::new([from, to], INK.stroke_width(grown(2)));
+            let end = scaled(5);
+            let stroke = |from, to| PathElement::new([from, to], INK.stroke_width(scaled(2)));
             for (from, to) in [
                 (place(left, y), place(right, y)),
                 (place(left, y - end), place(left, y + end)),
@@ -176,21 +175,21 @@ impl Words {
             ] {
                 area.draw(&stroke(from, to)).map_err(cannot)?;
             }
-            area.draw_text(&name, &text(size, INK, HPos::Right), place(left - grown(8), y)).map_err(cannot)?;
+            area.draw_text(&name, &text(size, INK, HPos::Right), place(left - scaled(8), y)).map_err(cannot)?;
         }
         if let Some([x, y]) = self.axes {
             let (x, y) = (x.round() as i32, y.round() as i32);
-            let [long, beyond, around] = [44, 56, 11].map(|pixels| grown(pixels) as i32);
+            let [long, beyond, around] = [44, 56, 11].map(|pixels| scaled(pixels) as i32);
             let [r, g, b] = PAPER;
             let paper = RGBColor(r, g, b);
             let axes = [((x + long, y), "u", (x + beyond, y)), ((x, y - long), "v", (x, y - beyond))];
-            // On paper of their own, so that they are seen over whatever disc.
+            // On a background, so that they are visible over discs.
             for (to, _, at) in axes {
-                area.draw(&PathElement::new([(x, y), to], paper.stroke_width(grown(7)))).map_err(cannot)?;
+                area.draw(&PathElement::new([(x, y), to], paper.stroke_width(scaled(7)))).map_err(cannot)?;
                 area.draw(&Circle::new(at, around, paper.filled())).map_err(cannot)?;
             }
             for (to, name, at) in axes {
-                area.draw(&PathElement::new([(x, y), to], INK.stroke_width(grown(3)))).map_err(cannot)?;
+                area.draw(&PathElement::new([(x, y), to], INK.stroke_width(scaled(3)))).map_err(cannot)?;
                 area.draw_text(name, &text(size, INK, HPos::Center), at).map_err(cannot)?;
             }
         }
@@ -198,10 +197,10 @@ impl Words {
     }
 }
 
-/// The largest length of 1, 2 or 5 with zeros that is at most `most_m`, and how people write it.
-fn round_length(most_m: f64) -> (f64, String) {
-    let power = libm::pow(10.0, libm::floor(libm::log10(most_m.max(1e-9))));
-    let metres = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|&m| m <= most_m).unwrap_or(power);
+/// The largest length of 1, 2 or 5 times a power of ten up to `max_m`, m, and its text.
+fn round_length(max_m: f64) -> (f64, String) {
+    let power = libm::pow(10.0, libm::floor(libm::log10(max_m.max(1e-9))));
+    let metres = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|&m| m <= max_m).unwrap_or(power);
     let name = match metres {
         m if m >= 1.0 => format!("{m:.0} m"),
         m if m >= 0.01 => format!("{:.0} cm", m * 1e2),
@@ -224,28 +223,28 @@ mod tests {
 
     #[test]
     fn a_legend_breaks_its_rows_before_the_bar() {
-        let mut words = Words::new("x", 800);
+        let mut labels = Labels::new("x", 800);
         let key = vec![(None, "a field of some name".to_owned()); 9];
-        let below = words.key(key.clone(), [800, 800]);
-        let rows = words.rows();
+        let below = labels.key(key.clone(), [800, 800]);
+        let rows = labels.rows();
         assert!(rows.iter().all(|&(x, _)| x < 800 - BAR));
         assert_eq!((rows.last().unwrap().1, below), (4, 5 * ROW + 12));
         // No room: they are counted.
-        assert_eq!(words.key(key, [800, 400]), ROW + 12);
-        assert_eq!(words.key[0].1, "9 fields");
+        assert_eq!(labels.key(key, [800, 400]), ROW + 12);
+        assert_eq!(labels.key[0].1, "9 fields");
         // A name that takes the bar's place has the bar below it.
-        let mut narrow = Words::new("x", 400);
+        let mut narrow = Labels::new("x", 400);
         assert_eq!(narrow.key(vec![(None, "a field of a rather long name".to_owned())], [400, 400]), 2 * ROW + 12);
     }
 
     #[test]
     fn words_grow_with_the_picture_and_a_title_fits() {
-        let [small, large] = [500, 3000].map(|width| Words::new("hand/midhand/index · 5 taxels, plane chart", width));
-        assert_eq!((small.grown(SIZE), large.grown(SIZE)), (SIZE, 3 * SIZE));
+        let [small, large] = [500, 3000].map(|width| Labels::new("hand/midhand/index · 5 taxels, plane chart", width));
+        assert_eq!((small.scaled(SIZE), large.scaled(SIZE)), (SIZE, 3 * SIZE));
         assert_eq!((small.above(), large.above()), (TITLE, 3 * TITLE));
         assert_eq!(large.title_size(), 3 * TITLE_SIZE);
-        let long = Words::new("hand/midhand/index · 5 taxels, plane chart, distortion 3.2 %", 400);
-        assert!((LEAST_SIZE..TITLE_SIZE).contains(&long.title_size()));
+        let long = Labels::new("hand/midhand/index · 5 taxels, plane chart, distortion 3.2 %", 400);
+        assert!((MIN_TITLE_SIZE..TITLE_SIZE).contains(&long.title_size()));
         assert!(ink::width(&long.title, long.title_size()).unwrap() <= 400 - 2 * SIDE);
     }
 }

@@ -1,9 +1,9 @@
-//! How much of the surface each given taxel stands for: its Voronoi cell, which ends half a pitch outside the outermost taxels.
+//! The area of given taxels: their Voronoi cells, which end half a pitch outside the outermost taxels.
 //!
-//! Around each taxel the surface is unrolled: its neighbours become points of a plane with the taxel at the origin, each as
-//! far away as the shortest way along the surface is long. What another sheet carries is no neighbour, however close it
-//! lies. The cell is what the perpendicular bisectors leave, one for each neighbour. Where the taxels end, a neighbour's
-//! mirror image takes the place of the one that is missing. What of the cell lies beyond the surface's edge is taken off.
+//! Around each taxel the surface is unrolled: its neighbours become points of a plane around the taxel, at their distance
+//! along the surface. Taxels on another part of the surface are no neighbours. The cell is bounded by the perpendicular
+//! bisectors to the neighbours. Where the layout ends, mirror images replace the missing neighbours. The part of the cell
+//! beyond the surface's edge is subtracted.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -11,70 +11,69 @@ use glam::{DVec2, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::canvas::Canvas;
-use super::crowd::face_alike;
 use super::lattice::{inward, walk};
 use super::place::Placed;
+use super::rest_surface::RestSurface;
+use super::sample_neighbours::points_on_same_side;
 use crate::body::{NONE, SurfaceIndex, Topology};
-use crate::field::geodesic::{LogMap, Place};
+use crate::field::geodesic::{LogMap, SurfacePlace};
 
-/// Taxels nearer than this to each other are at one place, m.
-const ONE_PLACE_M: f64 = 1e-6;
+/// Taxels nearer to each other than this are coincident, m.
+const COINCIDENT_M: f64 = 1e-6;
 
-/// Ways are followed so many times as far as the sixth nearest taxel is in a straight line, and as the second nearest.
+/// Distance limits along the surface over the straight distances to the sixth nearest and the second nearest taxel.
 const REACH_OF_SIXTH: f64 = 2.0;
 const REACH_OF_SECOND: f64 = 12.0;
 
-/// How often ways are followed twice as far, where they are long around what the straight line crosses.
-const MOST_DOUBLINGS: u32 = 3;
+/// How often the limit is doubled if too few taxels are reached.
+const MAX_DOUBLINGS: u32 = 3;
 
-/// A neighbour has another opposite it within 40° of the opposite direction, and so many times as far away. A square grid has
-/// its diagonals at 45°, which stand for nobody beside them.
+/// A neighbour has an opposite one within 40° of the opposite direction (the diagonals of a square grid are at 45°), up to
+/// this many times as far away.
 const OPPOSITE_COSINE: f64 = 0.766_044_443_118_978;
 const OPPOSITE_REACH: f64 = 1.9;
 
-/// The taxels end where a cell reaches farther than this part of the distance to the neighbour on its other side.
-const OPEN: f64 = 0.9;
+/// A side of the layout is open if a cell extends beyond this share of the distance to the neighbour on its other side.
+const OPEN_SIDE_SHARE: f64 = 0.9;
 
-/// No two sides of a cell at its taxels' end face further apart than this, 115°: in a hexagonal grid they face 60° apart.
-const WIDEST_TURN: f64 = 115.0 / 360.0 * TAU;
+/// Maximum angle between adjacent sides of a cell at the end of a layout, 115°; in a hexagonal grid it is 60°.
+const MAX_SIDE_TURN: f64 = 115.0 / 360.0 * TAU;
 
-/// Sides shorter than this part of the distance to their neighbour are rounding.
-const LEAST_SIDE: f64 = 1e-6;
+/// Sides shorter than this share of the distance to their neighbour are rounding errors.
+const MIN_SIDE: f64 = 1e-6;
 
-/// Directions in which the surface's edge is looked for, 2° apart.
+/// Number of directions in which the surface's edge is searched, 2° apart.
 const RAYS: u32 = 180;
 
-/// The area of the cell of each of `placed`, m²; taxels at one place share theirs. 0, not known, for one whose ways along
-/// the surface meet no other taxel.
-pub(super) fn areas(canvas: &Canvas<'_>, placed: &[Placed]) -> Vec<f64> {
-    let sites = Sites::of(canvas, placed);
+/// The area of the cell of each of `placed`, m²; coincident taxels share theirs. 0, unknown, if no other taxel is reached.
+pub(super) fn areas(rest_surface: &RestSurface<'_>, placed: &[Placed]) -> Vec<f64> {
+    let sites = Sites::of(rest_surface, placed);
     let cells: Vec<f64> = (0..sites.places.len()).map(|site| sites.area(site).unwrap_or(0.0)).collect();
     sites.of_taxel.iter().map(|&site| cells[site] / f64::from(sites.taxels[site])).collect()
 }
 
 type Spot = GeomWithData<[f64; 3], usize>;
 
-/// The places of taxels, each once.
+/// The distinct places of taxels.
 struct Sites<'a> {
     topology: &'a Topology,
-    places: Vec<Place>,
+    places: Vec<SurfacePlace>,
     positions: Vec<DVec3>,
     tree: RTree<Spot>,
     /// Per taxel its site.
     of_taxel: Vec<usize>,
-    /// Per site how many taxels are there.
+    /// Per site its number of taxels.
     taxels: Vec<u32>,
 }
 
 impl<'a> Sites<'a> {
-    fn of(canvas: &'a Canvas<'_>, placed: &[Placed]) -> Self {
-        let topology = canvas.topology();
-        let mut sound = vec![NONE; canvas.triangles.len()];
+    fn of(rest_surface: &'a RestSurface<'_>, placed: &[Placed]) -> Self {
+        let topology = rest_surface.topology();
+        let mut sound = vec![NONE; rest_surface.triangles.len()];
         (0..).zip(&topology.given).for_each(|(index, &given)| sound[given as usize] = index);
         let mut index = None;
         let mut place_of = |one: &Placed| match sound[one.triangle] {
-            // Its triangle has hardly any area, or is there twice.
+            // Its triangle is degenerate or duplicate.
             NONE => {
                 let all = || (0..topology.triangles.len() as u32).map(|triangle| topology.corners(triangle));
                 let index = index.get_or_insert_with(|| SurfaceIndex::of_triangles(all()));
@@ -93,16 +92,16 @@ impl<'a> Sites<'a> {
         };
         for (taxel, one) in placed.iter().enumerate() {
             let at = one.point.position;
-            let here = tree.locate_within_distance(at.to_array(), ONE_PLACE_M * ONE_PLACE_M).map(|spot| spot.data);
-            let first = here.filter(|&other| face_alike(&placed[other].point, &one.point)).min();
+            let here = tree.locate_within_distance(at.to_array(), COINCIDENT_M * COINCIDENT_M).map(|spot| spot.data);
+            let first = here.filter(|&other| points_on_same_side(&placed[other].point, &one.point)).min();
             let site = first.filter(|&first| first < taxel).map_or(sites.places.len(), |first| sites.of_taxel[first]);
             if site == sites.places.len() {
                 let triangle = place_of(one);
                 let barycentric = match triangle {
                     NONE => [1.0, 0.0, 0.0],
-                    triangle => Place::in_triangle(topology, triangle, at).barycentric,
+                    triangle => SurfacePlace::in_triangle(topology, triangle, at).barycentric,
                 };
-                sites.places.push(Place { triangle, barycentric });
+                sites.places.push(SurfacePlace { triangle, barycentric });
                 sites.positions.push(at);
                 sites.taxels.push(0);
             }
@@ -117,16 +116,16 @@ impl<'a> Sites<'a> {
     fn area(&self, site: usize) -> Option<f64> {
         let here = self.positions[site];
         let others = self.tree.nearest_neighbor_iter_with_distance_2(here.to_array());
-        let distances = others.map(|(_, squared)| squared.sqrt()).filter(|&distance| distance > ONE_PLACE_M);
+        let distances = others.map(|(_, squared)| squared.sqrt()).filter(|&distance| distance > COINCIDENT_M);
         let near: Vec<f64> = distances.take(6).collect();
         let (&second, &sixth) = (near.get(1).or(near.first())?, near.last()?);
         let mut limit_m = (REACH_OF_SIXTH * sixth).min(REACH_OF_SECOND * second);
         let start = Some(self.places[site]).filter(|place| place.triangle != NONE).map(inward)?;
-        for doubling in 0..=MOST_DOUBLINGS {
+        for doubling in 0..=MAX_DOUBLINGS {
             let u = self.normal(start.triangle).any_orthonormal_vector();
             let map = LogMap::new(self.topology, start, u, limit_m).ok()?;
             let around = self.around(site, &map, limit_m);
-            if around.len() >= 2.min(near.len()) || (doubling == MOST_DOUBLINGS && !around.is_empty()) {
+            if around.len() >= 2.min(near.len()) || (doubling == MAX_DOUBLINGS && !around.is_empty()) {
                 let cell = Cell::new(&around, limit_m);
                 return Some(cell.area() - self.beyond_edge(&cell, &map, start.triangle));
             }
@@ -140,19 +139,19 @@ impl<'a> Sites<'a> {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Where the sites within `limit_m` of `site` are on `map`, the nearest first.
+    /// The sites within `limit_m` of `site` on `map`, the nearest first.
     fn around(&self, site: usize, map: &LogMap<'_>, limit_m: f64) -> Vec<DVec2> {
         let near = self.tree.locate_within_distance(self.positions[site].to_array(), limit_m * limit_m);
         let mut others: Vec<usize> = near.map(|spot| spot.data).filter(|&other| other != site).collect();
         others.sort_unstable();
         let reached = others.into_iter().filter_map(|other| map.reach(&self.places[other]));
-        let reached = reached.filter(|way| way.distance_m <= limit_m && way.distance_m > ONE_PLACE_M);
+        let reached = reached.filter(|way| way.distance_m <= limit_m && way.distance_m > COINCIDENT_M);
         let mut around: Vec<DVec2> = reached.map(|way| way.uv).collect();
         around.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         around
     }
 
-    /// How much of `cell` lies beyond the edge of the surface, seen from its taxel in `triangle`, m².
+    /// The area of `cell` beyond the edge of the surface, seen from its taxel in `triangle`, m².
     fn beyond_edge(&self, cell: &Cell, map: &LogMap<'_>, triangle: u32) -> f64 {
         let [from, u, v, _] = map.frame();
         let between = TAU / f64::from(RAYS);
@@ -172,14 +171,14 @@ fn tree(positions: impl Iterator<Item = DVec3>) -> RTree<Spot> {
     RTree::bulk_load(positions.zip(0..).map(|(p, index)| Spot::new(p.to_array(), index)).collect())
 }
 
-/// What made a side of a cell.
+/// What lies beyond a side of a cell.
 #[derive(Clone, Copy, PartialEq)]
 enum Beyond {
-    /// The square that all cells are cut from.
+    /// The initial square.
     Nothing,
-    /// A neighbour at this point.
+    /// A neighbouring taxel.
     Taxel(DVec2),
-    /// A point where a regular layout would have gone on.
+    /// The mirror image of a neighbour, where the layout ends.
     Image(DVec2),
 }
 
@@ -192,7 +191,7 @@ impl Beyond {
     }
 }
 
-/// A side of a cell: where it begins, and what lies beyond it.
+/// A side of a cell: its start, and what lies beyond it.
 #[derive(Clone, Copy)]
 struct Side {
     from: DVec2,
@@ -203,14 +202,14 @@ struct Side {
 struct Cell(Vec<Side>);
 
 impl Cell {
-    /// The cell of a taxel whose neighbours are `around`, the nearest first, and known within `limit_m`.
+    /// The cell of a taxel with the neighbours `around`, the nearest first, up to `limit_m`.
     fn new(around: &[DVec2], limit_m: f64) -> Self {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let side = |(x, y)| Side { from: DVec2::new(x, y) * limit_m, beyond: Beyond::Nothing };
         let mut cell = Self(corners.map(side).to_vec());
         around.iter().for_each(|&neighbour| cell.cut(Beyond::Taxel(neighbour)));
         let images: Vec<DVec2> = cell.beside().filter_map(|side| side.beyond.point()).map(|point| -point).collect();
-        // The third nearest stands for all: in an irregular layout the nearest is too near, and others lie across a gap.
+        // The third nearest is typical: the nearest may be too near, others across a gap.
         let usual_m = around.get(2).or(around.last()).map_or(0.0, |neighbour| neighbour.length());
         let open: Vec<DVec2> = images.into_iter().filter(|&image| cell.is_open(image, usual_m, around)).collect();
         open.into_iter().for_each(|image| cell.cut(Beyond::Image(image)));
@@ -219,11 +218,11 @@ impl Cell {
         cell
     }
 
-    /// Its sides towards taxels and images that are more than rounding.
+    /// Its sides towards taxels and images, without rounding errors.
     fn beside(&self) -> impl Iterator<Item = &Side> {
         (0..self.0.len()).map(|side| (&self.0[side], self.end(side))).filter_map(|(side, end)| {
             let length = side.beyond.point()?.length();
-            (side.from.distance(end) > LEAST_SIDE * length).then_some(side)
+            (side.from.distance(end) > MIN_SIDE * length).then_some(side)
         })
     }
 
@@ -231,17 +230,17 @@ impl Cell {
         self.0[(side + 1) % self.0.len()].from
     }
 
-    /// Cuts off what is nearer to the point `beyond` than to the origin.
+    /// Cuts off the part nearer to the point `beyond` than to the origin.
     fn cut(&mut self, beyond: Beyond) {
         let Some(point) = beyond.point() else { return };
-        let over = |p: DVec2| p.dot(point) - point.length_squared() / 2.0;
-        if self.0.iter().all(|side| over(side.from) <= 0.0) {
+        let distance_beyond = |p: DVec2| p.dot(point) - point.length_squared() / 2.0;
+        if self.0.iter().all(|side| distance_beyond(side.from) <= 0.0) {
             return;
         }
         let mut kept = Vec::with_capacity(self.0.len() + 1);
         for (index, side) in self.0.iter().enumerate() {
             let end = self.end(index);
-            let (before, after) = (over(side.from), over(end));
+            let (before, after) = (distance_beyond(side.from), distance_beyond(end));
             let crossing = || side.from.lerp(end, before / (before - after));
             if before <= 0.0 {
                 kept.push(*side);
@@ -256,22 +255,22 @@ impl Cell {
         self.0 = kept;
     }
 
-    /// Whether the taxels end on the side of `image`, the mirror image of a neighbour: neighbours are `usual_m` away.
+    /// Whether the layout ends on the side of `image`, the mirror image of a neighbour; neighbours are typically `usual_m` away.
     fn is_open(&self, image: DVec2, usual_m: f64, around: &[DVec2]) -> bool {
         let (towards, length) = (image.normalize(), image.length().max(usual_m));
         let opposite = |other: &DVec2| {
             other.dot(towards) >= OPPOSITE_COSINE * other.length() && other.length() <= OPPOSITE_REACH * length
         };
         let farthest = self.0.iter().map(|side| side.from.dot(towards)).fold(0.0, f64::max);
-        farthest > OPEN * length && !around.iter().any(opposite)
+        farthest > OPEN_SIDE_SHARE * length && !around.iter().any(opposite)
     }
 
-    /// Closes what is still open, half of `pitch_m` away: at the end of a row, or at a sharp corner.
+    /// Closes the cell at half of `pitch_m` where it is still open: at the end of a row, or at a sharp corner.
     fn close(&mut self, pitch_m: f64) {
         let sides: Vec<Side> = self.beside().copied().collect();
         let meet = |side: &Side, next: &Side| {
             let index = self.0.iter().position(|own| own.from == side.from && own.beyond == side.beyond);
-            index.is_some_and(|index| self.end(index).distance(next.from) <= LEAST_SIDE * pitch_m)
+            index.is_some_and(|index| self.end(index).distance(next.from) <= MIN_SIDE * pitch_m)
         };
         let mut images = Vec::new();
         for (index, side) in sides.iter().enumerate() {
@@ -280,8 +279,8 @@ impl Cell {
             let both_real = matches!((side.beyond, next.beyond), (Beyond::Taxel(_), Beyond::Taxel(_)));
             let turn = libm::atan2(a.perp_dot(b), a.dot(b)).rem_euclid(TAU);
             let turn = if sides.len() == 1 { TAU } else { turn };
-            // Two taxels beside each other, however far apart, leave nothing open.
-            if turn < WIDEST_TURN || (both_real && sides.len() > 1 && meet(side, next)) {
+            // The gap between two adjacent taxels is not open.
+            if turn < MAX_SIDE_TURN || (both_real && sides.len() > 1 && meet(side, next)) {
                 continue;
             }
             let missing = (turn / FRAC_PI_2 - 1e-6).ceil() - 1.0;
@@ -293,7 +292,7 @@ impl Cell {
         images.into_iter().for_each(|image| self.cut(Beyond::Image(image)));
     }
 
-    /// How far it reaches in the direction of the unit vector `direction`.
+    /// Its extent in the unit direction `direction`.
     fn reach(&self, direction: DVec2) -> f64 {
         let sides = self.0.iter().filter_map(|side| side.beyond.point());
         let across = sides.filter(|point| point.dot(direction) > 0.0);

@@ -1,4 +1,4 @@
-//! Words of a recipe that need reading: lengths with units, globs, ids.
+//! Values in recipes: lengths with units, globs, ranges of ids.
 
 use std::fmt;
 
@@ -51,7 +51,7 @@ impl<'de> Deserialize<'de> for Length {
     }
 }
 
-/// One glob or several, of which any may match. `*` also runs over slashes.
+/// One glob or several, of which any may match. `*` also matches slashes.
 #[derive(Clone, Debug)]
 pub struct Globs {
     text: Vec<String>,
@@ -65,7 +65,7 @@ impl Globs {
         self.set.is_match(name)
     }
 
-    /// As they were written.
+    /// The globs as text.
     #[must_use]
     pub fn text(&self) -> &[String] {
         &self.text
@@ -100,7 +100,7 @@ impl<'de> Deserialize<'de> for Globs {
     }
 }
 
-/// A taxel's id, or a range of ids with both ends in it, like `"10..=20"`.
+/// A taxel's id, or an inclusive range of ids, like `"10..=20"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ids {
     /// The lowest.

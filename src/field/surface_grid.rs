@@ -1,21 +1,20 @@
-//! From chart coordinates back to the surface.
+//! Maps chart coordinates to the surface.
 //!
-//! A centroid is a point (u, v) of a chart; where that is on the skin, and which way the skin looks there, is read from
-//! a grid over the chart that holds the surface and its normal at its nodes, bilinear in between. The grid is made once
-//! from the body's triangles, at half the members' spacing, so that a frame costs a few multiplications instead of a
-//! search through the mesh.
+//! The surface point and normal at (u, v), such as a centroid, are interpolated bilinearly in a grid over the chart. The
+//! grid is computed once from the body's triangles, at half the members' spacing, so that a frame needs no search in the
+//! mesh.
 
 use glam::{DVec2, DVec3};
 
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::curved::Curved;
+use super::geodesic_surface::GeodesicSurface;
 use super::{Chart, Field, anchor_from_link};
 use crate::body::{Body, ChartKind, Nearest, SurfaceIndex};
 
-/// A field's grid has at most this many nodes a side.
-const MOST_NODES: f64 = 96.0;
+/// Maximum number of a grid's nodes per side.
+const MAX_NODES: f64 = 96.0;
 
 /// The surface over a field's chart.
 #[derive(Clone, Debug)]
@@ -24,19 +23,19 @@ pub struct Lift {
     steepest: (f64, f64),
 }
 
-/// Nodes over a chart, at least two a side.
+/// Nodes over a chart, at least two per side.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     pub(crate) corner: DVec2,
     pub(crate) cell_m: DVec2,
     pub(crate) columns: usize,
     pub(crate) rows: usize,
-    /// What the surface's point is in chart axes beyond (u, v, 0), m, and the normal in chart axes; row by row.
+    /// The surface point less (u, v, 0), m, and the normal, both in chart axes; row by row.
     pub(crate) nodes: Vec<(DVec3, DVec3)>,
 }
 
 impl Lift {
-    /// The surface over `field`'s chart, or `None` where it has no chart.
+    /// The surface over `field`'s chart; `None` if it has no chart.
     #[must_use]
     pub fn new(body: &Body, field: &Field) -> Option<Self> {
         Self::on(&Nearest::new(body), field)
@@ -51,10 +50,10 @@ impl Lift {
         let low = places.iter().copied().fold(places[0], DVec2::min);
         let high = places.iter().copied().fold(places[0], DVec2::max);
         let step = 0.5 * field.spacing_m();
-        // Centroids lie within the members' box; a point field still gets a grid of its own.
+        // Centroids are within the members' bounding box; a field at one point gets a minimal grid.
         let extent = high - low;
         let cells = if step > 0.0 {
-            (extent / step).ceil().clamp(DVec2::ONE, DVec2::splat(MOST_NODES - 1.0))
+            (extent / step).ceil().clamp(DVec2::ONE, DVec2::splat(MAX_NODES - 1.0))
         } else {
             DVec2::ONE
         };
@@ -68,7 +67,7 @@ impl Lift {
         let uvs = uvs.map(|(column, row)| low + cell_m * DVec2::new(column as f64, row as f64));
         let nodes = match chart.kind {
             ChartKind::Geodesic => {
-                let curved = Curved::new(body, field, chart.u_in_anchor, &surface);
+                let curved = GeodesicSurface::new(body, field, chart.u_in_anchor, &surface);
                 let node = |uv: DVec2| {
                     let (offset, normal) = curved.at(uv);
                     (chart.project(offset) - uv.extend(0.0), chart.project(normal))
@@ -94,7 +93,7 @@ impl Lift {
         &self.grid
     }
 
-    /// Whether the members' box, and a cell around it, holds (u, v): elsewhere nothing is known of the surface.
+    /// Whether (u, v) is within the members' bounding box and a cell around it.
     #[must_use]
     pub fn covers(&self, uv: DVec2) -> bool {
         let Grid { corner, cell_m, columns, rows, .. } = self.grid;
@@ -103,8 +102,8 @@ impl Lift {
         at.cmpge(DVec2::NEG_ONE).all() && at.cmple(last + DVec2::ONE).all()
     }
 
-    /// The surface's point at (u, v) and its outward unit normal, both in chart axes from the field's origin, m; beyond
-    /// the grid, those of its rim.
+    /// The surface point at (u, v) and its outward unit normal, in chart axes from the field's origin, m; outside the grid
+    /// those of its rim.
     #[must_use]
     pub fn at(&self, uv: DVec2) -> (DVec3, DVec3) {
         let Grid { corner, cell_m, columns, rows, ref nodes } = self.grid;
@@ -119,7 +118,7 @@ impl Lift {
         (uv.extend(0.0) + beyond, normal.normalize_or(DVec3::Z))
     }
 
-    /// How much point and normal change at most per metre of (u, v): Lipschitz constants of [`Lift::at`].
+    /// Maximum change of point and normal per metre of (u, v): Lipschitz constants of [`Lift::at`].
     ///
     /// Along a cell's edges the interpolant is linear; inside, its gradient lies between those of opposite edges. Over a
     /// plane, a depth of slope L changes the point by √(1 + L²); else all three coordinates are taken together. A
@@ -145,7 +144,7 @@ impl Grid {
             for column in 0..self.columns - 1 {
                 let at = |dx: usize, dy: usize| self.nodes[(row + dy) * self.columns + column + dx].1;
                 let corners = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
-                // Any mean of them is at least as long as it is along their middle.
+                // The length of any mean is at least its component along their middle.
                 let middle = corners.iter().sum::<DVec3>().normalize_or_zero();
                 shortest = corners.iter().map(|corner| corner.dot(middle)).fold(shortest, f64::min);
             }
@@ -153,8 +152,8 @@ impl Grid {
         (point.length(), if shortest > 0.0 { normal.length() * 2.0 / shortest } else { f64::INFINITY })
     }
 
-    /// Per direction, how much a metre of it changes at most a node's point, as `of` takes it from what is beyond (u, v)
-    /// and the step in (u, v), and the normal.
+    /// Per direction the maximum change per metre of a node's point, computed by `of` from the change of the offset and the
+    /// step in (u, v), and of the normal.
     fn slopes(&self, of: impl Fn(DVec3, DVec2) -> DVec3) -> (DVec2, DVec2) {
         let (mut point, mut normal) = (DVec2::ZERO, DVec2::ZERO);
         let between = |a: (DVec3, DVec3), b: (DVec3, DVec3), step: DVec2| {
@@ -179,7 +178,7 @@ impl Grid {
     }
 }
 
-/// What a node's depth and normal over a plane are made from.
+/// The data for a node's depth and normal over a plane chart.
 struct Sampler<'a> {
     body: &'a Body,
     field: &'a Field,
@@ -190,8 +189,8 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// Depth and normal of the surface over `uv`: where the line along the chart's normal meets it, nearest to the
-    /// members' own depth there; off the surface's edge, or without a surface, those of the nearest member.
+    /// Depth and normal of the surface over `uv` along the chart's normal, nearest to the members' depth there; off the
+    /// surface's edge, or without a surface, those of the nearest member.
     fn at(&self, uv: DVec2) -> (f64, DVec3) {
         let nearest = self.members.nearest_neighbor(uv.to_array()).expect("a field has members").data;
         let nearest = &self.field.members[nearest];

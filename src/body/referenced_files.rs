@@ -6,10 +6,10 @@ use serde_json::Value;
 
 use super::document::split;
 
-/// The file at `path`, and those that its buffers and images lie in.
+/// The file at `path`, and the files of its buffers and images.
 pub(super) fn files(path: &Path) -> Vec<PathBuf> {
     let mut files = vec![path.to_owned()];
-    // A device would be read without end.
+    // A device may be endless.
     let bytes = if path.is_file() { std::fs::read(path).unwrap_or_default() } else { Vec::new() };
     let Ok(root) = split(&bytes).map(|(text, _)| serde_json::from_slice::<Value>(text).unwrap_or_default()) else {
         return files;

@@ -1,4 +1,4 @@
-//! Samples that crowd each other: who is near whom, and which of them stay.
+//! Neighbour lists of samples, and the elimination of samples by them.
 
 use std::collections::binary_heap::PeekMut;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -7,43 +7,41 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::SurfacePoint;
-use super::grid::{Grid, Spot};
+use super::grid::{Grid, GridPoint};
 use super::place::{Placed, Progress};
 
-/// Samples whose neighbours are listed at a time.
+/// Samples per unit of parallel work.
 const CHUNK: usize = 4096;
 
-/// Neighbours that room is made for at first; five samples for each point kept have 18 on average.
-const LIKELY: usize = 20;
+/// Initial capacity for neighbours of a sample; with five samples per point there are 18 on average.
+const EXPECTED_NEIGHBOURS: usize = 20;
 
-/// cos 90°, and room for the rounding of normals: the two faces of a box's edge are neighbours, the two sides of
-/// anything sharper are not.
-const LEAST_COSINE: f64 = -1e-9;
+/// cos 90° with a tolerance for rounding: the two faces at a box's edge are neighbours, those of a sharper edge are not.
+const MIN_NORMAL_COSINE: f64 = -1e-9;
 
-/// How many times the largest spacing may be the smallest: beyond it, places count as equally thin.
-const MOST_LEVELS: i32 = 24;
+/// Maximum number of grids, each with twice the cell size of the one before.
+const MAX_GRID_LEVELS: i32 = 24;
 
-/// Whether two samples lie on one side of what they are on. Normals that face apart belong to two sides of a part,
-/// which are no neighbours however thin it is.
+/// Whether two samples are on the same side of a part: normals over 90° apart belong to two sides of a thin part.
 pub(super) fn same_side(a: &Placed, b: &Placed) -> bool {
-    face_alike(&a.point, &b.point)
+    points_on_same_side(&a.point, &b.point)
 }
 
-/// The same of two points.
-pub(super) fn face_alike(a: &SurfacePoint, b: &SurfacePoint) -> bool {
-    a.normal.dot(b.normal) > LEAST_COSINE
+/// The same for two points.
+pub(super) fn points_on_same_side(a: &SurfacePoint, b: &SurfacePoint) -> bool {
+    a.normal.dot(b.normal) > MIN_NORMAL_COSINE
 }
 
-/// Per sample, the samples within the smaller of the two's reaches on the same side, each with a value made of their
-/// distance over that reach.
-pub(super) struct Crowd<T> {
+/// Per sample its neighbours: samples on the same side within the smaller of both reaches, with a value computed from
+/// distance and reach.
+pub(super) struct SampleNeighbours<T> {
     chunks: Vec<Vec<(u32, T)>>,
-    /// Per sample its chunk, and where in it its list begins and ends.
+    /// Per sample its chunk, and the start and end of its list there.
     lists: Vec<(u32, u32, u32)>,
 }
 
-impl<T: Copy + Send> Crowd<T> {
-    /// Lists neighbours; `reaches_m` has a value a sample.
+impl<T: Copy + Send> SampleNeighbours<T> {
+    /// Lists the neighbours; `reaches_m` has one value per sample.
     pub(super) fn new(samples: &[Placed], reaches_m: &[f64], value: impl Fn(f64, f64) -> T + Sync) -> Self {
         let positions: Vec<DVec3> = samples.iter().map(|sample| sample.point.position).collect();
         let grids = grids(&positions, reaches_m);
@@ -51,14 +49,15 @@ impl<T: Copy + Send> Crowd<T> {
         let listed: Vec<_> = order
             .par_chunks(CHUNK)
             .map(|chunk| {
-                let (mut found, mut ends) = (Vec::with_capacity(LIKELY * chunk.len()), Vec::with_capacity(chunk.len()));
-                let mut around: Vec<([u64; 3], [&[Spot]; 9])> = vec![([u64::MAX; 3], [&[]; 9]); grids.len()];
+                let (mut found, mut ends) =
+                    (Vec::with_capacity(EXPECTED_NEIGHBOURS * chunk.len()), Vec::with_capacity(chunk.len()));
+                let mut around: Vec<([u64; 3], [&[GridPoint]; 9])> = vec![([u64::MAX; 3], [&[]; 9]); grids.len()];
                 for &i in chunk {
                     let here = &samples[i as usize];
                     let (p, reach) = (here.point.position, reaches_m[i as usize]);
                     let first = found.len();
                     for (grid, (cube, near)) in grids.iter().zip(&mut around) {
-                        // Samples come cube by cube, so that what is around one is around the next.
+                        // Consecutive samples often share a cube, and so its surroundings.
                         let own = grid.cube(p);
                         if own != *cube {
                             (*cube, *near) = (own, grid.around(own));
@@ -74,7 +73,7 @@ impl<T: Copy + Send> Crowd<T> {
                             }
                         }
                     }
-                    // The order in which cubes yield must not reach the sums.
+                    // Sums must not depend on the order of cubes.
                     found[first..].sort_unstable_by_key(|&(j, _)| j);
                     ends.push((i, first as u32, found.len() as u32));
                 }
@@ -98,14 +97,14 @@ impl<T: Copy + Send> Crowd<T> {
     }
 }
 
-/// The samples in grids by the size of their reach, to the next power of two.
+/// Grids of the samples by reach, rounded up to powers of two.
 fn grids(positions: &[DVec3], reaches_m: &[f64]) -> Vec<Grid> {
     let least = reaches_m.iter().copied().fold(f64::INFINITY, f64::min);
     let mut levels: BTreeMap<i32, (f64, Vec<u32>)> = BTreeMap::new();
     for (i, &reach) in reaches_m.iter().enumerate() {
         let mut level = 0;
         let mut up_to = least;
-        while up_to < reach && level < MOST_LEVELS {
+        while up_to < reach && level < MAX_GRID_LEVELS {
             (level, up_to) = (level + 1, up_to * 2.0);
         }
         let (side, which) = levels.entry(level).or_insert((0.0, Vec::new()));
@@ -115,24 +114,28 @@ fn grids(positions: &[DVec3], reaches_m: &[f64]) -> Vec<Grid> {
     levels.into_values().map(|(side, which)| Grid::new(positions, which.iter().copied(), side)).collect()
 }
 
-/// How crowded a sample is, and after it which it is, in one number: the most crowded is the largest, the first of equals
-/// the larger. The weight is rounded to single precision, which no choice worth making hangs on.
-fn standing(weight: f64, sample: usize) -> u64 {
-    // The bits of floats from 0 up are in the floats' order; the last subtraction may leave a little under 0.
+/// Weight (in single precision) and index of a sample in one sortable number; of equal weights the first index is larger.
+fn priority(weight: f64, sample: usize) -> u64 {
+    // Non-negative floats sort like their bits; rounding may leave a weight slightly below 0.
     (u64::from((weight.max(0.0) as f32).to_bits()) << 32) | u64::from(!(sample as u32))
 }
 
-/// The indices, rising, of the `count` samples that are left when the most crowded have gone one by one.
-pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize, progress: Progress<'_>) -> Vec<usize> {
+/// Eliminates the most crowded samples one by one. Returns the ascending indices of the `count` that remain.
+pub(super) fn eliminate_crowded(
+    crowd: &SampleNeighbours<f64>,
+    samples: usize,
+    count: usize,
+    progress: Progress<'_>,
+) -> Vec<usize> {
     let mut weights: Vec<f64> = (0..samples).map(|i| crowd.of(i).iter().map(|(_, w)| w).sum()).collect();
     let mut alive = vec![true; samples];
-    let mut heap: BinaryHeap<u64> = weights.iter().enumerate().map(|(i, &weight)| standing(weight, i)).collect();
+    let mut heap: BinaryHeap<u64> = weights.iter().enumerate().map(|(i, &weight)| priority(weight, i)).collect();
     let mut left = samples;
     while left > count {
         let Some(mut top) = heap.peek_mut() else { break };
         let sample = !(*top as u32) as usize;
-        // Weights only fall, so an entry that is out of date stands too high and comes up in time to be put right.
-        let now = standing(weights[sample], sample);
+        // Weights only fall, so an outdated entry comes up early and is corrected.
+        let now = priority(weights[sample], sample);
         if *top > now {
             *top = now;
             continue;
@@ -150,12 +153,11 @@ pub(super) fn thin_out(crowd: &Crowd<f64>, samples: usize, count: usize, progres
     (0..samples).filter(|&i| alive[i]).collect()
 }
 
-/// The indices, rising, of as many samples as fit with no two of them neighbours: always the one next that leaves the
-/// fewest others without room, so that a front of close neighbours grows over the surface.
-pub(super) fn pack<T: Copy + Send>(crowd: &Crowd<T>, samples: usize, progress: Progress<'_>) -> Vec<usize> {
+/// Selects samples of which no two are neighbours, always the one that blocks the fewest others. Returns ascending indices.
+pub(super) fn pack<T: Copy + Send>(crowd: &SampleNeighbours<T>, samples: usize, progress: Progress<'_>) -> Vec<usize> {
     let mut free: Vec<usize> = (0..samples).map(|i| crowd.of(i).len()).collect();
     let mut open = vec![true; samples];
-    // By how many are free around them; an entry that is out of date has another in a lower bucket.
+    // By the number of free neighbours; an outdated entry has a newer one in a lower bucket.
     let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); free.iter().max().map_or(0, |most| most + 1)];
     for (i, &free) in free.iter().enumerate().rev() {
         buckets[free].push(i as u32);

@@ -1,35 +1,35 @@
-//! What somebody wishes of accuracy and time, and the combination that grants it.
+//! Requested accuracy and time, and the combination that meets them.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Report, Row, Way};
 use crate::error::{Error, Result};
 
-/// A tolerance, a budget, or both.
+/// A tolerance, a time budget, or both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wish {
-    /// How far a centroid may be off, m.
+    /// Tolerance of centroids, m.
     pub centroid_m: Option<f64>,
-    /// How far an orientation may be turned, rad.
+    /// Tolerance of orientations, rad.
     pub orientation_rad: Option<f64>,
-    /// How long a frame may take, s.
+    /// Time budget of a frame, s.
     pub budget_s: Option<f64>,
 }
 
-/// What grants a wish, or misses it by least.
+/// The selected combination.
 #[derive(Clone, Debug)]
 pub struct Pick<'a> {
-    /// The combination, as measured.
+    /// Its measurement.
     pub row: &'a Row,
-    /// What it misses, in words; empty where it grants all.
+    /// Missed requirements in words; empty if all are met.
     pub missed: Vec<String>,
 }
 
-/// The number that `text` begins with, and its unit.
+/// Splits `text` into a number and its unit.
 fn number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     let end = text.find(|c: char| !(c.is_ascii_digit() || ".eE+-".contains(c))).unwrap_or(text.len());
-    // `1e` of `1eon` is no number, and neither has a unit that begins with an e.
+    // No unit begins with an e.
     let value = text[..end].parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)?;
     Some((value, text[end..].trim()))
 }
@@ -46,7 +46,7 @@ fn quantity(text: &str, what: &str, example: &str, units: &[(&str, f64)]) -> Res
     })
 }
 
-/// The length that `text` says, m.
+/// Parses a length, m.
 ///
 /// # Errors
 /// It says none over 0.
@@ -54,7 +54,7 @@ pub fn length(text: &str) -> Result<f64> {
     quantity(text, "length", "0.5 mm", &[("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("cm", 1e-2), ("m", 1.0)])
 }
 
-/// The angle that `text` says, rad.
+/// Parses an angle, rad.
 ///
 /// # Errors
 /// It says none over 0.
@@ -63,7 +63,7 @@ pub fn angle(text: &str) -> Result<f64> {
     quantity(text, "angle", "2 deg", &[("deg", degree), ("°", degree), ("rad", 1.0)])
 }
 
-/// The time that `text` says, s.
+/// Parses a time, s.
 ///
 /// # Errors
 /// It says none over 0.
@@ -72,10 +72,10 @@ pub fn time(text: &str) -> Result<f64> {
 }
 
 impl Wish {
-    /// The tolerance that `text` says: a length for centroids, an angle for orientations, or both with a comma between.
+    /// Parses a tolerance: a length for centroids, an angle for orientations, or both separated by a comma.
     ///
     /// # Errors
-    /// It says something else, or one of them twice.
+    /// It is something else, or has one of them twice.
     pub fn within(text: &str) -> Result<Self> {
         let mut wish = Self::default();
         for part in text.split(',') {
@@ -94,13 +94,13 @@ impl Wish {
         Ok(wish)
     }
 
-    /// Whether nothing is wished for.
+    /// Whether nothing is requested.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// This, and of `other` what this leaves open.
+    /// This, with missing values from `other`.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -110,7 +110,7 @@ impl Wish {
         }
     }
 
-    /// It in words.
+    /// It as text.
     #[must_use]
     pub fn words(&self) -> String {
         let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
@@ -122,11 +122,11 @@ impl Wish {
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
-    /// By how many times `row` misses each part.
+    /// Ratios of `row`'s values to the limits.
     fn misses(&self, row: &Row) -> [f64; 3] {
         let [centroid, orientation] = row.judged();
         let over = |value: f64, limit: Option<f64>| limit.map_or(0.0, |limit| value / limit);
-        // What is never there is not within anything.
+        // Without a comparison no tolerance is met.
         let of = |errors: &super::Errors| if errors.compared > 0 { errors.p99 } else { f64::INFINITY };
         [
             over(if self.centroid_m.is_some() { of(centroid) * 1e-3 } else { 0.0 }, self.centroid_m),
@@ -135,8 +135,8 @@ impl Wish {
         ]
     }
 
-    /// The fastest combination of `report` that grants it to frames that come `way`; of a budget alone, the truest. Where
-    /// none does, the one that misses by least.
+    /// The fastest combination of `report` for `way` that meets it; for a budget alone the most accurate one. If none meets
+    /// it, the nearest one.
     #[must_use]
     pub fn pick<'a>(&self, report: &'a Report, way: Way) -> Option<Pick<'a>> {
         let mut rows = report.of(way);
@@ -145,7 +145,7 @@ impl Wish {
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
         let true_to = |row: &Row| {
             let [centroid, orientation] = row.judged();
-            // A degree is to an orientation what a millimetre is to a centroid, about: at 57 mm they are one.
+            // A degree counts like a millimetre: at a distance of 57 mm they are equal.
             centroid.p99.hypot(orientation.p99)
         };
         let picked = if tolerant || self.is_empty() {
@@ -161,7 +161,7 @@ impl Wish {
         Some(Pick { row, missed: self.missed(row) })
     }
 
-    /// What `row` misses, in words.
+    /// Requirements that `row` misses, in words.
     fn missed(&self, row: &Row) -> Vec<String> {
         let [centroid, orientation] = row.judged();
         let texts = [

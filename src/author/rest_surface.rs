@@ -1,4 +1,4 @@
-//! All of a body's surface in one frame, to place taxels on: the world at rest, as a viewer shows the file.
+//! All surfaces of a body in the world at rest, to place taxels on.
 
 use std::cell::OnceCell;
 
@@ -9,38 +9,38 @@ use super::{blend_skinning, heaviest_four};
 use crate::body::{Body, Details, Home, Modality, Skinning, Taxel, Topology};
 use crate::error::{Error, Result, nearest};
 
-/// A body's surfaces as one.
-pub(super) struct Canvas<'a> {
+/// All surfaces of a body as one mesh.
+pub(super) struct RestSurface<'a> {
     pub(super) body: &'a Body,
     pub(super) details: &'a Details,
     /// Vertices in the world at rest, m.
     pub(super) positions: Vec<DVec3>,
-    /// Counter-clockwise seen from outside, whatever mirrors them.
+    /// Counter-clockwise seen from outside, mirrored nodes corrected.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Per triangle its part, and its number there.
+    /// Per triangle its part and its index in the part.
     pub(super) origin: Vec<(u32, u32)>,
-    /// Per triangle the link that carries it most.
+    /// Per triangle its link, or the one with the largest weight.
     pub(super) link: Vec<u32>,
     /// Per part its first vertex.
     first_vertex: Vec<u32>,
-    /// Per part the four joints that carry each vertex most.
+    /// Per part the four joints with the largest weights for each vertex.
     skinning: Vec<Option<Skinning>>,
     topology: OnceCell<Topology>,
 }
 
-/// A taxel as it is written: in the coordinates of the mesh that it is on.
-pub(super) struct Seated {
-    /// The part that it is on.
+/// A taxel in the coordinates of its mesh, as it is written.
+pub(super) struct MeshTaxel {
+    /// Its part.
     pub(super) part: usize,
-    /// Its place, normal and area in the mesh's coordinates; the link is that of the body.
+    /// The taxel; position, normal and area are in the mesh's coordinates.
     pub(super) taxel: Taxel,
-    /// What carries it, on a skin.
+    /// Its joints and weights on a skinned mesh.
     pub(super) carriers: Option<([u16; 4], [f32; 4])>,
 }
 
-impl<'a> Canvas<'a> {
+impl<'a> RestSurface<'a> {
     pub(super) fn new(body: &'a Body, details: &'a Details) -> Self {
-        let mut canvas = Self {
+        let mut rest_surface = Self {
             body,
             details,
             positions: Vec::new(),
@@ -52,9 +52,9 @@ impl<'a> Canvas<'a> {
             topology: OnceCell::new(),
         };
         for part in 0..body.surfaces.len() {
-            canvas.take(part);
+            rest_surface.take(part);
         }
-        canvas
+        rest_surface
     }
 
     fn take(&mut self, part: usize) {
@@ -97,7 +97,7 @@ impl<'a> Canvas<'a> {
         self.skinning.push(skinning);
     }
 
-    /// How all triangles hang together.
+    /// The topology of all triangles.
     pub(super) fn topology(&self) -> &Topology {
         self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles))
     }
@@ -107,7 +107,7 @@ impl<'a> Canvas<'a> {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
 
-    /// The surface of `triangle`, m².
+    /// The area of `triangle`, m².
     pub(super) fn area(&self, triangle: usize) -> f64 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).length() / 2.0
@@ -116,7 +116,7 @@ impl<'a> Canvas<'a> {
     /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it.
     ///
     /// # Errors
-    /// No part has such an attribute, or which of its numbers is meant is left open.
+    /// No part has such an attribute, or it has several numbers and `name` has no channel.
     pub(super) fn painted(&self, name: &str) -> Result<Vec<Option<f64>>> {
         let (attribute, channel) = match name.rsplit_once('.') {
             Some((attribute, channel)) => {
@@ -165,8 +165,8 @@ impl<'a> Canvas<'a> {
         }))
     }
 
-    /// The taxel with `id` at `placed`, whose triangle is one of the canvas.
-    pub(super) fn seat(&self, placed: &Placed, id: u32, modality: Modality) -> Seated {
+    /// The taxel `id` at `placed`, whose triangle is one of this surface.
+    pub(super) fn mesh_taxel(&self, placed: &Placed, id: u32, modality: Modality) -> MeshTaxel {
         let (part, index) = self.origin[placed.triangle];
         let part = part as usize;
         let surface = &self.body.surfaces[part];
@@ -183,18 +183,17 @@ impl<'a> Canvas<'a> {
                 joints[carriers.map_or(0, |(joints, _)| usize::from(joints[0]))]
             }
         };
-        // By how much the plane across the normal is stretched on the way to the link.
+        // How much the transform to the link stretches areas.
         let DMat3 { x_axis: x, y_axis: y, z_axis: z } = link_from_mesh.matrix3;
         let stretch = (DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal).length();
         let area = if stretch > 0.0 { placed.point.area / stretch } else { 0.0 };
         let position_in_link = at(0) + at(1) + at(2);
         let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality };
-        Seated { part, taxel, carriers }
+        MeshTaxel { part, taxel, carriers }
     }
 }
 
-/// The four joints that carry each vertex most, of all sets; a vertex that no weight holds hangs on the joint that counts as
-/// its heaviest.
+/// Per vertex the four joints with the largest weights of all sets; a vertex without weights gets the joint in `heaviest`.
 fn merged(sets: &[Skinning], joints: usize, heaviest: &[usize]) -> Skinning {
     let mut merged = Skinning::default();
     for (vertex, &heaviest) in heaviest.iter().enumerate() {

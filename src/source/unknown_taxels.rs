@@ -1,31 +1,31 @@
-//! Values for taxels that the body does not have: left out, named once, and counted.
+//! Values of taxels that the body does not have: skipped, named once and counted.
 
 use std::collections::BTreeSet;
 
-/// Ids are remembered up to so many, so that garbage does not fill the memory.
+/// Maximum number of ids to remember, so that invalid input does not fill the memory.
 const MAX_IDS: usize = 10_000;
-/// Ids that a message names.
-const SHOWN: usize = 12;
+/// Maximum number of ids listed in a message.
+const MAX_LISTED_IDS: usize = 12;
 
-/// What a source was given for taxels that the body does not have.
+/// Values that a source received for taxels that the body does not have.
 #[derive(Default)]
-pub(super) struct Unknown {
-    /// Whether it is an error.
+pub(super) struct UnknownTaxels {
+    /// Whether an unknown taxel is an error.
     pub(super) refused: bool,
     ids: BTreeSet<u32>,
-    /// Of these, those that have not been named yet.
+    /// The ids that no notice has named yet.
     unnamed: Vec<u32>,
     values: u64,
 }
 
-impl Unknown {
-    /// Refuses taxel `id` where that is to be an error.
+impl UnknownTaxels {
+    /// An error for the unknown taxel `id`, if it is to be one.
     pub(super) fn check(&self, id: u32) -> Result<(), String> {
         let what = || format!("the body has no taxel {id}; leave it out, or give the body that has it");
         if self.refused { Err(what()) } else { Ok(()) }
     }
 
-    /// Counts a value that is left out.
+    /// Counts a skipped value.
     pub(super) fn leave_out(&mut self, id: u32) {
         self.values += 1;
         if self.ids.len() < MAX_IDS && self.ids.insert(id) {
@@ -33,7 +33,7 @@ impl Unknown {
         }
     }
 
-    /// Names the taxels that have not been named yet.
+    /// A notice of the ids that no notice has named yet.
     pub(super) fn notice(&mut self) -> Option<String> {
         let ids = std::mem::take(&mut self.unnamed);
         let (what, whose) = match ids.len() {
@@ -45,7 +45,7 @@ impl Unknown {
         Some(format!("the body has no {what} {ids}; {whose} values are left out (--strict stops instead)"))
     }
 
-    /// How many values were left out, if any were.
+    /// The number of skipped values in words, if any.
     pub(super) fn loss(&self) -> Option<String> {
         let values = match self.values {
             0 => return None,
@@ -58,8 +58,8 @@ impl Unknown {
 
 /// The first few of `ids`, and how many more there are.
 fn named(ids: impl ExactSizeIterator<Item = u32>) -> String {
-    let more = ids.len().saturating_sub(SHOWN);
-    let names: Vec<String> = ids.take(SHOWN).map(|id| id.to_string()).collect();
+    let more = ids.len().saturating_sub(MAX_LISTED_IDS);
+    let names: Vec<String> = ids.take(MAX_LISTED_IDS).map(|id| id.to_string()).collect();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!("{}{more}", names.join(", "))
 }
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn many_ids_fill_neither_the_memory_nor_a_line() {
-        let mut unknown = Unknown::default();
+        let mut unknown = UnknownTaxels::default();
         (0..20_000).for_each(|id| unknown.leave_out(id));
         assert_eq!(unknown.ids.len(), MAX_IDS);
         let named = "0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 9988 more";

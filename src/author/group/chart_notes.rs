@@ -1,20 +1,20 @@
-//! What is told of charts: one line for all fields that a thing is true of, so that a body of many links stays readable.
+//! Notes about charts, one line for all fields with the same problem.
 
-use super::charts::POOR;
+use super::charts::POOR_DISTORTION;
 use crate::field::NoChart;
 
-/// What there is to tell.
+/// Problems with charts.
 #[derive(Default)]
-pub(super) struct Words {
+pub(super) struct ChartNotes {
     /// Fields that were split, into how many parts and why.
     pub(super) split: Vec<(String, usize, String)>,
     /// Fields without a chart, why, and whether others are below them.
     pub(super) bare: Vec<(String, NoChart, bool)>,
-    /// Fields whose charts are far from true, and how far.
+    /// Fields with distorted charts, and their distortion.
     pub(super) poor: Vec<(String, f64)>,
 }
 
-impl Words {
+impl ChartNotes {
     pub(super) fn lines(&self) -> Vec<String> {
         let mut lines = self.of_split();
         lines.extend(self.of_bare());
@@ -79,13 +79,13 @@ impl Words {
                 let names: Vec<&str> = poor.iter().map(|(name, _)| &name[..]).collect();
                 let (count, worst) = (poor.len(), format!("{} in `{}`", off(worst.1), worst.0));
                 let names = names.join("`, `");
-                format!("distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`", off(POOR))
+                format!("distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`", off(POOR_DISTORTION))
             }
         })
     }
 }
 
-/// Reasons that are one to a person.
+/// Reasons that are reported together.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Links,
@@ -111,7 +111,7 @@ pub(super) fn plain(why: &NoChart) -> String {
     why.strip_suffix("; split it").map(str::to_owned).unwrap_or(why)
 }
 
-/// What to do about a field that is refused; `parts` is how many would have what it asks for, if any up to `most` have.
+/// The advice for a refused field; `parts` is the number of parts of a split that works, if any up to `most` does.
 pub(super) fn advice(why: &NoChart, parts: Option<usize>, is_parent: bool, most: usize) -> String {
     match (why, parts) {
         (NoChart::SeveralLinks(_), _) => "; for a field on each link, write `each = \"link\"`".into(),
@@ -129,7 +129,7 @@ mod tests {
     fn lines(bare: &[(&str, NoChart, bool)], poor: &[(&str, f64)]) -> Vec<String> {
         let bare = bare.iter().map(|(name, why, is_parent)| ((*name).to_owned(), why.clone(), *is_parent)).collect();
         let poor = poor.iter().map(|(name, off)| ((*name).to_owned(), *off)).collect();
-        Words { split: Vec::new(), bare, poor }.lines()
+        ChartNotes { split: Vec::new(), bare, poor }.lines()
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A wiring as the file that it is read from.
+//! Writes a wiring as a TOML file.
 
 use std::fmt::Write as _;
 

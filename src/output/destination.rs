@@ -1,23 +1,23 @@
-//! What a path leads to, and whether two lead to the same.
+//! Resolves paths of outputs and compares them.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Links that are followed one after the other: as many as Linux follows.
-const MOST_LINKS: usize = 40;
+/// Maximum number of links to follow, as in Linux.
+const MAX_LINKS: usize = 40;
 
-/// What a path leads to, all links followed.
+/// The destination of a path, with all links followed.
 #[derive(Debug)]
-pub(super) enum Place {
-    /// Nothing yet: here a file would be made.
+pub(super) enum Destination {
+    /// No file yet; it would be created here.
     Nothing(PathBuf),
     /// A regular file.
     File(PathBuf),
     /// A pipe, a terminal or a device.
     Device(PathBuf),
-    /// A stream of this process, such as `/dev/stdout`, wherever it leads.
+    /// A stream of this process, such as `/dev/stdout`.
     Stream(Stream),
     Folder,
 }
@@ -34,11 +34,11 @@ pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-impl Place {
-    /// Where `path` leads. Its folder must be there; the file need not, nor what a link points at.
+impl Destination {
+    /// The destination of `path`. Its folder must exist; the file or the target of a link need not.
     pub(super) fn of(path: &Path) -> io::Result<Self> {
         let mut at = path.to_owned();
-        for _ in 0..MOST_LINKS {
+        for _ in 0..MAX_LINKS {
             let ends_as_folder = at.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| byte == b'/');
             let Some(name) = at.file_name().filter(|_| !ends_as_folder) else { return Ok(Self::Folder) };
             let folder = folder_of(&at).canonicalize()?;
@@ -55,7 +55,7 @@ impl Place {
             }
             let next = folder.join(fs::read_link(&at)?);
             match fs::metadata(&at) {
-                // A pipe that a shell hands over as /dev/fd/63 has no name that the link could lead to.
+                // The link of a shell's pipe, such as /dev/fd/63, has no real target.
                 Ok(there) if fs::symlink_metadata(&next).is_err() => return Ok(Self::there(at, &there)),
                 _ => at = next,
             }
@@ -71,12 +71,12 @@ impl Place {
         }
     }
 
-    /// Which file it is, or would be. `None` for what takes output from many sides, such as a terminal.
+    /// Its file. `None` for destinations that may be shared, such as a terminal.
     pub(super) fn identity(&self) -> Option<Identity> {
         match self {
             Self::Nothing(at) => {
                 let folder = folder_of(at);
-                Some(Identity::NotYet(number(folder, &fs::metadata(folder).ok()?)?, at.file_name()?.to_owned()))
+                Some(Identity::Planned(file_number(folder, &fs::metadata(folder).ok()?)?, at.file_name()?.to_owned()))
             }
             Self::File(at) | Self::Device(at) => Identity::of_input(at),
             Self::Stream(stream) => Identity::of_stream(*stream),
@@ -85,26 +85,26 @@ impl Place {
     }
 }
 
-/// Which file something is, however it is spelt.
+/// The identity of a file, independent of its path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    There(Number),
-    /// The file of this name that would be made in a folder.
-    NotYet(Number, OsString),
+    Existing(FileNumber),
+    /// A file of this name to be created in a folder.
+    Planned(FileNumber, OsString),
 }
 
 impl Identity {
-    /// Of the file at `path`. `None` where there is no regular file and no named pipe.
+    /// The identity of the file at `path`. `None` if it is neither a regular file nor a named pipe.
     pub(super) fn of_input(path: &Path) -> Option<Self> {
         let there = fs::metadata(path).ok()?;
-        if there.is_file() || is_pipe(&there) { number(path, &there).map(Self::There) } else { None }
+        if there.is_file() || is_pipe(&there) { file_number(path, &there).map(Self::Existing) } else { None }
     }
 
-    /// Of the regular file that `stream` leads into, if it is one.
+    /// The identity of the regular file that `stream` is redirected to, if any.
     #[cfg(unix)]
     fn of_stream(stream: Stream) -> Option<Self> {
         let there = stream.duplicate().ok()?.metadata().ok()?;
-        if there.is_file() { number(Path::new(""), &there).map(Self::There) } else { None }
+        if there.is_file() { file_number(Path::new(""), &there).map(Self::Existing) } else { None }
     }
 
     #[cfg(not(unix))]
@@ -113,21 +113,21 @@ impl Identity {
     }
 }
 
-/// The device and the file's number on it.
+/// Device and inode.
 #[cfg(unix)]
-type Number = (u64, u64);
-/// The path without links, where the library knows no numbers of files.
+type FileNumber = (u64, u64);
+/// The canonical path, where inodes are not available.
 #[cfg(not(unix))]
-type Number = PathBuf;
+type FileNumber = PathBuf;
 
 #[cfg(unix)]
-fn number(_: &Path, there: &Metadata) -> Option<Number> {
+fn file_number(_: &Path, there: &Metadata) -> Option<FileNumber> {
     use std::os::unix::fs::MetadataExt as _;
     Some((there.dev(), there.ino()))
 }
 
 #[cfg(not(unix))]
-fn number(path: &Path, _: &Metadata) -> Option<Number> {
+fn file_number(path: &Path, _: &Metadata) -> Option<FileNumber> {
     path.canonicalize().ok()
 }
 
@@ -143,7 +143,7 @@ fn is_pipe(_: &Metadata) -> bool {
 }
 
 impl Stream {
-    /// The one that has this name in this folder.
+    /// The stream with this name in this folder.
     fn called(folder: &Path, name: &OsStr) -> Option<Self> {
         let stream = match name.to_str()? {
             "1" => Self::Output,
@@ -154,7 +154,7 @@ impl Stream {
         own.iter().any(|own| own.canonicalize().is_ok_and(|own| own == folder)).then_some(stream)
     }
 
-    /// A file that writes where the stream does: at its end, if it was opened to be appended to.
+    /// A file that writes to the stream.
     #[cfg(unix)]
     pub(super) fn duplicate(self) -> io::Result<File> {
         use std::os::fd::AsFd as _;

@@ -1,31 +1,30 @@
-//! A whole body's surface at rest, searchable from each of its links.
+//! Searches a body's surface at rest, as seen from each of its links.
 
 use glam::{DAffine3, DVec3};
 
 use crate::body::{Body, Hit, Home, Surface, SurfaceIndex};
 
-/// Two ways to bring a skinned mesh into the world are one where no number in them differs by more, m: the rounding of
-/// inverse bind matrices.
-const SAME_WAY: f64 = 2e-7;
+/// Transforms of a skinned mesh to the world are equal up to this difference, m: the rounding of inverse bind matrices.
+const SAME_TRANSFORM: f64 = 2e-7;
 
-/// Taxels lie on a surface that is this near beside what single precision loses, m; `docs/layout.md` has it.
+/// Maximum distance of a taxel on the surface, beside rounding to single precision, m; see `docs/layout.md`.
 const ON_SURFACE_M: f64 = 1e-6;
 
-/// What two roundings to single precision lose of the largest coordinate, as `Topology` welds.
+/// Relative error of two roundings to single precision, as in the welding of `Topology`.
 const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 
-/// Indices of a body's surfaces in the world at rest. A skinned mesh is brought there as the link that asks sees it: by
-/// that link's own joint, at bind.
-pub(super) struct Ground<'a> {
+/// Search indices of a body's surfaces in the world at rest. A skinned mesh is transformed by the joint of the link that
+/// searches, at bind.
+pub(super) struct SurfaceSearch<'a> {
     body: &'a Body,
     rigid: SurfaceIndex,
-    /// Per skinned surface the ways it was brought into the world, each with what came of it.
+    /// Per skinned surface its transforms to the world, each with a search index.
     skinned: Vec<(&'a Surface, Vec<(DAffine3, SurfaceIndex)>)>,
-    /// How far from a surface a point that is on it may be found, m.
+    /// Maximum distance of a point that is on the surface, m.
     tolerance_m: f64,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> SurfaceSearch<'a> {
     pub(super) fn of(body: &'a Body) -> Self {
         let in_world = |surface: &'a Surface| match &surface.home {
             Home::Rigid { link, link_from_mesh } => {
@@ -40,38 +39,39 @@ impl<'a> Ground<'a> {
                 places.fold(0.0, f64::max)
             };
             match &surface.home {
-                // Coordinates are rounded where they are stored: in the mesh, and in the taxels' node.
+                // Coordinates are rounded in the mesh and in the taxels' node.
                 Home::Rigid { link_from_mesh, .. } => of_points(*link_from_mesh),
                 Home::Skinned { joints, .. } => joints.iter().map(|&(_, way)| of_points(way)).fold(0.0, f64::max),
             }
         });
         let tolerance_m = ON_SURFACE_M + ROUNDING * largest.fold(0.0, f64::max);
         let skinned = body.surfaces.iter().filter(|surface| matches!(surface.home, Home::Skinned { .. }));
-        let mut ground = Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
-        ground.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
+        let mut surface_search =
+            Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
+        surface_search.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
         for link in 0..body.links.len() {
             if body.taxels.iter().any(|taxel| taxel.link == link) {
-                ground.bring(link);
+                surface_search.add_link(link);
             }
         }
-        ground
+        surface_search
     }
 
-    /// Brings skinned surfaces into the world as `link` sees them.
-    fn bring(&mut self, link: usize) {
+    /// Adds the search indices of skinned surfaces for `link`.
+    fn add_link(&mut self, link: usize) {
         for (surface, ways) in &mut self.skinned {
             let Some(way) = world_from_skinned(self.body, surface, link) else { continue };
-            if !ways.iter().any(|(known, _)| known.abs_diff_eq(way, SAME_WAY)) {
+            if !ways.iter().any(|(known, _)| known.abs_diff_eq(way, SAME_TRANSFORM)) {
                 ways.push((way, SurfaceIndex::of_triangles(surface.corners_through(way))));
             }
         }
     }
 
-    /// The indices in which `link` finds its surroundings.
+    /// The search indices for `link`.
     fn seen_from(&self, link: usize) -> impl Iterator<Item = &SurfaceIndex> {
         let skinned = self.skinned.iter().filter_map(move |(surface, ways)| {
             let way = world_from_skinned(self.body, surface, link)?;
-            ways.iter().find(|(known, _)| known.abs_diff_eq(way, SAME_WAY)).map(|(_, index)| index)
+            ways.iter().find(|(known, _)| known.abs_diff_eq(way, SAME_TRANSFORM)).map(|(_, index)| index)
         });
         std::iter::once(&self.rigid).chain(skinned).filter(|index| !index.is_empty())
     }
@@ -81,7 +81,7 @@ impl<'a> Ground<'a> {
         self.body.surfaces.is_empty()
     }
 
-    /// How far from a surface a point on it may be found, m.
+    /// Maximum distance of a point that is on the surface, m.
     pub(super) fn tolerance_m(&self) -> f64 {
         self.tolerance_m
     }
@@ -98,7 +98,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Takes the coordinates of a skinned mesh to the world at rest, by the joint that `link` is, else by its first.
+/// The transform of a skinned mesh to the world at rest, by the joint of `link`, else by its first joint.
 fn world_from_skinned(body: &Body, surface: &Surface, link: usize) -> Option<DAffine3> {
     let Home::Skinned { joints, .. } = &surface.home else { return None };
     let own = joints.iter().find(|(joint, _)| *joint == link).or(joints.first());

@@ -1,17 +1,17 @@
-//! A body's surface as charts and groups need it, link by link.
+//! A body's surface in the frames of its links.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use glam::DVec3;
 
-use super::geodesic::Place;
+use super::geodesic::SurfacePlace;
 use crate::body::{Body, SurfaceIndex, Topology};
 
-/// A body's surface in the frames of its links, each taken up when it is first asked for.
+/// A body's surface in the frames of its links, computed on demand.
 pub(crate) struct Surfaces<'a> {
     body: &'a Body,
-    in_links: BTreeMap<usize, Rc<Skin>>,
+    in_links: BTreeMap<usize, Rc<LinkSurface>>,
 }
 
 impl<'a> Surfaces<'a> {
@@ -20,20 +20,20 @@ impl<'a> Surfaces<'a> {
     }
 
     /// All of the body's surface in the frame of `link`, at rest.
-    pub(crate) fn in_link(&mut self, link: usize) -> Rc<Skin> {
-        self.in_links.entry(link).or_insert_with(|| Rc::new(Skin::new(self.body, link))).clone()
+    pub(crate) fn in_link(&mut self, link: usize) -> Rc<LinkSurface> {
+        self.in_links.entry(link).or_insert_with(|| Rc::new(LinkSurface::new(self.body, link))).clone()
     }
 }
 
-/// A surface with known neighbours that can be searched; both count the same triangles.
-pub(crate) struct Skin {
+/// A surface with topology and search index over the same triangles.
+pub(crate) struct LinkSurface {
     pub(crate) topology: Topology,
     index: SurfaceIndex,
-    /// Per surface of the body that is seen: its index, how many triangles come before it, whether it is mirrored.
+    /// Per surface of the body its index, the number of triangles before it, and whether it is mirrored.
     parts: Vec<(usize, usize, bool)>,
 }
 
-impl Skin {
+impl LinkSurface {
     fn new(body: &Body, link: usize) -> Self {
         let corners: Vec<DVec3> = body.triangles_in_link(link).flatten().collect();
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
@@ -51,9 +51,9 @@ impl Skin {
         Self { topology, index, parts }
     }
 
-    /// Where on the surface the point `p` with the outward `normal` is: at the nearest place, or where a place about as
-    /// near looks the same way, as on the two sides of a sheet, at that one.
-    pub(crate) fn locate(&self, p: DVec3, normal: DVec3) -> Option<Place> {
+    /// The place of the point `p` with the outward `normal`: the nearest one, or one about as near with a similar normal, as
+    /// on the other side of a sheet.
+    pub(crate) fn locate(&self, p: DVec3, normal: DVec3) -> Option<SurfacePlace> {
         let nearest = self.index.nearest(p)?;
         let hit = match nearest.normal.dot(normal) >= 0.0 {
             true => nearest,
@@ -62,18 +62,17 @@ impl Skin {
                 self.index.along(p, normal, reach).unwrap_or(nearest)
             }
         };
-        Some(Place::in_triangle(&self.topology, hit.triangle as u32, hit.position))
+        Some(SurfacePlace::in_triangle(&self.topology, hit.triangle as u32, hit.position))
     }
 
     /// The place nearest to `p`.
-    pub(crate) fn nearest(&self, p: DVec3) -> Option<Place> {
+    pub(crate) fn nearest(&self, p: DVec3) -> Option<SurfacePlace> {
         let hit = self.index.nearest(p)?;
-        Some(Place::in_triangle(&self.topology, hit.triangle as u32, hit.position))
+        Some(SurfacePlace::in_triangle(&self.topology, hit.triangle as u32, hit.position))
     }
 
-    /// The body's surface that `place` is on, the triangle among that surface's own, and the weights of its corners in
-    /// the surface's order.
-    pub(crate) fn origin_of(&self, place: &Place) -> (usize, usize, [f64; 3]) {
+    /// The body's surface of `place`, the triangle's index there, and the weights of its corners in that surface's order.
+    pub(crate) fn origin_of(&self, place: &SurfacePlace) -> (usize, usize, [f64; 3]) {
         let given = self.topology.given[place.triangle as usize] as usize;
         let part = self.parts.partition_point(|&(_, first, _)| first <= given) - 1;
         let (surface, first, mirrored) = self.parts[part];

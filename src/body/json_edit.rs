@@ -1,4 +1,4 @@
-//! JSON changed as text: what is not changed keeps every byte, its numbers' digits and its blanks included.
+//! Edits JSON as text, so that unchanged parts keep every byte.
 
 use std::fmt;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
-/// Where something stands in a text.
+/// A range of bytes in the text.
 pub(super) type Span = Range<usize>;
 
 struct Members<'a>(Vec<(String, &'a RawValue)>);
@@ -58,13 +58,13 @@ impl<'de> Deserialize<'de> for Elements<'de> {
     }
 }
 
-/// A text and the changes that it is to get, which may not overlap.
-pub(super) struct Splice<'a> {
+/// A text and its changes, which must not overlap.
+pub(super) struct JsonEdit<'a> {
     text: &'a str,
     changes: Vec<(Span, String)>,
 }
 
-impl<'a> Splice<'a> {
+impl<'a> JsonEdit<'a> {
     pub(super) fn new(text: &'a str) -> Self {
         Self { text, changes: Vec::new() }
     }
@@ -123,7 +123,7 @@ impl<'a> Splice<'a> {
         }
     }
 
-    /// Gives the object at `span` the `members` (key, value), which it does not have.
+    /// Adds `members` (key, value), which it must not have, to the object at `span`.
     pub(super) fn extend(&mut self, span: &Span, members: &[(String, String)]) {
         if !members.is_empty() {
             let written: Vec<String> = members.iter().map(|(key, value)| format!("\"{key}\":{value}")).collect();
@@ -132,8 +132,7 @@ impl<'a> Splice<'a> {
         }
     }
 
-    /// Takes those `gone` out of `all`, the members or elements (with what goes before each, such as a key) of what is at
-    /// `span`.
+    /// Removes the parts `gone` of `all`, the members (with their keys) or elements of the value at `span`.
     fn cut(&mut self, span: &Span, all: &[Span], gone: impl Fn(usize) -> bool) {
         // From the end of what stays before to the end of what goes, or at the start to the start of what stays.
         let mut kept: Option<usize> = None;
@@ -210,28 +209,28 @@ mod tests {
 
     #[test]
     fn what_is_not_changed_keeps_its_bytes() {
-        let splice = Splice::new(TEXT);
-        assert_eq!(splice.list("a").iter().map(|span| splice.get(span)).collect::<Vec<_>>(), ["1.00", "2e-7", "3"]);
-        assert_eq!(splice.apply(), TEXT);
-        let mut splice = Splice::new(TEXT);
-        let root = splice.root();
-        let [a, b, c] = ["a", "b", "c"].map(|key| splice.member(&root, key).unwrap());
-        splice.append(&a, &["4".into(), "5".into()]);
-        splice.append(&c, &["6".into()]);
-        splice.extend(&b, &[("z".into(), "[]".into())]);
-        splice.extend(&root, &[("d".into(), "7".into()), ("e".into(), "8".into())]);
+        let edit = JsonEdit::new(TEXT);
+        assert_eq!(edit.list("a").iter().map(|span| edit.get(span)).collect::<Vec<_>>(), ["1.00", "2e-7", "3"]);
+        assert_eq!(edit.apply(), TEXT);
+        let mut edit = JsonEdit::new(TEXT);
+        let root = edit.root();
+        let [a, b, c] = ["a", "b", "c"].map(|key| edit.member(&root, key).unwrap());
+        edit.append(&a, &["4".into(), "5".into()]);
+        edit.append(&c, &["6".into()]);
+        edit.extend(&b, &[("z".into(), "[]".into())]);
+        edit.extend(&root, &[("d".into(), "7".into()), ("e".into(), "8".into())]);
         let expected =
             "{ \"a\": [1.00, 2e-7 ,3,4,5],\n\t\"b\" : {\"x\":0.10, \"y\": -0,\"z\":[]},\"c\":[ 6] ,\"d\":7,\"e\":8}\n";
-        assert_eq!(splice.apply(), expected);
+        assert_eq!(edit.apply(), expected);
     }
 
     #[test]
     fn what_goes_takes_its_comma_along() {
         let without = |gone: &[usize]| {
-            let mut splice = Splice::new(TEXT);
-            let a = splice.member(&splice.root(), "a").unwrap();
-            splice.remove_elements(&a, |i| gone.contains(&i));
-            let text = splice.apply();
+            let mut edit = JsonEdit::new(TEXT);
+            let a = edit.member(&edit.root(), "a").unwrap();
+            edit.remove_elements(&a, |i| gone.contains(&i));
+            let text = edit.apply();
             serde_json::from_str::<serde_json::Value>(&text).unwrap()["a"].to_string()
         };
         assert_eq!(without(&[0]), "[2e-7,3]");
@@ -242,10 +241,10 @@ mod tests {
             ("a", "{\"b\":{\"x\":0.1,\"y\":-0.0},\"c\":[]}"),
             ("c", "{\"a\":[1.0,2e-7,3],\"b\":{\"x\":0.1,\"y\":-0.0}}"),
         ] {
-            let mut splice = Splice::new(TEXT);
-            let root = splice.root();
-            splice.remove_members(&root, |key| key == gone);
-            assert_eq!(serde_json::from_str::<serde_json::Value>(&splice.apply()).unwrap().to_string(), left);
+            let mut edit = JsonEdit::new(TEXT);
+            let root = edit.root();
+            edit.remove_members(&root, |key| key == gone);
+            assert_eq!(serde_json::from_str::<serde_json::Value>(&edit.apply()).unwrap().to_string(), left);
         }
     }
 }
