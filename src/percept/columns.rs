@@ -30,7 +30,6 @@ pub struct Column {
     /// Where its components are kept.
     pub(crate) store: Store,
     /// What shaders call the override that says in which of a device's columns it is.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "for shaders alone"))]
     pub(crate) shader_override: &'static str,
 }
 

@@ -79,7 +79,10 @@ impl ChartNotes {
                 let names: Vec<&str> = poor.iter().map(|(name, _)| &name[..]).collect();
                 let (count, worst) = (poor.len(), format!("{} in `{}`", off(worst.1), worst.0));
                 let names = names.join("`, `");
-                format!("distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`", off(POOR_DISTORTION))
+                format!(
+                    "distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`",
+                    off(POOR_DISTORTION)
+                )
             }
         })
     }

@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::divide::numbered;
 use super::chart_notes::{self, ChartNotes};
-use super::{ChartWish, Grouping, Grouper, FieldDraft, Wrap};
+use super::divide::numbered;
+use super::{ChartWish, FieldDraft, Grouper, Grouping, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
 use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};

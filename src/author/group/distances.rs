@@ -64,9 +64,9 @@ impl LinkDistances {
     }
 
     /// Distances from taxel `from` up to `limit_m`.
-    pub(super) fn from_taxel(&mut self, from: usize, limit_m: f64) -> Vec<TaxelDistance> {
+    pub(super) fn near_taxel(&mut self, from: usize, limit_m: f64) -> Vec<TaxelDistance> {
         let mut reached = match self.places.get(from).copied() {
-            Some(place) => self.from_place(&place, from, limit_m),
+            Some(place) => self.near_place(&place, from, limit_m),
             None => self.along_net(from, limit_m),
         };
         reached[from] = TaxelDistance { distance_m: 0.0, uv: Some(DVec2::ZERO) };
@@ -74,24 +74,24 @@ impl LinkDistances {
     }
 
     /// Distances from taxel `from` without a limit.
-    pub(super) fn from_taxel_to_all(&mut self, from: usize) -> Vec<TaxelDistance> {
-        let Some(start) = self.places.get(from) else { return self.from_taxel(from, f64::INFINITY) };
+    pub(super) fn all_from_taxel(&mut self, from: usize) -> Vec<TaxelDistance> {
+        let Some(start) = self.places.get(from) else { return self.near_taxel(from, f64::INFINITY) };
         let part = |place: &SurfacePlace| self.surface.topology.part[place.triangle as usize];
         let same: Vec<usize> = (0..self.places.len()).filter(|&i| part(&self.places[i]) == part(start)).collect();
         let apart = same.iter().map(|&i| self.points[i].0.distance(self.points[from].0));
         let mut limit_m = FIRST_LIMIT * apart.fold(0.0, f64::max);
         for _ in 0..MAX_DOUBLINGS {
-            let reached = self.from_taxel(from, limit_m);
+            let reached = self.near_taxel(from, limit_m);
             if same.iter().all(|&i| reached[i].distance_m < f64::INFINITY) {
                 return reached;
             }
             limit_m *= 2.0;
         }
-        self.from_taxel(from, f64::INFINITY)
+        self.near_taxel(from, f64::INFINITY)
     }
 
     /// Distances from `place`, or in a net from taxel `nearest`, up to `limit_m`.
-    pub(super) fn from_place(&mut self, place: &SurfacePlace, nearest: usize, limit_m: f64) -> Vec<TaxelDistance> {
+    pub(super) fn near_place(&mut self, place: &SurfacePlace, nearest: usize, limit_m: f64) -> Vec<TaxelDistance> {
         if self.too_long_m.is_none_or(|too_long_m| limit_m < too_long_m) {
             match LogMap::new(&self.surface.topology, *place, DVec3::X, limit_m) {
                 Ok(map) => {

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use super::Grouper;
+use super::distances::LinkDistances;
 use super::patches::{patches, spread};
 use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
-use super::distances::LinkDistances;
 use crate::error::{Error, Result};
 use crate::field::unions;
 
@@ -127,9 +127,9 @@ impl Grouper<'_> {
             (Some(seeds), ..) => self.seeds(seeds, chosen)?,
             (None, Some(overlap), Some(radius_m)) => {
                 let apart_m = 2.0 * radius_m * (1.0 - overlap);
-                let spread = links
-                    .iter_mut()
-                    .flat_map(|distances| spread(distances, apart_m).into_iter().map(|i| distances.taxels[i]).collect::<Vec<_>>());
+                let spread = links.iter_mut().flat_map(|distances| {
+                    spread(distances, apart_m).into_iter().map(|i| distances.taxels[i]).collect::<Vec<_>>()
+                });
                 let mut taxels: Vec<usize> = spread.collect();
                 taxels.sort_unstable();
                 taxels.into_iter().map(Seed::Taxel).collect()
@@ -144,7 +144,7 @@ impl Grouper<'_> {
                 None => {
                     let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
                     let all: Vec<f64> =
-                        links[link].from_taxel_to_all(nearest).into_iter().map(|reach| reach.distance_m).collect();
+                        links[link].all_from_taxel(nearest).into_iter().map(|reach| reach.distance_m).collect();
                     let distances = &links[link];
                     let distance = |&other: &usize| match seeds[other] {
                         Seed::Taxel(taxel) => distances.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
@@ -195,8 +195,9 @@ impl Grouper<'_> {
         };
         match *seed {
             Seed::Taxel(taxel) => {
-                let find =
-                    |(link, distances): (usize, &LinkDistances)| Some((link, distances.taxels.iter().position(|&t| t == taxel)?, None));
+                let find = |(link, distances): (usize, &LinkDistances)| {
+                    Some((link, distances.taxels.iter().position(|&t| t == taxel)?, None))
+                };
                 links.iter().enumerate().find_map(find).unwrap_or((0, 0, None))
             }
             Seed::Point(p) => {
@@ -292,8 +293,8 @@ fn from(
 ) -> Vec<f64> {
     let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, distances.points[nearest].1));
     let reached = match place {
-        Some(place) => distances.from_place(&place, nearest, limit_m),
-        None => distances.from_taxel(nearest, limit_m),
+        Some(place) => distances.near_place(&place, nearest, limit_m),
+        None => distances.near_taxel(nearest, limit_m),
     };
     reached.into_iter().map(|reach| reach.distance_m).collect()
 }

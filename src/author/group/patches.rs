@@ -34,14 +34,14 @@ impl Seeding {
         let (mut seed, limit_m) = self.farthest();
         let is_first = limit_m == f64::INFINITY;
         if is_first {
-            let from_here = distances.from_taxel_to_all(seed);
+            let from_here = distances.all_from_taxel(seed);
             let finite = |reach: &&(usize, &TaxelDistance)| reach.1.distance_m < f64::INFINITY;
             let rim = from_here.iter().enumerate();
             let rim =
                 rim.filter(|r| finite(&r)).max_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0)));
             seed = rim.map_or(seed, |(i, _)| i);
         }
-        let reached = if is_first { distances.from_taxel_to_all(seed) } else { distances.from_taxel(seed, limit_m) };
+        let reached = if is_first { distances.all_from_taxel(seed) } else { distances.near_taxel(seed, limit_m) };
         for (nearest, reach) in self.nearest_m.iter_mut().zip(&reached) {
             *nearest = nearest.min(reach.distance_m);
         }
@@ -116,7 +116,7 @@ fn assign(
     loop {
         // Another path to the same place may be longer by rounding.
         let maps: Vec<Vec<TaxelDistance>> =
-            seeds.iter().map(|&seed| distances.from_taxel(seed, limit_m * (1.0 + 1e-9))).collect();
+            seeds.iter().map(|&seed| distances.near_taxel(seed, limit_m * (1.0 + 1e-9))).collect();
         let mut patches = vec![Vec::new(); seeds.len()];
         let (mut widest_m, mut out): (f64, bool) = (0.0, false);
         for i in 0..distances.len() {

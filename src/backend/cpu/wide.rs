@@ -368,10 +368,7 @@ fn in_sixteen<S: Simd, A: Sum<S>, const K: usize>(
         }
         half /= 2;
     }
-    sums[0].map(
-        #[inline(always)]
-        |sum| sum.total(),
-    )
+    sums[0].map(A::total)
 }
 
 impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
