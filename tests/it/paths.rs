@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 
 use syn::visit::Visit;
 
+/// How often an item is handed on, at most.
+const MOST_EXPORTS: usize = 8;
+
 /// A module's path, from the crate's root.
 type Module = Vec<String>;
 
@@ -45,11 +48,15 @@ impl Paths {
         self.named.insert(module, reader.named);
     }
 
-    /// By file, the files that have an item which it uses.
-    pub fn uses(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
+    /// By file, the files that an item which it uses is of; of one that a module takes from elsewhere and hands on, the
+    /// module's with `as_handed_on`, else where it comes from.
+    pub fn uses(&self, as_handed_on: bool) -> BTreeMap<&Path, BTreeSet<&Path>> {
         let of = |(module, named): (&Module, &Vec<Named>)| {
             let own = self.files[module].as_path();
-            let used = named.iter().filter_map(|named| self.file_of(named, 0)).filter(|file| *file != own);
+            let used = named
+                .iter()
+                .filter_map(|named| self.file_of(named, if as_handed_on { MOST_EXPORTS } else { 0 }))
+                .filter(|file| *file != own);
             (own, used.collect())
         };
         self.named.iter().map(of).collect()
@@ -88,7 +95,7 @@ impl Paths {
             module.pop()?;
         }
         let export = rest.first().and_then(|name| self.exports.get(&module)?.get(name));
-        match export.filter(|_| depth < 8) {
+        match export.filter(|_| depth < MOST_EXPORTS) {
             Some(export) => self.file_of(export, depth + 1).or(self.files.get(&module).map(PathBuf::as_path)),
             None => self.files.get(&module).map(PathBuf::as_path),
         }
