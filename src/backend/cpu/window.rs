@@ -2,8 +2,7 @@
 //!
 //! Sixteen frames of a million taxels are 64 MB of pressures. Written by calibration and read again by fields, they would
 //! go to memory and back. Where fields that follow each other have taxels that do, it is enough to keep some thousands of
-//! them: fields are gone through in order, a stretch of them at a time, and the window on their taxels slides along. What comes
-//! into it next is known, and fetched meanwhile.
+//! them: fields are gone through in order, a stretch of them at a time, and the window on their taxels slides along.
 
 use std::ops::Range;
 use std::sync::Arc;
