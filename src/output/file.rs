@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
 use super::destination::{Destination, folder_of};
-use super::{OutputPath, already_exists};
+use super::path::{OutputPath, already_exists};
 use crate::error::{Error, Result};
 
 /// An output being written. A file appears when it is finished; dropped before, it leaves nothing, and an existing file

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::destination::Destination;
-use super::{OutputPath, OutputPaths};
+use super::path::{OutputPath, OutputPaths};
 use crate::error::{Error, Result};
 
 /// A folder for files with given names.

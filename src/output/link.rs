@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::Builder;
 
-use super::OutputPaths;
 use super::destination::{Identity, folder_of};
+use super::path::OutputPaths;
 use crate::error::{Error, Result};
 
 /// A symbolic link that may be made and changed.

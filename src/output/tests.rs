@@ -2,6 +2,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::*;
+use crate::error::Result;
 
 /// A folder with a file `in.csv` that holds `mine`.
 fn with_input() -> (tempfile::TempDir, PathBuf) {

@@ -1,5 +1,6 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
+mod choose_fields;
 mod curves;
 mod explain;
 mod filter;
@@ -8,10 +9,11 @@ mod members;
 mod plan;
 mod slots;
 
+pub use choose_fields::choose_fields;
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
-pub use plan::{Plan, choose_fields};
+pub use plan::Plan;
 pub(crate) use plan::{PlanField, Stages};
 
 use crate::error::{Error, Result};

@@ -1,7 +1,9 @@
 //! Notes about charts, one line for all fields with the same problem.
 
-use super::charts::POOR_DISTORTION;
 use crate::field::NoChart;
+
+/// A chart with more distortion is split, if requested, or reported.
+pub(super) const POOR_DISTORTION: f64 = 0.25;
 
 /// Problems with charts.
 #[derive(Default)]

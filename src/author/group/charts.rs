@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::chart_notes::{self, ChartNotes};
+use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
 use super::divide::numbered;
 use super::{ChartWish, FieldDraft, Grouper, Grouping, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
@@ -13,9 +13,6 @@ use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
 /// off. On a cylinder of radius R that allows θ = arccos 0.95 = 18° on each side of the middle; a point at Rθ is drawn at
 /// R sin θ, 1.7 % too near.
 pub const MAX_PLANE_DISTORTION: f64 = 0.05;
-
-/// A chart with more distortion is split, if requested, or reported.
-pub(super) const POOR_DISTORTION: f64 = 0.25;
 
 /// Minimum number of taxels in a sector of a split, for an orientation.
 const MIN_SECTOR_TAXELS: usize = 3;
