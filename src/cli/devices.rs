@@ -14,7 +14,7 @@ use super::{DONE, print};
 const EXAMPLES: &str = "\
 Examples:
   somatic devices
-  somatic devices --json | jq -r '.ports[] | select(.problem == null) | .name'
+  somatic devices --json | jq -r '.ports[] | select(.trouble == null) | .name'
 
 Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all
 the same.";
@@ -95,7 +95,7 @@ impl Found {
                 &format!("{}\n", bullet("no serial port; plug a board in, or make a virtual one with `somatic board`"));
             return text;
         }
-        let mut table = plain(["port", "what", "can be opened", "stable_path name"]);
+        let mut table = plain(["port", "what", "can be opened", "steady name"]);
         for port in &self.ports {
             let stable_path = port.stable_path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
             table.add_row([&port.name, &port.device, port.problem.as_deref().unwrap_or("yes"), &stable_path]);
@@ -110,7 +110,7 @@ impl Found {
         let ports = self
             .ports
             .iter()
-            .map(|port| json!({"name": port.name, "what": port.device, "stable_path": port.stable_path, "problem": port.problem}));
+            .map(|port| json!({"name": port.name, "what": port.device, "steady": port.stable_path, "trouble": port.problem}));
         json!({
             "cpu": self.cpu,
             "gpus": gpus.collect::<Vec<_>>(),

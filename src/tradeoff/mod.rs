@@ -1,4 +1,5 @@
-//! What each knob costs and gives, measured on a body, a recording and a machine; and the pick for a tolerance or a budget.
+//! Measures time and accuracy of each knob on a body, a recording and a machine, and selects knobs for a tolerance or a time
+//! budget.
 //!
 //! Combinations of knobs take turns, so that changes of the machine's speed affect all of them. Percepts are compared with
 //! the reference in the layout's own charts, and with the truth if the source has it.
