@@ -41,7 +41,7 @@ mod tests {
             let mut engine = Engine::new(&body, Options::default()).unwrap();
             if name == "hand" {
                 let touch = CsvSource::from_reader("touch", TOUCH, None, None).unwrap();
-                engine.listen(touch.taxels()).unwrap();
+                engine.set_channels(touch.taxels()).unwrap();
             }
         }
         assert!(body("foot").is_none());

@@ -54,7 +54,7 @@ impl Default for Options {
 /// let mut engine = somatic::Engine::new(&body, somatic::Options::default())?;
 /// let mut frame = engine.frame(0.0);
 /// frame.values.fill(somatic::RawValue::new(0.0));
-/// frame.values[engine.value_of(4).unwrap()] = somatic::RawValue::new(512.0);
+/// frame.values[engine.index_of_taxel(4).unwrap()] = somatic::RawValue::new(512.0);
 /// let percepts = engine.process_one(&frame)?;
 /// assert!(percepts.touched(0).all(|percept| percept.total == Some(512.0)));
 /// # Ok(())
@@ -179,7 +179,7 @@ impl Engine {
     ///
     /// # Errors
     /// An id that the body does not have, or one twice.
-    pub fn listen(&mut self, ids: &[u32]) -> Result<()> {
+    pub fn set_channels(&mut self, ids: &[u32]) -> Result<()> {
         let mut taken = vec![false; self.ids.len()];
         let mut taxel_of_value = Vec::with_capacity(ids.len());
         for id in ids {
@@ -194,15 +194,15 @@ impl Engine {
             }
             taxel_of_value.push(taxel);
         }
-        self.intake.listen(taxel_of_value);
+        self.intake.set_channels(taxel_of_value);
         self.pick();
         Ok(())
     }
 
     /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`crate::Flags::STALE`] beside
     /// [`crate::Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
-    pub fn heed_stale(&mut self) {
-        self.intake.heed_stale();
+    pub fn track_stale(&mut self) {
+        self.intake.track_stale();
         self.pick();
     }
 
@@ -230,7 +230,7 @@ impl Engine {
 
     /// Where the taxel with `id` stands in the values of [`Engine::frame`].
     #[must_use]
-    pub fn value_of(&self, id: u32) -> Option<usize> {
+    pub fn index_of_taxel(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
     }
 

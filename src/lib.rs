@@ -23,7 +23,7 @@
 //! // One frame: every value missing, then those that your driver has.
 //! let mut frame = engine.frame(0.0);
 //! for id in 0..9 {
-//!     frame.values[engine.value_of(id).unwrap()] = RawValue::new(f64::from(10 * id));
+//!     frame.values[engine.index_of_taxel(id).unwrap()] = RawValue::new(f64::from(10 * id));
 //! }
 //! let percepts = engine.process_one(&frame)?;
 //! for percept in percepts.touched(0) {

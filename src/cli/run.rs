@@ -135,13 +135,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         }
         None => {
             let source = input.open_lines(&ids, &asked)?;
-            engine.heed_stale();
+            engine.track_stale();
             engine.wire(source.wiring());
             let live = LineReport::new(source.lines(), summary, asked.quiet);
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
     };
-    engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+    engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if asked.backend.unwrap_or_default() == BackendKind::Auto && !asked.quiet {
         let (name, what, why) = engine.backend();
         say(&format!("backend {name} ({what}): {}", settled.why.as_deref().unwrap_or(why)));
@@ -254,7 +254,7 @@ impl Pump {
                     told.notices.iter().filter(|_| !self.view.is_table()).for_each(|notice| say(notice));
                     losses = told.losses;
                     if told.has_stale && !std::mem::replace(&mut self.heeds_stale, true) {
-                        self.engine.heed_stale();
+                        self.engine.track_stale();
                     }
                     if let Some(sum) = &mut self.agreement {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);

@@ -148,7 +148,7 @@ impl Series {
                 ..Options::default()
             };
             let mut engine = Engine::new(source.body(), options)?;
-            engine.listen(source.taxels())?;
+            engine.set_channels(source.taxels())?;
             let batch = engine.process(frames)?;
             percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
         }

@@ -187,7 +187,7 @@ impl Reader {
     }
 
     /// From now on gives what is stale as [`RawValue::STALE`], for engines that heed it
-    /// ([`crate::Engine::heed_stale`]); else it is missing.
+    /// ([`crate::Engine::track_stale`]); else it is missing.
     pub fn report_stale(&mut self) {
         self.stale = RawValue::STALE;
     }

@@ -13,7 +13,7 @@ pub struct RawValue(u32);
 impl RawValue {
     /// No value arrived.
     pub const MISSING: Self = Self(0xFFFF_FFFF);
-    /// No value arrived, as the sensor's board is silent. Only for engines that track it ([`crate::Engine::heed_stale`]);
+    /// No value arrived, as the sensor's board is silent. Only for engines that track it ([`crate::Engine::track_stale`]);
     /// others get [`RawValue::MISSING`].
     pub const STALE: Self = Self(0xFFFF_FFFE);
     /// Something arrived that is no number.

@@ -25,7 +25,7 @@ pub(crate) struct Intake {
 }
 
 impl Intake {
-    /// For the taxels of `calibration`; frames have their order until [`Intake::listen`] changes it.
+    /// For the taxels of `calibration`; frames have their order until [`Intake::set_channels`] changes it.
     pub(crate) fn new(calibration: Calibration, neighbours: Vec<Vec<u32>>, max_age_s: f64) -> Self {
         let taxels = calibration.taxels.len();
         Self {
@@ -42,7 +42,7 @@ impl Intake {
     }
 
     /// From now on, value i of a frame belongs to taxel `taxel_of_value[i]`.
-    pub(crate) fn listen(&mut self, taxel_of_value: Vec<usize>) {
+    pub(crate) fn set_channels(&mut self, taxel_of_value: Vec<usize>) {
         self.taxel_of_value = taxel_of_value;
     }
 
@@ -52,7 +52,7 @@ impl Intake {
     }
 
     /// Starts to track stale taxels.
-    pub(crate) fn heed_stale(&mut self) {
+    pub(crate) fn track_stale(&mut self) {
         self.stale = Some(Vec::new());
     }
 
@@ -201,7 +201,7 @@ mod tests {
     fn what_is_stale_is_missing_and_noted() {
         let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.0);
         assert!(intake.picks(&[0, 1]).is_some() && intake.stale().is_empty());
-        intake.heed_stale();
+        intake.track_stale();
         assert!(intake.picks(&[0, 1]).is_none());
         let mut seen = frame(0.0, &[Some(1.0), None, None]);
         seen.values[2] = RawValue::STALE;

@@ -232,7 +232,7 @@ impl ReferencePercepts {
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
         let mut engine = Engine::new(body, options)?;
-        engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
+        engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let percepts = engine.process(&played.frames)?.clone();
         let letters = engine.plan().letters().len();
         let (mut touched, mut ties) = (0, 0);
@@ -274,7 +274,7 @@ impl Trial {
         let outputs = options.scene.outputs | Outputs::CENTROID;
         let scene = Scene { knobs, outputs, ..options.scene.clone() };
         let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
-        engine.listen(&played.taxels).map_err(|e| e.at(&played.source))?;
+        engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let (times_us, errors) = (Vec::new(), ErrorSamples::default());
         Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors })
     }

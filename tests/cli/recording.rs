@@ -606,7 +606,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     // As an engine says that got the frames themselves.
     let options = somatic::Options { backend: somatic::BackendKind::Cpu, ..somatic::Options::default() };
     let mut engine = somatic::Engine::new(&body, options).unwrap();
-    engine.heed_stale();
+    engine.track_stale();
     let percepts = engine.process(&kept).unwrap();
     let replayed = frames(&done(&["run", "--source", &source(&place("a.mcap")), "--backend", "cpu", "--all-fields"]));
     assert_eq!(replayed.len(), kept.len());

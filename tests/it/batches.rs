@@ -23,7 +23,7 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
     if let Some(ids) = ids {
-        engine.listen(ids).unwrap();
+        engine.set_channels(ids).unwrap();
     }
     let mut seen = Vec::new();
     for part in frames.chunks(cut) {

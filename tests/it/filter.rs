@@ -231,7 +231,7 @@ fn over_the_bundled_touch_every_backend_agrees_and_few_choices_are_close() {
     for backend in backends() {
         let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
         let mut engine = Engine::new(&body, Options { backend, scene, batch: 64, ..Options::default() }).unwrap();
-        engine.listen(source.taxels()).unwrap();
+        engine.set_channels(source.taxels()).unwrap();
         let back = engine.plan().fields().position(|(name, _)| name == "hand/back").unwrap();
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
         assert!(agreement.holds(), "{backend:?}: {agreement}");

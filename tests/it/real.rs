@@ -26,7 +26,7 @@ fn run(body: &Body, calibration: &str, kind: BackendKind, ids: &[u32], frames: &
     let calibration = Some(Calibration::parse(calibration, &all).unwrap());
     let mut engine =
         Engine::new(body, Options { backend: kind, batch: 64, calibration, ..Options::default() }).unwrap();
-    engine.listen(ids).unwrap();
+    engine.set_channels(ids).unwrap();
     let (percepts, agreement) = engine.process_and_compare(frames).unwrap();
     (percepts.clone(), agreement)
 }
@@ -198,7 +198,7 @@ fn grasps_are_told_apart_by_how_much_the_total_rises() {
                     let calibration = Some(calibration.clone());
                     let options = Options { backend, tare: true, calibration, batch: 32, ..Options::default() };
                     let mut engine = Engine::new(&body, options).unwrap();
-                    engine.listen(&ids).unwrap();
+                    engine.set_channels(&ids).unwrap();
                     let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
                     assert!(agreement.holds(), "{agreement}");
                     let total = |frame| percepts.get(frame, field(&body, "hand")).total.unwrap();

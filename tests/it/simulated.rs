@@ -265,7 +265,7 @@ fn totals(simulation: &mut SimulatedSource, calibration: &str) -> Vec<f64> {
     let calibration = Some(Calibration::parse(calibration, simulation.taxels()).unwrap());
     let options = Options { calibration, backend: BackendKind::Reference, ..Options::default() };
     let mut engine = Engine::new(simulation.body(), options).unwrap();
-    engine.listen(simulation.taxels()).unwrap();
+    engine.set_channels(simulation.taxels()).unwrap();
     let mut frame = Frame::missing(0.0, simulation.taxels().len());
     let mut totals = Vec::new();
     while simulation.next_frame(&mut frame).unwrap() {

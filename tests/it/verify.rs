@@ -170,7 +170,7 @@ fn on_the_mat_a_tenth_as_gain_disagrees_nowhere() {
         for posture in 1..=6 {
             let (ids, frames) = read(&folder.join(format!("posture_{posture}.csv")));
             let mut engine = engine(&body, backend, "[all]\ngain = 0.1\ndead_band = 1\n", Outputs::all());
-            engine.listen(&ids).unwrap();
+            engine.set_channels(&ids).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
             check_sums(percepts, &agreement);
             sum.merge(agreement);

@@ -116,7 +116,7 @@ fn played(
         if !frames.is_empty() {
             on = format!("on the first {} of {}", count(frames.len() as u64, "frame"), input.name);
             for engine in engines {
-                engine.listen(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+                engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
             }
         }
     }
