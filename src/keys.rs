@@ -8,8 +8,8 @@ use toml::Spanned;
 
 use crate::error::{Error, Result, nearest};
 
-/// Numbers beyond this are beyond belief, whatever their unit.
-const MOST: f64 = 1e9;
+/// Larger numbers are not credible in any unit.
+const MAX_CREDIBLE: f64 = 1e9;
 
 /// A file's text, which knows on which line something stands.
 #[derive(Clone, Copy)]
@@ -72,7 +72,7 @@ impl Text<'_> {
     /// The number under `key`, if `fits` and not beyond belief.
     fn number(self, key: &str, value: &Spanned<f64>, must: &str, fits: impl Fn(f64) -> bool) -> Result<f64> {
         let number = *value.get_ref();
-        if fits(number) && number.abs() <= MOST {
+        if fits(number) && number.abs() <= MAX_CREDIBLE {
             return Ok(number);
         }
         Err(self.wrong(value.span(), format!("`{key}` is {number}; it must be {must}, and no more than 1e9 in size")))
@@ -108,7 +108,7 @@ impl Text<'_> {
     pub(crate) fn check_times(self, key: &str, span: Range<usize>, times: impl IntoIterator<Item = f64>) -> Result<()> {
         let mut before = None;
         for t_s in times {
-            if !(0.0..=MOST).contains(&t_s) {
+            if !(0.0..=MAX_CREDIBLE).contains(&t_s) {
                 return Err(self.wrong(span, format!("`{key}` has the time {t_s}; times are 0 or more, in seconds")));
             }
             if let Some(before) = before.replace(t_s).filter(|&before| t_s <= before) {

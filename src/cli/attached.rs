@@ -1,4 +1,4 @@
-//! What lies in a recording beside its frames: put in by `run`, and used where no body is named.
+//! Files attached to a recording: written by `run`, and used if no body is named.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use somatic::body::{Body, Original};
 use somatic::recording::{BODY, CALIBRATION, Reader, SCENE};
 use somatic::{Error, Result, bundled};
 
-use super::scene::Asked;
+use super::scene::RunOptions;
 
 /// The body in the recording at `path`: its name, and its bytes as `.glb`.
 ///
@@ -30,11 +30,11 @@ pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
     text.map(Some).map_err(|_| Error::failed("the attached calibration is no text").at(path.display()))
 }
 
-/// The files that a recording of this run is to hold: name, media type, bytes.
+/// The files to attach to a recording of this run: name, media type, bytes.
 ///
 /// # Errors
 /// One of them cannot be read.
-pub(super) fn files(asked: &Asked, body: &Body, scene: Option<&Path>) -> Result<Vec<(String, String, Vec<u8>)>> {
+pub(super) fn files(asked: &RunOptions, body: &Body, scene: Option<&Path>) -> Result<Vec<(String, String, Vec<u8>)>> {
     let text = |path: &Path| std::fs::read(path).map_err(|e| Error::io(path, &e));
     let recording = asked.recording()?;
     let inherited = recording.as_deref().map(self::body).transpose()?.flatten();
@@ -55,7 +55,7 @@ pub(super) fn files(asked: &Asked, body: &Body, scene: Option<&Path>) -> Result<
     Ok(files)
 }
 
-/// The body called `name`, a file or one of the bundled, as the bytes of a `.glb` that stands alone.
+/// The body `name`, a file or a bundled one, as a self-contained `.glb`.
 ///
 /// # Errors
 /// It cannot be read.
@@ -67,11 +67,11 @@ pub(super) fn body_bytes(name: &str) -> Result<Vec<u8>> {
         return Ok(bytes.to_vec());
     }
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
-    // A .glb may still have buffers in files beside it; what is put together anew has not.
+    // A .glb may refer to buffers in other files; writing it anew embeds them.
     Original::from_bytes(name, &bytes, path.parent())?.to_glb().map_err(|e| e.at(name))
 }
 
-/// The last part of a path, by which calibrations name a body.
+/// The file name of a path, by which calibrations name a body.
 pub(super) fn file_name(path: &str) -> String {
     Path::new(path).file_name().map_or_else(|| path.to_owned(), |name| name.to_string_lossy().into_owned())
 }

@@ -1,4 +1,4 @@
-//! A bar that fills while somebody waits at a terminal.
+//! A progress bar at a terminal.
 
 use std::time::{Duration, Instant};
 
@@ -7,41 +7,41 @@ use console::Term;
 use super::screen::Screen;
 use super::words::span;
 
-/// Before this long there is nothing to wait for.
-const PATIENCE: Duration = Duration::from_secs(1);
-const BETWEEN_DRAWINGS: Duration = Duration::from_millis(100);
+/// Shorter work shows no bar.
+const SHOW_AFTER: Duration = Duration::from_secs(1);
+const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
 const WIDTH: usize = 40;
 
-/// The bar, not drawn before it is worth it, and gone when it is dropped.
+/// A progress bar, cleared when dropped.
 pub(super) struct Bar {
     doing: &'static str,
     screen: Option<Screen>,
     next: Instant,
     begun: Instant,
-    /// What is said of the time that is left.
+    /// The remaining time in words.
     left: Option<String>,
 }
 
 impl Bar {
-    /// A bar for what is said to be `doing`, from now on.
+    /// Starts a bar labelled `doing`.
     pub(super) fn new(doing: &'static str) -> Self {
         let now = Instant::now();
-        Self { doing, screen: None, next: now + PATIENCE, begun: now, left: None }
+        Self { doing, screen: None, next: now + SHOW_AFTER, begun: now, left: None }
     }
 
-    /// The same, with the time that is left at this pace.
+    /// As [`Self::show`], with the remaining time.
     pub(super) fn show_with_time_left(&mut self, share: f64) {
         let took = self.begun.elapsed().as_secs_f64();
         self.left = (share > 0.02).then(|| format!(", {} left", span(took * (1.0 - share) / share)));
         self.show(share);
     }
 
-    /// Shows that `share` is done, if standard error is a terminal and it is time to draw.
+    /// Shows that `share` is done, if standard error is a terminal and a redraw is due.
     pub(super) fn show(&mut self, share: f64) {
         if Instant::now() < self.next {
             return;
         }
-        self.next = Instant::now() + BETWEEN_DRAWINGS;
+        self.next = Instant::now() + REDRAW_INTERVAL;
         let term = Term::stderr();
         if !term.is_term() {
             return;

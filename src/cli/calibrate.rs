@@ -11,7 +11,7 @@ use somatic::source::{Lines, Source, SourceSpec};
 use somatic::survey::{Findings, Found, Survey, Wishes};
 use somatic::{Body, Calibration, Error, Result};
 
-use super::feed::{Arrival, Feed, Manner};
+use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::plot::Plot;
 use super::ports::LineFlags;
@@ -176,7 +176,7 @@ fn gather(
     let stop = stop_on_signal()?;
     let mut feed = match lines {
         Some(_) => Feed::start_live(source, 64),
-        None => Feed::start(source, Manner { most: 64, gather: !is_live, speed: None }),
+        None => Feed::start(source, ReadMode { most: 64, gather: !is_live, speed: None }),
     };
     let guide = |what: &str| {
         if is_live {

@@ -74,7 +74,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
     let mut source = from.open(&[], arguments.rate)?;
-    source.tell_stale();
+    source.report_stale();
     let attached = files(arguments, &from)?;
     let mut target = match &to {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {

@@ -1,4 +1,4 @@
-//! `somatic devices`: what there is to compute on and to read from, and what is missing.
+//! `somatic devices`: the GPUs and serial ports, and what is missing.
 
 use std::thread::available_parallelism;
 
@@ -14,7 +14,7 @@ use super::{DONE, print};
 const EXAMPLES: &str = "\
 Examples:
   somatic devices
-  somatic devices --json | jq -r '.ports[] | select(.problem == null) | .name'
+  somatic devices --json | jq -r '.ports[] | select(.trouble == null) | .name'
 
 Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all
 the same.";
@@ -29,24 +29,24 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn devices(arguments: &Arguments) -> Result<u8> {
-    let found = Found { cpu: somatic::backend::processor(), gpus: gpus(), ports: serial_ports()? };
+    let found = Devices { cpu: somatic::backend::processor(), gpus: gpus(), ports: serial_ports()? };
     print(&if arguments.json { format!("{:#}\n", found.json()) } else { found.text() })?;
     Ok(DONE)
 }
 
 /// What this machine has.
-struct Found {
+struct Devices {
     cpu: String,
     gpus: Gpus,
     ports: Vec<PortSummary>,
 }
 
-/// The GPUs, as far as they matter here.
+/// GPUs, and what is missing.
 #[derive(Default)]
 struct Gpus {
-    /// Name, kind, API and driver of each, and why it does not serve.
-    answering: Vec<([String; 4], Option<String>)>,
-    /// What is missing, each with its remedy.
+    /// Name, kind, API and driver of each, and why it cannot be used.
+    adapters: Vec<([String; 4], Option<String>)>,
+    /// What is missing, with the remedy.
     missing: Vec<String>,
 }
 
@@ -65,8 +65,8 @@ fn gpus() -> Gpus {
                 .to_owned(),
         );
     }
-    let answering = adapters.into_iter().map(|gpu| ([gpu.name, gpu.kind.to_owned(), gpu.api, gpu.driver], gpu.unfit));
-    Gpus { answering: answering.collect(), missing }
+    let adapters = adapters.into_iter().map(|gpu| ([gpu.name, gpu.kind.to_owned(), gpu.api, gpu.driver], gpu.unfit));
+    Gpus { adapters: adapters.collect(), missing }
 }
 
 #[cfg(not(feature = "gpu"))]
@@ -74,13 +74,13 @@ fn gpus() -> Gpus {
     Gpus { missing: vec!["this build has no GPU backend; build with feature gpu".to_owned()], ..Gpus::default() }
 }
 
-impl Found {
+impl Devices {
     fn text(&self) -> String {
         let cores = available_parallelism().map_or(1, usize::from);
         let mut text = format!("cpu     {}, {}\n\n", self.cpu, count(cores as u64, "core"));
-        if !self.gpus.answering.is_empty() {
+        if !self.gpus.adapters.is_empty() {
             let mut table = plain(["gpu", "kind", "through", "driver", "backend gpu"]);
-            for ([name, kind, api, driver], unfit) in &self.gpus.answering {
+            for ([name, kind, api, driver], unfit) in &self.gpus.adapters {
                 let serves = unfit.as_ref().map_or_else(|| "runs".to_owned(), |why| format!("does not run: {why}"));
                 table.add_row([name, kind, api, driver, &serves]);
             }
@@ -95,7 +95,7 @@ impl Found {
                 &format!("{}\n", bullet("no serial port; plug a board in, or make a virtual one with `somatic board`"));
             return text;
         }
-        let mut table = plain(["port", "what", "can be opened", "stable_path name"]);
+        let mut table = plain(["port", "what", "can be opened", "steady name"]);
         for port in &self.ports {
             let stable_path = port.stable_path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
             table.add_row([&port.name, &port.device, port.problem.as_deref().unwrap_or("yes"), &stable_path]);
@@ -104,13 +104,12 @@ impl Found {
     }
 
     fn json(&self) -> Value {
-        let gpus = self.gpus.answering.iter().map(|([name, kind, api, driver], unfit)| {
+        let gpus = self.gpus.adapters.iter().map(|([name, kind, api, driver], unfit)| {
             json!({"name": name, "kind": kind, "api": api, "driver": driver, "unfit": unfit})
         });
-        let ports = self
-            .ports
-            .iter()
-            .map(|port| json!({"name": port.name, "what": port.device, "stable_path": port.stable_path, "problem": port.problem}));
+        let ports = self.ports.iter().map(
+            |port| json!({"name": port.name, "what": port.device, "steady": port.stable_path, "trouble": port.problem}),
+        );
         json!({
             "cpu": self.cpu,
             "gpus": gpus.collect::<Vec<_>>(),

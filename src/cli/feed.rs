@@ -1,4 +1,4 @@
-//! A source on a thread of its own, so that a read that blocks holds up neither the table nor a clean end.
+//! Reads a source on its own thread, so that a blocked read holds up neither the table nor a clean end.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::thread;
@@ -7,39 +7,39 @@ use std::time::{Duration, Instant};
 use somatic::source::Source;
 use somatic::{Error, Frame};
 
-/// What comes from a source.
+/// What a source delivers.
 pub(super) enum Arrival {
-    /// The next frames, and what is known of them.
-    Frames(Vec<Frame>, Told),
-    /// There is no more; what was lost on the way.
+    /// The next frames, and information on them.
+    Frames(Vec<Frame>, FrameInfo),
+    /// The end; a line per kind of loss.
     End(Vec<String>),
-    /// It cannot go on.
+    /// Reading failed.
     Failed(Error),
 }
 
-/// What a source tells of frames beside them.
+/// Information on frames.
 #[derive(Debug, Default)]
-pub(super) struct Told {
-    /// How much of the whole has been read, where that is known.
+pub(super) struct FrameInfo {
+    /// The share of the source that has been read, if known.
     pub(super) progress: Option<f64>,
-    /// When the last byte of each was read, of those of which that is known.
+    /// When the last byte of each frame was read, if known.
     pub(super) read_at: Vec<Instant>,
-    /// Whether anything so far is stale.
+    /// Whether any value so far was stale.
     pub(super) has_stale: bool,
-    /// What is to be said of them.
+    /// Messages for the user.
     pub(super) notices: Vec<String>,
-    /// What has been lost so far, where that is asked for.
+    /// What has been lost so far, if requested.
     pub(super) losses: Vec<String>,
 }
 
-/// How frames are to come.
+/// How frames are read and passed on.
 #[derive(Clone, Copy)]
-pub(super) struct Manner {
-    /// Frames at once, at most.
+pub(super) struct ReadMode {
+    /// Maximum number of frames per arrival.
     pub(super) most: usize,
-    /// Wait until there are so many; else take those that are there.
+    /// Wait for `most` frames; else pass on those that are there.
     pub(super) gather: bool,
-    /// As fast as they were recorded, times this.
+    /// Playback at this many times the recorded speed; `None` is as fast as possible.
     pub(super) speed: Option<f64>,
 }
 
@@ -53,28 +53,28 @@ pub(super) struct Feed {
 
 impl Feed {
     /// Starts to read `source`.
-    pub(super) fn start(source: Box<dyn Source + Send>, manner: Manner) -> Self {
-        Self::holding(source, manner, if manner.gather { 4 } else { 1024 }, true)
+    pub(super) fn start(source: Box<dyn Source + Send>, mode: ReadMode) -> Self {
+        Self::with_queue(source, mode, if mode.gather { 4 } else { 1024 }, true)
     }
 
-    /// Starts to read `source`, which itself drops and tells what is not taken in time, at most so many frames at once.
+    /// Starts to read `source`, which itself drops and reports late frames, at most `most` frames at once.
     pub(super) fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
-        Self::holding(source, Manner { most, gather: false, speed: None }, 1, false)
+        Self::with_queue(source, ReadMode { most, gather: false, speed: None }, 1, false)
     }
 
-    /// Starts to read `source`, of which so many arrivals may wait, with what it lost up to each if that is asked for.
-    fn holding(mut source: Box<dyn Source + Send>, manner: Manner, waiting: usize, with_losses: bool) -> Self {
-        let (sender, arrivals) = sync_channel(waiting);
+    /// Starts to read `source`; up to `queue_length` arrivals wait, with the losses so far if requested.
+    fn with_queue(mut source: Box<dyn Source + Send>, mode: ReadMode, queue_length: usize, with_losses: bool) -> Self {
+        let (sender, arrivals) = sync_channel(queue_length);
         let (spare, used) = channel();
         thread::spawn(move || {
-            let end = read(&mut *source, manner, with_losses, &sender, &used);
-            // Nobody hears it when the command has ended already.
+            let end = read(&mut *source, mode, with_losses, &sender, &used);
+            // The command may have ended already.
             let _ = sender.send(end);
         });
-        Self { arrivals, spare, next: None, most: manner.most }
+        Self { arrivals, spare, next: None, most: mode.most }
     }
 
-    /// What comes next, if it does so within `wait`.
+    /// The next arrival, if it comes within `wait`.
     pub(super) fn next(&mut self, wait: Duration) -> Option<Arrival> {
         let first = match self.next.take() {
             Some(arrival) => arrival,
@@ -84,16 +84,16 @@ impl Feed {
                 Err(RecvTimeoutError::Disconnected) => Arrival::Failed(Error::failed("the source broke down")),
             },
         };
-        let Arrival::Frames(mut frames, mut told) = first else { return Some(first) };
+        let Arrival::Frames(mut frames, mut info) = first else { return Some(first) };
         while frames.len() < self.most {
             match self.arrivals.try_recv() {
                 Ok(Arrival::Frames(more, further)) => {
                     frames.extend(more);
-                    told.progress = further.progress;
-                    told.read_at.extend(further.read_at);
-                    told.has_stale |= further.has_stale;
-                    told.notices.extend(further.notices);
-                    told.losses = further.losses;
+                    info.progress = further.progress;
+                    info.read_at.extend(further.read_at);
+                    info.has_stale |= further.has_stale;
+                    info.notices.extend(further.notices);
+                    info.losses = further.losses;
                 }
                 Ok(other) => {
                     self.next = Some(other);
@@ -102,38 +102,38 @@ impl Feed {
                 Err(_) => break,
             }
         }
-        Some(Arrival::Frames(frames, told))
+        Some(Arrival::Frames(frames, info))
     }
 
-    /// Takes back frames whose memory can be used again.
+    /// Takes back frames to reuse their memory.
     pub(super) fn give_back(&self, frames: Vec<Frame>) {
         let _ = self.spare.send(frames);
     }
 }
 
-/// Reads all of `source`; what it returns is how that ended.
+/// Reads all of `source`; returns how it ended.
 fn read(
     source: &mut dyn Source,
-    manner: Manner,
+    mode: ReadMode,
     with_losses: bool,
     to: &SyncSender<Arrival>,
     used: &Receiver<Vec<Frame>>,
 ) -> Arrival {
-    let together = if manner.gather { manner.most } else { 1 };
+    let together = if mode.gather { mode.most } else { 1 };
     let width = source.taxels().len();
     let mut pool: Vec<Frame> = Vec::new();
-    let mut clock = manner.speed.map(Clock::new);
+    let mut clock = mode.speed.map(Clock::new);
     loop {
         pool.extend(used.try_iter().flatten());
         let mut frames = Vec::with_capacity(together);
-        let mut told = Told::default();
+        let mut info = FrameInfo::default();
         let mut end = None;
         while frames.len() < together && end.is_none() {
             let mut frame = pool.pop().unwrap_or_else(|| Frame::missing(0.0, width));
             match source.next_frame(&mut frame) {
                 Ok(true) => {
                     frames.push(frame);
-                    told.read_at.extend(source.read_at());
+                    info.read_at.extend(source.read_at());
                 }
                 Ok(false) => end = Some(Arrival::End(source.losses())),
                 Err(e) => end = Some(Arrival::Failed(e)),
@@ -142,12 +142,12 @@ fn read(
         if let (Some(clock), Some(frame)) = (&mut clock, frames.first()) {
             thread::sleep(clock.until(frame.t_s));
         }
-        (told.progress, told.has_stale) = (source.progress(), source.has_stale());
-        told.notices = source.notices();
+        (info.progress, info.has_stale) = (source.progress(), source.has_stale());
+        info.notices = source.notices();
         if with_losses {
-            told.losses = source.losses();
+            info.losses = source.losses();
         }
-        if !frames.is_empty() && to.send(Arrival::Frames(frames, told)).is_err() {
+        if !frames.is_empty() && to.send(Arrival::Frames(frames, info)).is_err() {
             return Arrival::End(Vec::new());
         }
         if let Some(end) = end {
@@ -156,7 +156,7 @@ fn read(
     }
 }
 
-/// When a recorded time is due.
+/// Maps recorded time to real time.
 struct Clock {
     speed: f64,
     start: Option<(Instant, f64)>,
@@ -168,7 +168,7 @@ impl Clock {
         Self { speed, start: None, last_s: 0.0 }
     }
 
-    /// How long it is until `t_s` is due. Where recorded time goes back, it starts anew.
+    /// The time until `t_s` is due. Restarts where recorded time goes back.
     fn until(&mut self, t_s: f64) -> Duration {
         if t_s < self.last_s {
             self.start = None;
@@ -187,14 +187,14 @@ mod tests {
 
     const ROWS: &str = "t,4\n0,1\n1,2\n2,3\n3,4\n4,oops\n";
 
-    fn feed(manner: Manner) -> Feed {
-        Feed::start(Box::new(CsvSource::from_reader("a", ROWS.as_bytes(), None, None).unwrap()), manner)
+    fn feed(mode: ReadMode) -> Feed {
+        Feed::start(Box::new(CsvSource::from_reader("a", ROWS.as_bytes(), None, None).unwrap()), mode)
     }
 
     #[test]
     fn frames_come_as_asked_for_and_then_what_went_wrong() {
         for (most, gather) in [(1, false), (3, false), (3, true), (99, true)] {
-            let mut feed = feed(Manner { most, gather, speed: None });
+            let mut feed = feed(ReadMode { most, gather, speed: None });
             let mut times = Vec::new();
             let error = loop {
                 match feed.next(Duration::from_secs(20)) {

@@ -6,7 +6,7 @@ use somatic::Body;
 use somatic::output::OutputPaths;
 use somatic::source::{SimulatedSource, SourceSpec};
 
-use super::scene::Asked;
+use super::scene::RunOptions;
 
 /// Files that a command reads, whether they are there or not.
 #[derive(Default)]
@@ -14,7 +14,7 @@ pub(super) struct FilesRead(Vec<PathBuf>);
 
 impl FilesRead {
     /// Those of `asked`, by flags or by the scene file at `scene`.
-    pub(super) fn of(asked: &Asked, scene: Option<&Path>) -> Self {
+    pub(super) fn of(asked: &RunOptions, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
     }
@@ -24,12 +24,12 @@ impl FilesRead {
         self
     }
 
-    /// Bodies, with what lies beside them.
+    /// Bodies, with the files they refer to.
     pub(super) fn bodies<'a>(self, names: impl IntoIterator<Item = &'a String>) -> Self {
         self.files(names.into_iter().flat_map(Body::files))
     }
 
-    /// What `sources` are read from; one that is none is found out when it is opened.
+    /// The files of `sources`; an invalid source is reported when it is opened.
     pub(super) fn sources(self, sources: &[String]) -> Self {
         sources.iter().filter_map(|source| source.parse().ok()).fold(self, |files, source| match source {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) => files.files([path]),
@@ -39,7 +39,7 @@ impl FilesRead {
         })
     }
 
-    /// What is asked for every output of the command.
+    /// Checks for every output of the command.
     pub(super) fn outputs(self, force: bool) -> OutputPaths {
         OutputPaths::new(force, self.0)
     }

@@ -1,10 +1,10 @@
-//! What frames are read from.
+//! The input of a run.
 
 use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, Source, SourceSpec};
 use somatic::{Error, Result, bundled};
 
 use super::check_body_name;
-use super::scene::Asked;
+use super::scene::RunOptions;
 
 /// A source, or the bundled touch.
 pub(super) struct Input {
@@ -12,18 +12,18 @@ pub(super) struct Input {
     pub(super) name: String,
     /// `None` is the bundled touch.
     pub(super) spec: Option<SourceSpec>,
-    /// The serial lines, each with its speed in baud where one is given; empty for what is no serial line.
+    /// The serial lines with their baud rates, if given; empty for other sources.
     pub(super) lines: Vec<(String, Option<u32>)>,
 }
 
 impl Input {
-    /// What is read for `asked`, if anything is: a plan can be made without.
-    pub(super) fn named_or_none(asked: &Asked) -> Result<Option<Self>> {
+    /// The input for `asked`, if any: a plan needs none.
+    pub(super) fn named_or_none(asked: &RunOptions) -> Result<Option<Self>> {
         let nothing = asked.sources.is_empty() && !matches!(asked.body.as_deref(), None | Some("hand"));
         if nothing { Ok(None) } else { Self::named(asked).map(Some) }
     }
 
-    pub(super) fn named(asked: &Asked) -> Result<Self> {
+    pub(super) fn named(asked: &RunOptions) -> Result<Self> {
         let Some(text) = asked.sources.first() else {
             return match asked.body.as_deref() {
                 None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new() }),
@@ -63,7 +63,7 @@ impl Input {
         self.spec.is_none()
     }
 
-    /// Whether its frames may hold any of the body's taxels: no header says which.
+    /// Whether its frames may hold any taxel of the body, as no header names them.
     pub(super) fn holds_any(&self) -> bool {
         self.spec == Some(SourceSpec::Stdin)
     }
@@ -76,7 +76,7 @@ impl Input {
         self.spec == Some(SourceSpec::Stdin)
     }
 
-    /// Which recording it is: the file's place, length and last change. `None` for what is live, and never twice the same.
+    /// Identifies the recording: path, length and modification time. `None` for live input.
     pub(super) fn recording(&self) -> Option<String> {
         let Some(spec) = &self.spec else { return Some(self.name.clone()) };
         let (SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path)) = spec else { return None };
@@ -90,15 +90,15 @@ impl Input {
     }
 
     /// Opens the serial lines.
-    pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<SerialSource> {
+    pub(super) fn open_lines(&self, ids: &[u32], asked: &RunOptions) -> Result<SerialSource> {
         asked.line_flags().open(&self.lines, ids, asked.max_age)
     }
 
-    /// Opens it, or the part of it that is asked for, for a body whose taxels have `ids`.
+    /// Opens it, or the requested part, for a body whose taxels have `ids`.
     ///
     /// # Errors
-    /// It cannot be opened; there is no such part.
-    pub(super) fn open(&self, ids: &[u32], asked: &Asked) -> Result<Box<dyn Source + Send>> {
+    /// It cannot be opened, or the part does not exist.
+    pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
         let cut = Cut {
             from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),
             to_s: asked.to.unwrap_or(Cut::WHOLE.to_s),

@@ -46,7 +46,7 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     let odd = lint(&body, &fields);
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);
-    let seen = Seen { body, fields, coverage, findings, odd };
+    let seen = Inspection { body, fields, coverage, findings, odd };
     print(&match arguments.json {
         true => json::text(&seen),
         false => report::text(&seen),
@@ -54,13 +54,13 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     Ok(if arguments.strict && !seen.findings.is_empty() { FAILED } else { DONE })
 }
 
-/// Everything that is looked at.
-struct Seen {
+/// What is reported about a body.
+struct Inspection {
     body: Body,
     fields: Vec<Field>,
     coverage: Coverage,
-    /// A line each, those of reading first.
+    /// A line each; those of reading first.
     findings: Vec<String>,
-    /// Those of the lint, with what they count.
+    /// Findings of the lint.
     odd: Vec<Finding>,
 }

@@ -1,4 +1,4 @@
-//! What a person is told of serial lines while they are read, and in the end.
+//! Messages on serial lines while they are read, and at the end.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -14,31 +14,31 @@ use super::repeats::Repeats;
 use super::say;
 use super::words::count;
 
-/// What was said last stays below the table.
-const REMEMBERED: usize = 3;
-/// More boards than this have one row together.
-const MOST_ROWS: usize = 6;
+/// Number of messages shown below the table.
+const LATEST_MESSAGES: usize = 3;
+/// More boards than this share one row.
+const MAX_BOARD_ROWS: usize = 6;
 
-/// Something that was said, to stand below the table.
+/// A message shown below the table.
 struct Latest {
     text: String,
-    /// With when it came, and how often.
+    /// With its time and count.
     told: String,
 }
 
-/// Serial lines while they are read.
-pub(super) struct Live {
+/// Collects and shows the messages of serial lines.
+pub(super) struct LineReport {
     lines: Lines,
     latency: Latency,
     repeats: Repeats,
-    /// Said while a table stood there.
+    /// Messages that came while a table was shown.
     kept: Vec<String>,
     latest: VecDeque<Latest>,
     summary: Option<OutputPath>,
     quiet: bool,
 }
 
-impl Live {
+impl LineReport {
     pub(super) fn new(lines: Lines, summary: Option<OutputPath>, quiet: bool) -> Self {
         Self {
             lines,
@@ -51,12 +51,12 @@ impl Live {
         }
     }
 
-    /// The percepts of frames whose last bytes were read then have been written.
+    /// Notes that the percepts of frames read at these times have been written.
     pub(super) fn see(&mut self, read_at: &[Instant]) {
         read_at.iter().for_each(|read_at| self.latency.see(read_at.elapsed()));
     }
 
-    /// Says what is to be said of the lines; below the table and after it, where one stands there.
+    /// Shows new messages; with a table, below it and again at the end.
     pub(super) fn tell(&mut self, at_table: bool) {
         for notice in self.lines.notices() {
             let Some(told) = self.repeats.tell(notice.at_s, &notice.text) else { continue };
@@ -64,7 +64,7 @@ impl Live {
                 say(&told);
                 continue;
             }
-            if self.latest.len() == REMEMBERED {
+            if self.latest.len() == LATEST_MESSAGES {
                 self.latest.pop_front();
             }
             self.latest.push_back(Latest { text: notice.text, told: told.clone() });
@@ -79,7 +79,7 @@ impl Live {
     pub(super) fn rows(&self) -> Vec<String> {
         let accounts = self.lines.accounts();
         let mut rows = Vec::new();
-        if accounts.len() <= MOST_ROWS {
+        if accounts.len() <= MAX_BOARD_ROWS {
             rows.extend(accounts.iter().map(|account| {
                 let text = format!("  board {}: {}, {}", account.board, account.state.word(), told(account));
                 if account.state == BoardState::Speaking { text } else { style(text).yellow().to_string() }

@@ -13,22 +13,22 @@ mod columns;
 use columns::Scale;
 
 /// Between two drawings: as fast as reading needs, slow enough not to flicker.
-const REDRAW: Duration = Duration::from_millis(66);
+const REDRAW_INTERVAL: Duration = Duration::from_millis(66);
 /// How long a field that is no longer touched stays readable.
-const FADE: Duration = Duration::from_millis(700);
+const FADE_TIME: Duration = Duration::from_millis(700);
 /// Fields that a summary lists.
-const MOST_IN_SUMMARY: usize = 40;
+const MAX_SUMMARY_ROWS: usize = 40;
 
 /// Which view a run gets.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Choice {
+pub(super) enum ViewKind {
     Table,
     Bar,
     Nothing,
 }
 
-/// What a view says about a run.
-pub(super) struct About<'a> {
+/// What a view shows about a run.
+pub(super) struct RunInfo<'a> {
     pub(super) engine: &'a Engine,
     pub(super) body: &'a str,
     pub(super) source: &'a str,
@@ -39,24 +39,24 @@ pub(super) struct About<'a> {
 pub(super) struct View {
     screen: Option<Screen>,
     table: Option<Table>,
-    pace: Pace,
+    pace: Progress,
     drawn: Option<Instant>,
-    /// What stands below the table.
+    /// Lines below the table.
     footer: Vec<String>,
 }
 
 impl View {
     /// A table where standard output is a terminal and free, a bar where only standard error is one, for recordings.
-    pub(super) fn choose(quiet: bool, stdout_taken: bool, recording: bool) -> Choice {
+    pub(super) fn choose(quiet: bool, stdout_taken: bool, recording: bool) -> ViewKind {
         let (out, err) = (Term::stdout(), Term::stderr());
         if quiet || console::is_dumb() {
-            Choice::Nothing
+            ViewKind::Nothing
         } else if out.is_term() {
-            if stdout_taken { Choice::Nothing } else { Choice::Table }
+            if stdout_taken { ViewKind::Nothing } else { ViewKind::Table }
         } else if err.is_term() && recording {
-            Choice::Bar
+            ViewKind::Bar
         } else {
-            Choice::Nothing
+            ViewKind::Nothing
         }
     }
 
@@ -73,7 +73,7 @@ impl View {
     }
 
     fn is_due(&self) -> bool {
-        self.screen.is_some() && self.drawn.is_none_or(|drawn| drawn.elapsed() >= REDRAW)
+        self.screen.is_some() && self.drawn.is_none_or(|drawn| drawn.elapsed() >= REDRAW_INTERVAL)
     }
 
     /// Puts `lines` below the table, if it is time to draw.
@@ -116,12 +116,12 @@ impl View {
     }
 }
 
-impl Choice {
+impl ViewKind {
     pub(super) fn is_table(self) -> bool {
         self == Self::Table
     }
 
-    pub(super) fn open(self, about: &About<'_>) -> View {
+    pub(super) fn open(self, about: &RunInfo<'_>) -> View {
         let term = match self {
             Self::Table => Some(Term::stdout()),
             Self::Bar => Some(Term::stderr()),
@@ -130,15 +130,15 @@ impl Choice {
         View {
             screen: term.map(Screen::new),
             table: self.is_table().then(|| Table::new(about)),
-            pace: Pace::new(self == Self::Bar),
+            pace: Progress::new(self == Self::Bar),
             drawn: None,
             footer: Vec::new(),
         }
     }
 }
 
-/// How far it is and how fast it goes.
-struct Pace {
+/// Progress and rate.
+struct Progress {
     on_stderr: bool,
     started: Instant,
     frames: u64,
@@ -149,7 +149,7 @@ struct Pace {
     rate: Option<f64>,
 }
 
-impl Pace {
+impl Progress {
     fn new(on_stderr: bool) -> Self {
         let now = Instant::now();
         let (frames, first_s, last_s, progress, rate) = (0, None, 0.0, None, None);
@@ -196,8 +196,8 @@ impl Pace {
     }
 }
 
-/// A field, as far as it was seen.
-struct Row {
+/// The state of a field.
+struct FieldRow {
     name: String,
     latest: Option<Percept>,
     touches: usize,
@@ -211,7 +211,7 @@ struct Table {
     backend: String,
     outputs: Outputs,
     all_fields: bool,
-    rows: Vec<Row>,
+    rows: Vec<FieldRow>,
     largest_total: f64,
     in_world: bool,
     /// Rows shown at most so far: the table grows and does not shrink, or what is below would jump.
@@ -219,10 +219,10 @@ struct Table {
 }
 
 impl Table {
-    fn new(about: &About<'_>) -> Self {
+    fn new(about: &RunInfo<'_>) -> Self {
         let (name, what, _) = about.engine.backend();
         let plan = about.engine.plan();
-        let row = |field: usize| Row {
+        let row = |field: usize| FieldRow {
             name: plan.label(field),
             latest: None,
             touches: 0,
@@ -271,7 +271,7 @@ impl Table {
         }
     }
 
-    fn lines(&mut self, lines: &mut Vec<String>, pace: &Pace, rows: usize, columns: usize) {
+    fn lines(&mut self, lines: &mut Vec<String>, pace: &Progress, rows: usize, columns: usize) {
         let rate = pace.rate.map_or(String::new(), |rate| format!("   {} frames/s", number_of_frames(rate)));
         let head = format!("t {:.2} s   {}{rate}", pace.last_s, count(pace.frames, "frame"));
         let wide = |text: &str| console::measure_text_width(text);
@@ -283,8 +283,8 @@ impl Table {
         if rows >= 8 && wide(&self.title) + 2 <= columns {
             lines.insert(0, format!("  {}", style(&self.title).bold()));
         }
-        let shown = |row: &&Row| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE);
-        let visible: Vec<&Row> = self.rows.iter().filter(shown).collect();
+        let shown = |row: &&FieldRow| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE_TIME);
+        let visible: Vec<&FieldRow> = self.rows.iter().filter(shown).collect();
         let longest = self.rows.iter().map(|row| wide(&row.name)).max().unwrap_or(0);
         let layout = columns::Layout::new(longest, self.outputs, self.in_world, columns.saturating_sub(2));
         lines.push(format!("  {}", style(layout.headings()).dim()));
@@ -305,7 +305,7 @@ impl Table {
         lines.resize(self.tallest.max(lines.len()), String::new());
     }
 
-    fn summary(&self, pace: &Pace) -> String {
+    fn summary(&self, pace: &Progress) -> String {
         let seconds = pace.started.elapsed().as_secs_f64();
         let length = pace.first_s.map_or(0.0, |first| pace.last_s - first);
         let mut text = format!(
@@ -316,7 +316,7 @@ impl Table {
             number_of_frames(pace.frames as f64 / seconds.max(1e-9)),
             self.backend
         );
-        let touched: Vec<&Row> = self.rows.iter().filter(|row| row.frames_touched > 0).collect();
+        let touched: Vec<&FieldRow> = self.rows.iter().filter(|row| row.frames_touched > 0).collect();
         if touched.is_empty() {
             return text + &format!("none of {} was touched\n", count(self.rows.len() as u64, "field"));
         }
@@ -325,7 +325,7 @@ impl Table {
         let width = longest.max(5).min(columns.saturating_sub(42)).max(8);
         let head = format!("{}  frames touched  largest total      at", fitted("field", width, false));
         text += &format!("\n{}\n", style(clipped(&head, columns)).dim());
-        for row in touched.iter().take(MOST_IN_SUMMARY) {
+        for row in touched.iter().take(MAX_SUMMARY_ROWS) {
             let share = 100.0 * row.frames_touched as f64 / pace.frames as f64;
             text += &format!("{}  {:>8} {share:>3.0} %", fitted(&row.name, width, false), row.frames_touched);
             if let Some((total, at)) = row.largest {
@@ -333,7 +333,7 @@ impl Table {
             }
             text += "\n";
         }
-        let more = touched.len().saturating_sub(MOST_IN_SUMMARY);
+        let more = touched.len().saturating_sub(MAX_SUMMARY_ROWS);
         if more > 0 {
             text += &format!("… and {more} more\n");
         }

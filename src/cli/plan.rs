@@ -12,7 +12,7 @@ use somatic::{Error, Result};
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
 use super::input::Input;
-use super::scene::{Asked, grouped};
+use super::scene::{RunOptions, grouped};
 use super::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: Asked,
+    asked: RunOptions,
 
     /// Print JSON: bytes of a frame, times of a frame in µs.
     #[arg(long)]
@@ -47,7 +47,7 @@ pub(super) struct Arguments {
 
 pub(super) fn plan(arguments: &Arguments) -> Result<u8> {
     if arguments.schema {
-        let schema = serde_json::to_string_pretty(&schemars::schema_for!(Asked));
+        let schema = serde_json::to_string_pretty(&schemars::schema_for!(RunOptions));
         print(&(schema.map_err(|e| Error::failed(e.to_string()))? + "\n"))?;
         return Ok(DONE);
     }

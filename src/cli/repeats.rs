@@ -1,32 +1,32 @@
-//! Messages that come again and again: told once, then with their count at growing intervals, and in the end.
+//! Repeated messages: shown once, then with their count at growing intervals, and at the end.
 
 use std::collections::BTreeMap;
 
-/// What has come before is told again after so long at the earliest, s; after that, twice as long each time.
+/// Time until a message is shown again, s; doubles each time.
 const FIRST_WAIT_S: f64 = 10.0;
-/// The longest wait, s.
+/// Maximum of that time, s.
 const LONGEST_WAIT_S: f64 = 640.0;
 
-/// A message that has come.
-struct Told {
+/// A message, and how often it came and was shown.
+struct Repeated {
     times: u64,
-    /// The first so many of which have been told.
+    /// How many of these the user knows of.
     told: u64,
     told_at_s: f64,
     wait_s: f64,
 }
 
-/// What has been told so far.
+/// The messages so far.
 #[derive(Default)]
 pub(super) struct Repeats {
-    messages: BTreeMap<String, Told>,
+    messages: BTreeMap<String, Repeated>,
 }
 
 impl Repeats {
-    /// What is to be told now that `text` has come at `at_s`, if anything is.
+    /// The line to show now that `text` came at `at_s`, if any.
     pub(super) fn tell(&mut self, at_s: f64, text: &str) -> Option<String> {
         let Some(told) = self.messages.get_mut(text) else {
-            let first = Told { times: 1, told: 1, told_at_s: at_s, wait_s: FIRST_WAIT_S };
+            let first = Repeated { times: 1, told: 1, told_at_s: at_s, wait_s: FIRST_WAIT_S };
             self.messages.insert(text.to_owned(), first);
             return Some(timed(at_s, text));
         };
@@ -39,7 +39,7 @@ impl Repeats {
         Some(format!("{} ({} times so far)", timed(at_s, text), told.times))
     }
 
-    /// What has come more often than was told.
+    /// The final counts of messages that came more often than was shown.
     pub(super) fn rest(&self) -> impl Iterator<Item = String> + '_ {
         let untold = self.messages.iter().filter(|(_, told)| told.times > told.told);
         untold.map(|(text, told)| format!("{text}: {} times in all", told.times))

@@ -8,21 +8,21 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use console::Term;
 use somatic::signal::Unfit;
-use somatic::sink::{FieldNames, Flow, Heard, Session, Sink, SinkSpec, SinkTarget};
+use somatic::sink::{FieldNames, Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
 use super::attached;
 use super::doubts::Doubts;
-use super::feed::{Arrival, Feed, Manner};
+use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::input::Input;
 #[cfg(unix)]
 use super::keys::{self, Keys};
-use super::lines::Live;
-use super::live::{About, View};
+use super::lines::LineReport;
+use super::live::{RunInfo, View};
 use super::repeats::Repeats;
-use super::scene::{Asked, grouped};
+use super::scene::{RunOptions, grouped};
 use super::tradeoff::{say_kept, settled};
 use super::{DONE, FAILED, LOST, say, words};
 
@@ -69,7 +69,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: Asked,
+    asked: RunOptions,
 
     /// Stop after this time, such as 10s.
     #[arg(long = "for", value_name = "TIME")]
@@ -130,14 +130,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     // Boards speak as soon as their lines are open: not before somebody can listen.
     let (source, live) = match recorded {
         Some(mut source) => {
-            source.tell_stale();
+            source.report_stale();
             (source, None)
         }
         None => {
             let source = input.open_lines(&ids, &asked)?;
             engine.track_stale();
             engine.wire(source.wiring());
-            let live = Live::new(source.lines(), summary, asked.quiet);
+            let live = LineReport::new(source.lines(), summary, asked.quiet);
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
     };
@@ -158,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let stop = stop_on_signal()?;
     let targets = if sinks.is_empty() && !at_terminal { vec![SinkTarget::Stdout] } else { targets };
     let names = field_names(engine.plan());
-    let about = About { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
+    let about = RunInfo { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
@@ -174,7 +174,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     };
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
     let feed = match live {
-        None => Feed::start(source, Manner { most: batch, gather, speed }),
+        None => Feed::start(source, ReadMode { most: batch, gather, speed }),
         Some(_) => Feed::start_live(source, batch),
     };
     let agreement = verify.then(Agreement::default);
@@ -185,7 +185,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         view,
         flush: !gather,
         agreement,
-        unfit: Told::default(),
+        unfit: UnfitReport::default(),
         failed: false,
         live,
         heeds_stale,
@@ -232,11 +232,11 @@ struct Pump {
     /// Whether somebody waits for every frame.
     flush: bool,
     agreement: Option<Agreement>,
-    unfit: Told,
+    unfit: UnfitReport,
     /// Whether a sink could not go on.
     failed: bool,
     /// The serial lines, if they are read.
-    live: Option<Live>,
+    live: Option<LineReport>,
     /// Whether the engine heeds what is stale.
     heeds_stale: bool,
     /// What is looked for in the first frames.
@@ -297,8 +297,8 @@ impl Pump {
     /// Gives `frames`, and what the engine made of them, to every sink.
     fn pass_on(&mut self, frames: &[Frame]) -> Result<()> {
         let Self { engine, sinks, flush, failed, .. } = self;
-        let heard = Heard { frames, pressures: &|frame, to| engine.pressures(frame, to) };
-        serve(sinks, *flush, failed, |sink| give(sink, &heard, engine.percepts(), *flush))
+        let input = InputFrames { frames, pressures: &|frame, to| engine.pressures(frame, to) };
+        serve(sinks, *flush, failed, |sink| give(sink, &input, engine.percepts(), *flush))
     }
 
     fn each_sink(&mut self, act: impl FnMut(&mut dyn Sink) -> Result<Flow>) -> Result<()> {
@@ -358,8 +358,8 @@ fn serve(
     Ok(())
 }
 
-fn give(sink: &mut dyn Sink, heard: &Heard<'_>, percepts: &Percepts, flush: bool) -> Result<Flow> {
-    for flow in [sink.hear(heard)?, sink.write(percepts)?] {
+fn give(sink: &mut dyn Sink, input: &InputFrames<'_>, percepts: &Percepts, flush: bool) -> Result<Flow> {
+    for flow in [sink.write_input(input)?, sink.write(percepts)?] {
         if flow == Flow::Closed {
             return Ok(flow);
         }
@@ -369,14 +369,14 @@ fn give(sink: &mut dyn Sink, heard: &Heard<'_>, percepts: &Percepts, flush: bool
 
 /// What was told of taxels that are left out.
 #[derive(Default)]
-struct Told {
+struct UnfitReport {
     unfit: Vec<(u32, Unfit)>,
     repeats: Repeats,
     /// The time of the last frame, s.
     at_s: f64,
 }
 
-impl Told {
+impl UnfitReport {
     /// Says which taxels are left out from now on and which are used again, where that differs from what was told.
     fn tell(&mut self, engine: &Engine) {
         let now: Vec<(u32, Unfit)> = engine.unfit().collect();

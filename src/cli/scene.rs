@@ -1,9 +1,9 @@
-//! What is asked for: by the arguments of `somatic run` and `somatic plan`, and by scene files, which have the same words.
+//! Options of a run: the flags of `somatic run` and `somatic plan`, and the same keys in scene files.
 
 mod accuracy;
 mod check;
+mod deserialize;
 mod groups;
-mod said;
 
 use std::path::{Path, PathBuf};
 
@@ -15,13 +15,13 @@ use somatic::error::nearest;
 use somatic::keys;
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
-use somatic::sink::{Part, SinkSpec};
+use somatic::sink::{RecordPart, SinkSpec};
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
+use self::deserialize::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 pub(super) use self::groups::{first, grouped};
-use self::said::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 use super::input::Input;
 use super::ports::LineFlags;
 use super::{attached, load_body};
@@ -31,7 +31,7 @@ use super::{attached, load_body};
 #[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do; docs/scenes.md")]
-pub(super) struct Asked {
+pub(super) struct RunOptions {
     /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
     /// hand].
     #[arg(long, value_name = "BODY")]
@@ -166,10 +166,10 @@ pub(super) struct Asked {
 
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
     #[arg(long, hide_possible_values = true, value_name = "PART,...", value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<Part>()))]
+        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<RecordPart>()))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
-    pub(super) record: Vec<Part>,
+    pub(super) record: Vec<RecordPart>,
 
     /// How long a taxel that frames leave out keeps its value, in seconds; after that it counts as missing [default: 0;
     /// for boards three of their frames, and at least 0.05].
@@ -251,7 +251,7 @@ pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
     named.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
 }
 
-impl Asked {
+impl RunOptions {
     /// What the scene file at `path` asks for, its paths made relative to where we are.
     ///
     /// # Errors
@@ -290,7 +290,7 @@ impl Asked {
     /// What these arguments and the scene file at `scene` ask for together; an argument comes before a key.
     ///
     /// # Errors
-    /// As [`Asked::load`]; values that make no sense.
+    /// As [`RunOptions::load`]; values that make no sense.
     pub(super) fn with(&self, scene: Option<&Path>) -> Result<Self> {
         let file = scene.map(Self::load).transpose()?.unwrap_or_default();
         fn list<T: Clone>(first: &[T], then: Vec<T>) -> Vec<T> {

@@ -1,7 +1,7 @@
 //! `somatic tradeoff`: what each knob costs and gives, on one's own body, recording and machine.
 
 mod settled;
-mod written;
+mod write_scene;
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -10,7 +10,9 @@ use clap::Args;
 use console::style;
 use somatic::signal::Frame;
 use somatic::source::{SimulatedSource, Source, SourceSpec};
-use somatic::tradeoff::{Errors, Manner, Pick, Played, Report, Row, Store, Way, Wish, measure, plot_png, plot_svg};
+use somatic::tradeoff::{
+    CallMode, Errors, MeasureOptions, Measurement, Pick, Report, Store, Target, TestFrames, measure, plot_png, plot_svg,
+};
 use somatic::{BackendKind, Body, Engine, Error, Options, OutputPath, Result};
 
 use self::settled::driver;
@@ -20,7 +22,7 @@ use super::files::FilesRead;
 use super::input::Input;
 use super::plot::Plot;
 use super::run::{RECORDED_BATCH, stop_on_signal};
-use super::scene::{Asked, first, grouped};
+use super::scene::{RunOptions, first, grouped};
 use super::table::{plain, right, shown};
 use super::words::{count, number};
 use super::{DONE, FAILED, print, say};
@@ -52,7 +54,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: Asked,
+    asked: RunOptions,
 
     /// How long to measure, in seconds; more is steadier.
     #[arg(long, value_name = "S", default_value_t = 10.0)]
@@ -81,7 +83,7 @@ pub(super) struct Arguments {
 
 pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
-    let wish = asked.accuracy.wish();
+    let target = asked.accuracy.target();
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is no time span; give seconds over 0", arguments.seconds)));
     }
@@ -89,7 +91,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
-        (Some(_), true) if wish.is_empty() => {
+        (Some(_), true) if target.is_empty() => {
             return Err(Error::usage("--write writes what is picked; say by what with --within or --budget"));
         }
         // The one input that is written: to change it is what is asked for.
@@ -107,10 +109,10 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let options = asked.options(&body, &ids, 1)?;
     let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
     let played = played(&input, &asked, &ids, most)?;
-    let manner = manner(&asked, &options, arguments.seconds)?;
+    let measure_options = measure_options(&asked, &options, arguments.seconds)?;
     let stop = stop_on_signal()?;
     let mut bar = Bar::new("measured");
-    let report = measure(&body, &options, &played, &manner, &mut |share| {
+    let report = measure(&body, &options, &played, &measure_options, &mut |share| {
         bar.show_with_time_left(share);
         !stop.load(Ordering::Relaxed)
     });
@@ -126,8 +128,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     {
         say(&format!("what was measured is not kept: {e}"));
     }
-    let way = if asked.batch.is_some_and(|batch| batch > 1) { Way::Batch } else { Way::Live };
-    let pick = if wish.is_empty() { None } else { wish.pick(&report, way) };
+    let way = if asked.batch.is_some_and(|batch| batch > 1) { CallMode::Batch } else { CallMode::Live };
+    let pick = if target.is_empty() { None } else { target.pick(&report, way) };
     if let Some(plot) = plot {
         plot.draw(|| plot_svg(&report), || plot_png(&report))?;
     }
@@ -135,25 +137,25 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let Some(pick) = pick else { return Ok(DONE) };
     let combination = pick.row.combination()?;
     if !pick.missed.is_empty() {
-        say(&missed(&wish, &pick)?);
+        say(&missed(&target, &pick)?);
         return Ok(FAILED);
     }
-    say(&format!("{} for {}: {combination}; {:.2} µs a frame", picked(way), wish.words(), pick.row.p50_us));
+    say(&format!("{} for {}: {combination}; {:.2} µs a frame", picked(way), target.words(), pick.row.p50_us));
     if let Some((path, edit)) = scene {
-        written::write(edit, &settled::of_row(pick.row, &report)?, &wish)?;
+        write_scene::write(edit, &settled::of_row(pick.row, &report)?, &target)?;
         say(&format!("written into {}", path.display()));
     }
     Ok(DONE)
 }
 
-fn picked(way: Way) -> String {
+fn picked(way: CallMode) -> String {
     format!("picked ({})", way.word())
 }
 
-/// What `pick` misses of `wish`, which nothing grants.
-fn missed(wish: &Wish, pick: &Pick<'_>) -> Result<String> {
+/// What `pick` misses of `target`, which nothing grants.
+fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
     let combination = pick.row.combination()?;
-    Ok(format!("no knobs reach {}; nearest is {combination}: {}", wish.words(), pick.missed.join("; ")))
+    Ok(format!("no knobs reach {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
 }
 
 /// Why a GPU is not chosen unless it is asked for, where all there are compute on the CPU.
@@ -171,7 +173,7 @@ fn software() -> Option<String> {
 }
 
 /// What is measured for `asked`.
-fn manner(asked: &Asked, options: &Options, seconds: f64) -> Result<Manner> {
+fn measure_options(asked: &RunOptions, options: &Options, seconds: f64) -> Result<MeasureOptions> {
     let backends = match options.backend {
         BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
         BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
@@ -181,12 +183,12 @@ fn manner(asked: &Asked, options: &Options, seconds: f64) -> Result<Manner> {
         kind => vec![kind],
     };
     let batch = asked.batch.map_or(RECORDED_BATCH, |batch| batch as usize);
-    Ok(Manner { seconds, batch, ways: Way::ALL.to_vec(), backends })
+    Ok(MeasureOptions { seconds, batch, ways: CallMode::ALL.to_vec(), backends })
 }
 
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
-fn played(input: &Input, asked: &Asked, ids: &[u32], most: usize) -> Result<Played> {
-    let mut played = Played { source: input.name.clone(), ..Played::default() };
+fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize) -> Result<TestFrames> {
+    let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
     let mut take =
         |source: &mut dyn Source, truth: &mut dyn FnMut() -> Option<Vec<somatic::source::Truth>>| -> Result<()> {
             played.taxels = source.taxels().to_vec();
@@ -235,12 +237,12 @@ fn text(report: &Report, all: bool) -> String {
     for line in report.kept_charts.iter().chain(&report.left_out) {
         text += &format!("  not measured  {line}\n");
     }
-    for way in Way::ALL {
+    for way in CallMode::ALL {
         let rows = report.of(way);
         if rows.is_empty() {
             continue;
         }
-        let listed: Vec<&&Row> = rows.iter().filter(|row| all || row.front).collect();
+        let listed: Vec<&&Measurement> = rows.iter().filter(|row| all || row.front).collect();
         let beaten = rows.len() - rows.iter().filter(|row| row.front).count();
         text += &format!(
             "\n{}: {} of {} combinations, of which {beaten} are beaten\n",
@@ -281,7 +283,7 @@ fn text(report: &Report, all: bool) -> String {
 }
 
 /// What `somatic plan` calls a row.
-pub(super) fn in_words(row: &Row) -> String {
+pub(super) fn in_words(row: &Measurement) -> String {
     let [centroid, orientation] = row.judged();
     let mut words = vec![format!("{:.2} µs a frame, p99 {:.2} µs", row.p50_us, row.p99_us)];
     if centroid.compared > 0 {
@@ -294,9 +296,9 @@ pub(super) fn in_words(row: &Row) -> String {
 }
 
 /// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
-pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> Played {
+pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> TestFrames {
     let frames = super::plan::pressed(body.taxels.len(), 32);
-    Played { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
+    TestFrames { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
 }
 
 /// Says once which fields stay in charts that the scene does not ask for.

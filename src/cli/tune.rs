@@ -1,7 +1,7 @@
 //! `somatic tune`: boards' potentiometers set so that rest and a firm press use their converters' range.
 
-mod bench;
 mod report;
+mod session;
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use clap::Args;
 use somatic::signal::{FsrCircuit, Wiring};
-use somatic::survey::tuning::{MOST_ROUNDS, Tuned, Tuning};
+use somatic::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::{Error, Result};
 
-use self::bench::{Bench, Until, Went};
+use self::session::{PhaseEnd, PhaseLimit, TuningSession};
 use super::calibrate::name_of;
 use super::files::FilesRead;
 use super::ports::LineFlags;
@@ -103,25 +103,25 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let start = wiring.with_taps(|board, channel| Some(own(board, channel).unwrap_or(arguments.tap)));
     let stop = stop_on_signal()?;
     let source = arguments.lines.open_as(Some(start.clone()), &ports, &ids, None)?;
-    let mut bench = Bench::new(source, &start, stop);
+    let mut session = TuningSession::new(source, &start, stop);
 
-    let press = press.flatten().map_or(Until::Enter, Until::Over);
+    let press = press.flatten().map_or(PhaseLimit::Enter, PhaseLimit::After);
     let mut tuning = None;
-    let tuned = rounds(&mut bench, rest, press, &mut tuning);
+    let tuned = rounds(&mut session, rest, press, &mut tuning);
     let tuning = match (tuned, tuning) {
-        (Ok(Went::On), Some(tuning)) => tuning,
-        (Ok(_), _) => return Err(Error::failed(format!("ended before all was tuned; {}", bench.put_back()))),
+        (Ok(PhaseEnd::Completed), Some(tuning)) => tuning,
+        (Ok(_), _) => return Err(Error::failed(format!("ended before all was tuned; {}", session.restore_taps()))),
         (Err(error), _) => {
-            say(&bench.put_back());
+            say(&session.restore_taps());
             return Err(error);
         }
     };
-    let now = bench.places(&start);
-    bench.close();
+    let now = session.places(&start);
+    session.close();
 
     let tapped = |board: u16, channel: u16| {
         let sensor = now.iter().zip(tuning.sensors()).find(|(place, _)| (place.id, place.channel) == (board, channel));
-        // What a board does not set says nothing of what it has.
+        // A tap that was not confirmed is unknown.
         sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.tap).or_else(|| own(board, channel))
     };
     if let Some(output) = output {
@@ -141,35 +141,42 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     Ok(if tuning.outcomes().any(|(_, tuned, _)| tuned == Tuned::NotSet) { FAILED } else { DONE })
 }
 
-/// Looks and sets, until every sensor fits.
-fn rounds(bench: &mut Bench, rest: Duration, press: Until, done: &mut Option<Tuning>) -> Result<Went> {
-    bench.guide.say("setting the taps to begin with");
-    if bench.settle()? == Went::Stopped {
-        return Ok(Went::Stopped);
+/// Runs rounds of measuring and setting taps until every sensor fits.
+fn rounds(
+    session: &mut TuningSession,
+    rest: Duration,
+    press: PhaseLimit,
+    done: &mut Option<Tuning>,
+) -> Result<PhaseEnd> {
+    session.guide.say("setting the taps to begin with");
+    if session.settle()? == PhaseEnd::Stopped {
+        return Ok(PhaseEnd::Stopped);
     }
-    let mut tuning = bench.tuning()?;
-    bench.guide.say(&format!("leave the robot alone for {} s", rest.as_secs_f64()));
-    if bench.listen(Until::Over(rest), &mut tuning, |tuning, frame| tuning.rest(&frame.values))? == Went::Stopped {
-        return Ok(Went::Stopped);
+    let mut tuning = session.tuning()?;
+    session.guide.say(&format!("leave the robot alone for {} s", rest.as_secs_f64()));
+    if session.observe(PhaseLimit::After(rest), &mut tuning, |tuning, frame| tuning.rest(&frame.values))?
+        == PhaseEnd::Stopped
+    {
+        return Ok(PhaseEnd::Stopped);
     }
     loop {
         let again = if tuning.rounds() == 0 { "" } else { " once more" };
-        let end = if press == Until::Enter { "; Enter when all are done" } else { "" };
-        bench.guide.say(&format!("now press every sensor firmly{again}{end}"));
-        if bench.listen(press, &mut tuning, |tuning, frame| tuning.press(&frame.values))? == Went::Stopped {
-            return Ok(Went::Stopped);
+        let end = if press == PhaseLimit::Enter { "; Enter when all are done" } else { "" };
+        session.guide.say(&format!("now press every sensor firmly{again}{end}"));
+        if session.observe(press, &mut tuning, |tuning, frame| tuning.press(&frame.values))? == PhaseEnd::Stopped {
+            return Ok(PhaseEnd::Stopped);
         }
         let taps = tuning.next_round()?;
         if taps.is_empty() {
             break;
         }
-        bench.guide.say(&format!("round {} of at most {MOST_ROUNDS}: setting {} taps", tuning.rounds(), taps.len()));
-        bench.set(&taps);
-        if bench.settle()? == Went::Stopped {
-            return Ok(Went::Stopped);
+        session.guide.say(&format!("round {} of at most {MAX_ROUNDS}: setting {} taps", tuning.rounds(), taps.len()));
+        session.set(&taps);
+        if session.settle()? == PhaseEnd::Stopped {
+            return Ok(PhaseEnd::Stopped);
         }
-        bench.heed_troubles(&mut tuning);
+        session.mark_failed_taps(&mut tuning);
     }
     *done = Some(tuning);
-    Ok(Went::On)
+    Ok(PhaseEnd::Completed)
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::entries::{Attached, Channel, attached, channel, data_of, preface};
 use super::records::{
-    ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, LONGEST, MESSAGE, METADATA, Next, Parts, Record, Records,
+    ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, MAX_RECORD_BYTES, MESSAGE, METADATA, Next, Parts, Record, Records,
 };
 use super::{FRAMES, frames, nanoseconds, unpack};
 use crate::error::{Error, Result};
@@ -128,7 +128,7 @@ impl Reader {
                     }
                 }
                 CHANNEL => {
-                    self.records.body(record, LONGEST, &mut body)?;
+                    self.records.body(record, MAX_RECORD_BYTES, &mut body)?;
                     self.channels.extend(channel(&mut Parts(&body)));
                 }
                 ATTACHMENT => {
@@ -186,9 +186,9 @@ impl Reader {
         self.from = nanoseconds(t_s);
     }
 
-    /// From now on gives what is stale as [`RawValue::STALE`], for engines that heed it
+    /// From now on gives what is stale as [`RawValue::STALE`], for engines that track it
     /// ([`crate::Engine::track_stale`]); else it is missing.
-    pub fn tell_stale(&mut self) {
+    pub fn report_stale(&mut self) {
         self.stale = RawValue::STALE;
     }
 

@@ -11,7 +11,7 @@ const HEAD: u64 = 9;
 const END: u64 = HEAD + 20 + 8;
 
 /// Bytes of a record that says a word or two; a longer one is damaged.
-pub(super) const LONGEST: u64 = 1 << 16;
+pub(super) const MAX_RECORD_BYTES: u64 = 1 << 16;
 
 // Kinds of records.
 pub(super) const FOOTER: u8 = 0x02;
@@ -137,7 +137,7 @@ impl<R: Read + Seek> Records<R> {
             while let Next::Record(record) = self.next()? {
                 if record.kind == kind {
                     let mut body = Vec::new();
-                    self.body(record, LONGEST, &mut body)?;
+                    self.body(record, MAX_RECORD_BYTES, &mut body)?;
                     bodies.push(body);
                 } else {
                     self.skip(record.length)?;

@@ -1,17 +1,17 @@
-//! Chunks that other programs have compressed, as they were before.
+//! Decompression of chunks.
 
 use std::io::Read;
 
-/// Bytes of a chunk, at most: more is damage, or meant to fill memory.
-const MOST: u64 = 1 << 28;
+/// Maximum size of a chunk, bytes; more is damage or an attack.
+const MAX_CHUNK_BYTES: u64 = 1 << 28;
 
-/// Ways to compress that are known.
+/// Supported compressions.
 pub(super) const KNOWN: [&str; 3] = ["", "lz4", "zstd"];
 
-/// The `length` bytes that `bytes` are, compressed by one of [`KNOWN`]. `None` where they are not.
+/// Decompresses `bytes` to `length` bytes; `None` if that fails.
 pub(super) fn unpacked(compression: &str, bytes: &[u8], length: u64) -> Option<Vec<u8>> {
     let mut unpacked = Vec::new();
-    let wanted = (length <= MOST).then(|| length + 1)?;
+    let wanted = (length <= MAX_CHUNK_BYTES).then(|| length + 1)?;
     let read = match compression {
         "lz4" => lz4_flex::frame::FrameDecoder::new(bytes).take(wanted).read_to_end(&mut unpacked),
         "zstd" => ruzstd::decoding::StreamingDecoder::new(bytes).ok()?.take(wanted).read_to_end(&mut unpacked),

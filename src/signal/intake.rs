@@ -25,7 +25,7 @@ pub(crate) struct Intake {
 }
 
 impl Intake {
-    /// For the taxels of `calibration`; frames have their order until [`Intake::listen`] changes it.
+    /// For the taxels of `calibration`; frames have their order until [`Intake::set_channels`] changes it.
     pub(crate) fn new(calibration: Calibration, neighbours: Vec<Vec<u32>>, max_age_s: f64) -> Self {
         let taxels = calibration.taxels.len();
         Self {

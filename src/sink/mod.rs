@@ -28,7 +28,7 @@ pub trait Sink {
     ///
     /// # Errors
     /// As [`Sink::write`].
-    fn hear(&mut self, _heard: &Heard<'_>) -> Result<Flow> {
+    fn write_input(&mut self, _heard: &InputFrames<'_>) -> Result<Flow> {
         Ok(Flow::Open)
     }
 
@@ -75,7 +75,7 @@ pub struct FieldNames {
 }
 
 /// Frames, and access to their pressures.
-pub struct Heard<'a> {
+pub struct InputFrames<'a> {
     /// The frames.
     pub frames: &'a [Frame],
     /// Replaces a list by the taxel ids and pressures of one of the frames.
@@ -99,12 +99,12 @@ pub struct Session<'a> {
     /// Files to attach to a recording: name, media type, bytes.
     pub attached: Vec<(String, String, Vec<u8>)>,
     /// The parts that recordings hold; empty for all.
-    pub parts: Vec<Part>,
+    pub parts: Vec<RecordPart>,
 }
 
 /// A part of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum RecordPart {
     /// Raw frames.
     Frames,
     /// Percepts, as in NDJSON.
@@ -113,7 +113,7 @@ pub enum Part {
     View,
 }
 
-impl FromStr for Part {
+impl FromStr for RecordPart {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {

@@ -2,7 +2,7 @@
 
 use super::line::LineWriter;
 use super::view::ViewWriter;
-use super::{Flow, Heard, Part, Session, Sink};
+use super::{Flow, InputFrames, RecordPart, Session, Sink};
 use crate::error::Result;
 use crate::output::OutputPath;
 use crate::percept::Percepts;
@@ -30,23 +30,23 @@ impl RecordingSink {
         let holds = |part| session.parts.is_empty() || session.parts.contains(&part);
         Ok(Self {
             recorder,
-            frames: holds(Part::Frames),
-            percepts: holds(Part::Percepts).then(|| LineWriter::new(&session.names, session.all_fields)),
-            view: session.body.filter(|_| holds(Part::View)).map(|body| ViewWriter::new(body, &session.names)),
+            frames: holds(RecordPart::Frames),
+            percepts: holds(RecordPart::Percepts).then(|| LineWriter::new(&session.names, session.all_fields)),
+            view: session.body.filter(|_| holds(RecordPart::View)).map(|body| ViewWriter::new(body, &session.names)),
             line: Vec::new(),
         })
     }
 }
 
 impl Sink for RecordingSink {
-    fn hear(&mut self, heard: &Heard<'_>) -> Result<Flow> {
+    fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         if self.frames {
-            for frame in heard.frames {
+            for frame in input.frames {
                 self.recorder.frame(frame)?;
             }
         }
         if let Some(view) = &mut self.view {
-            view.write_frames(heard, &mut self.recorder)?;
+            view.write_frames(input, &mut self.recorder)?;
         }
         Ok(Flow::Open)
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
-use super::{FieldNames, Heard};
+use super::{FieldNames, InputFrames};
 use crate::body::Body;
 use crate::error::Result;
 use crate::percept::Percepts;
@@ -108,8 +108,8 @@ impl ViewWriter {
     }
 
     /// Writes links and taxels.
-    pub(super) fn write_frames(&mut self, heard: &Heard<'_>, recorder: &mut Recorder) -> Result<()> {
-        for frame in heard.frames {
+    pub(super) fn write_frames(&mut self, input: &InputFrames<'_>, recorder: &mut Recorder) -> Result<()> {
+        for frame in input.frames {
             let [taxels, _, links] = &mut self.timers;
             let period_s = if frame.pose.is_empty() { LINKS_PERIOD_S } else { TOUCHES_PERIOD_S };
             let (links_due, taxels_due) = (links.is_due_after(frame.t_s, period_s), taxels.due(frame.t_s));
@@ -126,7 +126,7 @@ impl ViewWriter {
                 recorder.write(LINKS, frame.t_s, &self.message)?;
             }
             if taxels_due {
-                (heard.pressures)(frame, &mut self.pressures);
+                (input.pressures)(frame, &mut self.pressures);
                 self.max_pressure = self
                     .pressures
                     .iter()

@@ -52,7 +52,7 @@ pub trait Source {
     fn skip_to(&mut self, _t_s: f64) {}
 
     /// From now on delivers stale values as [`crate::RawValue::STALE`] instead of as missing, for engines that track them.
-    fn tell_stale(&mut self) {}
+    fn report_stale(&mut self) {}
 
     /// Whether any value so far was stale.
     fn has_stale(&self) -> bool {

@@ -22,8 +22,8 @@ impl Source for Reader {
         Self::skip_to(self, t_s);
     }
 
-    fn tell_stale(&mut self) {
-        Self::tell_stale(self);
+    fn report_stale(&mut self) {
+        Self::report_stale(self);
     }
 
     fn has_stale(&self) -> bool {

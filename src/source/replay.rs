@@ -92,7 +92,7 @@ impl Replay {
         self.had_stale |= self.source.has_stale();
         self.source = (self.open)()?;
         if self.marks_stale {
-            self.source.tell_stale();
+            self.source.report_stale();
         }
         (self.start_s, self.has_delivered, self.restarted) = (None, false, true);
         Ok(true)
@@ -158,9 +158,9 @@ impl Source for Replay {
         Some((done / self.cut.times as f64).min(1.0))
     }
 
-    fn tell_stale(&mut self) {
+    fn report_stale(&mut self) {
         self.marks_stale = true;
-        self.source.tell_stale();
+        self.source.report_stale();
     }
 
     fn has_stale(&self) -> bool {

@@ -16,22 +16,22 @@ pub mod tuning;
 use crate::error::{Error, Result};
 use crate::signal::RawValue;
 
-/// Values of a sensor that are kept, at most; of a longer rest every second, fourth and so on.
-const MOST: usize = 4096;
-/// The share of values at rest that noise may exceed.
-const EXCEEDED: f64 = 1e-3;
-/// The dead band over the noise.
-const MARGIN: f64 = 1.5;
-/// A travel under this many dead bands is no press.
-const CLEAR: f64 = 3.0;
-/// Chance takes a value this many standard deviations from the baseline at most.
-const CHANCE: f64 = 12.0;
-/// The share of the raw range over which a dead band is too wide where chance does not explain it,
-const WIDE: f64 = 1.0 / 16.0;
-/// and where it does, or a single wrong value makes it.
-const TOO_WIDE: f64 = 1.0 / 4.0;
-/// Noise over this many times that of most sensors is worth a word.
-const LOUD: f64 = 5.0;
+/// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
+const MAX_REST_VALUES: usize = 4096;
+/// Share of rest values that may exceed the noise.
+const EXCEEDING_SHARE: f64 = 1e-3;
+/// Dead band over noise.
+const DEAD_BAND_MARGIN: f64 = 1.5;
+/// Minimum travel of a press, in dead bands.
+const MIN_TRAVEL_BANDS: f64 = 3.0;
+/// Maximum deviation by random noise, in standard deviations.
+const MAX_NOISE_SIGMAS: f64 = 12.0;
+/// A dead band is too wide above this share of the raw range where noise does not explain it,
+const WIDE_NOISE_SHARE: f64 = 1.0 / 16.0;
+/// and above this share where noise or a single wrong value does.
+const WIDE_SHARE: f64 = 1.0 / 4.0;
+/// Noise over this many times the median is reported.
+const LOUD_RATIO: f64 = 5.0;
 
 /// A survey that is being made. Sensors stand in the order of the ids it was begun with, and so do the values of a frame.
 #[derive(Clone, Debug)]
@@ -133,7 +133,7 @@ impl Survey {
         if !(self.rest_frames - 1).is_multiple_of(self.stride) {
             return;
         }
-        if self.rest_frames.div_ceil(self.stride) > MOST {
+        if self.rest_frames.div_ceil(self.stride) > MAX_REST_VALUES {
             self.stride *= 2;
             for kept in &mut self.rest {
                 let mut index = 0;
@@ -186,7 +186,7 @@ impl Survey {
         }
         let step = if self.whole_numbers { 1.0 } else { 0.0 };
         let dead_band = |noise: f64| {
-            let band = MARGIN * noise;
+            let band = DEAD_BAND_MARGIN * noise;
             if self.whole_numbers { band.ceil() } else { rounded(band) }
         };
         // The two travels of each sensor: downwards and upwards.
@@ -194,7 +194,7 @@ impl Survey {
             at_rest.iter().zip(&self.pressed).map(|(rest, pressed)| travels(rest, pressed)).collect();
         let clear = |sensor: usize, side: usize| {
             let band = at_rest[sensor].map_or(f64::INFINITY, |(_, noise)| dead_band(noise).max(step));
-            travels[sensor][side] > CLEAR * band
+            travels[sensor][side] > MIN_TRAVEL_BANDS * band
         };
         let votes = |side: usize| {
             (0..self.ids.len()).filter(|&i| clear(i, side) && travels[i][side] > travels[i][1 - side]).count()
@@ -208,9 +208,9 @@ impl Survey {
             .map(|sensor| {
                 let Some((baseline, noise)) = at_rest[sensor] else { return false };
                 let movement = movement_of(&self.rest[sensor], baseline);
-                let by_chance = CHANCE * chance_of(&self.rest[sensor], step);
-                (dead_band(movement) > WIDE * range && movement > by_chance)
-                    || (is_range_known && dead_band(noise) > TOO_WIDE * range)
+                let by_chance = MAX_NOISE_SIGMAS * chance_of(&self.rest[sensor], step);
+                (dead_band(movement) > WIDE_NOISE_SHARE * range && movement > by_chance)
+                    || (is_range_known && dead_band(noise) > WIDE_SHARE * range)
             })
             .collect();
         if moved.contains(&true) && !wishes.mask_moved {
@@ -292,7 +292,7 @@ fn rest_of(kept: &[f32]) -> Option<(f64, f64)> {
 fn noise_of(values: impl Iterator<Item = f64>, baseline: f64) -> f64 {
     let mut strays: Vec<f64> = values.map(|value| (value - baseline).abs()).collect();
     strays.sort_by(f64::total_cmp);
-    let rank = ((1.0 - EXCEEDED) * strays.len() as f64).ceil() as usize;
+    let rank = ((1.0 - EXCEEDING_SHARE) * strays.len() as f64).ceil() as usize;
     strays.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
@@ -367,7 +367,7 @@ impl Findings {
             ("moved at rest, and are masked", ids(&|found| found.moved && !at_its_end(found))),
             (
                 "are far noisier than the others at rest",
-                ids(&|found| usual > 0.0 && found.noise > LOUD * usual && !found.moved),
+                ids(&|found| usual > 0.0 && found.noise > LOUD_RATIO * usual && !found.moved),
             ),
         ];
         kinds
@@ -514,7 +514,11 @@ mod tests {
         for n in 0..100_000 {
             survey.rest(&[RawValue::new(f64::from(n % 11))]);
         }
-        assert!(survey.rest[0].len() <= MOST && survey.rest[0].len() > MOST / 4, "{}", survey.rest[0].len());
+        assert!(
+            survey.rest[0].len() <= MAX_REST_VALUES && survey.rest[0].len() > MAX_REST_VALUES / 4,
+            "{}",
+            survey.rest[0].len()
+        );
         assert_eq!(rest_of(&survey.rest[0]), Some((5.0, 5.0)));
     }
 }

@@ -8,22 +8,22 @@
 //! A sensor's own circuit is not quite the model's, and a press that stands at the end of the range says only that it is
 //! at least so firm. So what is chosen is looked at anew, in rounds, until every press is where it should be.
 
-use super::{CLEAR, Pressed, Survey, Wishes, rest_of};
+use super::{MIN_TRAVEL_BANDS, Pressed, Survey, Wishes, rest_of};
 use crate::error::Result;
 use crate::signal::{FsrCircuit, RawValue};
 
-/// The share of the range that a firm press leaves.
+/// Share of the range that a firm press leaves unused.
 pub const HEADROOM: f64 = 1.0 / 16.0;
-/// A press that leaves less is cut off, or soon will be.
+/// A press that leaves less than this share may be cut off.
 const CUT_OFF: f64 = 1.0 / 64.0;
-/// A gain of less than this share of the range is not worth another tap.
-const WORTH: f64 = 0.06;
-/// A sensor that uses less than this share of the range at the highest or lowest tap is worth a word.
-const POOR: f64 = 0.5;
-/// A press that goes less than this share of the way that is expected is none.
-const EXPECTED: f64 = 0.25;
-/// After so many rounds a sensor is left as it is.
-pub const MOST_ROUNDS: usize = 5;
+/// Minimum gain, as a share of the range, for which a tap is changed.
+const MIN_GAIN: f64 = 0.06;
+/// A sensor that uses less than this share of the range at an extreme tap is reported.
+const POOR_SHARE: f64 = 0.5;
+/// Minimum travel of a press, as a share of the expected travel.
+const MIN_EXPECTED_SHARE: f64 = 0.25;
+/// Maximum number of rounds.
+pub const MAX_ROUNDS: usize = 5;
 
 /// What a sensor read at one tap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +101,7 @@ impl Divider {
     fn better(self, look: Look, tap: u8) -> Option<u8> {
         let best = self.best(look, tap);
         let gain = self.share(self.moved(look, tap, best)) - self.share(look);
-        (best != tap && (self.headroom(look) < CUT_OFF || gain > WORTH)).then_some(best)
+        (best != tap && (self.headroom(look) < CUT_OFF || gain > MIN_GAIN)).then_some(best)
     }
 }
 
@@ -222,7 +222,8 @@ impl Tuning {
 
     fn learn_noise(&mut self) {
         for (sensor, kept) in self.sensors.iter_mut().zip(&self.survey.rest) {
-            let noise = rest_of(kept).map(|(_, noise)| CLEAR * (super::MARGIN * noise).ceil().max(1.0));
+            let noise =
+                rest_of(kept).map(|(_, noise)| MIN_TRAVEL_BANDS * (super::DEAD_BAND_MARGIN * noise).ceil().max(1.0));
             sensor.noise = noise.unwrap_or(f64::INFINITY);
             sensor.clear = sensor.noise;
         }
@@ -257,7 +258,7 @@ impl Tuning {
                 sensor.tuned = if found.baseline.is_none() { Tuned::Silent } else { Tuned::NotPressed };
             }
         }
-        let (first, last) = (self.rounds == 1, self.rounds == MOST_ROUNDS);
+        let (first, last) = (self.rounds == 1, self.rounds == MAX_ROUNDS);
         let mut taps = Vec::new();
         for (index, sensor) in self.sensors.iter_mut().enumerate() {
             let divider = Divider { most: sensor.most, falls: self.falls };
@@ -274,14 +275,14 @@ impl Tuning {
             let better = divider.better(look, sensor.tap);
             sensor.tuned = match better {
                 None if divider.headroom(look) < CUT_OFF => Tuned::CutOff,
-                None if divider.share(look) < POOR && sensor.tap == 255 => Tuned::Weak,
+                None if divider.share(look) < POOR_SHARE && sensor.tap == 255 => Tuned::Weak,
                 None => Tuned::Fits,
                 Some(_) if !sensor.settable => Tuned::NotSet,
                 Some(_) => Tuned::Unsettled,
             };
             if let Some(tap) = better.filter(|_| sensor.settable && !last) {
                 let expected = divider.share(divider.moved(look, sensor.tap, tap)) * divider.most;
-                sensor.clear = sensor.noise.max(EXPECTED * expected);
+                sensor.clear = sensor.noise.max(MIN_EXPECTED_SHARE * expected);
                 (sensor.tap, sensor.tuned) = (tap, Tuned::NotPressedAgain);
                 taps.push((index, tap));
             }
@@ -367,7 +368,7 @@ mod tests {
         }
 
         /// Tunes it beside a sound sensor, pressed `times` times as softly in each round.
-        fn tune(&self, tap: u8, softer: [f64; MOST_ROUNDS]) -> Tuning {
+        fn tune(&self, tap: u8, softer: [f64; MAX_ROUNDS]) -> Tuning {
             let other = Real { rest_ohm: f64::INFINITY, press_ohm: 1e3, ..*self };
             let mut tuning = Tuning::new(&[(4, self.most, tap), (5, self.most, 38)]);
             let frame = |tuning: &Tuning, own: f64, others: f64| {
@@ -420,7 +421,7 @@ mod tests {
     #[test]
     fn what_cannot_be_tuned_is_told_from_what_fits() {
         let outcome = |real: Real, tap| {
-            let tuning = real.tune(tap, [1.0; MOST_ROUNDS]);
+            let tuning = real.tune(tap, [1.0; MAX_ROUNDS]);
             let (sensor, tuned, _) = tuning.outcomes().next().unwrap();
             (tuned, sensor.before, sensor.tap)
         };
@@ -497,7 +498,7 @@ mod tests {
             // softer press uses less, and what is not worth another tap is left; a hundredth for the model's other wiper.
             let softest_ohm = press_ohm * softer.into_iter().fold(0.0, f64::max);
             let most_ohm = potentiometer_ohm * 255.0 / 256.0 + wiper_ohm;
-            let least = (most_ohm / (most_ohm + softest_ohm) - WORTH - 0.01).min(0.6);
+            let least = (most_ohm / (most_ohm + softest_ohm) - MIN_GAIN - 0.01).min(0.6);
             prop_assert!(share.unwrap() > least, "{share:?} {least} {sensor:?}");
             let divider = Divider { most, falls };
             prop_assert!(divider.headroom(sensor.last().unwrap()) >= CUT_OFF);

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
-use super::{Combination, Report, Row, Way};
+use super::{CallMode, Combination, Measurement, Report};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
@@ -18,7 +18,7 @@ use crate::source::Truth;
 
 /// Frames, and their truth if known.
 #[derive(Clone, Debug, Default)]
-pub struct Played {
+pub struct TestFrames {
     /// Their source, for display.
     pub source: String,
     /// The ids of their taxels.
@@ -31,13 +31,13 @@ pub struct Played {
 
 /// Settings of a measurement.
 #[derive(Clone, Debug)]
-pub struct Manner {
+pub struct MeasureOptions {
     /// Total time of all turns, s.
     pub seconds: f64,
     /// Frames per call of a batch.
     pub batch: usize,
     /// Live, in batches, or both.
-    pub ways: Vec<Way>,
+    pub ways: Vec<CallMode>,
     /// The backends.
     pub backends: Vec<BackendKind>,
 }
@@ -49,7 +49,7 @@ const MIN_ROUNDS: usize = 4;
 
 /// A combination that is being measured.
 struct Trial {
-    way: Way,
+    way: CallMode,
     combination: Combination,
     engine: Engine,
     /// The next call, and the number of complete passes.
@@ -97,8 +97,8 @@ impl Calls {
 pub fn measure(
     body: &Body,
     options: &Options,
-    played: &Played,
-    manner: &Manner,
+    played: &TestFrames,
+    measure_options: &MeasureOptions,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
     // Once, as geodesic charts may take seconds.
@@ -124,16 +124,18 @@ pub fn measure(
     const PROGRESS_BUILT: f64 = 0.1;
     const PROGRESS_COMPARED: f64 = 0.3;
     let stopped = || Error::failed("stopped before everything had been measured once");
-    let combinations: Vec<(Way, Combination)> = manner
+    let combinations: Vec<(CallMode, Combination)> = measure_options
         .ways
         .iter()
-        .flat_map(|&way| Combination::all(&options.scene, way, &manner.backends).into_iter().map(move |one| (way, one)))
+        .flat_map(|&way| {
+            Combination::all(&options.scene, way, &measure_options.backends).into_iter().map(move |one| (way, one))
+        })
         .filter(|(_, combination)| another(combination.knobs.charts))
         .collect();
     let mut trials = Vec::new();
     for (index, &(way, combination)) in combinations.iter().enumerate() {
         let recharted = charted[combination.knobs.charts.word()].clone();
-        match Trial::new(body, options, played, way, combination, recharted, manner.batch) {
+        match Trial::new(body, options, played, way, combination, recharted, measure_options.batch) {
             Ok(trial) => trials.push(trial),
             Err(e) if combination.backend == BackendKind::Gpu => {
                 let why = format!("gpu: {e}");
@@ -154,7 +156,7 @@ pub fn measure(
         return Err(Error::failed("no field with a chart is touched in these frames; give others").at(&played.source));
     }
     let count = trials.len();
-    let mut calls = [Calls::new(&played.frames, 1), Calls::new(&played.frames, manner.batch.max(1))];
+    let mut calls = [Calls::new(&played.frames, 1), Calls::new(&played.frames, measure_options.batch.max(1))];
     for (index, trial) in trials.iter_mut().enumerate() {
         let geometry = &geometries[&trial.combination.knobs.charts.word()];
         trial.compare(&mut calls[trial.way as usize], geometry, authored, &right)?;
@@ -173,7 +175,7 @@ pub fn measure(
         if rounds == 1 {
             trials.iter_mut().for_each(|trial| trial.times_us.clear());
         }
-        let share = (start.elapsed().as_secs_f64() / manner.seconds).min(1.0);
+        let share = (start.elapsed().as_secs_f64() / measure_options.seconds).min(1.0);
         let go_on = progress(PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
         if rounds < 2 && !go_on {
             return Err(stopped());
@@ -225,7 +227,7 @@ struct ReferencePercepts {
 }
 
 impl ReferencePercepts {
-    fn new(body: &Body, options: &Options, played: &Played, authored: &ChartGeometry) -> Result<Self> {
+    fn new(body: &Body, options: &Options, played: &TestFrames, authored: &ChartGeometry) -> Result<Self> {
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
@@ -257,13 +259,13 @@ impl Trial {
     fn new(
         body: &Body,
         options: &Options,
-        played: &Played,
-        way: Way,
+        played: &TestFrames,
+        way: CallMode,
         combination: Combination,
         recharted: Recharted,
         batch: usize,
     ) -> Result<Self> {
-        let batch = if way == Way::Live { 1 } else { batch.max(1) };
+        let batch = if way == CallMode::Live { 1 } else { batch.max(1) };
         let Combination { backend, mut knobs } = combination;
         if backend == BackendKind::Reference {
             knobs.arithmetic = None;
@@ -327,12 +329,12 @@ impl Trial {
         Ok(())
     }
 
-    fn row(mut self, truth: bool) -> Row {
+    fn row(mut self, truth: bool) -> Measurement {
         let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
             self.combination.words().map(str::to_owned);
         self.times_us.sort_by(f64::total_cmp);
         let errors = &mut self.errors;
-        Row {
+        Measurement {
             way: self.way,
             backend,
             arithmetic,
@@ -358,18 +360,18 @@ mod tests {
     use crate::bundled;
     use crate::source::{CsvSource, Source as _};
 
-    pub(crate) fn touch() -> Played {
+    pub(crate) fn touch() -> TestFrames {
         let mut source = CsvSource::from_reader("touch", bundled::TOUCH, None, None).unwrap();
         let mut frame = Frame::missing(0.0, source.taxels().len());
         let mut frames = Vec::new();
         while frames.len() < 80 && source.next_frame(&mut frame).unwrap() {
             frames.push(frame.clone());
         }
-        Played { source: "touch".into(), taxels: source.taxels().to_vec(), frames, truth: Vec::new() }
+        TestFrames { source: "touch".into(), taxels: source.taxels().to_vec(), frames, truth: Vec::new() }
     }
 
-    fn manner(seconds: f64) -> Manner {
-        Manner { seconds, batch: 32, ways: Way::ALL.to_vec(), backends: vec![BackendKind::Cpu] }
+    fn measure_options(seconds: f64) -> MeasureOptions {
+        MeasureOptions { seconds, batch: 32, ways: CallMode::ALL.to_vec(), backends: vec![BackendKind::Cpu] }
     }
 
     #[test]
@@ -380,18 +382,18 @@ mod tests {
             ..Options::default()
         };
         let mut shares = Vec::new();
-        let report = measure(&body, &options, &touch(), &manner(0.05), &mut |share| {
+        let report = measure(&body, &options, &touch(), &measure_options(0.05), &mut |share| {
             shares.push(share);
             true
         })
         .unwrap();
         assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
         // The hand's own charts are planes.
-        let of_way = |&way: &Way| {
+        let of_way = |&way: &CallMode| {
             let all = Combination::all(&options.scene, way, &[BackendKind::Cpu]);
             all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
         };
-        let expected: usize = Way::ALL.iter().map(of_way).sum();
+        let expected: usize = CallMode::ALL.iter().map(of_way).sum();
         assert!(report.left_out.iter().any(|left| left.starts_with("charts plane")), "{:?}", report.left_out);
         assert_eq!(report.rows.len(), expected);
         for row in &report.rows {
@@ -408,10 +410,10 @@ mod tests {
     #[test]
     fn what_is_stopped_too_early_says_so() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        let stopped = measure(&body, &Options::default(), &touch(), &manner(60.0), &mut |_| false);
+        let stopped = measure(&body, &Options::default(), &touch(), &measure_options(60.0), &mut |_| false);
         assert!(stopped.unwrap_err().to_string().contains("stopped before"));
-        let nothing = Played { frames: touch().frames[..1].to_vec(), ..touch() };
-        let untouched = measure(&body, &Options::default(), &nothing, &manner(0.1), &mut |_| true);
+        let nothing = TestFrames { frames: touch().frames[..1].to_vec(), ..touch() };
+        let untouched = measure(&body, &Options::default(), &nothing, &measure_options(0.1), &mut |_| true);
         assert!(untouched.unwrap_err().to_string().contains("no field with a chart is touched"));
     }
 }

@@ -1,4 +1,5 @@
-//! What each knob costs and gives, measured on a body, a recording and a machine; and the pick for a tolerance or a budget.
+//! Measures time and accuracy of each knob on a body, a recording and a machine, and selects knobs for a tolerance or a time
+//! budget.
 //!
 //! Combinations of knobs take turns, so that changes of the machine's speed affect all of them. Percepts are compared with
 //! the reference in the layout's own charts, and with the truth if the source has it.
@@ -16,10 +17,10 @@ use serde::{Deserialize, Serialize};
 
 pub use errors::Errors;
 pub use ladder::{Rung, ladder};
-pub use measure::{Manner, Played, measure};
+pub use measure::{MeasureOptions, TestFrames, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
-pub use target::{Pick, Wish, angle, length, time};
+pub use target::{Pick, Target, angle, length, time};
 
 use crate::backend::BackendKind;
 use crate::percept::Outputs;
@@ -29,14 +30,14 @@ use crate::signal::Receptor;
 /// How frames come to an engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Way {
+pub enum CallMode {
     /// One frame per call.
     Live,
     /// Many frames per call.
     Batch,
 }
 
-impl Way {
+impl CallMode {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Live, Self::Batch];
 
@@ -83,10 +84,10 @@ impl Combination {
 
     /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed.
     #[must_use]
-    pub fn all(scene: &Scene, way: Way, backends: &[BackendKind]) -> Vec<Self> {
+    pub fn all(scene: &Scene, way: CallMode, backends: &[BackendKind]) -> Vec<Self> {
         let given = scene.knobs;
         let usual = Knobs::default();
-        let live = way == Way::Live;
+        let live = way == CallMode::Live;
         fn some<T: Copy + PartialEq>(given: T, usual: T, all: &[T]) -> Vec<T> {
             if given == usual { all.to_vec() } else { vec![given] }
         }
@@ -142,9 +143,9 @@ impl Combination {
 
 /// Time and errors of a combination.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct Measurement {
     /// How frames were passed.
-    pub way: Way,
+    pub way: CallMode,
     /// The backend, as in [`Combination::words`].
     pub backend: String,
     /// See [`Arithmetic`].
@@ -173,7 +174,7 @@ pub struct Row {
     pub front: bool,
 }
 
-impl Row {
+impl Measurement {
     /// The combination.
     ///
     /// # Errors
@@ -223,13 +224,13 @@ pub struct Report {
     /// Combinations that were not measured, and why.
     pub left_out: Vec<String>,
     /// One per combination and way.
-    pub rows: Vec<Row>,
+    pub rows: Vec<Measurement>,
 }
 
 impl Report {
     /// Marks the rows on the Pareto front.
     fn find_front(&mut self) {
-        let beaten = |row: &Row, by: &Row| {
+        let beaten = |row: &Measurement, by: &Measurement| {
             let (a, b) = (row.judged(), by.judged());
             let no_worse = b[0].p99 <= a[0].p99 && b[1].p99 <= a[1].p99 && by.p50_us <= row.p50_us;
             let better = b[0].p99 < a[0].p99 || b[1].p99 < a[1].p99 || by.p50_us < row.p50_us;
@@ -243,8 +244,8 @@ impl Report {
 
     /// The rows of `way`, the fastest first.
     #[must_use]
-    pub fn of(&self, way: Way) -> Vec<&Row> {
-        let mut rows: Vec<&Row> = self.rows.iter().filter(|row| row.way == way).collect();
+    pub fn of(&self, way: CallMode) -> Vec<&Measurement> {
+        let mut rows: Vec<&Measurement> = self.rows.iter().filter(|row| row.way == way).collect();
         rows.sort_by(|a, b| a.p50_us.total_cmp(&b.p50_us));
         rows
     }
@@ -254,13 +255,13 @@ impl Report {
 mod tests {
     use super::*;
 
-    pub(super) fn row(backend: &str, p50_us: f64, centroid: f64, orientation: f64) -> Row {
+    pub(super) fn row(backend: &str, p50_us: f64, centroid: f64, orientation: f64) -> Measurement {
         let errors = |p99: f64| Errors { compared: 10, rms: p99 / 2.0, p99, worst: p99 * 2.0 };
         let knobs = Knobs { arithmetic: (backend != "reference").then_some(Arithmetic::OnePass), ..Knobs::default() };
         let combination = Combination { backend: backend.parse().unwrap(), knobs };
         let [backend, arithmetic, charts, orientation_by, coverage, cadence] = combination.words().map(str::to_owned);
-        Row {
-            way: Way::Live,
+        Measurement {
+            way: CallMode::Live,
             backend,
             arithmetic,
             charts,
@@ -277,7 +278,7 @@ mod tests {
         }
     }
 
-    pub(super) fn report(rows: Vec<Row>) -> Report {
+    pub(super) fn report(rows: Vec<Measurement>) -> Report {
         let mut report = Report {
             body: "hand".into(),
             source: "touch".into(),
@@ -311,31 +312,41 @@ mod tests {
     #[test]
     fn combinations_are_all_that_make_sense_and_none_that_does_not() {
         let scene = Scene::default();
-        let live = Combination::all(&scene, Way::Live, &[BackendKind::Cpu, BackendKind::Gpu]);
+        let live = Combination::all(&scene, CallMode::Live, &[BackendKind::Cpu, BackendKind::Gpu]);
         let count = |backend| live.iter().filter(|c| c.backend == backend).count();
         // Arithmetics, charts, ways to orientation, coverages, cadences.
         assert_eq!(count(BackendKind::Cpu), 2 * 3 * 2 * 2 * 2);
         assert_eq!(count(BackendKind::Gpu), 2 * 3 * 2 * 2);
         assert_eq!(count(BackendKind::Reference), 3 * 2 * 2);
-        let batch = Combination::all(&scene, Way::Batch, &[BackendKind::Cpu]);
+        let batch = Combination::all(&scene, CallMode::Batch, &[BackendKind::Cpu]);
         assert_eq!(batch.len(), 3 * 3 * 2);
         for combination in live.iter().chain(&batch) {
             assert!(combination.backend.with(combination.knobs.arithmetic).is_ok(), "{combination}");
         }
         let knobs = Knobs { charts: Charts::Plane, arithmetic: Some(Arithmetic::OnePass), ..Knobs::default() };
-        let some =
-            Combination::all(&Scene { knobs, outputs: Outputs::CENTROID, ..scene }, Way::Batch, &[BackendKind::Cpu]);
+        let some = Combination::all(
+            &Scene { knobs, outputs: Outputs::CENTROID, ..scene },
+            CallMode::Batch,
+            &[BackendKind::Cpu],
+        );
         assert_eq!(some.iter().map(|c| c.knobs).collect::<Vec<_>>(), [knobs]);
     }
 
     #[test]
     fn a_row_says_its_combination_again() {
-        for way in Way::ALL {
+        for way in CallMode::ALL {
             for combination in Combination::all(&Scene::default(), way, &[BackendKind::Cpu, BackendKind::Gpu]) {
                 let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
                     combination.words().map(str::to_owned);
-                let row =
-                    Row { backend, arithmetic, charts, orientation_by, coverage, cadence, ..row("cpu", 1.0, 0.0, 0.0) };
+                let row = Measurement {
+                    backend,
+                    arithmetic,
+                    charts,
+                    orientation_by,
+                    coverage,
+                    cadence,
+                    ..row("cpu", 1.0, 0.0, 0.0)
+                };
                 assert_eq!(row.combination().unwrap().words(), combination.words());
             }
         }

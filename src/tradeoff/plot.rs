@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{Errors, Report, Row, Way};
+use super::{CallMode, Errors, Measurement, Report};
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
 
@@ -46,21 +46,21 @@ pub fn plot_png(report: &Report) -> Result<Vec<u8>> {
 
 /// A panel for a way and a quantity.
 struct Panel<'a> {
-    way: Way,
+    way: CallMode,
     what: &'static str,
     unit: &'static str,
     /// Whether errors are against the truth.
     truth: bool,
-    points: Vec<(&'a Row, &'a Errors)>,
+    points: Vec<(&'a Measurement, &'a Errors)>,
 }
 
 fn panels(report: &Report) -> Vec<Panel<'_>> {
     let mut panels = Vec::new();
-    for way in Way::ALL {
+    for way in CallMode::ALL {
         for (index, what, unit) in [(0, "centroid", "mm"), (1, "orientation", "degrees")] {
             let points = report.of(way).into_iter().map(|row| (row, row.judged()[index]));
             let points: Vec<_> = points.filter(|(_, errors)| errors.compared > 0).collect();
-            let knows = |row: &Row| [row.true_centroid_mm, row.true_orientation_deg][index].is_some();
+            let knows = |row: &Measurement| [row.true_centroid_mm, row.true_orientation_deg][index].is_some();
             if !points.is_empty() {
                 let truth = points.iter().any(|(row, _)| knows(row));
                 panels.push(Panel { way, what, unit, truth, points });
@@ -111,7 +111,7 @@ fn draw_legend<B: DrawingBackend>(report: &Report, area: &DrawingArea<B, Shift>)
     Ok(())
 }
 
-fn colour(row: &Row) -> (&'static str, RGBColor) {
+fn colour(row: &Measurement) -> (&'static str, RGBColor) {
     let index = match (row.backend.as_str(), row.arithmetic.as_str()) {
         ("reference", _) => 2,
         ("gpu", "compensated") => 4,
@@ -132,7 +132,7 @@ fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
 impl Panel<'_> {
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
         let from = if self.truth { "from the truth" } else { "from the reference" };
-        let place = |(row, errors): &(&Row, &Errors)| (row.p50_us, errors.p99.max(MIN_ERROR));
+        let place = |(row, errors): &(&Measurement, &Errors)| (row.p50_us, errors.p99.max(MIN_ERROR));
         let places: Vec<(f64, f64)> = self.points.iter().map(place).collect();
         let x = decades(places.iter().map(|point| point.0));
         let y = decades(places.iter().map(|point| point.1));

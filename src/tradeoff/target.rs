@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Report, Row, Way};
+use super::{CallMode, Measurement, Report};
 use crate::error::{Error, Result};
 
 /// A tolerance, a time budget, or both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Wish {
+pub struct Target {
     /// Tolerance of centroids, m.
     pub centroid_m: Option<f64>,
     /// Tolerance of orientations, rad.
@@ -20,7 +20,7 @@ pub struct Wish {
 #[derive(Clone, Debug)]
 pub struct Pick<'a> {
     /// Its measurement.
-    pub row: &'a Row,
+    pub row: &'a Measurement,
     /// Missed requirements in words; empty if all are met.
     pub missed: Vec<String>,
 }
@@ -71,17 +71,17 @@ pub fn time(text: &str) -> Result<f64> {
     quantity(text, "time", "100 us", &[("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("ns", 1e-9), ("s", 1.0)])
 }
 
-impl Wish {
+impl Target {
     /// Parses a tolerance: a length for centroids, an angle for orientations, or both separated by a comma.
     ///
     /// # Errors
     /// It is something else, or has one of them twice.
     pub fn within(text: &str) -> Result<Self> {
-        let mut wish = Self::default();
+        let mut target = Self::default();
         for part in text.split(',') {
             let place = match (length(part), angle(part)) {
-                (Ok(length), _) => wish.centroid_m.replace(length),
-                (_, Ok(angle)) => wish.orientation_rad.replace(angle),
+                (Ok(length), _) => target.centroid_m.replace(length),
+                (_, Ok(angle)) => target.orientation_rad.replace(angle),
                 _ => {
                     let what = "is neither a length nor an angle";
                     return Err(Error::usage(format!("`{}` {what}; write such as \"0.5 mm, 2 deg\"", part.trim())));
@@ -91,7 +91,7 @@ impl Wish {
                 return Err(Error::usage(format!("`{text}` says one thing twice; write such as \"0.5 mm, 2 deg\"")));
             }
         }
-        Ok(wish)
+        Ok(target)
     }
 
     /// Whether nothing is requested.
@@ -123,7 +123,7 @@ impl Wish {
     }
 
     /// Ratios of `row`'s values to the limits.
-    fn misses(&self, row: &Row) -> [f64; 3] {
+    fn misses(&self, row: &Measurement) -> [f64; 3] {
         let [centroid, orientation] = row.judged();
         let over = |value: f64, limit: Option<f64>| limit.map_or(0.0, |limit| value / limit);
         // Without a comparison no tolerance is met.
@@ -138,12 +138,12 @@ impl Wish {
     /// The fastest combination of `report` for `way` that meets it; for a budget alone the most accurate one. If none meets
     /// it, the nearest one.
     #[must_use]
-    pub fn pick<'a>(&self, report: &'a Report, way: Way) -> Option<Pick<'a>> {
+    pub fn pick<'a>(&self, report: &'a Report, way: CallMode) -> Option<Pick<'a>> {
         let mut rows = report.of(way);
         rows.retain(|row| report.truth || row.orientation_by == report.asked_by);
-        let granted = |row: &&&Row| self.misses(row).iter().all(|times| *times <= 1.0);
+        let granted = |row: &&&Measurement| self.misses(row).iter().all(|times| *times <= 1.0);
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
-        let true_to = |row: &Row| {
+        let true_to = |row: &Measurement| {
             let [centroid, orientation] = row.judged();
             // A degree counts like a millimetre: at a distance of 57 mm they are equal.
             centroid.p99.hypot(orientation.p99)
@@ -156,13 +156,13 @@ impl Wish {
         if let Some(row) = picked {
             return Some(Pick { row, missed: Vec::new() });
         }
-        let worst = |row: &Row| self.misses(row).into_iter().fold(0.0, f64::max);
+        let worst = |row: &Measurement| self.misses(row).into_iter().fold(0.0, f64::max);
         let row = rows.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
         Some(Pick { row, missed: self.missed(row) })
     }
 
     /// Requirements that `row` misses, in words.
-    fn missed(&self, row: &Row) -> Vec<String> {
+    fn missed(&self, row: &Measurement) -> Vec<String> {
         let [centroid, orientation] = row.judged();
         let texts = [
             format!("centroid {:.3} mm", centroid.p99),
@@ -196,15 +196,15 @@ mod tests {
     #[test]
     fn wishes_are_read_with_their_units() {
         let near = |got: Option<f64>, right: f64| (got.unwrap() - right).abs() <= 1e-12 * right;
-        let wish = Wish::within("0.5 mm, 2 deg").unwrap();
-        assert!(near(wish.centroid_m, 5e-4) && near(wish.orientation_rad, 2_f64.to_radians()));
-        let wish = Wish::within("0.1rad,20um").unwrap();
-        assert!(near(wish.centroid_m, 2e-5) && near(wish.orientation_rad, 0.1));
-        assert_eq!(Wish::within("1e-3 m").unwrap().orientation_rad, None);
+        let target = Target::within("0.5 mm, 2 deg").unwrap();
+        assert!(near(target.centroid_m, 5e-4) && near(target.orientation_rad, 2_f64.to_radians()));
+        let target = Target::within("0.1rad,20um").unwrap();
+        assert!(near(target.centroid_m, 2e-5) && near(target.orientation_rad, 0.1));
+        assert_eq!(Target::within("1e-3 m").unwrap().orientation_rad, None);
         assert!(near(time("100us").ok(), 1e-4) && near(time("2 ms").ok(), 2e-3));
-        assert_eq!(Wish::within("0.5 mm, 2 deg").unwrap().words(), "0.5 mm, 2 deg");
+        assert_eq!(Target::within("0.5 mm, 2 deg").unwrap().words(), "0.5 mm, 2 deg");
         for wrong in ["", "0.5", "0 mm", "-1 mm", "2 degrees", "1 mm, 2 mm", "nan mm", "1mm,"] {
-            assert!(Wish::within(wrong).unwrap_err().is_usage(), "{wrong}");
+            assert!(Target::within(wrong).unwrap_err().is_usage(), "{wrong}");
         }
     }
 
@@ -216,12 +216,12 @@ mod tests {
             row("cpu", 3.0, 3.0, 1.0),
             row("reference", 9.0, 0.0, 0.0),
         ]);
-        let pick = |wish: Wish| wish.pick(&report, Way::Live).unwrap();
-        let within = |text: &str| Wish::within(text).unwrap();
+        let pick = |target: Target| target.pick(&report, CallMode::Live).unwrap();
+        let within = |text: &str| Target::within(text).unwrap();
         assert_eq!(pick(within("3 mm")).row.p50_us, 1.0);
         assert_eq!(pick(within("2 mm")).row.p50_us, 2.0);
         assert_eq!(pick(within("2 mm, 2 deg")).row.p50_us, 9.0);
-        let budget = |us: f64| Wish { budget_s: Some(us * 1e-6), ..Wish::default() };
+        let budget = |us: f64| Target { budget_s: Some(us * 1e-6), ..Target::default() };
         assert_eq!(pick(budget(10.0)).row.p50_us, 9.0);
         assert_eq!(pick(budget(3.5)).row.p50_us, 3.0);
         assert!(pick(budget(3.5)).missed.is_empty());
@@ -229,6 +229,6 @@ mod tests {
         let none = pick(within("2 mm, 2 deg").or(budget(5.0)));
         assert!(!none.missed.is_empty() && none.missed[0].contains("times"), "{:?}", none.missed);
         assert_eq!(pick(budget(0.5)).missed, ["1.00 µs a frame, 2.000 times 0.5 us"]);
-        assert!(Wish::default().pick(&report, Way::Batch).is_none());
+        assert!(Target::default().pick(&report, CallMode::Batch).is_none());
     }
 }

@@ -628,7 +628,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     let mut frame = Frame::missing(0.0, ids.len());
     assert!((0..150).all(|_| reader.next_frame(&mut frame).unwrap()));
     assert!(frame.values[0] == RawValue::MISSING && reader.has_stale());
-    reader.tell_stale();
+    reader.report_stale();
     assert!(reader.next_frame(&mut frame).unwrap());
     assert_eq!(frame.values, kept[150].values);
     let said = stderr(&output(&["convert", text_of(&place("a.mcap")), text_of(&place("c.csv"))]));

@@ -16,8 +16,8 @@ use somatic::wire::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
 use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
-use self::station::{Common, Station};
-use super::feed::{Arrival, Feed, Manner};
+use self::station::{LineSettings, Station};
+use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::run::stop_on_signal;
 use super::{DONE, load_body, print, words};
@@ -133,14 +133,14 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// So long a board answers when it has sent everything, and the other side has time to read.
+/// How long a board still answers after its last frame, so that the host can read.
 const LINGER: Duration = Duration::from_millis(500);
 /// So long it waits for a plug that is pulled just then.
-const PATIENCE: Duration = Duration::from_secs(5);
+const UNPLUG_TIMEOUT: Duration = Duration::from_secs(5);
 /// So often it says meanwhile that it has.
-const TELL_EVERY: Duration = Duration::from_millis(50);
+const FINAL_REPORT_INTERVAL: Duration = Duration::from_millis(50);
 /// A byte at 57600 baud takes 0.17 ms; the other side sees some at once, as from any USB adapter.
-const STEP: Duration = Duration::from_millis(2);
+const TIME_STEP: Duration = Duration::from_millis(2);
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let (mut stations, common, play) = open(arguments)?;
@@ -186,21 +186,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         }
         // A board whose plug is pulled has yet to say how many frames there were.
         if let Some(since) = ending
-            && now >= since.max(pulled_at.min(since + PATIENCE)) + LINGER
+            && now >= since.max(pulled_at.min(since + UNPLUG_TIMEOUT)) + LINGER
         {
             break;
         }
         if ending.is_some() && now >= told_again {
             // Who listens learns how many frames there were; more than once, as its line may be bad.
             stations.iter_mut().for_each(|station| station.board.finish(now));
-            told_again = now + TELL_EVERY;
+            told_again = now + FINAL_REPORT_INTERVAL;
         }
-        pty::wait(stations.iter().filter_map(|station| station.plug.as_ref()), STEP);
+        pty::wait(stations.iter().filter_map(|station| station.plug.as_ref()), TIME_STEP);
     }
     tell_what(arguments, &stations, start.elapsed())
 }
 
-/// What is played.
+/// The source that boards play.
 struct Play {
     spec: Option<SourceSpec>,
     ids: Vec<u32>,
@@ -212,7 +212,7 @@ struct Play {
 impl Play {
     fn open(spec: Option<&SourceSpec>, ids: &[u32]) -> Result<Box<dyn Source + Send>> {
         match spec {
-            // Nobody listens to a board for what is left out.
+            // Lines of unknown taxels are errors: a board has no way to report them.
             Some(SourceSpec::Stdin) => Ok(Box::new(NdjsonSource::stdin(ids.to_vec()).strict())),
             Some(spec) => spec.open(ids, None),
             None => Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?)),
@@ -221,7 +221,7 @@ impl Play {
 
     fn start(&self) -> Result<Feed> {
         let speed = (self.spec != Some(SourceSpec::Stdin)).then_some(1.0);
-        Ok(Feed::start(Self::open(self.spec.as_ref(), &self.ids)?, Manner { most: 1, gather: false, speed }))
+        Ok(Feed::start(Self::open(self.spec.as_ref(), &self.ids)?, ReadMode { most: 1, gather: false, speed }))
     }
 
     /// Whole counts within the bits of a value. What is missing or no number is no reading.
@@ -232,7 +232,7 @@ impl Play {
     }
 }
 
-fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
+fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
     let faults: Faults = arguments.faults.parse()?;
     let spec = arguments.source.as_deref().map(str::parse::<SourceSpec>).transpose()?;
     let again = arguments.again || arguments.frames.is_some();
@@ -311,7 +311,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, Common, Play)> {
         let places = wired.taxels.iter().map(place).collect();
         stations.push(Station::new(wired.id, VirtualBoard::new(make, Duration::ZERO), places, link, arguments.seed));
     }
-    let common = Common { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
+    let common = LineSettings { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
     Ok((stations, common, Play { spec, ids, taxels, most: most.into(), again: again && !live }))
 }
 

@@ -1,4 +1,4 @@
-//! A pseudo-terminal: a serial line whose one end is this process. The only user of `rustix`.
+//! A pseudo-terminal as a virtual serial port.
 
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use somatic::{Error, Result};
 /// This process's end.
 pub(super) struct Pty {
     end: OwnedFd,
-    /// What the other side opens.
+    /// The device to open on the other side.
     pub(super) path: PathBuf,
 }
 
@@ -29,25 +29,25 @@ impl Pty {
         ready.map_err(|e| failed("cannot set it up", e))?;
         let name = ptsname(&end, Vec::new()).map_err(|e| failed("it has no name", e))?;
         let path = PathBuf::from(name.to_string_lossy().into_owned());
-        // Opened and closed once, it knows that nobody is there.
+        // After one open and close it reports a hang-up while nobody has it open.
         drop(rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty()));
         Ok(Self { end, path })
     }
 
-    /// Whether somebody has opened the other end.
+    /// Whether the other end is open.
     pub(super) fn is_open(&self) -> bool {
         let mut ask = [PollFd::new(&self.end, PollFlags::IN)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
         poll(&mut ask, Some(&now)).is_ok() && !ask[0].revents().contains(PollFlags::HUP)
     }
 
-    /// What the other side sent since; nothing where nobody is there.
+    /// Reads what the other side sent.
     pub(super) fn read<'a>(&self, buffer: &'a mut [u8]) -> &'a [u8] {
         let count = rustix::io::read(&self.end, &mut *buffer).unwrap_or(0);
         &buffer[..count]
     }
 
-    /// Gives `bytes` to the other side; how many it had room for.
+    /// Sends `bytes`; returns how many fit.
     pub(super) fn write(&self, bytes: &[u8]) -> usize {
         let mut written = 0;
         while written < bytes.len() {
@@ -60,8 +60,7 @@ impl Pty {
         written
     }
 
-    /// The speed that the other side has set, over `baud`: 1 within the 2 % that a UART bears. With another parity,
-    /// number of bits or of stop bits, it is not 1.
+    /// The other side's speed over `baud`: 1 within the 2 % that a UART tolerates, and not 1 with another framing.
     pub(super) fn baud_ratio(&self, baud: u32) -> f64 {
         let Ok(set) = tcgetattr(&self.end) else { return 1.0 };
         let ratio = f64::from(set.output_speed()) / f64::from(baud);
@@ -74,9 +73,9 @@ impl Pty {
     }
 }
 
-/// Sleeps until one of `ends` has something to read, or for `most`.
+/// Sleeps until one of `ends` can be read, for at most `most`.
 pub(super) fn wait<'a>(ends: impl Iterator<Item = &'a Pty>, most: Duration) {
-    // An end that nobody has opened is always ready.
+    // An end that is not open is always ready.
     let mut ask: Vec<PollFd<'_>> =
         ends.filter(|pty| pty.is_open()).map(|pty| PollFd::new(&pty.end, PollFlags::IN)).collect();
     let most = Timespec { tv_sec: 0, tv_nsec: most.subsec_nanos().into() };

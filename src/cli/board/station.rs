@@ -1,4 +1,4 @@
-//! A board with its line: paced to its speed, with the faults it is to have.
+//! A virtual board on its serial line: paced by the baud rate, with simulated faults.
 
 use std::time::Duration;
 
@@ -9,27 +9,27 @@ use somatic::wire::board::{Faults, FaultyLine, VirtualBoard, Window};
 
 use super::pty::Pty;
 
-/// A line that was not looked after for so long has not sent meanwhile.
-const MOST_AT_ONCE: Duration = Duration::from_millis(50);
+/// Maximum time that the line is credited for at once.
+const MAX_CREDIT_STEP: Duration = Duration::from_millis(50);
 
-/// What all boards of a command have in common.
-pub(super) struct Common {
+/// Settings that all boards of a command share.
+pub(super) struct LineSettings {
     pub(super) baud: u32,
     pub(super) faults: Faults,
-    /// Frames that a board sends at most.
+    /// Maximum number of frames per board.
     pub(super) frames: u64,
 }
 
 pub(super) struct Station {
     pub(super) id: u16,
     pub(super) board: VirtualBoard,
-    /// Per channel, its place in a row of readings.
+    /// Per channel, its index in the readings.
     pub(super) places: Vec<Option<usize>>,
     pub(super) plug: Option<Pty>,
     pub(super) link: Option<OutputLink>,
     to_host: FaultyLine,
     from_host: FaultyLine,
-    /// Bytes that the line has had time for.
+    /// Bytes that the line may send now.
     credit: f64,
     row: u64,
     resets: u64,
@@ -83,17 +83,17 @@ impl Station {
         self.plug = None;
     }
 
-    /// Whether it has sent all that it will.
-    pub(super) fn is_done(&mut self, common: &Common) -> bool {
+    /// Whether everything has been sent.
+    pub(super) fn is_done(&mut self, common: &LineSettings) -> bool {
         self.board.frames() >= common.frames && self.board.outgoing().is_empty()
     }
 
-    /// Does what happens between `now` − `step` and `now`. `row` numbers the `readings`.
+    /// Simulates the time from `now` − `step` to `now`. `row` is the number of the `readings`.
     pub(super) fn go_on(
         &mut self,
         now: Duration,
         step: Duration,
-        common: &Common,
+        common: &LineSettings,
         row: u64,
         readings: &[Option<u16>],
     ) -> Result<()> {
@@ -118,7 +118,7 @@ impl Station {
             }
             self.board.receive(&arrives, now);
         }
-        self.credit += step.min(MOST_AT_ONCE).as_secs_f64() * f64::from(common.baud) / 10.0;
+        self.credit += step.min(MAX_CREDIT_STEP).as_secs_f64() * f64::from(common.baud) / 10.0;
         let (silent, mut arrives) = (lasts(&faults.silence), Vec::new());
         while self.credit >= 1.0 {
             if self.board.outgoing().is_empty() {
@@ -150,7 +150,7 @@ impl Station {
         self.plug.as_ref().map_or_else(|| "unplugged".to_owned(), |plug| plug.path.display().to_string())
     }
 
-    /// What it did.
+    /// Counts of what was sent and which faults occurred.
     pub(super) fn account(&self) -> Value {
         let (out, back) = (self.to_host.done, self.from_host.done);
         json!({

@@ -5,11 +5,11 @@ use somatic::author::Finding;
 use somatic::body::Body;
 use somatic::field::{Field, WORLD};
 
-use super::Seen;
+use super::Inspection;
 
 /// One object and a newline.
-pub(super) fn text(seen: &Seen) -> String {
-    let Seen { body, fields, .. } = seen;
+pub(super) fn text(seen: &Inspection) -> String {
+    let Inspection { body, fields, .. } = seen;
     let link = |index: usize| body.links[index].name.as_str();
     let taxel = |index: usize| {
         let taxel = &body.taxels[index];

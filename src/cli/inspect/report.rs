@@ -7,13 +7,13 @@ use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, WORLD};
 
-use super::Seen;
+use super::Inspection;
 use crate::cli::table::{plain, right, shown};
 use crate::cli::words::{bullet, count, millimetres};
 
 /// All there is to say, the oddest last, where it is read.
-pub(super) fn text(seen: &Seen) -> String {
-    let Seen { body, fields, findings, .. } = seen;
+pub(super) fn text(seen: &Inspection) -> String {
+    let Inspection { body, fields, findings, .. } = seen;
     let mut text = format!("{}\n", style(&body.name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<10}{value}\n");
     let triangles: usize = body.surfaces.iter().map(|surface| surface.triangles.len()).sum();

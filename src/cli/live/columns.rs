@@ -1,4 +1,4 @@
-//! The columns of the live table: which of them fit, and what stands in them.
+//! The columns of the live table: which fit, and their contents.
 
 use std::f64::consts::PI;
 
@@ -9,22 +9,22 @@ use crate::cli::words::{clipped, fitted, millimetres, number};
 
 /// Blank between columns.
 const GAP: usize = 2;
-/// What a field's name gets at least, and what flags get.
-const LEAST_NAME: usize = 14;
-const LEAST_FLAGS: usize = 9;
-const BAR: usize = 8;
+/// Minimum widths of names and of flags.
+const MIN_NAME_WIDTH: usize = 14;
+const MIN_FLAGS_WIDTH: usize = 9;
+const BAR_WIDTH: usize = 8;
 
-/// What a percept is shown beside.
+/// Context of a percept's cells.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
-    /// The largest total seen, which totals and peaks are measured by.
+    /// The largest total so far.
     pub(super) largest_total: f64,
-    /// How many separate touches the field has.
+    /// Number of separate touches of the field.
     pub(super) touches: usize,
 }
 
 impl Scale {
-    /// `value` with as many decimals as give the largest five digits, so that points stand below each other.
+    /// `value` with the decimals that give the largest total five digits, so that decimal points align.
     fn number(self, value: f64) -> String {
         if !(1e-3..1e7).contains(&self.largest_total) {
             return number(value);
@@ -37,9 +37,9 @@ impl Scale {
 struct Column {
     heading: &'static str,
     width: usize,
-    /// Shown where one of these is asked for.
+    /// Shown if one of these is requested.
     outputs: Outputs,
-    /// The column with the largest number gives way first.
+    /// Columns with larger numbers are dropped first.
     gives_way: u8,
     text: fn(&Percept, Scale) -> Option<String>,
 }
@@ -52,7 +52,7 @@ const COLUMNS: [Column; 11] = [
         gives_way: 0,
         text: |p, scale| p.total.map(|total| scale.number(total)),
     },
-    Column { heading: "", width: BAR, outputs: Outputs::TOTAL, gives_way: 3, text: bar },
+    Column { heading: "", width: BAR_WIDTH, outputs: Outputs::TOTAL, gives_way: 3, text: bar },
     Column {
         heading: "peak",
         width: 8,
@@ -118,7 +118,7 @@ const COLUMNS: [Column; 11] = [
     },
 ];
 
-/// What of a table fits into a terminal.
+/// The columns that fit into a terminal.
 pub(super) struct Layout {
     name: usize,
     columns: Vec<&'static Column>,
@@ -131,8 +131,8 @@ impl Layout {
     pub(super) fn new(longest: usize, outputs: Outputs, in_world: bool, width: usize) -> Self {
         let mut columns: Vec<&Column> = COLUMNS.iter().filter(|column| outputs.intersects(column.outputs)).collect();
         let taken = |columns: &[&Column]| columns.iter().map(|column| column.width + GAP).sum::<usize>();
-        let least_name = longest.clamp(5, LEAST_NAME);
-        let mut flags = LEAST_FLAGS;
+        let least_name = longest.clamp(5, MIN_NAME_WIDTH);
+        let mut flags = MIN_FLAGS_WIDTH;
         while least_name + taken(&columns) + GAP + flags > width {
             match columns.iter().enumerate().max_by_key(|(_, column)| column.gives_way) {
                 Some((index, column)) if column.gives_way > 2 => drop(columns.remove(index)),
@@ -164,7 +164,7 @@ impl Layout {
         for column in &self.columns {
             text += &" ".repeat(GAP);
             let cell = percept.map_or(Some("·".to_owned()), |percept| (column.text)(percept, scale));
-            // What is absent leaves a mark, so that columns can be followed.
+            // Absent values leave a mark, so that columns stay readable.
             let cell = fitted(cell.as_deref().unwrap_or("–"), column.width, !column.heading.is_empty());
             let is_bar = column.heading.is_empty() && touched;
             text += &if is_bar { style(cell).cyan().to_string() } else { cell };
@@ -183,14 +183,14 @@ fn places(metres: &[f64]) -> String {
     texts.join(" ")
 }
 
-/// Degrees, and which way a line at `angle` runs where +u points right and +v up.
+/// Degrees and the direction of a line at `angle`; +u points right and +v up.
 fn line(angle: f64) -> String {
     const LINES: [&str; 4] = ["─", "╱", "│", "╲"];
     let eighth = (angle / (PI / 4.0)).round() as usize % LINES.len();
     format!("{:.0}° {}", angle.to_degrees(), LINES[eighth])
 }
 
-/// Degrees, and which way that points where +u points right and +v up.
+/// Degrees and an arrow; +u points right and +v up.
 fn arrow(direction: f64) -> String {
     const ARROWS: [&str; 8] = ["→", "↗", "↑", "↖", "←", "↙", "↓", "↘"];
     let eighth = (direction / (PI / 4.0)).round().rem_euclid(ARROWS.len() as f64) as usize;
@@ -202,8 +202,8 @@ fn bar(percept: &Percept, scale: Scale) -> Option<String> {
     const EIGHTHS: [&str; 8] = ["", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
     let total = percept.total?;
     let share = if scale.largest_total > 0.0 { (total / scale.largest_total).clamp(0.0, 1.0) } else { 0.0 };
-    // Whatever is touched is seen.
-    let eighths = ((share * (8 * BAR) as f64).round() as usize).max(1);
+    // A touch always shows.
+    let eighths = ((share * (8 * BAR_WIDTH) as f64).round() as usize).max(1);
     Some("█".repeat(eighths / 8) + EIGHTHS[eighths % 8])
 }
 

@@ -7,7 +7,7 @@ use somatic::{Agreement, BackendKind, Body, Engine, Frame, Options, Outputs, Res
 use super::timed::{Played, measured, pressed};
 use crate::cli::input::Input;
 use crate::cli::run::RECORDED_BATCH;
-use crate::cli::scene::Asked;
+use crate::cli::scene::RunOptions;
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
 
@@ -49,7 +49,7 @@ pub(super) struct Measured {
 
 impl Bill {
     /// The bill of `asked`.
-    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body) -> Result<Self> {
+    pub(super) fn of(asked: &RunOptions, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
@@ -98,7 +98,7 @@ impl Bill {
 
 /// The frames that `engines` are measured on, and what they are, in words.
 fn played(
-    asked: &Asked,
+    asked: &RunOptions,
     recorded: Option<&Input>,
     body: &Body,
     batch: usize,

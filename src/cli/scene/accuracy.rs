@@ -5,10 +5,10 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use somatic::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Wish, angle, length, time};
+use somatic::tradeoff::{Target, angle, length, time};
 use somatic::{Error, Outputs, Result, keys};
 
-use super::said::word;
+use super::deserialize::word;
 
 /// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
 /// by measurement, or the knobs themselves.
@@ -16,11 +16,11 @@ use super::said::word;
 #[serde(default, deny_unknown_fields)]
 pub(in crate::cli) struct Accuracy {
     /// Tolerances by flag; in a file they are two keys.
-    #[arg(long, value_name = "LENGTH,ANGLE", value_parser = Wish::within,
+    #[arg(long, value_name = "LENGTH,ANGLE", value_parser = Target::within,
         help = "Measure, and use the fastest knobs that keep 99 % of the centroids and orientations within this, such as \
                 '0.5 mm, 2 deg' or one of these")]
     #[serde(skip)]
-    pub(in crate::cli) within: Option<Wish>,
+    pub(in crate::cli) within: Option<Target>,
 
     /// How far 99 % of the centroids may be off, such as "0.5 mm".
     #[arg(skip)]
@@ -107,7 +107,7 @@ impl Accuracy {
     /// These arguments, and what `file` says where they say nothing. Knobs by flag take the place of a file's wish, and a
     /// wish by flag that of a file's knobs.
     pub(super) fn or(&self, file: Self) -> Self {
-        let file = match (self.wish().is_empty(), self.knob().is_none()) {
+        let file = match (self.target().is_empty(), self.knob().is_none()) {
             (true, false) => Self { centroid: None, orientation: None, budget: None, ..file },
             (false, true) => {
                 Self { centroid: file.centroid, orientation: file.orientation, budget: file.budget, ..Self::default() }
@@ -128,8 +128,8 @@ impl Accuracy {
     }
 
     /// What is wished for, if anything is.
-    pub(in crate::cli) fn wish(&self) -> Wish {
-        let file = Wish { centroid_m: self.centroid, orientation_rad: self.orientation, budget_s: self.budget };
+    pub(in crate::cli) fn target(&self) -> Target {
+        let file = Target { centroid_m: self.centroid, orientation_rad: self.orientation, budget_s: self.budget };
         self.within.unwrap_or_default().or(file)
     }
 
@@ -158,18 +158,18 @@ impl Accuracy {
 
     /// Refuses what contradicts itself, with the key where it is found out.
     pub(super) fn check(&self, backend: Option<&str>, outputs: Outputs) -> Result<(), (&'static str, Error)> {
-        let wish = self.wish();
-        if let Some(knob) = self.knob().filter(|_| !wish.is_empty()) {
+        let target = self.target();
+        if let Some(knob) = self.knob().filter(|_| !target.is_empty()) {
             let what = format!(
                 "`{knob}` is a knob, and {} leaves the knobs to be chosen; give one or the other",
-                wish.words()
+                target.words()
             );
             return Err((knob, Error::usage(what)));
         }
-        if wish.centroid_m.is_some() && outputs.is_empty() {
+        if target.centroid_m.is_some() && outputs.is_empty() {
             return Err(("centroid", Error::usage("a tolerance needs outputs to hold for")));
         }
-        if wish.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
+        if target.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
             let what = "a tolerance of orientation is for output `orientation` or `axis`, and neither is asked for";
             return Err(("orientation", Error::usage(what)));
         }

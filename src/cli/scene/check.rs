@@ -3,9 +3,9 @@
 use somatic::scene::MotionFilter;
 use somatic::{Error, Outputs, Result};
 
-use super::Asked;
+use super::RunOptions;
 
-impl Asked {
+impl RunOptions {
     pub(super) fn check(&self) -> Result<()> {
         self.check_accuracy().map_err(|(_, e)| e)?;
         self.line_flags().lines(&self.sources)?;

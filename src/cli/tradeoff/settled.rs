@@ -1,13 +1,13 @@
 //! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
 
 use somatic::scene::{Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Combination, Found, Pick, Report, Row, Store, Way, day, measure};
+use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day, measure};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::{in_words, made_up, manner, missed, played, software};
+use super::{in_words, made_up, measure_options, missed, played, software};
 use crate::cli::input::Input;
 use crate::cli::say;
-use crate::cli::scene::Asked;
+use crate::cli::scene::RunOptions;
 
 /// Seconds of a brief measurement, and its frames.
 const BRIEF_S: f64 = 1.0;
@@ -34,11 +34,11 @@ pub(super) fn driver() -> String {
 ///
 /// # Errors
 /// What is asked for makes no sense, or no knobs grant it.
-pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
+pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(body, &ids, batch)?;
-    let wish = asked.accuracy.wish();
-    let way = if batch > 1 { Way::Batch } else { Way::Live };
+    let target = asked.accuracy.target();
+    let way = if batch > 1 { CallMode::Batch } else { CallMode::Live };
     let store = Store::of_user();
     let kept = store.as_ref().filter(|store| store.file(body, &options).exists());
     let recording = input.and_then(Input::recording);
@@ -58,14 +58,14 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
     };
     // Another run may have been asked to measure it.
     let report = report.map(|mut report| {
-        let is_gpu = |row: &Row| row.backend == "gpu";
+        let is_gpu = |row: &Measurement| row.backend == "gpu";
         let is_left_open = options.backend == BackendKind::Auto;
         if is_left_open && report.rows.iter().any(is_gpu) && software().is_some() {
             report.rows.retain(|row| !is_gpu(row));
         }
         report
     });
-    if wish.is_empty() {
+    if target.is_empty() {
         return Ok(match report {
             Some(report) => without_wish(options, &report, way, &when),
             None => Settled { options, why: None, measured: None },
@@ -77,7 +77,7 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
             let again = input.filter(|input| input.is_recording());
             let played = again.map(|input| played(input, asked, &ids, BRIEF_FRAMES)).transpose()?;
             let played = played.unwrap_or_else(|| made_up(body, ids.clone()));
-            let brief = manner(asked, &options, BRIEF_S)?;
+            let brief = measure_options(asked, &options, BRIEF_S)?;
             let measured = measure(body, &options, &played, &brief, &mut |_| true);
             // The first frames of a recording may touch nothing.
             let measured = measured.or_else(|_| measure(body, &options, &made_up(body, ids), &brief, &mut |_| true))?;
@@ -85,27 +85,27 @@ pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body,
             (measured, when)
         }
     };
-    let Some(pick) = wish.pick(&report, way) else {
-        return Err(Error::failed(format!("nothing was measured that could grant {}", wish.words())));
+    let Some(pick) = target.pick(&report, way) else {
+        return Err(Error::failed(format!("nothing was measured that could grant {}", target.words())));
     };
     if !pick.missed.is_empty() {
-        return Err(Error::failed(missed(&wish, &pick)?));
+        return Err(Error::failed(missed(&target, &pick)?));
     }
-    granted(options, &report, &pick, &when, &wish.words())
+    granted(options, &report, &pick, &when, &target.words())
 }
 
-fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, wish: &str) -> Result<Settled> {
+fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, target: &str) -> Result<Settled> {
     let Combination { backend, knobs } = of_row(pick.row, report)?;
     let scene = somatic::Scene { knobs, ..options.scene };
     Ok(Settled {
         options: Options { scene, backend, ..options },
-        why: Some(format!("picked for {wish}, as measured {when}")),
+        why: Some(format!("picked for {target}, as measured {when}")),
         measured: Some(format!("{}; {when}", in_words(pick.row))),
     })
 }
 
 /// The combination of `row` as a scene would say it: an orientation that is asked for by name stays as it was asked for.
-pub(super) fn of_row(row: &Row, report: &Report) -> Result<Combination> {
+pub(super) fn of_row(row: &Measurement, report: &Report) -> Result<Combination> {
     let mut combination = row.combination()?;
     if row.orientation_by == report.asked_by {
         combination.knobs.orientation_by = OrientationBy::AsAsked;
@@ -114,9 +114,9 @@ pub(super) fn of_row(row: &Row, report: &Report) -> Result<Combination> {
 }
 
 /// `options` with the backend that `report` says is the fastest, where that is left open.
-fn without_wish(options: Options, report: &Report, way: Way, when: &str) -> Settled {
+fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) -> Settled {
     let knobs = options.scene.knobs;
-    let alike = |row: &&Row| {
+    let alike = |row: &&Measurement| {
         let Ok(combination) = of_row(row, report) else { return false };
         let kind = options.backend;
         let other = combination.knobs;
@@ -144,7 +144,7 @@ fn is_usual(combination: &Combination) -> bool {
 }
 
 /// The coverage that stands for `auto` among those that are measured.
-fn usual_coverage(combination: &Combination, way: Way) -> Coverage {
-    let gated = combination.backend == BackendKind::Cpu && way == Way::Live;
+fn usual_coverage(combination: &Combination, way: CallMode) -> Coverage {
+    let gated = combination.backend == BackendKind::Cpu && way == CallMode::Live;
     if gated { Coverage::All } else { combination.knobs.coverage }
 }

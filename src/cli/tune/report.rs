@@ -8,14 +8,14 @@ use somatic::signal::{FsrCircuit, Wiring};
 use somatic::survey::tuning::{Tuned, Tuning};
 use somatic::{Error, Result};
 
-use super::bench::Place;
+use super::session::TunedChannel;
 use crate::cli::table::{plain, right, shown};
 use crate::cli::words::{bullet, count};
 
 /// More sensors than this are summed up.
 const LISTED: usize = 64;
 
-pub(super) fn table(tuning: &Tuning, places: &[Place]) -> String {
+pub(super) fn table(tuning: &Tuning, places: &[TunedChannel]) -> String {
     let fits = tuning.outcomes().filter(|(_, tuned, _)| *tuned == Tuned::Fits).count();
     let mut text = format!(
         "{} of {} fit after {}; raw values {} when pressed\n",
@@ -54,7 +54,7 @@ pub(super) fn table(tuning: &Tuning, places: &[Place]) -> String {
 }
 
 /// What a person should know, a line a kind of trouble.
-fn remarks(tuning: &Tuning, places: &[Place]) -> Vec<String> {
+fn remarks(tuning: &Tuning, places: &[TunedChannel]) -> Vec<String> {
     let mut kinds: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (at, (_, tuned, _)) in places.iter().zip(tuning.outcomes()) {
         let why = match at.trouble {
@@ -68,7 +68,7 @@ fn remarks(tuning: &Tuning, places: &[Place]) -> Vec<String> {
     kinds.into_iter().map(|(why, taxels)| format!("{why}: taxel {}", taxels.join(", "))).collect()
 }
 
-pub(super) fn json(tuning: &Tuning, places: &[Place]) -> String {
+pub(super) fn json(tuning: &Tuning, places: &[TunedChannel]) -> String {
     let sensors: Vec<Value> = places
         .iter()
         .zip(tuning.outcomes())

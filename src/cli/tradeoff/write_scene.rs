@@ -1,20 +1,20 @@
-//! A pick, written into a scene file in place of the wish that it grants. Whatever else stands there stays, comments too.
+//! Writes the selected combination into a scene file in place of the target; keeps everything else, comments too.
 
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Combination, Wish};
+use somatic::tradeoff::{Combination, Target};
 use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
 /// Writes `combination` into the scene file that is edited.
-pub(super) fn write(scene: OutputPath, combination: &Combination, wish: &Wish) -> Result<()> {
+pub(super) fn write(scene: OutputPath, combination: &Combination, target: &Target) -> Result<()> {
     let path = scene.name();
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
-    let text = with(&text, combination, wish).map_err(|e| e.at(path.display()))?;
+    let text = with(&text, combination, target).map_err(|e| e.at(path.display()))?;
     scene.write(text.as_bytes())
 }
 
 /// `text` with `combination` in it.
-fn with(text: &str, combination: &Combination, wish: &Wish) -> Result<String> {
+fn with(text: &str, combination: &Combination, target: &Target) -> Result<String> {
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
     let [backend, arithmetic, ..] = combination.words();
     let Knobs { charts, orientation_by, coverage, cadence, .. } = combination.knobs;
@@ -37,7 +37,7 @@ fn with(text: &str, combination: &Combination, wish: &Wish) -> Result<String> {
     knob("cadence", cadence.word(), cadence == Cadence::EveryFrame);
     let first = table.iter().next().map(|(key, _)| key.to_owned());
     if let Some(mut key) = first.and_then(|first| table.key_mut(&first)) {
-        key.leaf_decor_mut().set_prefix(format!("# Picked by `somatic tradeoff` for {}.\n", wish.words()));
+        key.leaf_decor_mut().set_prefix(format!("# Picked by `somatic tradeoff` for {}.\n", target.words()));
     }
     let is_empty = table.is_empty();
     if is_empty {
@@ -57,15 +57,15 @@ mod tests {
         let text = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\n\n[accuracy]\ncentroid = \
                     \"0.5 mm\"\nbudget = \"1 ms\"\n";
         let knobs = Knobs { arithmetic: Some(Arithmetic::OnePass), coverage: Coverage::Touched, ..Knobs::default() };
-        let wish = Wish::within("0.5 mm").unwrap();
-        let written = with(text, &Combination { backend: BackendKind::Cpu, knobs }, &wish).unwrap();
+        let target = Target::within("0.5 mm").unwrap();
+        let written = with(text, &Combination { backend: BackendKind::Cpu, knobs }, &target).unwrap();
         let right = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\nbackend = \"cpu\"\n\n\
                      [accuracy]\n# Picked by `somatic tradeoff` for 0.5 mm.\narithmetic = \"one-pass\"\ncoverage = \
                      \"touched\"\n";
         assert_eq!(written, right);
         // Again, otherwise: nothing piles up.
-        let again = with(&written, &Combination { backend: BackendKind::Reference, knobs: Knobs::default() }, &wish);
+        let again = with(&written, &Combination { backend: BackendKind::Reference, knobs: Knobs::default() }, &target);
         assert_eq!(again.unwrap(), right.split("\n[accuracy]").next().unwrap().replace("\"cpu\"", "\"reference\""));
-        assert!(with("accuracy = 3", &Combination { backend: BackendKind::Cpu, knobs }, &wish).is_err());
+        assert!(with("accuracy = 3", &Combination { backend: BackendKind::Cpu, knobs }, &target).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! How a scene file's values are read: each where it stands, so that an error has its line and column.
+//! Deserializers of a scene file's values. Each parses in place, so that an error has its line and column.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -22,10 +22,10 @@ pub(super) enum OneOrMany {
     Many(Vec<String>),
 }
 
-/// What a text says, read where it stands, so that an error has its place.
-struct Said<T>(T);
+/// A value parsed from a string.
+struct Parsed<T>(T);
 
-impl<'de, T: FromStr<Err = Error>> Deserialize<'de> for Said<T> {
+impl<'de, T: FromStr<Err = Error>> Deserialize<'de> for Parsed<T> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         String::deserialize(from)?.parse().map(Self).map_err(D::Error::custom)
     }
@@ -47,7 +47,7 @@ impl<'de, T: FromStr<Err = Error>> Visitor<'de> for Texts<T> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<T>, A::Error> {
         let mut all = Vec::new();
-        while let Some(Said(one)) = list.next_element()? {
+        while let Some(Parsed(one)) = list.next_element()? {
             all.push(one);
         }
         Ok(all)
@@ -59,10 +59,10 @@ pub(super) fn words<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D)
 }
 
 pub(super) fn word<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    Said::deserialize(from).map(|Said(one)| Some(one))
+    Parsed::deserialize(from).map(|Parsed(one)| Some(one))
 }
 
-/// A text that says what a `T` is, and stays a text.
+/// A string that parses as a `T`.
 struct Checked<T>(String, PhantomData<T>);
 
 impl<T: FromStr<Err = Error>> FromStr for Checked<T> {
@@ -78,7 +78,7 @@ pub(super) fn names_of<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from:
     Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
 }
 
-/// Any text: whether it matches something is for the body to say.
+/// Any string.
 struct Text(String);
 
 impl FromStr for Text {

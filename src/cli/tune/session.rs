@@ -1,4 +1,4 @@
-//! Boards on their lines while they are tuned, and the person who presses.
+//! A tuning session: the boards, their sensors and the prompts for the user.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,55 +14,55 @@ use somatic::{Error, Frame, Result};
 use crate::cli::feed::{Arrival, Feed};
 use crate::cli::{say, words};
 
-/// Boards that do nothing for so long are not waited for.
-const PATIENCE: Duration = Duration::from_secs(6);
-/// What is on its way when a tap is set is over after so long.
-const SETTLING: Duration = Duration::from_millis(300);
-/// How long taps may take to be put back.
-const PUTTING_BACK: Duration = Duration::from_secs(4);
-/// Between two looks at who was pressed.
-const GLANCE: Duration = Duration::from_millis(150);
+/// Boards without progress for this long are given up.
+const BOARD_TIMEOUT: Duration = Duration::from_secs(6);
+/// Time until frames from before a tap change have passed.
+const SETTLE_TIME: Duration = Duration::from_millis(300);
+/// Time limit for restoring the taps.
+const RESTORE_TIMEOUT: Duration = Duration::from_secs(4);
+/// Time between updates of the press count.
+const UPDATE_INTERVAL: Duration = Duration::from_millis(150);
 
-/// When a phase is over.
+/// When a phase ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Until {
-    Over(Duration),
+pub(super) enum PhaseLimit {
+    After(Duration),
     Enter,
 }
 
-/// Whether a phase came to its end.
+/// How a phase ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Went {
-    On,
+pub(super) enum PhaseEnd {
+    Completed,
     Stopped,
 }
 
-/// Where a sensor is.
+/// A channel whose tap is tuned.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct TunedChannel {
     /// The board's number in the wiring, and its id.
     pub(super) board: usize,
     pub(super) id: u16,
     pub(super) channel: u16,
     pub(super) taxel: u32,
-    /// The tap that it had at first.
+    /// The tap at the start.
     before: u8,
-    /// Whether its board has confirmed the tap that it is to have.
+    /// Whether its board has confirmed the wanted tap.
     pub(super) is_set: bool,
-    /// Why not.
+    /// Why not, if it has not.
     pub(super) trouble: Option<&'static str>,
 }
 
-pub(super) struct Bench {
+pub(super) struct TuningSession {
     lines: Lines,
     feed: Feed,
     stop: Arc<AtomicBool>,
     enter: Option<Receiver<()>>,
-    places: Vec<Place>,
+    places: Vec<TunedChannel>,
     pub(super) guide: Guide,
 }
 
-/// What a person is told; at a terminal with a line that changes.
+/// Messages to the user, and a status line at a terminal.
 pub(super) struct Guide {
     term: Term,
     shown: bool,
@@ -89,7 +89,7 @@ impl Guide {
     }
 }
 
-impl Bench {
+impl TuningSession {
     /// For `source`, whose wiring is `wiring` with a tap on each channel.
     pub(super) fn new(source: SerialSource, wiring: &Wiring, stop: Arc<AtomicBool>) -> Self {
         let mut places = Vec::new();
@@ -97,7 +97,7 @@ impl Bench {
             for (channel, (taxel, tap)) in (0..).zip(wired.taxels.iter().zip(&wired.taps)) {
                 if let (Some(taxel), Some(before)) = (*taxel, *tap) {
                     let id = wired.id;
-                    places.push(Place { board, id, channel, taxel, before, is_set: false, trouble: None });
+                    places.push(TunedChannel { board, id, channel, taxel, before, is_set: false, trouble: None });
                 }
             }
         }
@@ -107,13 +107,13 @@ impl Bench {
         Self { lines, feed, stop, enter: None, places, guide }
     }
 
-    /// The sensors, at the taps that they begin with.
+    /// Tuning of the sensors at their first taps.
     pub(super) fn tuning(&mut self) -> Result<Tuning> {
         let accounts = self.lines.accounts();
         let most = |board: usize| f64::from((1_u32 << accounts[board].bits.unwrap_or(10)) - 1);
         let sensors: Vec<_> = self.places.iter().map(|at| (at.taxel, most(at.board), at.before)).collect();
         let mut tuning = Tuning::new(&sensors);
-        self.heed_troubles(&mut tuning);
+        self.mark_failed_taps(&mut tuning);
         if accounts.iter().all(|account| account.state == BoardState::Awaited) {
             return Err(Error::failed("no board is there; `somatic devices` shows the ports"));
         }
@@ -126,7 +126,7 @@ impl Bench {
         Ok(tuning)
     }
 
-    /// Wants the taps `taps` of sensors.
+    /// Requests taps, by sensor index.
     pub(super) fn set(&mut self, taps: &[(usize, u8)]) {
         for &(index, tap) in taps {
             let at = self.places[index];
@@ -134,7 +134,7 @@ impl Bench {
         }
     }
 
-    /// How many taps are not yet as wanted and not given up.
+    /// Number of taps that are requested, not confirmed and not given up.
     fn due(&self) -> usize {
         let due = self.lines.taps();
         due.iter()
@@ -149,30 +149,30 @@ impl Bench {
         }
     }
 
-    /// Waits until all taps are set, or nothing more is to be waited for.
-    pub(super) fn settle(&mut self) -> Result<Went> {
+    /// Waits until all taps are confirmed or given up.
+    pub(super) fn settle(&mut self) -> Result<PhaseEnd> {
         let (mut since, mut before) = (Instant::now(), usize::MAX);
         loop {
             let due = self.due();
             if due < before {
                 (since, before) = (Instant::now(), due);
             }
-            let over = since.elapsed() > if due == 0 { SETTLING } else { PATIENCE };
+            let over = since.elapsed() > if due == 0 { SETTLE_TIME } else { BOARD_TIMEOUT };
             if self.stop.load(Ordering::Relaxed) {
-                return Ok(Went::Stopped);
+                return Ok(PhaseEnd::Stopped);
             }
-            // A board that was just set up has not spoken yet.
+            // A board that was just set up has not sent anything yet.
             let awaited = self.lines.accounts().iter().any(|account| account.state == BoardState::Awaited);
-            if over && (!awaited || since.elapsed() > PATIENCE) {
+            if over && (!awaited || since.elapsed() > BOARD_TIMEOUT) {
                 self.guide.clear();
-                return Ok(Went::On);
+                return Ok(PhaseEnd::Completed);
             }
             self.guide.show(|| format!("  {due} taps to set"));
             self.take(|_| ())?;
         }
     }
 
-    /// Takes what comes next, if something does soon.
+    /// Takes the frames that arrive within 40 ms.
     fn take(&mut self, mut each: impl FnMut(&Frame)) -> Result<()> {
         self.tell();
         match self.feed.next(Duration::from_millis(40)) {
@@ -188,34 +188,34 @@ impl Bench {
     }
 
     /// Gives frames to `tuning` until the phase is over.
-    pub(super) fn listen(
+    pub(super) fn observe(
         &mut self,
-        until: Until,
+        until: PhaseLimit,
         tuning: &mut Tuning,
         give: impl Fn(&mut Tuning, &Frame),
-    ) -> Result<Went> {
+    ) -> Result<PhaseEnd> {
         let (start, mut glanced) = (Instant::now(), Instant::now());
-        if until == Until::Enter {
-            // What was typed before is no answer.
+        if until == PhaseLimit::Enter {
+            // Discards earlier input.
             self.entered();
         }
         while !self.stop.load(Ordering::Relaxed) {
             let over = match until {
-                Until::Over(span) => start.elapsed() >= span,
-                Until::Enter => self.entered(),
+                PhaseLimit::After(span) => start.elapsed() >= span,
+                PhaseLimit::Enter => self.entered(),
             };
             if over {
                 self.guide.clear();
-                return Ok(Went::On);
+                return Ok(PhaseEnd::Completed);
             }
             self.take(|frame| give(tuning, frame))?;
-            if glanced.elapsed() > GLANCE {
+            if glanced.elapsed() > UPDATE_INTERVAL {
                 glanced = Instant::now();
                 let left = match until {
-                    Until::Over(span) => {
+                    PhaseLimit::After(span) => {
                         format!("  {:.0} s", span.saturating_sub(start.elapsed()).as_secs_f64().ceil())
                     }
-                    Until::Enter => String::new(),
+                    PhaseLimit::Enter => String::new(),
                 };
                 self.guide.show(|| {
                     let awaited: Vec<String> = tuning.awaited().map(|id| id.to_string()).collect();
@@ -226,7 +226,7 @@ impl Bench {
                 });
             }
         }
-        Ok(Went::Stopped)
+        Ok(PhaseEnd::Stopped)
     }
 
     /// Whether Enter was pressed since the last call.
@@ -244,8 +244,8 @@ impl Bench {
         enter.try_iter().count() > 0
     }
 
-    /// Tells `tuning` which taps are not set, and says so of boards that have gone.
-    pub(super) fn heed_troubles(&mut self, tuning: &mut Tuning) {
+    /// Marks in `tuning` the taps that are not set.
+    pub(super) fn mark_failed_taps(&mut self, tuning: &mut Tuning) {
         let taps = self.lines.taps();
         for (index, at) in self.places.iter().enumerate() {
             let tap = taps[at.board][usize::from(at.channel)];
@@ -255,27 +255,27 @@ impl Bench {
         }
     }
 
-    /// Where the sensors are, and whether their taps are as wanted.
-    pub(super) fn places(&self, wiring: &Wiring) -> Vec<Place> {
+    /// The tuned channels, and whether their taps are confirmed.
+    pub(super) fn places(&self, wiring: &Wiring) -> Vec<TunedChannel> {
         let taps = self.lines.taps();
         debug_assert_eq!(taps.len(), wiring.boards().len());
-        let now = |at: &Place| {
+        let now = |at: &TunedChannel| {
             let tap = taps[at.board][usize::from(at.channel)];
             let is_set = tap.wanted == tap.set;
             let trouble = (!is_set).then(|| tap.trouble.map_or("is not there", |trouble| trouble.word()));
-            Place { is_set, trouble, ..*at }
+            TunedChannel { is_set, trouble, ..*at }
         };
         self.places.iter().map(now).collect()
     }
 
-    /// Puts all taps back as they were at first; in words, what came of it.
-    pub(super) fn put_back(&mut self) -> String {
+    /// Restores the first taps; returns the result in words.
+    pub(super) fn restore_taps(&mut self) -> String {
         self.guide.clear();
         for at in &self.places {
             self.lines.set_tap(at.board, usize::from(at.channel), at.before);
         }
         let start = Instant::now();
-        while self.due() > 0 && start.elapsed() < PUTTING_BACK {
+        while self.due() > 0 && start.elapsed() < RESTORE_TIMEOUT {
             self.tell();
             std::thread::sleep(Duration::from_millis(20));
         }
