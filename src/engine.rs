@@ -1,24 +1,25 @@
 //! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
 
+mod advance;
 mod cadence;
 mod check;
-mod host;
 mod ids;
-mod kept_up;
 mod place;
+mod post;
+mod state;
+mod upkeep_state;
 
-use std::ops::Range;
-
-use self::cadence::{OnChange, step};
+use self::cadence::OnChange;
 use self::check::Check;
-use self::host::{Host, Side, flag_stale};
 use self::ids::ranges;
-use self::kept_up::KeptUp;
 use self::place::Links;
+use self::post::PostState;
+pub use self::state::EngineState;
+use self::upkeep_state::UpkeepState;
 use crate::backend::agreement::{Agreement, compare};
-use crate::backend::{self, Backend, BackendKind, Picks, RawBatch, Rows, Step};
+use crate::backend::{self, Backend, BackendKind, Picks, Step};
 use crate::body::Body;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::Percepts;
 use crate::scene::{Cadence, Coordinates, Plan, Scene};
@@ -72,16 +73,17 @@ pub struct Engine {
     last_t_s: Option<f64>,
     max_gap_s: f64,
     percepts: Percepts,
-    /// Made by the first comparison, and kept, as the reference has a memory too.
+    /// The reference's side of the last comparison, if no frame was processed without one since.
     check: Option<Box<Check>>,
-    /// What the calibration's upkeep does, if it does anything.
-    upkeep: Option<KeptUp>,
-    /// What is remembered of frames before.
-    side: Side,
-    /// Which fields changed, where that is looked at.
+    /// If the calibration asks for any upkeep.
+    upkeep: Option<UpkeepState>,
+    post: PostState,
+    /// With cadence `on-change`.
     cadence: Option<OnChange>,
     /// Whether the first frame is still to be taken as the baselines.
     tare: bool,
+    /// Whether the calibration may change while the engine runs, by upkeep or tare.
+    recalibrates: bool,
     frames_done: u64,
     ids: Vec<u32>,
     links: Links,
@@ -116,7 +118,7 @@ impl Engine {
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         // Of a large skin these take as much memory as the plan.
         drop(recharted.fields);
-        let upkeep = KeptUp::new(&plan, calibration.upkeep, body);
+        let upkeep = UpkeepState::new(&plan, calibration.upkeep, body);
         if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(
                 "the calibration's [upkeep] must know what is touched; ask for letter `sustained` too",
@@ -133,8 +135,9 @@ impl Engine {
                 .with_letters(plan.letters().len())
                 .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
+            post: PostState::initial(plan.fields.len()),
+            recalibrates: upkeep.is_some() || tare,
             upkeep,
-            side: Side::new(plan.fields.len()),
             cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
             backend: chosen.backend,
             why: chosen.why,
@@ -240,6 +243,7 @@ impl Engine {
     /// A frame has another number of values than the engine listens to, or poses a link that the body does not have; or
     /// the device was lost.
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
+        self.check = None;
         self.advance(frames, None)?;
         Ok(&self.percepts)
     }
@@ -273,170 +277,26 @@ impl Engine {
         }
     }
 
-    /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds.
+    /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds. After frames that
+    /// were not compared, and after [`Engine::restore`], the reference goes on from the backend's state.
     ///
     /// # Errors
-    /// As [`Engine::process`]; also after frames that were not compared, as the reference has not seen them.
+    /// As [`Engine::process`].
     pub fn process_and_compare(&mut self, frames: &[Frame]) -> Result<(&Percepts, Agreement)> {
         let mut check = match self.check.take() {
             Some(check) => check,
-            None if self.frames_done > 0 => {
-                return Err(Error::usage("frames were processed without a comparison; compare from the first on"));
-            }
-            None => Box::new(Check::new(&self.plan)),
+            None => Box::new(Check::new(&self.plan, &self.backend.state()?, &self.post)?),
         };
-        let done = self.advance(frames, Some(&mut check));
+        self.advance(frames, Some(&mut check))?;
         let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
-        let agreement = done.map(|()| compare(&check.right, &check.bounds, &self.percepts, &names));
+        let agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
         self.check = Some(check);
-        Ok((&self.percepts, agreement?))
+        Ok((&self.percepts, agreement))
     }
 
     /// Taxels that are not used at present, by id, and why: those that upkeep has found unfit.
     pub fn unfit(&self) -> impl Iterator<Item = (u32, Unfit)> + '_ {
         let judged = self.upkeep.iter().flat_map(|kept| kept.upkeep.taxels());
         judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
-    }
-
-    /// All of `frames`, epoch by epoch where there is upkeep, on the backend and, if asked for, on the reference.
-    fn advance(&mut self, frames: &[Frame], mut check: Option<&mut Check>) -> Result<()> {
-        self.gather(frames)?;
-        self.percepts.reset(frames.len());
-        self.percepts.first_frame = self.frames_done;
-        if let Some(check) = check.as_deref_mut() {
-            check.right.reset(frames.len());
-            check.right.first_frame = self.frames_done;
-            check.bounds.clear();
-        }
-        if self.tare && !frames.is_empty() {
-            self.tare = false;
-            self.take_as_baselines(&frames[0], check.as_deref_mut());
-        }
-        let mut start = 0;
-        for index in 0..frames.len() {
-            if self.upkeep.as_ref().is_some_and(|kept| kept.upkeep.is_due(frames[index].t_s)) {
-                self.segment(frames, start..index, check.as_deref_mut())?;
-                self.close_epoch(check.as_deref_mut());
-                start = index;
-            }
-            if let Some(kept) = &mut self.upkeep {
-                let channels = self.plan.channels();
-                kept.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
-            }
-        }
-        self.segment(frames, start..frames.len(), check.as_deref_mut())?;
-        for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
-            flag_stale(&self.plan, self.intake.stale(), percepts);
-        }
-        self.frames_done += frames.len() as u64;
-        Ok(())
-    }
-
-    /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
-    fn take_as_baselines(&mut self, first: &Frame, check: Option<&mut Check>) {
-        let made = self.plan.taxels.clone();
-        let channels = self.plan.channels();
-        let first = rows(self.picks.as_ref(), &self.raw, std::slice::from_ref(first), channels);
-        for (channel, value) in first.row(0).enumerate() {
-            if let Some(value) = value.number() {
-                self.plan.keep_up(channel, value as f32, false, &made);
-            }
-        }
-        if let Some(kept) = &mut self.upkeep {
-            kept.restart(&self.plan);
-        }
-        self.backend.recalibrate(&self.plan);
-        if let Some(cadence) = &mut self.cadence {
-            cadence.forget();
-        }
-        if let Some(check) = check {
-            check.reference.recalibrate(&self.plan);
-        }
-    }
-
-    /// A run of frames that are calibrated alike.
-    fn segment(&mut self, frames: &[Frame], range: Range<usize>, check: Option<&mut Check>) -> Result<()> {
-        if range.is_empty() {
-            return Ok(());
-        }
-        let channels = self.plan.channels();
-        let raw = RawBatch {
-            first: range.start,
-            frames: range.len(),
-            rows: rows(self.picks.as_ref(), &self.raw, frames, channels).part(range.clone()),
-            steps: &self.steps[range.clone()],
-        };
-        if let Some(cadence) = &mut self.cadence {
-            cadence.look(&raw, &frames[range.clone()]);
-        }
-        let host = Host { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref() };
-        let (backend, percepts, side) = (&mut *self.backend, &mut self.percepts, &mut self.side);
-        let right = match check {
-            None => {
-                host.run(backend, &frames[range.clone()], &raw, percepts, side)?;
-                None
-            }
-            Some(check) => {
-                check.run(&host, backend, &frames[range.clone()], &raw, percepts, side)?;
-                Some(&mut check.right)
-            }
-        };
-        if let Some(kept) = &mut self.upkeep {
-            let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();
-            kept.note(&self.percepts.flags[cells.clone()]);
-            kept.flag(&mut self.percepts.flags[cells.clone()]);
-            right.into_iter().for_each(|right| kept.flag(&mut right.flags[cells.clone()]));
-        }
-        Ok(())
-    }
-
-    /// Lets upkeep judge the epoch, and calibrates from now on as it says.
-    fn close_epoch(&mut self, check: Option<&mut Check>) {
-        let Some(kept) = &mut self.upkeep else { return };
-        if kept.close(&mut self.plan) {
-            self.backend.recalibrate(&self.plan);
-            if let Some(cadence) = &mut self.cadence {
-                cadence.forget();
-            }
-            if let Some(check) = check {
-                check.reference.recalibrate(&self.plan);
-            }
-        }
-    }
-
-    fn gather(&mut self, frames: &[Frame]) -> Result<()> {
-        for (index, frame) in frames.iter().enumerate() {
-            let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
-            if frame.values.len() != self.intake.width() {
-                let (got, want) = (frame.values.len(), self.intake.width());
-                return Err(at(Error::failed(format!("it has {got} values where {want} belong"))));
-            }
-            if let Some((name, _)) = frame.pose.iter().find(|(name, _)| !self.links.index_of.contains_key(name)) {
-                let near = nearest(name, self.links.index_of.keys().map(String::as_str));
-                let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                return Err(at(Error::failed(format!("it poses link `{name}`, which the body does not have{hint}"))));
-            }
-        }
-        self.raw.clear();
-        self.intake.forget_stale();
-        if self.picks.is_none() {
-            for frame in frames {
-                self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
-            }
-        }
-        self.steps.clear();
-        for frame in frames {
-            self.steps.push(step(self.last_t_s, frame.t_s, self.max_gap_s));
-            self.last_t_s = Some(frame.t_s);
-        }
-        Ok(())
-    }
-}
-
-/// Where the values of `frames` lie: where `picks` says, or gathered in `raw`.
-fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], channels: usize) -> Rows<'a> {
-    match picks {
-        Some(picks) => Rows::Picked { frames, picks },
-        None => Rows::Packed { values: raw, channels },
     }
 }

@@ -83,7 +83,7 @@ pub mod wire;
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, Comparison};
 pub use body::Body;
-pub use engine::{Engine, Options};
+pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{COLUMNS, Column, Flags, Outputs, Percept, Percepts, Precision, Touch};

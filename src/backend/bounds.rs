@@ -3,8 +3,9 @@
 use glam::DVec2;
 
 use super::reference::{Before, Reference};
-use super::{Backend, RawBatch, Step};
-use crate::percept::{Flags, Outputs, Percepts, Values};
+use super::{Backend, BackendState, FieldState, RawBatch, Step};
+use crate::error::Result;
+use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
@@ -78,37 +79,6 @@ struct Doubt {
     filter: filter::Doubt,
 }
 
-/// What a backend's frame left of a field: what its next frame hangs on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Left {
-    contact: bool,
-    /// The centroid, m, and its pressed taxels, where percepts have them.
-    centroid: Option<motion::Centroid>,
-}
-
-impl Left {
-    /// By field, what frame `frame` of `percepts` left, as the backend has filled them.
-    pub(crate) fn by(plan: &Plan, percepts: &Percepts, frame: usize) -> Vec<Self> {
-        let told = Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL | Outputs::FILTERED;
-        let counted = plan.outputs.intersects(Outputs::ACTIVE | Outputs::FILTERED);
-        let place = |cell: usize| match &percepts.values {
-            Values::F32(columns) => columns.centroid(cell),
-            Values::F64(columns) => columns.centroid(cell),
-        };
-        (0..plan.fields.len())
-            .map(|field| {
-                let contact = percepts.in_contact(frame, field);
-                let known = contact && plan.fields[field].charted && plan.outputs.intersects(told) && counted;
-                let cell = frame * plan.fields.len() + field;
-                let centroid = known
-                    .then(|| place(cell))
-                    .map(|[u, v, _]| motion::Centroid { place: DVec2::new(u, v), pressed: percepts.active[cell] });
-                Self { contact, centroid }
-            })
-            .collect()
-    }
-}
-
 /// One field in one frame.
 struct Cell<'a> {
     index: usize,
@@ -159,23 +129,28 @@ impl BoundedReference {
             .collect()
     }
 
-    /// Goes on from what another backend left of field `index`, where the reference cannot tell.
-    pub(crate) fn resume(&mut self, index: usize, left: Left) {
+    /// Goes on from the state of another backend.
+    pub(crate) fn restore(&mut self, state: &BackendState) -> Result<()> {
+        self.reference.restore(state)?;
+        state.fields.iter().enumerate().for_each(|(index, field)| self.restore_field(index, *field));
+        Ok(())
+    }
+
+    /// The same in field `index`, where the reference cannot tell what the other chose.
+    pub(crate) fn restore_field(&mut self, index: usize, state: FieldState) {
+        self.reference.restore_field(index, state);
         let field = &self.reference.plan.fields[index];
-        let moves = left.contact && field.charted && self.reference.plan.stages().motion;
-        let in_unit = |c: motion::Centroid| motion::Centroid { place: c.place / f64::from(field.unit_m), ..c };
-        let centroid = left.centroid.filter(|_| moves).map(in_unit);
-        self.reference.before[index] = Before { contact: left.contact, centroid };
-        (self.doubts[index].place, self.doubts[index].unread) = (0.0, moves && centroid.is_none());
+        let moves = state.contact && field.charted && self.reference.plan.stages().motion;
+        (self.doubts[index].place, self.doubts[index].unread) = (0.0, moves && state.centroid.is_none());
     }
 
     /// The same for what the host remembers of the touches.
-    pub(crate) fn resume_touches(&mut self, index: usize, memory: &touches::Memory) {
+    pub(crate) fn restore_touches(&mut self, index: usize, memory: &touches::Memory) {
         self.doubts[index].touches = touches::Doubt::after(memory);
     }
 
     /// The same for what the host's filter remembers.
-    pub(crate) fn resume_filter(&mut self, index: usize, memory: &filter::Memory) {
+    pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory) {
         self.doubts[index].filter = filter::Doubt::after(memory);
     }
 

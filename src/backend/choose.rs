@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 #[cfg(feature = "gpu")]
 use super::gpu;
-use super::{Backend, BackendKind, RawBatch, Rows, Step, cpu, reference};
+use super::{Backend, BackendKind, BackendState, RawBatch, Rows, Step, cpu, reference};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
 use crate::error::Result;
@@ -107,7 +107,8 @@ fn least_times<const N: usize>(
             }
         }
     }
-    backends.iter_mut().for_each(|backend| backend.restart());
+    let initial = BackendState::initial(plan);
+    backends.iter_mut().try_for_each(|backend| backend.restore(&initial))?;
     Ok(least)
 }
 
@@ -136,7 +137,13 @@ mod tests {
             String::new()
         }
 
-        fn restart(&mut self) {}
+        fn state(&mut self) -> Result<BackendState> {
+            Ok(BackendState { raw: Vec::new(), fields: Vec::new() })
+        }
+
+        fn restore(&mut self, _: &BackendState) -> Result<()> {
+            Ok(())
+        }
 
         fn recalibrate(&mut self, _: &Plan) {}
 

@@ -8,12 +8,14 @@ pub(crate) mod cpu;
 pub mod gpu;
 mod raw;
 pub(crate) mod reference;
+mod state;
 
 use std::str::FromStr;
 
 pub(crate) use self::choose::choose;
 pub use self::choose::processor;
 pub(crate) use self::raw::{Picks, RawBatch, Rows, Step};
+pub(crate) use self::state::{BackendState, FieldState};
 use crate::error::{Error, Result};
 use crate::percept::{Percepts, Precision};
 use crate::scene::{Arithmetic, Plan};
@@ -81,8 +83,11 @@ pub(crate) trait Backend: Send {
     /// What it runs on, for people.
     fn describe(&self) -> String;
 
-    /// Forgets all frames so far.
-    fn restart(&mut self);
+    /// What the next frame depends on.
+    fn state(&mut self) -> Result<BackendState>;
+
+    /// Goes on from `state`, of the same plan.
+    fn restore(&mut self, state: &BackendState) -> Result<()>;
 
     /// Calibrates from now on as `plan` does, which differs in nothing but its taxels' calibration.
     fn recalibrate(&mut self, plan: &Plan);

@@ -1,6 +1,6 @@
 //! Backend `reference`: the stages' own f64, one cell after the other, and the bounds that the others are held to.
 
-use super::{Backend, RawBatch, Step};
+use super::{Backend, BackendState, FieldState, RawBatch, Step};
 use crate::error::Result;
 use crate::percept::{Component, Components, Flags, Outputs, Percepts, Store, Values};
 use crate::scene::{Plan, PlanField};
@@ -26,6 +26,13 @@ pub(super) struct Before {
     pub(super) centroid: Option<motion::Centroid>,
 }
 
+impl Before {
+    fn in_metres(self, field: &PlanField) -> FieldState {
+        let in_metres = |c: motion::Centroid| motion::Centroid { place: c.place * f64::from(field.unit_m), ..c };
+        FieldState { contact: self.contact, centroid: self.centroid.map(in_metres) }
+    }
+}
+
 impl Reference {
     pub(crate) fn new(plan: &Plan) -> Self {
         let fields = plan.fields.len();
@@ -34,6 +41,15 @@ impl Reference {
             before: vec![Before::default(); fields],
             raw_before: vec![RawValue::MISSING; plan.channels()],
         }
+    }
+
+    /// Goes on from `state` in field `index`.
+    pub(super) fn restore_field(&mut self, index: usize, state: FieldState) {
+        let field = &self.plan.fields[index];
+        let moves = state.contact && field.charted && self.plan.stages().motion;
+        let in_unit = |c: motion::Centroid| motion::Centroid { place: c.place / f64::from(field.unit_m), ..c };
+        let centroid = state.centroid.filter(|_| moves).map(in_unit);
+        self.before[index] = Before { contact: state.contact, centroid };
     }
 
     /// One frame's pressures and changes, slot by slot; `before` has the raw values of the frame before.
@@ -215,8 +231,18 @@ impl Backend for Reference {
         "double precision, as the equations read, one thread".to_owned()
     }
 
-    fn restart(&mut self) {
-        self.before.fill(Before::default());
+    fn state(&mut self) -> Result<BackendState> {
+        let fields = self.before.iter().zip(self.plan.fields.iter());
+        let fields = fields.map(|(before, field)| before.in_metres(field)).collect();
+        Ok(BackendState { raw: self.raw_before.clone(), fields })
+    }
+
+    fn restore(&mut self, state: &BackendState) -> Result<()> {
+        self.raw_before.clone_from(&state.raw);
+        for (index, field) in state.fields.iter().enumerate() {
+            self.restore_field(index, *field);
+        }
+        Ok(())
     }
 
     fn recalibrate(&mut self, plan: &Plan) {

@@ -18,12 +18,18 @@ pub(super) struct OnChange {
     starts: Vec<usize>,
     readers: Vec<usize>,
     max_gap_s: f64,
+    pub(super) state: ChangeState,
+    /// By frame and field, of the frames looked at last: the time since the change before, for a field that has changed.
+    cells: Vec<Option<Step>>,
+}
+
+/// What is kept from frame to frame.
+#[derive(Clone, Debug)]
+pub(super) struct ChangeState {
     /// The frame before, by channel; empty where there is none that counts.
     before: Vec<RawValue>,
     /// Per field, when it last changed.
     changed_at_s: Vec<Option<f64>>,
-    /// By frame and field, of the frames looked at last: the time since the change before, for a field that has changed.
-    cells: Vec<Option<Step>>,
 }
 
 impl OnChange {
@@ -47,36 +53,36 @@ impl OnChange {
             starts,
             readers: of_channel.concat(),
             max_gap_s,
-            before: Vec::new(),
-            changed_at_s: vec![None; plan.fields.len()],
+            state: ChangeState { before: Vec::new(), changed_at_s: vec![None; plan.fields.len()] },
             cells: Vec::new(),
         }
     }
 
     /// Takes all fields for changed in the next frame, as when values mean something else from then on.
     pub(super) fn forget(&mut self) {
-        self.before.clear();
+        self.state.before.clear();
     }
 
     /// Looks at `raw`, whose frames are `frames`.
     pub(super) fn look(&mut self, raw: &RawBatch<'_>, frames: &[Frame]) {
+        let ChangeState { before, changed_at_s } = &mut self.state;
         self.cells.clear();
         self.cells.resize(raw.frames * self.fields, None);
         for (index, frame) in frames.iter().enumerate() {
             let cells = &mut self.cells[index * self.fields..][..self.fields];
             let mut changed = |field: usize| {
                 cells[field].get_or_insert_with(|| {
-                    let since = step(self.changed_at_s[field], frame.t_s, self.max_gap_s);
-                    self.changed_at_s[field] = Some(frame.t_s);
+                    let since = step(changed_at_s[field], frame.t_s, self.max_gap_s);
+                    changed_at_s[field] = Some(frame.t_s);
                     since
                 });
             };
-            if self.before.is_empty() {
+            if before.is_empty() {
                 (0..self.fields).for_each(&mut changed);
-                self.before.extend(raw.rows.row(index));
+                before.extend(raw.rows.row(index));
                 continue;
             }
-            for (channel, (before, now)) in self.before.iter_mut().zip(raw.rows.row(index)).enumerate() {
+            for (channel, (before, now)) in before.iter_mut().zip(raw.rows.row(index)).enumerate() {
                 if before.to_bits() != now.to_bits() {
                     *before = now;
                     self.readers[self.starts[channel]..self.starts[channel + 1]].iter().copied().for_each(&mut changed);

@@ -1,13 +1,12 @@
-//! What is right, beside what a backend says.
+//! The comparison of a backend's percepts with the reference's.
 //!
-//! Where the reference cannot tell by its own margin, a backend may choose otherwise and remember another state: that of a
-//! contact, a centroid, touches, a filter. From there on the reference goes on from the state that the backend took, field by
-//! field, so that what follows is comparable, and the percepts compared are those that the backend gives without a
-//! comparison, to the bit.
+//! Where the reference cannot tell by its own margin, a backend may choose otherwise and keep another state: of a contact, a
+//! centroid, touches, a filter. From there on the reference goes on from the backend's state, field by field, so that what
+//! follows is comparable. The percepts compared are those that the backend gives without a comparison, to the bit.
 
-use super::host::{Host, Side};
-use crate::backend::bounds::{BoundedReference, CellBound, Left};
-use crate::backend::{Backend, RawBatch};
+use super::post::{Post, PostFieldState, PostState};
+use crate::backend::bounds::{BoundedReference, CellBound};
+use crate::backend::{BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::{Percepts, Precision};
 use crate::scene::Plan;
@@ -16,74 +15,88 @@ use crate::signal::Frame;
 /// The reference's side of a comparison.
 pub(super) struct Check {
     pub(super) reference: BoundedReference,
-    side: Side,
+    post: PostState,
     pub(super) right: Percepts,
     pub(super) bounds: Vec<CellBound>,
-    /// Those of the frame before, where percepts are kept.
+    /// Those of the last frame, where percepts may be kept.
     last_bounds: Vec<CellBound>,
 }
 
 impl Check {
-    pub(super) fn new(plan: &Plan) -> Self {
-        Self {
+    /// A comparison that goes on from the states of the engine's backend and post-processing.
+    pub(super) fn new(plan: &Plan, backend: &BackendState, post: &PostState) -> Result<Self> {
+        let right = Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
+            .with_columns(plan.columns, plan.kept_pressures())
+            .with_letters(plan.letters().len());
+        let last = post.last.as_ref().map(|last| {
+            let mut widened = right.clone();
+            widened.take_frame(last, 0);
+            widened
+        });
+        let mut check = Self {
             reference: BoundedReference::new(plan),
-            side: Side::new(plan.fields.len()),
-            right: Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
-                .with_columns(plan.columns, plan.kept_pressures())
-                .with_letters(plan.letters().len()),
+            post: PostState { last, ..post.clone() },
+            right,
             bounds: Vec::new(),
-            last_bounds: Vec::new(),
+            last_bounds: vec![CellBound::default(); plan.fields.len()],
+        };
+        check.reference.restore(backend)?;
+        for (field, state) in post.fields.iter().enumerate() {
+            check.reference.restore_touches(field, &state.touches);
+            check.reference.restore_filter(field, &state.filter);
         }
+        Ok(check)
     }
 
-    /// Does what [`Host::run`] does with `backend`, and the same with the reference.
-    pub(super) fn run(
+    /// Empties the percepts and bounds for `frames` frames, of which `first_frame` is the first.
+    pub(super) fn reset(&mut self, frames: usize, first_frame: u64) {
+        self.right.reset(frames);
+        self.right.first_frame = first_frame;
+        self.bounds.clear();
+    }
+
+    /// Computes frame `offset` of `raw`, which is `frame`, on the reference. `left` is the state in which the backend left the
+    /// fields in this frame, and `after` the state of its post-processing.
+    pub(super) fn frame(
         &mut self,
-        host: &Host<'_>,
-        backend: &mut dyn Backend,
-        frames: &[Frame],
+        post: &Post<'_>,
+        (offset, frame): (usize, &Frame),
         raw: &RawBatch<'_>,
-        percepts: &mut Percepts,
-        side: &mut Side,
-    ) -> Result<()> {
-        backend.run(raw, percepts)?;
-        host.place(frames, raw.first, percepts);
-        let first = self.bounds.len();
-        for (offset, frame) in frames.iter().enumerate() {
-            // Before the host keeps any percept in its stead.
-            let left = Left::by(host.plan, percepts, raw.first + offset);
-            host.frame(offset, frame, raw, percepts, side);
-            let advances = |field| host.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
-            let bounds = self.reference.run(raw, offset, &mut self.right, advances);
-            host.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
-            host.frame(offset, frame, raw, &mut self.right, &mut self.side);
-            for (field, bound) in bounds.iter().enumerate() {
-                self.resume(field, bound, left[field], side);
-            }
-            self.bounds.extend(bounds);
+        left: &[FieldState],
+        after: &PostState,
+    ) {
+        let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
+        let bounds = self.reference.run(raw, offset, &mut self.right, advances);
+        post.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
+        post.frame(offset, frame, raw, &mut self.right, &mut self.post);
+        for (field, bound) in bounds.iter().enumerate() {
+            self.restore_doubtful(field, bound, left[field], &after.fields[field]);
         }
-        host.finish(raw, percepts, side);
-        host.finish(raw, &self.right, &mut self.side);
-        if let Some(cadence) = host.cadence {
+        self.bounds.extend(bounds);
+    }
+
+    /// Ends a call, whose bounds begin at `first`.
+    pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) {
+        post.finish(raw, &self.right, &mut self.post);
+        if let Some(cadence) = post.cadence {
             cadence.bounds(&mut self.bounds[first..], raw.steps, &mut self.last_bounds);
         }
-        Ok(())
     }
 
-    /// Goes on from the state that the backend and its host, whose is `other`, took where it may differ.
-    fn resume(&mut self, field: usize, bound: &CellBound, left: Left, other: &Side) {
-        let (memory, may_remember) = (&other.memories[field], bound.may_remember);
+    /// Goes on from the backend's state where it may differ from the reference's.
+    fn restore_doubtful(&mut self, field: usize, bound: &CellBound, left: FieldState, after: &PostFieldState) {
+        let (may_remember, own) = (bound.may_remember, &mut self.post.fields[field]);
         if may_remember.contact {
-            self.reference.resume(field, left);
-            self.side.held[field] = other.held[field];
+            self.reference.restore_field(field, left);
+            own.contact = after.contact;
         }
         if may_remember.touches {
-            self.side.memories[field].touches = memory.touches.clone();
-            self.reference.resume_touches(field, &memory.touches);
+            own.touches = after.touches.clone();
+            self.reference.restore_touches(field, &after.touches);
         }
         if may_remember.filter {
-            self.side.memories[field].filter = memory.filter;
-            self.reference.resume_filter(field, &memory.filter);
+            own.filter = after.filter;
+            self.reference.restore_filter(field, &after.filter);
         }
     }
 }

@@ -29,15 +29,19 @@ impl Percepts {
         match (&mut self.values, of.map(|of| &of.values)) {
             (Values::F32(columns), Some(Values::F32(of))) => columns.keep(Some(of), from_cell, cell),
             (Values::F64(columns), Some(Values::F64(of))) => columns.keep(Some(of), from_cell, cell),
+            (Values::F64(columns), Some(Values::F32(of))) => columns.widen(of, from_cell, cell),
             (Values::F32(columns), _) => columns.keep(None, from_cell, cell),
             (Values::F64(columns), _) => columns.keep(None, from_cell, cell),
         }
     }
 
-    /// Makes the percept of field `field`, the next, in the first frame that of frame `from` of `of`.
-    pub(crate) fn take_over(&mut self, of: &Self, from: usize, field: usize) {
-        self.keep(Some(of), from, 0, field);
-        self.push_touches(of.touches(from, field).iter().copied());
+    /// Makes these percepts one frame: frame `from` of `of`, which may be less precise.
+    pub(crate) fn take_frame(&mut self, of: &Self, from: usize) {
+        self.reset(1);
+        for field in 0..self.fields() {
+            self.keep(Some(of), from, 0, field);
+            self.push_touches(of.touches(from, field).iter().copied());
+        }
     }
 
     /// The separate touches of field `field` in frame `from` of `of`, or of these.
@@ -57,6 +61,16 @@ impl Percepts {
         match &mut self.values {
             Values::F32(parts) => scale(parts, cell, |speed| (speed * by) as f32),
             Values::F64(parts) => scale(parts, cell, |speed| speed * by),
+        }
+    }
+}
+
+impl Components<f64> {
+    fn widen(&mut self, of: &Components<f32>, from: usize, to: usize) {
+        for &part in Component::ALL {
+            if to < self[part].len() {
+                self[part][to] = of[part][from].into();
+            }
         }
     }
 }

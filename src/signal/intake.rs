@@ -13,15 +13,28 @@ pub(crate) struct Intake {
     max_age_s: f64,
     /// Per value of a source's frame, the taxel it belongs to.
     taxel_of_value: Vec<usize>,
-    /// Per taxel, the last value that arrived, and when.
-    last: Vec<(RawValue, f64)>,
+    state: IntakeState,
     /// Per taxel its value in this frame.
     now: Vec<RawValue>,
     /// Per taxel its distance from rest, raw units, for the check of isolated values.
     rise: Vec<f64>,
-    frames_seen: u64,
     /// Per frame since [`Intake::forget_stale`] its stale taxels; `None` if they are not tracked.
     stale: Option<Vec<Vec<usize>>>,
+}
+
+/// What is kept from frame to frame.
+#[derive(Clone, Debug)]
+pub(crate) struct IntakeState {
+    /// Per taxel, the last value that arrived, and when.
+    last: Vec<(RawValue, f64)>,
+    frames_seen: u64,
+}
+
+impl IntakeState {
+    /// The number of taxels it is of.
+    pub(crate) fn taxels(&self) -> usize {
+        self.last.len()
+    }
 }
 
 impl Intake {
@@ -33,10 +46,9 @@ impl Intake {
             neighbours,
             max_age_s,
             taxel_of_value: (0..taxels).collect(),
-            last: vec![(RawValue::MISSING, 0.0); taxels],
+            state: IntakeState { last: vec![(RawValue::MISSING, 0.0); taxels], frames_seen: 0 },
             now: vec![RawValue::MISSING; taxels],
             rise: vec![0.0; taxels],
-            frames_seen: 0,
             stale: None,
         }
     }
@@ -49,6 +61,16 @@ impl Intake {
     /// Per value of a frame, the taxel it belongs to.
     pub(crate) fn taxel_of_value(&self) -> &[usize] {
         &self.taxel_of_value
+    }
+
+    /// The state after the frames so far.
+    pub(crate) fn state(&self) -> &IntakeState {
+        &self.state
+    }
+
+    /// Goes on from `state`, of the same calibration.
+    pub(crate) fn restore(&mut self, state: &IntakeState) {
+        self.state.clone_from(state);
     }
 
     /// Starts to track stale taxels.
@@ -96,8 +118,8 @@ impl Intake {
             self.hold(frame.t_s);
         }
         self.note_stale();
-        let settling = self.frames_seen < self.calibration.checks.settle_frames;
-        self.frames_seen += 1;
+        let settling = self.state.frames_seen < self.calibration.checks.settle_frames;
+        self.state.frames_seen += 1;
         if settling || self.is_broken() {
             out.extend(
                 slots
@@ -127,7 +149,7 @@ impl Intake {
 
     /// Replaces missing values by the last ones that arrived within `max_age_s`.
     fn hold(&mut self, t_s: f64) {
-        for (now, (last, at)) in self.now.iter_mut().zip(&mut self.last) {
+        for (now, (last, at)) in self.now.iter_mut().zip(&mut self.state.last) {
             if !now.is_missing() {
                 (*last, *at) = (*now, t_s);
             } else if (0.0..=self.max_age_s).contains(&(t_s - *at)) {

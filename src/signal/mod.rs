@@ -16,7 +16,7 @@ pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
-pub(crate) use intake::Intake;
+pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub(crate) use upkeep::{Kept, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};

@@ -7,7 +7,7 @@ use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawVa
 use crate::common::{backends, frame};
 
 /// Everything a frame's percepts say, with numbers as bits.
-fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
+pub(crate) fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
     // f64's `{:?}` prints the shortest number that reads back to the same bits.
     let touches = |field| percepts.touches(frame, field);
     percepts.frame(frame).map(|p| format!("{} {p:?} {:?}", percepts.t_s(frame), touches(p.field))).collect()
@@ -35,7 +35,7 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
 }
 
 /// A recording with a bit of everything: touches that move, gaps, faults.
-fn recording(body: &Body, frames: usize) -> Vec<Frame> {
+pub(crate) fn recording(body: &Body, frames: usize) -> Vec<Frame> {
     let mut seed = 12_345_u32;
     let mut random = move || {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

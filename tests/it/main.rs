@@ -35,6 +35,7 @@ mod simulated;
 mod skipped;
 #[path = "../skips/mod.rs"]
 mod skips;
+mod state;
 mod touch;
 mod upkeep;
 mod validator;

@@ -29,7 +29,7 @@ pub(crate) use fearless_simd::Level;
 
 use self::lanes::LANES;
 pub(crate) use self::lanes::with_widest;
-use super::{Backend, RawBatch};
+use super::{Backend, BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::parallel;
 use crate::percept::{CellsMut, Percepts};
@@ -67,7 +67,7 @@ impl Cpu {
             motion: motion::Fields::new(plan),
             before: vec![RawValue::MISSING; plan.channels()],
             touched: vec![false; plan.fields.len()],
-            last: motion::Before::none(plan.fields.len()),
+            last: motion::Before::new(plan.fields.iter().map(|_| None)),
             plan: plan.clone(),
         }
     }
@@ -98,9 +98,21 @@ impl Backend for Cpu {
         describe_with(self.level)
     }
 
-    fn restart(&mut self) {
-        self.touched.fill(false);
-        self.last = motion::Before::none(self.plan.fields.len());
+    fn state(&mut self) -> Result<BackendState> {
+        let centroids = self.last.centroids().zip(&self.touched);
+        let fields = centroids.map(|(centroid, &touched)| {
+            let centroid = centroid.filter(|_| self.plan.stages().motion);
+            FieldState { contact: touched || centroid.is_some(), centroid }
+        });
+        Ok(BackendState { raw: self.before.clone(), fields: fields.collect() })
+    }
+
+    fn restore(&mut self, state: &BackendState) -> Result<()> {
+        self.before.clone_from(&state.raw);
+        self.touched = state.fields.iter().map(|field| field.contact).collect();
+        self.last = motion::Before::new(state.fields.iter().map(|field| field.centroid));
+        self.live.forget();
+        Ok(())
     }
 
     fn recalibrate(&mut self, plan: &Plan) {

@@ -6,12 +6,17 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
+use glam::DVec2;
 
 use super::super::Step;
 use super::lanes::{F, I, LANES, Row, U, bits_where, of_direction, splat, splat_u, store, width, with_widest};
 use crate::parallel;
 use crate::percept::{CellsMut, Component, Flags, Outputs};
 use crate::scene::Plan;
+use crate::stage::motion::Centroid;
+
+/// Flags of a cell without a centroid to measure motion from.
+const NOWHERE: Flags = Flags::NO_CONTACT.union(Flags::NO_CHART);
 
 /// What this stage fills.
 const PARTS: [Component; 7] = [
@@ -61,14 +66,28 @@ pub(super) struct Before {
 }
 
 impl Before {
-    /// Of `fields` fields, none of which is in contact.
-    pub(super) fn none(fields: usize) -> Self {
-        Self {
-            flags: vec![Flags::NO_CONTACT.bits(); fields],
-            pressed: vec![0; fields],
-            u: vec![0.0; fields],
-            v: vec![0.0; fields],
+    /// Of fields with these centroids, m; `None` is a field out of contact or without a chart.
+    pub(super) fn new(centroids: impl Iterator<Item = Option<Centroid>>) -> Self {
+        let mut before = Self::default();
+        for centroid in centroids {
+            let flags = if centroid.is_some() { Flags::empty() } else { Flags::NO_CONTACT };
+            let Centroid { place, pressed } = centroid.unwrap_or_default();
+            before.flags.push(flags.bits());
+            before.pressed.push(pressed);
+            before.u.push(place.x as f32);
+            before.v.push(place.y as f32);
         }
+        before
+    }
+
+    /// The fields' centroids, m; `None` where motion has nothing to start from.
+    pub(super) fn centroids(&self) -> impl Iterator<Item = Option<Centroid>> + '_ {
+        let places = self.u.iter().zip(&self.v).map(|(&u, &v)| DVec2::new(u.into(), v.into()));
+        self.flags
+            .iter()
+            .zip(&self.pressed)
+            .zip(places)
+            .map(|((&flags, &pressed), place)| (flags & NOWHERE.bits() == 0).then_some(Centroid { place, pressed }))
     }
 
     /// Takes over frame `frame` of `cells`.
@@ -199,7 +218,7 @@ fn sixteen_fields<S: Simd>(
     let lanes = |column: &[f32]| -> Row<f32> { row(column, first, count, 0.0) };
     let bits = |column: &[u32], rest: u32| -> Row<u32> { row(column, first, count, rest) };
     let (u, v, u0, v0) = (lanes(u), lanes(v), lanes(from.u), lanes(from.v));
-    let nobody = (Flags::NO_CONTACT | Flags::NO_CHART).bits();
+    let nobody = NOWHERE.bits();
     let (now, before) = (bits(to.flags, nobody), bits(from.flags, nobody));
     let (per_unit, unit) = (lanes(&fields.per_unit), lanes(&fields.unit_m));
     let (pressed, pressed_before) = (bits(pressed, 0), bits(from.pressed, 0));

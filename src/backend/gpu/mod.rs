@@ -31,6 +31,7 @@ mod tests;
 pub use adapter::{AdapterSummary, adapters};
 pub use bus::{SilentGpu, silent_gpus};
 use bytemuck::cast_slice;
+use glam::DVec2;
 pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
 use self::adapter::Device;
@@ -41,12 +42,12 @@ use self::ring::{SETS, Set};
 use self::shaders::Values;
 use self::shares::Shares;
 use self::stage::{Over, Stage, table};
-use super::{Backend, RawBatch};
+use super::{Backend, BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::layout;
+use crate::stage::{layout, motion};
 
 /// Invocations a group, as `shaders/shared/layout.wgsl` has it.
 const GROUP: u32 = 64;
@@ -86,7 +87,7 @@ pub(crate) struct Gpu {
     /// The batch's steps and some values as the device reads them; kept so that a call allocates nothing.
     packed_steps: Vec<layout::Step>,
     packed: Vec<RawValue>,
-    /// What a restart sets to zero.
+    /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
     memory: [wgpu::Buffer; 2],
 }
 
@@ -314,12 +315,40 @@ impl Backend for Gpu {
         format!("{}, {} ({}, {})", summary.name, summary.kind, summary.api, summary.driver)
     }
 
-    fn restart(&mut self) {
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        for buffer in &self.memory {
-            encoder.clear_buffer(buffer, 0, None);
+    fn state(&mut self) -> Result<BackendState> {
+        let [touched, last] = &self.memory;
+        let touched: Vec<u32> = readback(&self.device, touched)?;
+        let last: Vec<[u32; 4]> = readback(&self.device, last)?;
+        let mut raw = match &self.before {
+            Some(before) => readback(&self.device, before)?,
+            None => Vec::new(),
+        };
+        raw.resize(self.plan.channels(), RawValue::MISSING);
+        let fields = self.units_m.iter().zip(touched).zip(last).map(|((&unit_m, touched), [u, v, pressed, known])| {
+            let place = DVec2::new(f32::from_bits(u).into(), f32::from_bits(v).into()) * f64::from(unit_m);
+            let centroid = (known == 1).then_some(motion::Centroid { place, pressed });
+            FieldState { contact: touched == 1 || centroid.is_some(), centroid }
+        });
+        Ok(BackendState { raw, fields: fields.collect() })
+    }
+
+    fn restore(&mut self, state: &BackendState) -> Result<()> {
+        let fields = || state.fields.iter();
+        let touched: Vec<u32> = fields().map(|field| field.contact.into()).collect();
+        let last = fields().zip(&self.units_m).map(|(field, &unit_m)| match field.centroid {
+            Some(motion::Centroid { place, pressed }) => {
+                let place = (place / f64::from(unit_m)).as_vec2();
+                [place.x.to_bits(), place.y.to_bits(), pressed, 1]
+            }
+            None => [0; 4],
+        });
+        let last: Vec<[u32; 4]> = last.collect();
+        self.device.queue.write_buffer(&self.memory[0], 0, cast_slice(&touched));
+        self.device.queue.write_buffer(&self.memory[1], 0, cast_slice(&last));
+        if let Some(before) = &self.before {
+            self.device.queue.write_buffer(before, 0, cast_slice(&state.raw));
         }
-        self.device.queue.submit([encoder.finish()]);
+        Ok(())
     }
 
     fn recalibrate(&mut self, plan: &Plan) {
@@ -357,6 +386,25 @@ impl Gpu {
         }
         Ok(())
     }
+}
+
+/// The contents of `buffer`, waiting for all work before.
+fn readback<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer) -> Result<Vec<T>> {
+    let copy = device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("state"),
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+    encoder.map_buffer_on_submit(&copy, wgpu::MapMode::Read, .., |_| {});
+    let submission = device.queue.submit([encoder.finish()]);
+    let until = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+    device.device.poll(until).map_err(|e| device.lost(&e))?;
+    device.check()?;
+    let bytes = copy.get_mapped_range(..).map_err(|e| device.lost(&e))?;
+    Ok(bytemuck::pod_collect_to_vec(&bytes))
 }
 
 /// Whether a processor stands in for a GPU.

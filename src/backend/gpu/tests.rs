@@ -12,7 +12,7 @@ use super::skips::skip;
 use super::stage::{folded, pipeline};
 
 use super::{GROUP, Gpu, adapter};
-use crate::backend::{Backend, RawBatch, Rows, Step};
+use crate::backend::{Backend, BackendState, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Percepts, Precision};
@@ -275,7 +275,7 @@ fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
         let mut gpu = Gpu::on(device.clone(), &plan, frames).unwrap();
         assert!(gpu.form != Form::Rows);
         let percepts = percepts_of_odd_values(&mut gpu, frames);
-        gpu.restart();
+        gpu.restore(&BackendState::initial(&plan)).unwrap();
         gpu.recalibrate(&careful);
         assert!(gpu.form == Form::Rows);
         assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames");

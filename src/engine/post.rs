@@ -1,44 +1,43 @@
-//! What the host does for every backend alike: places on the surface and in the world, separate touches, filtered motion.
+//! Post-processing, the same for every backend: places on the surface and in the world, separate touches, filtered motion.
 
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
 use super::place::{self, Links};
-use crate::backend::{Backend, RawBatch, Step};
-use crate::error::Result;
+use crate::backend::{RawBatch, Step};
 use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
 use crate::stage::layout::Member;
 use crate::stage::{filter, motion, touches};
 
-/// What the host's stages remember of a field.
+/// What post-processing keeps from frame to frame.
+#[derive(Clone, Debug)]
+pub(super) struct PostState {
+    pub(super) fields: Vec<PostFieldState>,
+    /// The percepts of the last frame, where cadence `on-change` may keep some.
+    pub(super) last: Option<Percepts>,
+}
+
+/// The same of one field.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Memory {
-    /// The touches of the frame before.
+pub(super) struct PostFieldState {
+    /// The separate touches of the last frame.
     pub(super) touches: touches::Memory,
     pub(super) filter: filter::Memory,
+    /// Whether the last frame was in contact, so that there is something to release.
+    pub(super) contact: bool,
 }
 
-/// What is remembered from call to call.
-pub(super) struct Side {
-    /// Per field.
-    pub(super) memories: Vec<Memory>,
-    /// Per field, whether its memory holds anything of a contact.
-    pub(super) held: Vec<bool>,
-    /// The percepts of the frame before, where some may be kept.
-    last: Option<Percepts>,
-}
-
-impl Side {
-    /// Of `fields` fields.
-    pub(super) fn new(fields: usize) -> Self {
-        Self { memories: vec![Memory::default(); fields], held: vec![false; fields], last: None }
+impl PostState {
+    /// The state before the first frame.
+    pub(super) fn initial(fields: usize) -> Self {
+        Self { fields: vec![PostFieldState::default(); fields], last: None }
     }
 }
 
-/// What the host does for every backend alike.
-pub(super) struct Host<'a> {
+/// Completes the percepts of a backend.
+pub(super) struct Post<'a> {
     pub(super) plan: &'a Plan,
     pub(super) links: &'a Links,
     /// Which fields changed, where the others keep their percepts.
@@ -61,25 +60,7 @@ pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Perce
     }
 }
 
-impl Host<'_> {
-    /// A backend's part of a call, then the host's.
-    pub(super) fn run(
-        &self,
-        backend: &mut dyn Backend,
-        frames: &[Frame],
-        raw: &RawBatch<'_>,
-        percepts: &mut Percepts,
-        side: &mut Side,
-    ) -> Result<()> {
-        backend.run(raw, percepts)?;
-        self.place(frames, raw.first, percepts);
-        for (offset, frame) in frames.iter().enumerate() {
-            self.frame(offset, frame, raw, percepts, side);
-        }
-        self.finish(raw, percepts, side);
-        Ok(())
-    }
-
+impl Post<'_> {
     /// Puts the centroids of `frames`, which stand in `percepts` from frame `first` on, on the skin, where that is wanted.
     pub(super) fn place(&self, frames: &[Frame], first: usize, percepts: &mut Percepts) {
         if self.plan.stages().position {
@@ -87,17 +68,16 @@ impl Host<'_> {
         }
     }
 
-    /// The host's part of frame `offset` of `raw`, which is `frame`, beside positions and normals.
+    /// Completes frame `offset` of `raw`, which is `frame`, but for positions and normals.
     pub(super) fn frame(
         &self,
         offset: usize,
         frame: &Frame,
         raw: &RawBatch<'_>,
         percepts: &mut Percepts,
-        side: &mut Side,
+        state: &mut PostState,
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
-        let Side { memories, held, last } = side;
         percepts.t_s[index] = frame.t_s;
         if !(stages.touches || stages.filter || self.cadence.is_some()) {
             return;
@@ -108,38 +88,36 @@ impl Host<'_> {
                 match cadence.since(offset, number) {
                     Some(since) => cadence::rates(percepts, cell, step, since),
                     None => {
-                        self.keep(number, index, last.as_ref(), percepts);
+                        self.keep(number, index, state.last.as_ref(), percepts);
                         continue;
                     }
                 }
             }
             let contact = percepts.in_contact(index, number);
-            if !contact && !held[number] {
+            let before = &mut state.fields[number];
+            if !contact && !before.contact {
                 // Most of a skin, most of the time.
                 if stages.touches {
                     percepts.push_touches([]);
                 }
                 continue;
             }
-            held[number] = contact;
+            before.contact = contact;
             if stages.touches {
                 let world = self.links.world_from_anchor(field, frame);
-                self.touches(field, world.as_ref(), index, cell, percepts, &mut memories[number].touches);
+                self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
             }
             if stages.filter && field.charted {
-                self.filter(field, step, cell, percepts, &mut memories[number].filter);
+                self.filter(field, step, cell, percepts, &mut before.filter);
             }
         }
     }
 
-    /// Remembers the last percepts of a call, where some may be kept.
-    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &Percepts, side: &mut Side) {
+    /// Keeps the last percepts of a call, where the next call may need them.
+    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &Percepts, state: &mut PostState) {
         if self.cadence.is_some() && raw.frames > 0 {
-            let mut one = side.last.take().unwrap_or_else(|| percepts.clone());
-            one.reset(1);
-            let fields = 0..self.plan.fields.len();
-            fields.for_each(|field| one.take_over(percepts, raw.first + raw.frames - 1, field));
-            side.last = Some(one);
+            let last = state.last.get_or_insert_with(|| percepts.clone());
+            last.take_frame(percepts, raw.first + raw.frames - 1);
         }
     }
 
@@ -154,7 +132,7 @@ impl Host<'_> {
         }
     }
 
-    /// Tells which of a cell's motion counts.
+    /// Filters a cell's motion.
     fn filter(
         &self,
         field: &PlanField,
@@ -177,7 +155,7 @@ impl Host<'_> {
         }
     }
 
-    /// Tells a cell's separate touches.
+    /// Finds a cell's separate touches.
     fn touches(
         &self,
         field: &PlanField,

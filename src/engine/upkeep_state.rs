@@ -1,4 +1,4 @@
-//! What an engine keeps for the upkeep of its calibration.
+//! The upkeep of an engine's calibration: its state, and what it needs of the plan.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,8 @@ use crate::signal::{Kept, RawValue, Receptor, Upkeep, UpkeepKeys, Wiring};
 use crate::stage::{calibrate, layout};
 
 /// Upkeep, and what it needs of the engine.
-pub(super) struct KeptUp {
+#[derive(Clone, Debug)]
+pub(super) struct UpkeepState {
     pub(super) upkeep: Upkeep,
     /// The taxels as the calibration has them, slot by slot.
     made: Vec<layout::Taxel>,
@@ -17,11 +18,11 @@ pub(super) struct KeptUp {
     groups: Vec<Vec<Option<usize>>>,
     /// Per field, whether it was in contact in this epoch.
     touched: Vec<bool>,
-    /// Per field, whether the drift of a taxel of its is unknown.
+    /// Per field, whether the drift of one of its taxels is unknown.
     unknown: Vec<bool>,
 }
 
-impl KeptUp {
+impl UpkeepState {
     pub(super) fn new(plan: &Plan, keys: UpkeepKeys, body: &Body) -> Option<Self> {
         let links = plan.body_taxels.iter().map(|&taxel| Some(body.taxels[taxel].link)).collect();
         Self::in_groups(plan, keys, vec![links, vec![Some(0); plan.channels()]])
@@ -37,10 +38,10 @@ impl KeptUp {
         })
     }
 
-    /// Begins anew with the calibration that `plan` has now.
+    /// Starts again with the calibration that `plan` has now.
     pub(super) fn restart(&mut self, plan: &Plan) {
-        let anew = Self::in_groups(plan, self.upkeep.keys(), self.groups.clone());
-        *self = anew.unwrap_or_else(|| unreachable!("it was on before"));
+        let restarted = Self::in_groups(plan, self.upkeep.keys(), self.groups.clone());
+        *self = restarted.unwrap_or_else(|| unreachable!("it was on before"));
     }
 
     /// Taxels of one board are warmed together more than those of a link; `id_of` gives each channel's taxel.
@@ -53,8 +54,8 @@ impl KeptUp {
         self.restart(plan);
     }
 
-    /// Takes note of which fields are in contact, by the flags of frames, cell by cell.
-    pub(super) fn note(&mut self, seen: &[Flags]) {
+    /// Notes which fields are in contact, by the flags of frames, cell by cell.
+    pub(super) fn note_contact(&mut self, seen: &[Flags]) {
         let fields = self.touched.len();
         for frame in seen.chunks_exact(fields) {
             for (touched, flags) in self.touched.iter_mut().zip(frame) {
@@ -63,8 +64,8 @@ impl KeptUp {
         }
     }
 
-    /// Flags the fields whose taxels drift by nobody knows how much, cell by cell.
-    pub(super) fn flag(&self, cells: &mut [Flags]) {
+    /// Flags the fields with a taxel whose drift is unknown, cell by cell.
+    pub(super) fn flag_unknown_drift(&self, cells: &mut [Flags]) {
         for frame in cells.chunks_exact_mut(self.unknown.len()) {
             for (flags, &unknown) in frame.iter_mut().zip(&self.unknown) {
                 // A percept that is kept from the frame before has that one's.

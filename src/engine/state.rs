@@ -1,0 +1,109 @@
+//! The state between frames as one value.
+
+use super::Engine;
+use super::cadence::ChangeState;
+use super::post::PostState;
+use super::upkeep_state::UpkeepState;
+use crate::backend::BackendState;
+use crate::error::{Error, Result};
+use crate::signal::{IntakeState, TaxelCalibration};
+use crate::stage::layout;
+
+/// Everything that the next percepts depend on beside the next frames.
+///
+/// ```
+/// # fn main() -> somatic::Result<()> {
+/// use somatic::{Body, Engine, Options, RawValue, bundled};
+///
+/// let body = Body::from_bytes("hand", bundled::HAND)?;
+/// let mut engine = Engine::new(&body, Options::default())?;
+/// let mut frame = engine.frame(0.0);
+/// frame.values.fill(RawValue::new(1.0));
+/// engine.process_one(&frame)?;
+///
+/// let state = engine.state()?;
+/// frame.t_s = 0.01;
+/// let percepts = engine.process_one(&frame)?.clone();
+/// // Later, on this engine or another of the same body and options: the same bits.
+/// engine.restore(&state)?;
+/// assert_eq!(*engine.process_one(&frame)?, percepts);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct EngineState {
+    frames_done: u64,
+    last_t_s: Option<f64>,
+    tare: bool,
+    /// By channel and by slot, if the calibration may change.
+    calibration: Option<(Vec<TaxelCalibration>, Vec<layout::Taxel>)>,
+    intake: IntakeState,
+    backend: BackendState,
+    post: PostState,
+    cadence: Option<ChangeState>,
+    upkeep: Option<UpkeepState>,
+}
+
+impl EngineState {
+    /// Number of frames that were processed before it.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames_done
+    }
+}
+
+impl Engine {
+    /// The state after the frames so far, so that a recording can be entered here again: to scrub, to resume, or to compare
+    /// from here on ([`Engine::process_and_compare`]). On a GPU it waits for the device.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn state(&mut self) -> Result<EngineState> {
+        Ok(EngineState {
+            frames_done: self.frames_done,
+            last_t_s: self.last_t_s,
+            tare: self.tare,
+            calibration: self.recalibrates.then(|| (self.plan.calibrations.clone(), self.plan.taxels.clone())),
+            intake: self.intake.state().clone(),
+            backend: self.backend.state()?,
+            post: self.post.clone(),
+            cadence: self.cadence.as_ref().map(|cadence| cadence.state.clone()),
+            upkeep: self.upkeep.clone(),
+        })
+    }
+
+    /// Goes on from `state`, of an engine with the same body, scene, calibration and options. On the same backend, percepts are
+    /// the same bits as those of an uninterrupted run, unless the scene lets small changes pass ([`crate::Scene::change_threshold`]);
+    /// on another they agree within its bounds.
+    ///
+    /// # Errors
+    /// The state does not fit this engine ([`Error::is_usage`]), or the device was lost.
+    pub fn restore(&mut self, state: &EngineState) -> Result<()> {
+        let fits = state.backend.fields.len() == self.plan.fields.len()
+            && state.backend.raw.len() == self.plan.channels()
+            && state.intake.taxels() == self.ids.len()
+            && state.calibration.is_some() == self.recalibrates
+            && state.cadence.is_some() == self.cadence.is_some()
+            && state.upkeep.is_some() == self.upkeep.is_some();
+        if !fits {
+            return Err(Error::usage(
+                "the state is of an engine with another body, scene or calibration; restore it where it fits",
+            ));
+        }
+        if let Some((calibrations, taxels)) = &state.calibration {
+            self.plan.calibrations.clone_from(calibrations);
+            self.plan.taxels.clone_from(taxels);
+            self.recalibrate(None);
+        }
+        self.backend.restore(&state.backend)?;
+        self.intake.restore(&state.intake);
+        self.post.clone_from(&state.post);
+        self.upkeep.clone_from(&state.upkeep);
+        if let (Some(cadence), Some(state)) = (&mut self.cadence, &state.cadence) {
+            cadence.state.clone_from(state);
+        }
+        (self.frames_done, self.last_t_s, self.tare) = (state.frames_done, state.last_t_s, state.tare);
+        self.check = None;
+        Ok(())
+    }
+}
