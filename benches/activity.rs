@@ -48,9 +48,9 @@ fn main() {
     // Cargo passes `--bench`; a name may follow, as for other benches.
     let body = skin();
     let engine = |coverage| {
-        let knobs = Knobs { coverage, ..Knobs::default() };
-        let scene = Scene { outputs: Outputs::CENTROID | Outputs::ORIENTATION, knobs, ..Scene::default() };
-        Engine::new(&body, Options { scene, backend: BackendKind::Cpu, ..Options::default() }).expect("the CPU is here")
+        let knobs = Knobs::default().coverage(coverage);
+        let scene = Scene::default().outputs(Outputs::CENTROID | Outputs::ORIENTATION).knobs(knobs);
+        Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Cpu)).expect("the CPU is here")
     };
     let cases = [
         ("all touched, no gate", SENSORS, Coverage::All),

@@ -28,6 +28,7 @@ use crate::stage::calibrate;
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Options {
     /// What is asked for.
     pub scene: Scene,
@@ -40,6 +41,14 @@ pub struct Options {
     /// Frames a call, about: 1 for a live robot, some hundred for recordings. More are taken in turns.
     pub batch: usize,
 }
+
+setters!(Options {
+    scene: Scene,
+    calibration: impl Into<Option<Calibration>>,
+    backend: BackendKind,
+    tare: bool,
+    batch: usize,
+});
 
 impl Default for Options {
     fn default() -> Self {

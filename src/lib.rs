@@ -47,6 +47,9 @@
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
 
+#[macro_use]
+mod setters;
+
 pub mod author;
 pub mod backend;
 pub mod body;

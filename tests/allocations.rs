@@ -6,8 +6,8 @@ use somatic::{BackendKind, Body, Calibration, Engine, Options, Outputs, RawValue
 fn allocations(body: &Body, outputs: Outputs, calibration: Option<&str>) -> u64 {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = calibration.map(|text| Calibration::parse(text, &ids).unwrap());
-    let scene = Scene { outputs, ..Scene::default() };
-    let options = Options { scene, calibration, backend: BackendKind::Cpu, ..Options::default() };
+    let scene = Scene::default().outputs(outputs);
+    let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu);
     let mut engine = Engine::new(body, options).unwrap();
     let mut frame = engine.frame(0.0);
     let mut touched = 0;

@@ -406,18 +406,18 @@ impl RunOptions {
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
         let live = self.sources.iter().any(|source| source.starts_with("serial:"));
-        let scene = Scene {
-            outputs,
-            fields: self.fields.clone(),
-            // Boards' values have their age where frames are put together.
-            max_age_s: self.max_age.filter(|_| !live).unwrap_or(usual.max_age_s),
-            max_gap_s: self.max_gap.unwrap_or(usual.max_gap_s),
-            letters: Letter::all_of(letters, &self.signal),
-            filter: self.filter(outputs)?,
-            knobs: self.accuracy.knobs(),
-            change_threshold: self.change_threshold.unwrap_or(usual.change_threshold),
-            coordinates: self.coordinates.unwrap_or(usual.coordinates),
-        };
+        // Boards' values have their age where frames are put together.
+        let max_age_s = self.max_age.filter(|_| !live).unwrap_or(usual.max_age_s);
+        let scene = Scene::default()
+            .outputs(outputs)
+            .fields(self.fields.clone())
+            .max_age_s(max_age_s)
+            .max_gap_s(self.max_gap.unwrap_or(usual.max_gap_s))
+            .letters(Letter::all_of(letters, &self.signal))
+            .filter(self.filter(outputs)?)
+            .knobs(self.accuracy.knobs())
+            .change_threshold(self.change_threshold.unwrap_or(usual.change_threshold))
+            .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
@@ -439,6 +439,11 @@ impl RunOptions {
                 Error::usage(what).at(source)
             })?;
         }
-        Ok(Options { scene, calibration, backend: self.backend.unwrap_or_default(), tare: self.tare, batch })
+        Ok(Options::default()
+            .scene(scene)
+            .calibration(calibration)
+            .backend(self.backend.unwrap_or_default())
+            .tare(self.tare)
+            .batch(batch))
     }
 }

@@ -13,6 +13,7 @@ use crate::stage::layout::Still;
 /// until motion has added up, farther it is taken for another touch. The direction of the steps that count is averaged
 /// over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MotionFilter {
     /// The window's low end, m; `None` is a sixteenth of the spacing of each field's taxels, about what noise feigns, and
     /// at most a third of the high end.
@@ -38,6 +39,8 @@ impl Default for MotionFilter {
         Self { low_m: None, high_m: None, by: FilterBy::Distance, time_constant_s: 0.1 }
     }
 }
+
+setters!(MotionFilter { low_m: impl Into<Option<f64>>, high_m: impl Into<Option<f64>>, by: FilterBy, time_constant_s: f64 });
 
 impl MotionFilter {
     /// The same with the window that `text` says: `0.5mm..20mm`, where either end may be left out.

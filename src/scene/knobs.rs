@@ -13,6 +13,7 @@ use crate::percept::Outputs;
 ///
 /// `docs/tradeoff.md` has what each costs and gives, `somatic tradeoff` measures it on one's own body and machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Knobs {
     /// How sums are made; `None` is what the backend is made for: one-pass, and double on the reference.
     pub arithmetic: Option<Arithmetic>,
@@ -25,6 +26,14 @@ pub struct Knobs {
     /// When a field is looked at.
     pub cadence: Cadence,
 }
+
+setters!(Knobs {
+    arithmetic: impl Into<Option<Arithmetic>>,
+    charts: Charts,
+    orientation_by: OrientationBy,
+    coverage: Coverage,
+    cadence: Cadence,
+});
 
 /// An enum of words: read from them, shown as them, and all of them in order.
 macro_rules! words {

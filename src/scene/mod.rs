@@ -23,6 +23,7 @@ pub use crate::stage::filter::FilterBy;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Scene {
     /// The quantities wanted.
     pub outputs: Outputs,
@@ -61,7 +62,25 @@ impl Default for Scene {
     }
 }
 
+setters!(Scene {
+    outputs: Outputs,
+    max_age_s: f64,
+    max_gap_s: f64,
+    letters: Vec<Letter>,
+    filter: MotionFilter,
+    knobs: Knobs,
+    change_threshold: f64,
+    coordinates: Coordinates,
+});
+
 impl Scene {
+    /// The same with these [`Scene::fields`].
+    #[must_use]
+    pub fn fields(mut self, globs: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.fields = globs.into_iter().map(Into::into).collect();
+        self
+    }
+
     /// Refuses a threshold that is none, or that no gate heeds.
     fn check_threshold(&self) -> Result<()> {
         let threshold = self.change_threshold;

@@ -604,7 +604,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     recorder.finish().unwrap();
 
     // As an engine says that got the frames themselves.
-    let options = somatic::Options { backend: somatic::BackendKind::Cpu, ..somatic::Options::default() };
+    let options = somatic::Options::default().backend(somatic::BackendKind::Cpu);
     let mut engine = somatic::Engine::new(&body, options).unwrap();
     engine.track_stale();
     let percepts = engine.process(&kept).unwrap();

@@ -19,9 +19,9 @@ fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option
     let calibration = Some(somatic::Calibration::parse(calibration, &all).unwrap());
     let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
     let outputs = somatic::Outputs::all();
-    let scene = Scene { outputs, max_age_s: 0.1, letters, ..Scene::default() };
+    let scene = Scene::default().outputs(outputs).max_age_s(0.1).letters(letters);
     let mut engine =
-        Engine::new(body, Options { backend: kind, batch: 100, calibration, scene, ..Options::default() }).unwrap();
+        Engine::new(body, Options::default().backend(kind).batch(100).calibration(calibration).scene(scene)).unwrap();
     if let Some(ids) = ids {
         engine.set_channels(ids).unwrap();
     }
@@ -83,8 +83,8 @@ fn percepts_do_not_depend_on_how_a_long_call_streams() {
     let frames = recording(&body, 2300);
     let wanted = somatic::Outputs::TOTAL | somatic::Outputs::CENTROID | somatic::Outputs::ORIENTATION;
     let run = |kind: BackendKind, cut: usize| {
-        let scene = Scene { outputs: wanted | somatic::Outputs::SPEED, ..Scene::default() };
-        let options = Options { backend: kind, batch: cut, scene, ..Options::default() };
+        let scene = Scene::default().outputs(wanted | somatic::Outputs::SPEED);
+        let options = Options::default().backend(kind).batch(cut).scene(scene);
         let mut engine = Engine::new(&body, options).unwrap();
         let mut seen = Vec::new();
         for part in frames.chunks(cut) {
@@ -124,14 +124,10 @@ fn percepts_of_a_frame_at_a_time_are_those_of_many() {
             (Some(calibrated.clone()), Arithmetic::OnePass),
             (Some(calibrated.clone()), Arithmetic::Compensated),
         ] {
-            let scene = Scene {
-                outputs,
-                knobs: Knobs { arithmetic: Some(arithmetic), ..Knobs::default() },
-                ..Scene::default()
-            };
+            let scene = Scene::default().outputs(outputs).knobs(Knobs::default().arithmetic(arithmetic));
             let run = |cut: usize| {
                 let (calibration, scene) = (calibration.clone(), scene.clone());
-                let options = Options { backend: kind, batch: cut, calibration, scene, ..Options::default() };
+                let options = Options::default().backend(kind).batch(cut).calibration(calibration).scene(scene);
                 let mut engine = Engine::new(&body, options).unwrap();
                 let mut seen = Vec::new();
                 for part in frames.chunks(cut) {

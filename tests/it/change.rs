@@ -19,9 +19,9 @@ fn skin() -> Body {
 
 fn engine(body: &Body, kind: BackendKind, calibration: &str, letters: Vec<Letter>) -> somatic::Result<Engine> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let scene = Scene { letters, outputs: Outputs::all(), ..Scene::default() };
+    let scene = Scene::default().letters(letters).outputs(Outputs::all());
     let calibration = Some(Calibration::parse(calibration, &ids)?);
-    Engine::new(body, Options { scene, calibration, backend: kind, batch: 32, ..Options::default() })
+    Engine::new(body, Options::default().scene(scene).calibration(calibration).backend(kind).batch(32))
 }
 
 /// The percepts of `frames` in `letters`, frame by frame: the same bits however they are cut, and held to the reference.

@@ -36,7 +36,7 @@ pub fn ways() -> Vec<(BackendKind, Knobs)> {
         for arithmetic in arithmetics {
             for &coverage in coverages {
                 for cadence in [Cadence::EveryFrame, Cadence::OnChange] {
-                    ways.push((backend, Knobs { arithmetic, coverage, cadence, ..Knobs::default() }));
+                    ways.push((backend, Knobs::default().arithmetic(arithmetic).coverage(coverage).cadence(cadence)));
                 }
             }
         }
@@ -146,7 +146,7 @@ impl Flat {
 
 /// An engine on `kind` with everything else as it comes.
 pub fn engine(body: &Body, kind: BackendKind) -> Engine {
-    Engine::new(body, Options { backend: kind, batch: 64, ..Options::default() }).unwrap()
+    Engine::new(body, Options::default().backend(kind).batch(64)).unwrap()
 }
 
 pub fn frame(t_s: f64, values: &[f64]) -> Frame {

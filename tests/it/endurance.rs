@@ -42,8 +42,8 @@ fn rounds(frames: usize) -> impl Iterator<Item = Frame> {
 }
 
 fn engine(body: &Body, backend: BackendKind, outputs: Outputs) -> Engine {
-    let scene = Scene { outputs, ..Scene::default() };
-    Engine::new(body, Options { backend, scene, batch: 1024, ..Options::default() }).unwrap()
+    let scene = Scene::default().outputs(outputs);
+    Engine::new(body, Options::default().backend(backend).scene(scene).batch(1024)).unwrap()
 }
 
 #[test]

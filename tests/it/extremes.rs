@@ -38,8 +38,8 @@ fn at_rest((backend, knobs): (BackendKind, Knobs)) -> Options {
         | Outputs::RADIAL_DISTANCE
         | Outputs::SPEED
         | Outputs::RADIAL_SPEED;
-    let scene = Scene { outputs: Outputs::USUAL - moving, knobs, ..Scene::default() };
-    Options { backend, scene, ..Options::default() }
+    let scene = Scene::default().outputs(Outputs::USUAL - moving).knobs(knobs);
+    Options::default().backend(backend).scene(scene)
 }
 
 #[test]
@@ -48,8 +48,8 @@ fn every_output_can_be_asked_for_alone() {
     for outputs in Outputs::all().iter() {
         let mut seen = Vec::new();
         for backend in backends() {
-            let scene = Scene { outputs, ..Scene::default() };
-            let mut engine = Engine::new(&field(&SQUARE), Options { backend, scene, ..Options::default() }).unwrap();
+            let scene = Scene::default().outputs(outputs);
+            let mut engine = Engine::new(&field(&SQUARE), Options::default().backend(backend).scene(scene)).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
             assert!(agreement.holds(), "{outputs:?} on {backend:?}: {agreement}");
             let mut compared =
@@ -135,7 +135,7 @@ fn all_saturated_still_answers() {
     let body = field(&[[-0.5, 0.0], [0.0, 0.0], [0.5, 0.0]]);
     let calibration = somatic::Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
     for way in ways() {
-        let options = Options { calibration: Some(calibration.clone()), ..at_rest(way) };
+        let options = at_rest(way).calibration(calibration.clone());
         let mut engine = Engine::new(&body, options).unwrap();
         let p = engine.process(&[frame(0.0, &[1023.0; 3])]).unwrap().get(0, 0);
         assert_eq!(p.flags, Flags::SATURATED);

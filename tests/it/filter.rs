@@ -23,7 +23,7 @@ fn at(t_s: f64, u: f64, v: f64) -> Frame {
 }
 
 fn filter(low_m: f64, high_m: f64, time_constant_s: f64) -> MotionFilter {
-    MotionFilter { low_m: Some(low_m), high_m: Some(high_m), by: FilterBy::Distance, time_constant_s }
+    MotionFilter::default().low_m(low_m).high_m(high_m).by(FilterBy::Distance).time_constant_s(time_constant_s)
 }
 
 /// The percepts of the one field on every backend, all at once and frame by frame, with how each compared.
@@ -33,9 +33,9 @@ fn runs(filter: MotionFilter, contact: &str, frames: &[Frame]) -> Vec<(Vec<Perce
     let mut runs = Vec::new();
     for backend in backends() {
         for cut in [1, frames.len()] {
-            let scene = Scene { outputs: Outputs::FILTERED, max_gap_s: 5.0, filter, ..Scene::default() };
+            let scene = Scene::default().outputs(Outputs::FILTERED).max_gap_s(5.0).filter(filter);
             let calibration = Some(calibration.clone());
-            let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
+            let options = Options::default().backend(backend).scene(scene).calibration(calibration).batch(64);
             let mut engine = Engine::new(&body, options).unwrap();
             let (mut seen, mut sum) = (Vec::new(), Agreement::default());
             for part in frames.chunks(cut) {
@@ -93,7 +93,7 @@ fn the_papers_measure_sees_nothing_around_the_origin() {
         assert!(run[1..].iter().all(|p| p.filtered_displacement.is_some()));
         assert!(near(run[1].filtered_direction, 3.0 * PI / 4.0) && near(run[2].filtered_direction, -3.0 * PI / 4.0));
     }
-    let radial = MotionFilter { by: FilterBy::Radial, ..filter(0.1, 1.5, 0.0) };
+    let radial = filter(0.1, 1.5, 0.0).by(FilterBy::Radial);
     for run in on_every_backend(radial, &frames) {
         assert!(run[1..].iter().all(|p| p.flags == Flags::HELD && p.filtered_direction.is_none()));
     }
@@ -154,8 +154,8 @@ fn a_clock_that_jumps_is_in_no_speed() {
 fn a_field_of_one_taxel_and_one_without_a_chart_have_no_filtered_motion() {
     let one = Flat::new(&[[0.1, 0.2]]).field("one", None, 0..1).body();
     for backend in backends() {
-        let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
-        let mut engine = Engine::new(&one, Options { backend, scene, ..Options::default() }).unwrap();
+        let scene = Scene::default().outputs(Outputs::all());
+        let mut engine = Engine::new(&one, Options::default().backend(backend).scene(scene)).unwrap();
         let frames = [frame(0.0, &[1.0]), frame(0.1, &[3.0]), frame(0.2, &[0.7])];
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
         assert!(agreement.holds(), "{agreement}");
@@ -167,8 +167,8 @@ fn a_field_of_one_taxel_and_one_without_a_chart_have_no_filtered_motion() {
     // The humanoid's whole body wraps around: no chart, so no motion, and it says so.
     let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
     for backend in backends() {
-        let scene = Scene { outputs: Outputs::FILTERED, ..Scene::default() };
-        let mut engine = Engine::new(&body, Options { backend, scene, ..Options::default() }).unwrap();
+        let scene = Scene::default().outputs(Outputs::FILTERED);
+        let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene)).unwrap();
         let mut pressed = engine.frame(0.0);
         pressed.values.fill(RawValue::new(5.0));
         let later = Frame { t_s: 0.1, ..pressed.clone() };
@@ -229,8 +229,8 @@ fn over_the_bundled_touch_every_backend_agrees_and_few_choices_are_close() {
         frames.push(frame.clone());
     }
     for backend in backends() {
-        let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
-        let mut engine = Engine::new(&body, Options { backend, scene, batch: 64, ..Options::default() }).unwrap();
+        let scene = Scene::default().outputs(Outputs::all());
+        let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene).batch(64)).unwrap();
         engine.set_channels(source.taxels()).unwrap();
         let back = engine.plan().fields().position(|(name, _)| name == "hand/back").unwrap();
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();

@@ -10,8 +10,8 @@ fn engine(coverage: Coverage, calibration: Option<&str>) -> Engine {
     let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = calibration.map(|text| Calibration::parse(text, &ids).unwrap());
-    let scene = Scene { outputs: Outputs::all(), knobs: Knobs { coverage, ..Knobs::default() }, ..Scene::default() };
-    Engine::new(&body, Options { scene, calibration, backend: BackendKind::Cpu, ..Options::default() }).unwrap()
+    let scene = Scene::default().outputs(Outputs::all()).knobs(Knobs::default().coverage(coverage));
+    Engine::new(&body, Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu)).unwrap()
 }
 
 /// All that a call gives, to the last bit: numbers are written with as many digits as tell them apart.
@@ -94,21 +94,21 @@ fn large(coverage: Coverage) -> Engine {
     for patch in 0..400 {
         skin = skin.field(&format!("patch {patch}"), Some("whole"), patch * 16..(patch + 1) * 16);
     }
-    let scene = Scene { outputs: Outputs::USUAL, knobs: Knobs { coverage, ..Knobs::default() }, ..Scene::default() };
-    let options = Options { scene, backend: BackendKind::Cpu, ..Options::default() };
+    let scene = Scene::default().outputs(Outputs::USUAL).knobs(Knobs::default().coverage(coverage));
+    let options = Options::default().scene(scene).backend(BackendKind::Cpu);
     Engine::new(&skin.body(), options).unwrap()
 }
 
 #[test]
 fn what_changes_less_than_the_threshold_is_unheeded_and_does_not_add_up() {
     let body = Flat::new(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]).field("field", None, 0..3).body();
-    let scene = |coverage, change_threshold| Scene {
-        outputs: Outputs::TOTAL,
-        knobs: Knobs { coverage, ..Knobs::default() },
-        change_threshold,
-        ..Scene::default()
+    let scene = |coverage, change_threshold| {
+        Scene::default()
+            .outputs(Outputs::TOTAL)
+            .knobs(Knobs::default().coverage(coverage))
+            .change_threshold(change_threshold)
     };
-    let of = |scene: Scene| Engine::new(&body, Options { scene, backend: BackendKind::Cpu, ..Options::default() });
+    let of = |scene: Scene| Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Cpu));
     let mut engine = of(scene(Coverage::Touched, 2.0)).unwrap();
     let mut total =
         |t_s: f64, values: [f64; 3]| engine.process(&[crate::common::frame(t_s, &values)]).unwrap().get(0, 0).total;

@@ -15,6 +15,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("output", vec!["error"]),
         ("keys", vec!["error"]),
         ("length", vec![]),
+        ("setters", vec![]),
         ("parallel", vec![]),
         ("signal", vec!["error", "keys"]),
         ("body", vec!["error", "output"]),

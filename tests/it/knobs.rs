@@ -6,12 +6,12 @@ use somatic::{BackendKind, Body, Engine, Flags, Frame, Options, Outputs, Scene, 
 use crate::common::{Flat, backends, frame};
 
 fn engine(body: &Body, backend: BackendKind, outputs: Outputs, knobs: Knobs) -> Engine {
-    Engine::new(body, Options { scene: Scene { outputs, knobs, ..Scene::default() }, backend, ..Options::default() })
+    Engine::new(body, Options::default().scene(Scene::default().outputs(outputs).knobs(knobs)).backend(backend))
         .unwrap()
 }
 
 fn with(arithmetic: Arithmetic) -> Knobs {
-    Knobs { arithmetic: Some(arithmetic), ..Knobs::default() }
+    Knobs::default().arithmetic(arithmetic)
 }
 
 /// The backends of single precision.
@@ -71,7 +71,7 @@ fn double_precision_is_the_references_wherever_it_is_asked_for() {
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
     let values: Vec<f64> = (0..body.taxels.len()).map(|index| (index * 37 % 101) as f64).collect();
     let answer = |backend, arithmetic| {
-        let knobs = Knobs { arithmetic, ..Knobs::default() };
+        let knobs = Knobs::default().arithmetic(arithmetic);
         let mut engine = engine(&body, backend, Outputs::USUAL, knobs);
         assert_eq!(engine.backend().0, "reference");
         format!("{:?}", engine.process(&[frame(0.0, &values)]).unwrap())
@@ -90,8 +90,8 @@ fn what_a_backend_cannot_do_is_refused_in_a_line() {
         (BackendKind::Reference, Arithmetic::OnePass, "always in double precision"),
         (BackendKind::Reference, Arithmetic::Compensated, "always in double precision"),
     ] {
-        let scene = Scene { knobs: with(arithmetic), ..Scene::default() };
-        let error = Engine::new(&body, Options { scene, backend, ..Options::default() }).err().unwrap();
+        let scene = Scene::default().knobs(with(arithmetic));
+        let error = Engine::new(&body, Options::default().scene(scene).backend(backend)).err().unwrap();
         assert!(error.is_usage() && error.to_string().contains(what), "{error}");
     }
 }
@@ -100,7 +100,7 @@ fn what_a_backend_cannot_do_is_refused_in_a_line() {
 fn second_moments_take_the_place_of_two_points_and_their_work() {
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
     let stages = |orientation_by| {
-        let knobs = Knobs { orientation_by, ..Knobs::default() };
+        let knobs = Knobs::default().orientation_by(orientation_by);
         let engine = engine(&body, BackendKind::Cpu, Outputs::ORIENTATION, knobs);
         let running = engine.plan().explain().into_iter().filter(|stage| stage.runs);
         (engine.plan().outputs(), running.map(|stage| stage.name).collect::<Vec<_>>())
@@ -109,9 +109,9 @@ fn second_moments_take_the_place_of_two_points_and_their_work() {
     assert_eq!(stages(OrientationBy::AsAsked), two);
     assert_eq!(stages(OrientationBy::TwoPoints), two);
     assert_eq!(stages(OrientationBy::SecondMoments), (Outputs::AXIS, vec!["calibrate", "contact", "centroid", "axis"]));
-    let knobs = Knobs { orientation_by: OrientationBy::SecondMoments, ..Knobs::default() };
-    let scene = Scene { outputs: Outputs::TOTAL, knobs, ..Scene::default() };
-    let error = Engine::new(&body, Options { scene, ..Options::default() }).err().unwrap();
+    let knobs = Knobs::default().orientation_by(OrientationBy::SecondMoments);
+    let scene = Scene::default().outputs(Outputs::TOTAL).knobs(knobs);
+    let error = Engine::new(&body, Options::default().scene(scene)).err().unwrap();
     assert!(error.is_usage() && error.to_string().contains("add output `orientation`"), "{error}");
 }
 
@@ -122,7 +122,7 @@ fn charts_of_the_other_kind_agree_with_the_reference_in_them() {
     let mut centroids = Vec::new();
     for charts in [Charts::AsAuthored, Charts::Plane, Charts::Geodesic] {
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::POSITION;
-        let mut engine = engine(&body, BackendKind::Cpu, outputs, Knobs { charts, ..Knobs::default() });
+        let mut engine = engine(&body, BackendKind::Cpu, outputs, Knobs::default().charts(charts));
         let (percepts, agreement) = engine.process_and_compare(&[frame(0.0, &values)]).unwrap();
         assert!(agreement.holds(), "{charts}: {agreement}");
         centroids.push(percepts.frame(0).map(|percept| percept.centroid).collect::<Vec<_>>());
@@ -147,7 +147,7 @@ fn a_field_is_looked_at_when_it_changes_and_moves_from_change_to_change() {
             frame(turn as f64 * 0.001, &(0..8).map(|id| if id == at { 5.0 } else { 0.0 }).collect::<Vec<_>>())
         })
         .collect();
-    let knobs = Knobs { cadence: Cadence::OnChange, ..Knobs::default() };
+    let knobs = Knobs::default().cadence(Cadence::OnChange);
     for kind in backends() {
         let mut seen: Vec<Vec<String>> = Vec::new();
         for at_once in [1, 7, 40] {
@@ -187,7 +187,7 @@ fn a_field_that_changes_in_every_frame_has_the_same_bits_on_change() {
         .map(|turn| frame(turn as f64 * 0.01, &(0..body.taxels.len()).map(|i| value(turn, i)).collect::<Vec<_>>()))
         .collect();
     let percepts = |cadence| {
-        let mut engine = engine(&body, BackendKind::Cpu, Outputs::USUAL, Knobs { cadence, ..Knobs::default() });
+        let mut engine = engine(&body, BackendKind::Cpu, Outputs::USUAL, Knobs::default().cadence(cadence));
         format!("{:?}", engine.process(&frames).unwrap())
     };
     assert_eq!(percepts(Cadence::OnChange), percepts(Cadence::EveryFrame));
@@ -196,12 +196,12 @@ fn a_field_that_changes_in_every_frame_has_the_same_bits_on_change() {
 #[test]
 fn a_cadence_and_what_it_makes_no_sense_with_are_refused() {
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-    let knobs = Knobs { cadence: Cadence::OnChange, ..Knobs::default() };
+    let knobs = Knobs::default().cadence(Cadence::OnChange);
     let letters = somatic::Letter::all_of(&[somatic::Receptor::Change], &[]);
-    let change = Scene { knobs, letters, ..Scene::default() };
-    let filtered = Scene { knobs, outputs: Outputs::FILTERED_SPEED, ..Scene::default() };
+    let change = Scene::default().knobs(knobs).letters(letters);
+    let filtered = Scene::default().knobs(knobs).outputs(Outputs::FILTERED_SPEED);
     for (scene, what) in [(change, "letter `change`"), (filtered, "filtered_*")] {
-        let error = Engine::new(&body, Options { scene, ..Options::default() }).err().unwrap();
+        let error = Engine::new(&body, Options::default().scene(scene)).err().unwrap();
         assert!(error.is_usage() && error.to_string().contains(what), "{error}");
     }
 }

@@ -18,8 +18,8 @@ fn parse(text: &str, count: u32) -> Calibration {
 }
 
 fn options(kind: BackendKind, calibration: &Calibration, signal: Option<FsrSignal>) -> Options {
-    let scene = Scene { letters: vec![Letter { signal, ..Letter::default() }], ..Scene::default() };
-    Options { scene, calibration: Some(calibration.clone()), backend: kind, batch: 64, ..Options::default() }
+    let scene = Scene::default().letters(vec![Letter { signal, ..Letter::default() }]);
+    Options::default().scene(scene).calibration(calibration.clone()).backend(kind).batch(64)
 }
 
 /// The percepts of `frames` on `kind`, frame by frame, held to the reference.

@@ -31,13 +31,11 @@ fn on_every_backend(calibration: &str, frames: &[Frame]) -> Vec<Vec<Percept>> {
     let calibration = Calibration::parse(calibration, &ids).unwrap();
     let mut runs = Vec::new();
     for backend in backends() {
-        let options = Options {
-            backend,
-            calibration: Some(calibration.clone()),
-            scene: Scene { max_gap_s: 5.0, ..Scene::default() },
-            batch: 64,
-            ..Options::default()
-        };
+        let options = Options::default()
+            .backend(backend)
+            .calibration(calibration.clone())
+            .scene(Scene::default().max_gap_s(5.0))
+            .batch(64);
         for cut in [1, frames.len()] {
             let mut engine = Engine::new(&body, options.clone()).unwrap();
             let mut seen = Vec::new();
@@ -147,7 +145,7 @@ fn contact_with_thresholds_begins_high_and_ends_low() {
 fn thresholds_for_a_field_that_is_not_there_are_refused() {
     let ids: Vec<u32> = (0..12).collect();
     let calibration = Some(Calibration::parse("[contact.field.feild]\non = 3", &ids).unwrap());
-    let refused = Engine::new(&cross(), Options { calibration, ..Options::default() }).err().unwrap().to_string();
+    let refused = Engine::new(&cross(), Options::default().calibration(calibration)).err().unwrap().to_string();
     assert!(refused.contains("`feild`") && refused.contains("did you mean `field`"), "{refused}");
 }
 
@@ -162,8 +160,8 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
     ];
     for backend in backends() {
         for cut in [1, frames.len()] {
-            let scene = Scene { outputs: Outputs::TOUCHES | Outputs::CENTROID, ..Scene::default() };
-            let mut engine = Engine::new(&cross(), Options { backend, scene, ..Options::default() }).unwrap();
+            let scene = Scene::default().outputs(Outputs::TOUCHES | Outputs::CENTROID);
+            let mut engine = Engine::new(&cross(), Options::default().backend(backend).scene(scene)).unwrap();
             let mut seen: Vec<Vec<Touch>> = Vec::new();
             let mut several = Vec::new();
             for part in frames.chunks(cut) {
@@ -183,7 +181,7 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
             assert_eq!(several, [true, true, false, false, false]);
             assert_eq!(seen[0][1].position, [4.0, 0.0, 0.0]);
         }
-        let mut usual = Engine::new(&cross(), Options { backend, ..Options::default() }).unwrap();
+        let mut usual = Engine::new(&cross(), Options::default().backend(backend)).unwrap();
         let percepts = usual.process(&frames).unwrap();
         assert!(percepts.touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
     }
@@ -217,8 +215,8 @@ fn a_ball_that_rolls_on_a_large_plate_has_a_direction() {
     for backend in backends() {
         let mut seen = Vec::new();
         for (outputs, cut) in [(MOVED, 1), (MOVED | Outputs::ACTIVE, 18), (MOVED, 7)] {
-            let scene = Scene { outputs, filter, ..Scene::default() };
-            let mut engine = Engine::new(&body, Options { backend, scene, batch: cut, ..Options::default() }).unwrap();
+            let scene = Scene::default().outputs(outputs).filter(filter);
+            let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene).batch(cut)).unwrap();
             let mut run = Vec::new();
             for part in frames.chunks(cut) {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();
@@ -274,15 +272,15 @@ fn what_counts_as_still_grows_with_the_pressed_taxels_of_both_frames() {
     ];
     let frames: Vec<Frame> =
         (0..20).map(|turn| frame(0.1 * f64::from(turn), &round[turn as usize % round.len()])).collect();
-    let filter = MotionFilter { low_m: Some(0.0), high_m: Some(1.0), time_constant_s: 0.0, ..MotionFilter::default() };
+    let filter = MotionFilter::default().low_m(0.0).high_m(1.0).time_constant_s(0.0);
     for (backend, knobs) in ways() {
         // That cadence filters motion in its own way.
         let filtered = knobs.cadence == Cadence::EveryFrame;
         let moved = if filtered { MOVED } else { MOVED - Outputs::FILTERED };
         let mut seen = Vec::new();
         for (outputs, cut) in [(moved, 1), (moved, 20), (moved | Outputs::ACTIVE, 7)] {
-            let scene = Scene { outputs, filter, knobs, ..Scene::default() };
-            let mut engine = Engine::new(&body, Options { backend, scene, batch: cut, ..Options::default() }).unwrap();
+            let scene = Scene::default().outputs(outputs).filter(filter).knobs(knobs);
+            let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene).batch(cut)).unwrap();
             let mut run = Vec::new();
             for part in frames.chunks(cut) {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();

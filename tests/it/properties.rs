@@ -113,14 +113,10 @@ proptest! {
         }).collect();
         for kind in backends() {
             let run = |cut: usize| {
-                let scene = Scene {
-                    letters: Letter::all_of(&[Receptor::Change, Receptor::Sustained], &[]),
-                    outputs: somatic::Outputs::all(),
-                    ..Scene::default()
-                };
+                let scene = Scene::default().letters(Letter::all_of(&[Receptor::Change, Receptor::Sustained], &[])).outputs(somatic::Outputs::all());
                 let calibration = Some(calibration.clone());
                 let mut engine =
-                    Engine::new(&body, Options { scene, calibration, backend: kind, batch: 64, ..Options::default() }).unwrap();
+                    Engine::new(&body, Options::default().scene(scene).calibration(calibration).backend(kind).batch(64)).unwrap();
                 let mut seen: Vec<Percept> = Vec::new();
                 for part in frames.chunks(cut) {
                     let (percepts, agreement) = engine.process_and_compare(part).unwrap();

@@ -24,8 +24,7 @@ fn read(path: &std::path::Path) -> (Vec<u32>, Vec<Frame>) {
 fn run(body: &Body, calibration: &str, kind: BackendKind, ids: &[u32], frames: &[Frame]) -> (Percepts, Agreement) {
     let all: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(Calibration::parse(calibration, &all).unwrap());
-    let mut engine =
-        Engine::new(body, Options { backend: kind, batch: 64, calibration, ..Options::default() }).unwrap();
+    let mut engine = Engine::new(body, Options::default().backend(kind).batch(64).calibration(calibration)).unwrap();
     engine.set_channels(ids).unwrap();
     let (percepts, agreement) = engine.process_and_compare(frames).unwrap();
     (percepts.clone(), agreement)
@@ -196,7 +195,7 @@ fn grasps_are_told_apart_by_how_much_the_total_rises() {
                 .map(|trial| {
                     let (ids, frames) = read(&folder.join(format!("{object}_{trial}.csv")));
                     let calibration = Some(calibration.clone());
-                    let options = Options { backend, tare: true, calibration, batch: 32, ..Options::default() };
+                    let options = Options::default().backend(backend).tare(true).calibration(calibration).batch(32);
                     let mut engine = Engine::new(&body, options).unwrap();
                     engine.set_channels(&ids).unwrap();
                     let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();

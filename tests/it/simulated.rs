@@ -263,7 +263,7 @@ fn dead_stuck_and_noisy_taxels_behave() {
 /// What a simulation's sensors feel under `calibration`: the total of each frame, 0 where there is no contact.
 fn totals(simulation: &mut SimulatedSource, calibration: &str) -> Vec<f64> {
     let calibration = Some(Calibration::parse(calibration, simulation.taxels()).unwrap());
-    let options = Options { calibration, backend: BackendKind::Reference, ..Options::default() };
+    let options = Options::default().calibration(calibration).backend(BackendKind::Reference);
     let mut engine = Engine::new(simulation.body(), options).unwrap();
     engine.set_channels(simulation.taxels()).unwrap();
     let mut frame = Frame::missing(0.0, simulation.taxels().len());

@@ -29,10 +29,11 @@ impl Case {
             Cadence::OnChange => (&[Receptor::Sustained], Outputs::all() - Outputs::FILTERED),
             Cadence::EveryFrame => (&[Receptor::Sustained, Receptor::Change], Outputs::all()),
         };
-        let knobs = Knobs { cadence: self.cadence, ..Knobs::default() };
+        let knobs = Knobs::default().cadence(self.cadence);
         let letters = Letter::all_of(receptors, &[]);
-        let scene = Scene { outputs, max_age_s: 0.1, letters, knobs, ..Scene::default() };
-        let options = Options { backend: self.backend, batch: 32, calibration, scene, tare: self.tare };
+        let scene = Scene::default().outputs(outputs).max_age_s(0.1).letters(letters).knobs(knobs);
+        let options =
+            Options::default().backend(self.backend).batch(32).calibration(calibration).scene(scene).tare(self.tare);
         Engine::new(body, options).unwrap()
     }
 }

@@ -41,10 +41,11 @@ fn on_every_backend_of(body: &Body, wiring: Option<&Wiring>, calibration: &str, 
             if coverage == gated && backend != BackendKind::Cpu {
                 continue;
             }
-            let scene = Scene { knobs: Knobs { coverage, ..Knobs::default() }, ..Scene::default() };
+            let scene = Scene::default().knobs(Knobs::default().coverage(coverage));
             let calibration = Some(calibration.clone());
             let mut engine =
-                Engine::new(body, Options { scene, backend, calibration, batch: 64, ..Options::default() }).unwrap();
+                Engine::new(body, Options::default().scene(scene).backend(backend).calibration(calibration).batch(64))
+                    .unwrap();
             wiring.into_iter().for_each(|wiring| engine.wire(wiring));
             let mut seen = Vec::new();
             for part in frames.chunks(cut) {
@@ -182,8 +183,7 @@ fn run_boards(calibration: &str, frames: &[Frame]) -> Vec<Vec<Percept>> {
     let (body, wiring) = three_boards();
     let ids: Vec<u32> = (0..24).collect();
     let calibration = Some(Calibration::parse(calibration, &ids).unwrap());
-    let mut engine =
-        Engine::new(&body, Options { backend: BackendKind::Cpu, calibration, ..Options::default() }).unwrap();
+    let mut engine = Engine::new(&body, Options::default().backend(BackendKind::Cpu).calibration(calibration)).unwrap();
     engine.wire(&wiring);
     let percepts = engine.process(frames).unwrap();
     (0..frames.len()).map(|frame| percepts.frame(frame).collect()).collect()

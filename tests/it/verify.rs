@@ -14,8 +14,8 @@ fn row() -> Body {
 fn engine(body: &Body, backend: BackendKind, calibration: &str, outputs: Outputs) -> Engine {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Some(Calibration::parse(calibration, &ids).unwrap());
-    let scene = Scene { outputs, ..Scene::default() };
-    Engine::new(body, Options { backend, scene, calibration, batch: 64, ..Options::default() }).unwrap()
+    let scene = Scene::default().outputs(outputs);
+    Engine::new(body, Options::default().backend(backend).scene(scene).calibration(calibration).batch(64)).unwrap()
 }
 
 /// Backends that are compared with the reference.

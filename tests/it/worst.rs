@@ -30,9 +30,8 @@ fn compared(kind: BackendKind, taxels: usize, fields: usize, frames: usize) -> A
         (0..frames).map(|n| frame(n as f64 * 0.01, &(0..uv.len()).map(&mut value).collect::<Vec<_>>())).collect();
     // No surface: what a lift loses is the lift's.
     let outputs = Scene::default().outputs - Outputs::POSITION - Outputs::NORMAL;
-    let scene = Scene { outputs, ..Scene::default() };
-    let mut engine =
-        Engine::new(&skin.body(), Options { backend: kind, scene, batch: frames, ..Options::default() }).unwrap();
+    let scene = Scene::default().outputs(outputs);
+    let mut engine = Engine::new(&skin.body(), Options::default().backend(kind).scene(scene).batch(frames)).unwrap();
     engine.process_and_compare(&recording).unwrap().1
 }
 

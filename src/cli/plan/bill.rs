@@ -2,7 +2,7 @@
 
 use somatic::scene::PlannedStage;
 use somatic::tradeoff::{Combination, ladder};
-use somatic::{Agreement, BackendKind, Body, Engine, Frame, Options, Outputs, Result};
+use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result};
 
 use super::timed::{Played, measured, pressed};
 use crate::cli::input::Input;
@@ -62,7 +62,7 @@ impl Bill {
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
         let rungs = ladder(plan);
         let made = |outputs: Outputs| -> Result<Engine> {
-            let mut options = Options { backend: kind, ..options.clone() };
+            let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
             Engine::new(body, options)
         };

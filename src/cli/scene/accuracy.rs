@@ -147,13 +147,12 @@ impl Accuracy {
 
     pub(in crate::cli) fn knobs(&self) -> Knobs {
         let usual = Knobs::default();
-        Knobs {
-            arithmetic: self.arithmetic,
-            charts: self.charts.unwrap_or(usual.charts),
-            orientation_by: self.orientation_by.unwrap_or(usual.orientation_by),
-            coverage: self.coverage.unwrap_or(usual.coverage),
-            cadence: self.cadence.unwrap_or(usual.cadence),
-        }
+        Knobs::default()
+            .arithmetic(self.arithmetic)
+            .charts(self.charts.unwrap_or(usual.charts))
+            .orientation_by(self.orientation_by.unwrap_or(usual.orientation_by))
+            .coverage(self.coverage.unwrap_or(usual.coverage))
+            .cadence(self.cadence.unwrap_or(usual.cadence))
     }
 
     /// Refuses what contradicts itself, with the key where it is found out.

@@ -46,11 +46,9 @@ impl RunOptions {
                 "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
             )));
         }
-        let filter = MotionFilter {
-            by: self.filter_by.unwrap_or(usual.by),
-            time_constant_s: self.filter_time.unwrap_or(usual.time_constant_s),
-            ..usual
-        };
+        let filter = usual
+            .by(self.filter_by.unwrap_or(usual.by))
+            .time_constant_s(self.filter_time.unwrap_or(usual.time_constant_s));
         self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
     }
 }

@@ -1,6 +1,6 @@
 //! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
 
-use somatic::scene::{Coverage, Knobs, OrientationBy};
+use somatic::scene::{Coverage, OrientationBy};
 use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day, measure};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
@@ -96,9 +96,9 @@ pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &
 
 fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, target: &str) -> Result<Settled> {
     let Combination { backend, knobs } = of_row(pick.row, report)?;
-    let scene = somatic::Scene { knobs, ..options.scene };
+    let scene = options.scene.clone().knobs(knobs);
     Ok(Settled {
-        options: Options { scene, backend, ..options },
+        options: options.scene(scene).backend(backend),
         why: Some(format!("picked for {target}, as measured {when}")),
         measured: Some(format!("{}; {when}", in_words(pick.row))),
     })
@@ -123,7 +123,7 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
         let arithmetic = knobs.arithmetic.or(other.arithmetic.filter(|_| is_usual(&combination)));
         let coverage =
             if knobs.coverage == Coverage::Auto { usual_coverage(&combination, way) } else { knobs.coverage };
-        let wanted = Knobs { arithmetic, coverage, ..knobs };
+        let wanted = knobs.arithmetic(arithmetic).coverage(coverage);
         (kind == BackendKind::Auto || kind == combination.backend) && other == wanted
     };
     let fastest = report.of(way).into_iter().find(alike);
@@ -134,7 +134,7 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
         return Settled { options, why: None, measured };
     }
     let why = Some(format!("the fastest of these knobs, as measured {when}"));
-    Settled { options: Options { backend: combination.backend, ..options }, why, measured }
+    Settled { options: options.backend(combination.backend), why, measured }
 }
 
 /// Whether its arithmetic is what its backend has unless told otherwise.

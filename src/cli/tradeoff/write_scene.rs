@@ -56,7 +56,7 @@ mod tests {
     fn a_pick_takes_the_place_of_the_wish_and_comments_stay() {
         let text = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\n\n[accuracy]\ncentroid = \
                     \"0.5 mm\"\nbudget = \"1 ms\"\n";
-        let knobs = Knobs { arithmetic: Some(Arithmetic::OnePass), coverage: Coverage::Touched, ..Knobs::default() };
+        let knobs = Knobs::default().arithmetic(Arithmetic::OnePass).coverage(Coverage::Touched);
         let target = Target::within("0.5 mm").unwrap();
         let written = with(text, &Combination { backend: BackendKind::Cpu, knobs }, &target).unwrap();
         let right = "# Mine.\nbody = \"hand\" # the left\noutputs = [\n  \"centroid\", # where\n]\nbackend = \"cpu\"\n\n\
