@@ -1,27 +1,88 @@
 //! What a plan does and does not do, and why: what `EXPLAIN` is to a query.
 
-use super::{Plan, PlanField};
+use serde::{Serialize, Serializer};
+
+use super::{Knobs, Plan, PlanField};
 use crate::percept::{Component, Outputs};
+use crate::signal::Letter;
 
 /// A stage of a plan.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct PlannedStage {
     /// As in `src/stage`.
+    #[serde(rename = "stage")]
     pub name: &'static str,
     /// Whether it runs.
     pub runs: bool,
-    /// Whether it runs on the host whatever the backend is.
-    pub on_host: bool,
     /// Why it runs, or does not.
     pub why: String,
+    /// Whether it runs on the host whatever the backend is.
+    #[serde(rename = "where", serialize_with = "host_or_backend")]
+    pub on_host: bool,
     /// The outputs that it gives.
+    #[serde(skip)]
     pub gives: Outputs,
     /// Fields, or of *calibrate* and *change* slots, that it goes over in a frame; 0 where it does not run.
     pub over: usize,
     /// Memberships that it goes over, once or several times; 0 where it works on what others found.
     pub memberships: usize,
-    /// Bytes that a frame brings to it, and that it adds to what comes back from a device.
-    pub bytes: [usize; 2],
+    /// Bytes that a frame brings to it.
+    pub bytes_up: usize,
+    /// Bytes that it adds to what comes back from a device.
+    pub bytes_down: usize,
+}
+
+fn host_or_backend<S: Serializer>(on_host: &bool, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(if *on_host { "host" } else { "backend" })
+}
+
+/// The plan's JSON: what it computes, over how much, and why.
+#[derive(Serialize)]
+struct Summary<'a> {
+    outputs: Vec<String>,
+    letters: &'a [Letter],
+    knobs: Knobs,
+    taxels: usize,
+    memberships: usize,
+    bytes_up: usize,
+    bytes_down: usize,
+    fields: Vec<FieldSummary<'a>>,
+    stages: Vec<PlannedStage>,
+}
+
+#[derive(Serialize)]
+struct FieldSummary<'a> {
+    field: &'a str,
+    link: &'a str,
+    /// Its index in `letters`.
+    letter: usize,
+    members: usize,
+    chart: bool,
+}
+
+impl<'a> FieldSummary<'a> {
+    fn of(field: &'a PlanField) -> Self {
+        let PlanField { name, link, letter, count, charted, .. } = field;
+        Self { field: name, link, letter: *letter, members: *count, chart: *charted }
+    }
+}
+
+impl Serialize for Plan {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let summary = Summary {
+            outputs: self.outputs().names().collect(),
+            letters: self.letters(),
+            knobs: self.knobs(),
+            taxels: self.channels(),
+            memberships: self.memberships(),
+            bytes_up: self.bytes_up(),
+            bytes_down: self.bytes_down(),
+            fields: self.fields.iter().map(FieldSummary::of).collect(),
+            stages: self.explain(),
+        };
+        summary.serialize(serializer)
+    }
 }
 
 impl Plan {
@@ -69,7 +130,8 @@ impl Plan {
                 gives,
                 over: if runs { over } else { 0 },
                 memberships: if runs { memberships } else { 0 },
-                bytes: [if name == "calibrate" { self.bytes_up() } else { 0 }, self.bytes_from(name)],
+                bytes_up: if name == "calibrate" { self.bytes_up() } else { 0 },
+                bytes_down: self.bytes_from(name),
             }
         };
         rows.iter().map(row).collect()
@@ -144,6 +206,18 @@ mod tests {
     }
 
     #[test]
+    fn a_plan_is_json() {
+        let plan = serde_json::to_value(plan(Outputs::TOTAL, &["humanoid/torso"])).unwrap();
+        assert_eq!((&plan["outputs"][0], &plan["letters"][0]["letter"]), (&"total".into(), &"sustained".into()));
+        assert_eq!(
+            (&plan["knobs"]["charts"], &plan["fields"][0]["field"]),
+            (&"as-authored".into(), &"humanoid/torso".into())
+        );
+        let contact = plan["stages"].as_array().unwrap().iter().find(|stage| stage["stage"] == "contact").unwrap();
+        assert_eq!((&contact["runs"], &contact["where"]), (&true.into(), &"backend".into()));
+    }
+
+    #[test]
     fn only_stages_that_an_output_needs_run() {
         assert_eq!(running(&plan(Outputs::TOTAL, &[])), ["calibrate", "contact"]);
         assert_eq!(running(&plan(Outputs::CENTROID, &[])), ["calibrate", "contact", "centroid"]);
@@ -175,9 +249,13 @@ mod tests {
         for outputs in [Outputs::TOTAL, Outputs::POSITION, Outputs::SPEED, Outputs::TOUCHES, Outputs::all()] {
             let plan = plan(outputs, &[]);
             let stages = plan.explain();
-            let sum = |way: usize| stages.iter().map(|stage| stage.bytes[way]).sum::<usize>();
-            assert_eq!([sum(0), sum(1)], [plan.bytes_up(), plan.bytes_down()], "{outputs:?}");
-            assert!(stages.iter().all(|stage| stage.runs || stage.bytes == [0, 0]), "{outputs:?}");
+            let sum = |bytes: fn(&PlannedStage) -> usize| stages.iter().map(bytes).sum::<usize>();
+            assert_eq!(
+                [sum(|stage| stage.bytes_up), sum(|stage| stage.bytes_down)],
+                [plan.bytes_up(), plan.bytes_down()],
+                "{outputs:?}"
+            );
+            assert!(stages.iter().all(|stage| stage.runs || stage.bytes_up + stage.bytes_down == 0), "{outputs:?}");
         }
     }
 }

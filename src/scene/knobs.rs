@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Serialize, Serializer};
+
 use super::choose_fields;
 use crate::body::{Body, ChartKind};
 use crate::error::{Error, Result, nearest};
@@ -12,7 +14,7 @@ use crate::percept::Outputs;
 /// What is traded for what; the default is as accurate as single precision is without pains, and as fast as it is.
 ///
 /// `docs/tradeoff.md` has what each costs and gives, `somatic tradeoff` measures it on one's own body and machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[non_exhaustive]
 pub struct Knobs {
     /// How sums are made; `None` is what the backend is made for: one-pass, and double on the reference.
@@ -73,6 +75,12 @@ macro_rules! words {
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(self.word())
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.word())
             }
         }
     };

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
+use serde::{Serialize, Serializer};
 
 /// One taxel's raw value: a single-precision number, or missing, or faulty.
 ///
@@ -59,6 +60,18 @@ impl Default for RawValue {
     }
 }
 
+/// A number; `null` if missing, else `"stale"` or `"faulty"`.
+impl Serialize for RawValue {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.number() {
+            Some(_) => serializer.serialize_f32(f32::from_bits(self.0)),
+            None if *self == Self::STALE => serializer.serialize_str("stale"),
+            None if self.is_missing() => serializer.serialize_none(),
+            None => serializer.serialize_str("faulty"),
+        }
+    }
+}
+
 impl std::fmt::Debug for RawValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.number() {
@@ -79,15 +92,28 @@ pub struct Pose {
     pub rotation: DQuat,
 }
 
+/// `[x, y, z, qx, qy, qz, qw]`.
+impl Serialize for Pose {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.translation.to_array().into_iter().chain(self.rotation.to_array()))
+    }
+}
+
 /// The raw values of one instant, in the order of the source's taxel ids.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Frame {
     /// Time, s.
+    #[serde(rename = "t")]
     pub t_s: f64,
     /// One value per taxel, [`RawValue::MISSING`] where none arrived.
     pub values: Vec<RawValue>,
     /// Poses of links by name, if the frame has them: world_from_link.
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "as_map")]
     pub pose: Vec<(String, Pose)>,
+}
+
+fn as_map<S: Serializer>(pose: &[(String, Pose)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pose.iter().map(|(link, pose)| (link, pose)))
 }
 
 impl Frame {
@@ -107,6 +133,15 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_is_json() {
+        let pose = Pose { translation: DVec3::X, rotation: DQuat::IDENTITY };
+        let values = vec![RawValue::new(0.1), RawValue::MISSING, RawValue::STALE, RawValue::FAULTY];
+        let frame = Frame { t_s: 0.5, values, pose: vec![("arm".to_owned(), pose)] };
+        let expected = r#"{"t":0.5,"values":[0.1,null,"stale","faulty"],"pose":{"arm":[1.0,0.0,0.0,0.0,0.0,0.0,1.0]}}"#;
+        assert_eq!(serde_json::to_string(&frame).unwrap(), expected);
+    }
 
     #[test]
     fn a_raw_value_keeps_what_it_was() {

@@ -3,11 +3,14 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::Serialize;
+
 use super::FsrSignal;
 use crate::error::{Error, Result, nearest};
 
 /// The quantity of a sensor's pressure P that a letter is made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Receptor {
     /// P itself, like slowly adapting Merkel discs.
     #[default]
@@ -47,11 +50,13 @@ impl FromStr for Receptor {
 }
 
 /// A letter: every field is computed once for each letter of a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Letter {
     /// The quantity.
+    #[serde(rename = "letter")]
     pub receptor: Receptor,
     /// The signal of sensors in the paper's circuit; by default that of the calibration.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub signal: Option<FsrSignal>,
 }
 

@@ -47,7 +47,7 @@ impl Bill {
                 stage.name.to_owned(),
                 if stage.runs { count(stage.over as u64, over) } else { "–".to_owned() },
                 number(stage.memberships),
-                match stage.bytes {
+                match [stage.bytes_up, stage.bytes_down] {
                     [0, 0] => String::new(),
                     [0, down] => format!("{down} down"),
                     [up, _] => format!("{up} up"),
@@ -74,17 +74,9 @@ impl Bill {
     pub(super) fn json(&self) -> Value {
         let (name, what, why) = &self.backend;
         let stage = |Stage { planned, measured_us }: &Stage| {
-            json!({
-                "stage": planned.name,
-                "runs": planned.runs,
-                "why": planned.why,
-                "where": if planned.on_host { "host" } else { "backend" },
-                "over": planned.over,
-                "memberships": planned.memberships,
-                "bytes_up": planned.bytes[0],
-                "bytes_down": planned.bytes[1],
-                "us": measured_us.map(rounded),
-            })
+            let mut row = json!(planned);
+            row["us"] = json!(measured_us.map(rounded));
+            row
         };
         let mut bill = json!({
             "body": self.body,

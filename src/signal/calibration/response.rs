@@ -4,7 +4,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::{Keys, TaxelCalibration, line_of};
@@ -46,7 +46,8 @@ impl Default for FsrResponse {
 }
 
 /// The paper's two signals, both from 0 to 1000.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum FsrSignal {
     /// The inverted reading: about logarithmic in the force.
     Raw,
