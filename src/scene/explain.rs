@@ -207,12 +207,9 @@ mod tests {
 
     #[test]
     fn a_plan_is_json() {
-        let plan = serde_json::to_value(plan(Outputs::TOTAL, &["humanoid/torso"])).unwrap();
+        let plan = serde_json::to_value(plan(Outputs::TOTAL, &["torso"])).unwrap();
         assert_eq!((&plan["outputs"][0], &plan["letters"][0]["letter"]), (&"total".into(), &"sustained".into()));
-        assert_eq!(
-            (&plan["knobs"]["charts"], &plan["fields"][0]["field"]),
-            (&"as-authored".into(), &"humanoid/torso".into())
-        );
+        assert_eq!((&plan["knobs"]["charts"], &plan["fields"][0]["field"]), (&"as-authored".into(), &"torso".into()));
         let contact = plan["stages"].as_array().unwrap().iter().find(|stage| stage["stage"] == "contact").unwrap();
         assert_eq!((&contact["runs"], &contact["where"]), (&true.into(), &"backend".into()));
     }
