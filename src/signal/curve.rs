@@ -1,7 +1,7 @@
 //! Curves: non-linear conversions from raw value to pressure.
 
-use super::calibration::{GAIN_RANGE, MAX_MAGNITUDE};
-use super::{FsrCircuit, FsrResponse, FsrSignal};
+use super::fsr::FsrCircuit;
+use super::response::{FsrResponse, FsrSignal, GAIN_RANGE, MAX_MAGNITUDE};
 use crate::error::{Error, Result};
 
 /// A monotone table from raw value to pressure: linear between its knots, constant beyond its ends.

@@ -6,18 +6,18 @@ mod frame;
 mod fsr;
 mod intake;
 mod letter;
+mod response;
 mod upkeep;
 mod wiring;
 
-pub use calibration::{
-    Calibration, ChangeCalibration, Checks, ContactThresholds, FsrResponse, FsrSignal, Response, TaxelCalibration,
-};
+pub use calibration::{Calibration, ChangeCalibration, Checks, ContactThresholds, TaxelCalibration};
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
 pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
+pub use response::{FsrResponse, FsrSignal, Response};
 pub(crate) use upkeep::{Kept, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};
 pub use wiring::{WiredBoard, Wiring};

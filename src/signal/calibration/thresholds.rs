@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{MAX_MAGNITUDE, line_of};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::keys::Text;
+use crate::signal::response::MAX_MAGNITUDE;
 
 /// The sums S at which a field's contact begins and ends, in the unit of S. By default any S > 0 is contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,7 +57,7 @@ const OF_CHANGES: &str = "in P per second";
 
 impl ContactKeys {
     /// The thresholds for all fields, and those of single fields by name.
-    pub(super) fn read(self, text: &str) -> Result<(ContactThresholds, BTreeMap<String, ContactThresholds>)> {
+    pub(super) fn read(self, text: Text<'_>) -> Result<(ContactThresholds, BTreeMap<String, ContactThresholds>)> {
         let all = thresholds(self.on.as_ref(), self.off.as_ref(), OF_SUMS, text)?;
         let one = |keys: FieldContactKeys| thresholds(Some(&keys.on), keys.off.as_ref(), OF_SUMS, text);
         let fields = self.field.into_iter().map(|(name, keys)| Ok((name, one(keys)?)));
@@ -65,13 +66,12 @@ impl ContactKeys {
 }
 
 impl ChangeKeys {
-    pub(super) fn read(&self, text: &str) -> Result<ChangeCalibration> {
+    pub(super) fn read(&self, text: Text<'_>) -> Result<ChangeCalibration> {
         let dead_band = self.dead_band.as_ref().map_or(0.0, |band| *band.get_ref());
         match &self.dead_band {
             Some(band) if !(0.0..=MAX_MAGNITUDE).contains(&dead_band) => {
-                let line = line_of(text, band.span().start);
-                Err(Error::failed(format!("`dead_band` is {dead_band}; it must be 0 or more, {OF_CHANGES}"))
-                    .at(format!("line {line}")))
+                let what = format!("`dead_band` is {dead_band}; it must be 0 or more, {OF_CHANGES}");
+                Err(text.wrong(band.span(), what))
             }
             _ => Ok(ChangeCalibration {
                 dead_band,
@@ -86,11 +86,10 @@ fn thresholds(
     on: Option<&Spanned<f64>>,
     off: Option<&Spanned<f64>>,
     unit: &str,
-    text: &str,
+    text: Text<'_>,
 ) -> Result<ContactThresholds> {
     let wrong = |key: &str, value: &Spanned<f64>, must: &str| {
-        let line = line_of(text, value.span().start);
-        Err(Error::failed(format!("`{key}` is {}; it must be {must}", value.get_ref())).at(format!("line {line}")))
+        Err(text.wrong(value.span(), format!("`{key}` is {}; it must be {must}", value.get_ref())))
     };
     let on_value = on.map_or(0.0, |on| *on.get_ref());
     let off_value = off.map_or(on_value, |off| *off.get_ref());

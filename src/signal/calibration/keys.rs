@@ -1,81 +1,30 @@
-//! The conversion from raw value to pressure: the keys `sensor`, `curve`, `tap`, `signal` and `full_scale_newton`, and the
-//! check that keys fit together.
+//! The keys of a taxel's calibration, and the check that they fit together.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Keys, TaxelCalibration, line_of};
+use super::TaxelCalibration;
 use crate::error::{Error, Result, nearest};
-use crate::signal::FsrCircuit;
+use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
+use crate::signal::fsr::FsrCircuit;
+use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
 
-/// The conversion from a taxel's raw value to its pressure.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Response {
-    /// A straight line: P = gain · (raw − baseline).
-    #[default]
-    Linear,
-    /// P = |gain| · curve(±(raw − baseline)), with the sign of the gain; which of [`super::Calibration::curves`].
-    Curve(usize),
-    /// The same with the curve of the paper's circuit.
-    Fsr(FsrResponse),
-}
-
-/// A force-sensing resistor in the paper's circuit, [`FsrCircuit`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FsrResponse {
-    /// The potentiometer's setting.
-    pub tap: u8,
-    /// Which of the paper's signals P is.
-    pub signal: FsrSignal,
-    /// The force at which the linearised signal is 1000, N.
-    pub full_scale_newton: f64,
-}
-
-impl Default for FsrResponse {
-    fn default() -> Self {
-        Self {
-            tap: FsrCircuit::MIDDLE_TAP,
-            signal: FsrSignal::default(),
-            full_scale_newton: FsrCircuit::SATURATION_NEWTON,
-        }
-    }
-}
-
-/// The paper's two signals, both from 0 to 1000.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FsrSignal {
-    /// The inverted reading: about logarithmic in the force.
-    Raw,
-    /// Proportional to the force.
-    #[default]
-    Linear,
-}
-
-impl FsrSignal {
-    const NAMES: [(&str, Self); 2] = [("raw", Self::Raw), ("linear", Self::Linear)];
-}
-
-impl fmt::Display for FsrSignal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Raw => "raw",
-            Self::Linear => "linear",
-        })
-    }
-}
-
-impl FromStr for FsrSignal {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        let found = Self::NAMES.into_iter().find(|(known, _)| *known == name);
-        found.map(|(_, signal)| signal).ok_or_else(|| Error::usage(format!("`{name}` is neither `raw` nor `linear`")))
-    }
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Keys {
+    baseline: Option<Spanned<f64>>,
+    gain: Option<Spanned<f64>>,
+    invert: Option<bool>,
+    dead_band: Option<Spanned<f64>>,
+    p_max: Option<Spanned<f64>>,
+    raw_range: Option<Spanned<[f64; 2]>>,
+    mask: Option<bool>,
+    curve: Option<Spanned<String>>,
+    sensor: Option<Spanned<String>>,
+    tap: Option<Spanned<i64>>,
+    signal: Option<Spanned<String>>,
+    full_scale_newton: Option<Spanned<f64>>,
 }
 
 /// `[curve.NAME]`.
@@ -87,14 +36,14 @@ pub(super) struct CurveKeys {
 }
 
 impl CurveKeys {
-    pub(super) fn read(&self, name: &str, text: &str) -> Result<Curve> {
+    pub(super) fn read(&self, name: &str, text: Text<'_>) -> Result<Curve> {
         let numbers = |column: &Spanned<Vec<Spanned<f64>>>| -> Vec<f64> {
             column.get_ref().iter().map(|x| *x.get_ref()).collect()
         };
         Curve::checked(&numbers(&self.raw), &numbers(&self.p)).map_err(|error| {
             let column = if error.column == Column::Raw { &self.raw } else { &self.p };
             let span = column.get_ref().get(error.knot).map_or(column.span(), Spanned::span);
-            Error::failed(error.what).at(format!("[curve.{name}]")).at(format!("line {}", line_of(text, span.start)))
+            Error::failed(error.what).at(format!("[curve.{name}]")).at(format!("line {}", text.line(span.start)))
         })
     }
 }
@@ -102,7 +51,7 @@ impl CurveKeys {
 /// A taxel's calibration while its keys are read.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Draft {
-    pub(super) taxel: TaxelCalibration,
+    taxel: TaxelCalibration,
     kind: Kind,
     fsr: FsrResponse,
     /// Lines of keys that are checked together with others at the end.
@@ -120,12 +69,64 @@ enum Kind {
 }
 
 impl Draft {
-    /// Applies the keys of the response; `curves` are the names of the file's curves.
-    pub(super) fn take(&mut self, keys: &Keys, curves: &[&str], text: &str) -> Result<()> {
-        let line = |start: usize| format!("line {}", line_of(text, start));
+    /// Applies `keys`; `curves` are the names of the file's curves.
+    pub(super) fn apply(&mut self, keys: &Keys, curves: &[&str], text: Text<'_>) -> Result<()> {
+        self.apply_response(keys, curves, text)?;
+        let taxel = &mut self.taxel;
+        let number =
+            |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f64>> {
+                let Some(value) = value else { return Ok(None) };
+                if fits(*value.get_ref()) {
+                    return Ok(Some(*value.get_ref()));
+                }
+                Err(text.wrong(value.span(), format!("`{key}` is {}; it must be {must}", value.get_ref())))
+            };
+        if let Some(x) =
+            number("baseline", &keys.baseline, &|x| x.abs() <= MAX_MAGNITUDE, "a finite number of raw units")?
+        {
+            taxel.baseline = x;
+        }
+        if let Some(x) = number(
+            "gain",
+            &keys.gain,
+            &|x| GAIN_RANGE.contains(&x),
+            "over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)",
+        )? {
+            taxel.gain = x.copysign(taxel.gain);
+        }
+        if let Some(invert) = keys.invert {
+            taxel.gain = if invert { -taxel.gain.abs() } else { taxel.gain.abs() };
+        }
+        if let Some(x) = number(
+            "dead_band",
+            &keys.dead_band,
+            &|x| (0.0..=MAX_MAGNITUDE).contains(&x),
+            "0 or more, in the unit of P",
+        )? {
+            taxel.dead_band = x;
+        }
+        if let Some(x) = number("p_max", &keys.p_max, &|x| x > 0.0 && x <= MAX_MAGNITUDE, "over 0, in the unit of P")? {
+            taxel.p_max = x;
+        }
+        if let Some(range) = &keys.raw_range {
+            let [low, high] = *range.get_ref();
+            if !(low < high && low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE) {
+                let what = format!("`raw_range` is [{low}, {high}]; give the lowest and the highest raw value");
+                return Err(text.wrong(range.span(), what));
+            }
+            taxel.raw_range = [low as f32, high as f32];
+        }
+        if let Some(mask) = keys.mask {
+            taxel.mask = mask;
+        }
+        Ok(())
+    }
+
+    /// Applies the keys of the response.
+    fn apply_response(&mut self, keys: &Keys, curves: &[&str], text: Text<'_>) -> Result<()> {
         if let (Some(curve), Some(_)) = (&keys.curve, &keys.sensor) {
             let what = "`curve` and `sensor` both define the response; keep one of them";
-            return Err(Error::failed(what).at(line(curve.span().start)));
+            return Err(text.wrong(curve.span(), what));
         }
         if let Some(curve) = &keys.curve {
             let index = curves.iter().position(|name| name == curve.get_ref()).ok_or_else(|| {
@@ -134,7 +135,7 @@ impl Draft {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("add a table [curve.{name}]"),
                 };
-                Error::failed(format!("`curve` is `{name}`, which is not there: {hint}")).at(line(curve.span().start))
+                text.wrong(curve.span(), format!("`curve` is `{name}`, which the file does not have: {hint}"))
             })?;
             self.kind = Kind::Curve(index);
         }
@@ -144,32 +145,30 @@ impl Draft {
                 "fsr" => Kind::Fsr,
                 other => {
                     let what = format!("`sensor` is `{other}`; it must be `linear` or `fsr`");
-                    return Err(Error::failed(what).at(line(sensor.span().start)));
+                    return Err(text.wrong(sensor.span(), what));
                 }
             };
         }
         if let Some(tap) = &keys.tap {
             self.fsr.tap = u8::try_from(*tap.get_ref()).map_err(|_| {
-                Error::failed(format!("`tap` is {}; it must be between 0 and 255", tap.get_ref()))
-                    .at(line(tap.span().start))
+                text.wrong(tap.span(), format!("`tap` is {}; it must be between 0 and 255", tap.get_ref()))
             })?;
         }
         if let Some(signal) = &keys.signal {
             self.fsr.signal = signal.get_ref().parse().map_err(|_| {
-                Error::failed(format!("`signal` is `{}`; it must be `raw` or `linear`", signal.get_ref()))
-                    .at(line(signal.span().start))
+                text.wrong(signal.span(), format!("`signal` is `{}`; it must be `raw` or `linear`", signal.get_ref()))
             })?;
         }
         if let Some(force) = &keys.full_scale_newton {
             let newton = *force.get_ref();
             if !(FsrCircuit::BREAK_NEWTON..=1e6).contains(&newton) {
                 let what = format!("`full_scale_newton` is {newton}; it must be between 0.1 and 1e6");
-                return Err(Error::failed(what).at(line(force.span().start)));
+                return Err(text.wrong(force.span(), what));
             }
             self.fsr.full_scale_newton = newton;
         }
-        self.baseline_line = keys.baseline.as_ref().map(|x| line_of(text, x.span().start)).or(self.baseline_line);
-        self.gain_line = keys.gain.as_ref().map(|x| line_of(text, x.span().start)).or(self.gain_line);
+        self.baseline_line = keys.baseline.as_ref().map(|x| text.line(x.span().start)).or(self.baseline_line);
+        self.gain_line = keys.gain.as_ref().map(|x| text.line(x.span().start)).or(self.gain_line);
         self.range_given |= keys.raw_range.is_some();
         Ok(())
     }
@@ -218,7 +217,7 @@ impl Draft {
 }
 
 /// Rejects keys of the circuit for other sensors.
-pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: &str) -> Result<()> {
+pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: Text<'_>) -> Result<()> {
     let starts = [
         ("tap", keys.tap.as_ref().map(Spanned::span)),
         ("signal", keys.signal.as_ref().map(Spanned::span)),
@@ -227,7 +226,7 @@ pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: &str) -> Result<()> 
     match starts.into_iter().find_map(|(key, span)| Some((key, span?.start))) {
         Some((key, start)) if !is_fsr => {
             let what = format!("`{key}` is for sensors of one kind; say `sensor = \"fsr\"` too");
-            Err(Error::failed(what).at(format!("line {}", line_of(text, start))))
+            Err(text.wrong(start..start, what))
         }
         _ => Ok(()),
     }

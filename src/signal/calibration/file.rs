@@ -1,0 +1,230 @@
+//! The file of a calibration, TOML.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
+use super::thresholds::{ChangeKeys, ContactKeys};
+use super::{Calibration, Checks};
+use crate::error::{Error, Result};
+use crate::keys::Text;
+use crate::signal::upkeep::UpkeepKeys;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    body: Option<String>,
+    #[serde(default)]
+    curve: HashMap<Spanned<String>, CurveKeys>,
+    #[serde(default)]
+    all: Keys,
+    #[serde(default)]
+    taxel: HashMap<Spanned<String>, Keys>,
+    #[serde(default)]
+    contact: ContactKeys,
+    #[serde(default)]
+    change: ChangeKeys,
+    #[serde(default)]
+    checks: Checks,
+    #[serde(default)]
+    upkeep: UpkeepKeys,
+}
+
+impl Calibration {
+    /// Reads the file at `path` for a body whose taxels have the ids `ids`, ascending.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, has a key this version does not know or a value that makes no sense, or
+    /// names a taxel that the body does not have. The message has the line.
+    pub fn load(path: impl AsRef<Path>, ids: &[u32]) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        Self::parse(&text, ids).map_err(|e| e.at(path.display()))
+    }
+
+    /// Reads the calibration in `text`, as [`Calibration::load`] does.
+    ///
+    /// # Errors
+    /// As [`Calibration::load`].
+    pub fn parse(text: &str, ids: &[u32]) -> Result<Self> {
+        let text = Text(text);
+        let file: File = text.parse()?;
+        let mut named: Vec<_> = file.curve.into_iter().collect();
+        named.sort_by_key(|(name, _)| name.span().start);
+        let names: Vec<&str> = named.iter().map(|(name, _)| name.get_ref().as_str()).collect();
+        let curves = named.iter().map(|(name, keys)| keys.read(name.get_ref(), text)).collect::<Result<Vec<_>>>()?;
+
+        let mut all = Draft::default();
+        all.apply(&file.all, &names, text)?;
+        let mut drafts = vec![all; ids.len()];
+        let mut named: Vec<_> = file.taxel.into_iter().collect();
+        named.sort_by_key(|(id, _)| id.span().start);
+        for (id, keys) in named {
+            let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
+                let made_for = file.body.as_ref().map_or(String::new(), |body| format!(" (the file is for `{body}`)"));
+                let name = id.get_ref();
+                let what = format!("[taxel.{name}] names a taxel that the body does not have; remove it{made_for}");
+                text.wrong(id.span(), what)
+            })?;
+            drafts[index].apply(&keys, &names, text)?;
+            only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
+        }
+        only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
+        let taxels = drafts.into_iter().map(|draft| draft.finish(&curves)).collect::<Result<_>>()?;
+        check_checks(&file.checks)?;
+        file.upkeep.check()?;
+        let (contact, fields) = file.contact.read(text)?;
+        let change = file.change.read(text)?;
+        let File { body, checks, upkeep, .. } = file;
+        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
+    }
+}
+
+fn check_checks(checks: &Checks) -> Result<()> {
+    let wrong = |key: &str, must: &str| Err(Error::failed(format!("[checks] `{key}` must be {must}")));
+    if checks.broken_frame_share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
+        return wrong("broken_frame_share", "between 0 and 1");
+    }
+    if checks.isolated_ratio.is_some_and(|ratio| !(ratio.is_finite() && ratio >= 1.0)) {
+        return wrong("isolated_ratio", "1 or more");
+    }
+    if !(checks.isolated_above.is_finite() && checks.isolated_above >= 0.0) {
+        return wrong("isolated_above", "0 or more");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{ChangeCalibration, ContactThresholds, FsrResponse, FsrSignal, Response};
+
+    #[test]
+    fn a_taxel_overrides_what_holds_for_all() {
+        let text =
+            "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\n[taxel.7]\nbaseline = 200\nmask = true\n";
+        let calibration = Calibration::parse(text, &[3, 7]).unwrap();
+        assert_eq!(calibration.taxels[0].gain, -2.0);
+        assert_eq!(calibration.taxels[0].baseline, 240.0);
+        assert_eq!(calibration.taxels[1].baseline, 200.0);
+        assert!(calibration.taxels[1].mask && !calibration.taxels[0].mask);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_named_with_its_line() {
+        let why = |text: &str| Calibration::parse(text, &[3, 7]).unwrap_err().to_string();
+        assert_eq!(
+            why("[all]\ngain = 0"),
+            "line 2: `gain` is 0; it must be over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)"
+        );
+        assert!(why("[all]\ngain = nan").contains("line 2"));
+        assert!(why("[taxel.5]\ngain = 1").contains("[taxel.5] names a taxel"));
+        assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
+        assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
+        assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
+        assert!(why("all = 3").contains("line 1"));
+        assert_eq!(why("[contact]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert!(why("[contact]\non = -3").contains("line 2"));
+        assert_eq!(why("[change]\ndead_band = -1"), "line 2: `dead_band` is -1; it must be 0 or more, in P per second");
+        assert_eq!(why("[change]\non = nan"), "line 2: `on` is NaN; it must be 0 or more, in P per second");
+        assert_eq!(why("[change]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
+        assert!(why("[change]\nfield = 3").starts_with("line 2"));
+    }
+
+    #[test]
+    fn what_changes_has_thresholds_of_its_own() {
+        let read = |text: &str| Calibration::parse(text, &[]).unwrap().change;
+        let contact = ContactThresholds { on: 30.0, off: 20.0 };
+        assert_eq!(read("[change]\ndead_band = 5\non = 30\noff = 20"), ChangeCalibration { dead_band: 5.0, contact });
+        assert_eq!(read("[change]\non = 30").contact.off, 30.0);
+        assert_eq!(read("[contact]\non = 30"), ChangeCalibration::default());
+    }
+
+    #[test]
+    fn a_response_is_read_and_overridden_by_a_taxel() {
+        let text = "body = \"hand\"\n[curve.finger]\nraw = [0, 128, 255]\np = [9.5, 4, 0]\n[all]\nsensor = \"fsr\"\n\
+                    tap = 12\nsignal = \"raw\"\n[taxel.3]\ntap = 255\nsignal = \"linear\"\nfull_scale_newton = 4\n\
+                    [taxel.7]\ncurve = \"finger\"\n[taxel.9]\nsensor = \"linear\"";
+        let calibration = Calibration::parse(text, &[1, 3, 7, 9]).unwrap();
+        let fsr = |tap, signal, full_scale_newton| Response::Fsr(FsrResponse { tap, signal, full_scale_newton });
+        let responses: Vec<Response> = calibration.taxels.iter().map(|taxel| taxel.response).collect();
+        let right =
+            [fsr(12, FsrSignal::Raw, 10.0), fsr(255, FsrSignal::Linear, 4.0), Response::Curve(0), Response::Linear];
+        assert_eq!(responses, right);
+        assert_eq!(calibration.taxels[0].raw_range, [0.0, 1023.0]);
+        assert_eq!(calibration.curves[0].knots(), [[0.0, 9.5], [128.0, 4.0], [255.0, 0.0]]);
+        // Pressed is positive, whichever way a sensor goes.
+        assert_eq!(
+            (calibration.rise(1, 1000.0), calibration.rise(2, 200.0), calibration.rise(3, 5.0)),
+            (23.0, 55.0, 5.0)
+        );
+    }
+
+    #[test]
+    fn a_response_that_makes_no_sense_is_named_with_its_line() {
+        let why = |text: &str| Calibration::parse(text, &[3, 7]).unwrap_err().to_string();
+        let curve = |raw: &str, p: &str| why(&format!("[curve.finger]\nraw = [{raw}]\np = [{p}]\n"));
+        assert_eq!(
+            curve("0, 1, 2", "0,\n9,\n8"),
+            "line 5: [curve.finger]: `p` is 8 at knot 3, after 9: it is not monotone; it must rise all the way, or fall \
+             all the way"
+        );
+        assert!(curve("0, 1, 2", "0, 1").starts_with("line 3: [curve.finger]: `raw` has 3 knots and `p` has 2"));
+        assert!(curve("0", "1").starts_with("line 2: [curve.finger]: `raw` has 1 of the two"));
+        assert!(curve("0, nan", "1, 2").starts_with("line 2: [curve.finger]: `raw` is NaN at knot 2"));
+        assert!(curve("0, 3, 3", "1, 2, 3").starts_with("line 2: [curve.finger]: `raw` is 3 at knot 3, after 3"));
+        let table = "[curve.finger]\nraw = [0, 1]\np = [0, 1]\n[all]\n";
+        assert_eq!(
+            why(&format!("{table}curve = \"fingr\"")),
+            "line 5: `curve` is `fingr`, which the file does not have: did you mean `finger`?"
+        );
+        assert!(why("[taxel.3]\ncurve = \"a\"").contains("line 2: `curve` is `a`, which is not there: add a table"));
+        assert!(why(&format!("{table}curve = \"finger\"\nsensor = \"fsr\"")).contains("line 5: `curve` and `sensor`"));
+        let steep = "[curve.a]\nraw = [0, 0.1]\np = [0, 1]\n[all]\ncurve = \"a\"\ngain = 1e12";
+        assert!(why(steep).starts_with("line 6: `gain`"), "{}", why(steep));
+        assert!(why("[all]\nsensor = \"fsr\"\ntap = 256").starts_with("line 3: `tap` is 256; it must be between 0"));
+        assert!(why("[all]\nsensor = \"fsr\"\ntap = 3.5").starts_with("line 3"));
+        assert!(why("[all]\nsensor = \"fsr\"\nsignal = \"log\"").starts_with("line 3: `signal` is `log`"));
+        assert!(why("[all]\nsensor = \"fsr\"\nfull_scale_newton = nan").starts_with("line 3: `full_scale_newton`"));
+        assert!(why("[all]\nsensor = \"piezo\"").starts_with("line 2: `sensor` is `piezo`"));
+        assert!(why("[all]\ntap = 3").starts_with("line 2: `tap` is for sensors of one kind"));
+        assert!(why("[all]\nsensor = \"fsr\"\n[taxel.3]\nsensor = \"linear\"\ntap = 3").starts_with("line 5: `tap`"));
+        assert!(why("[curv.a]\nraw = [0, 1]").contains("did you mean `curve`"));
+    }
+
+    #[test]
+    fn a_baseline_that_leaves_nothing_to_feel_is_refused() {
+        let why = |text: &str| Calibration::parse(text, &[3, 7]).map_err(|e| e.to_string());
+        assert_eq!(
+            why("[all]\nbaseline = 300\np_max = 255").unwrap_err(),
+            "line 2: `baseline` is 300, above `p_max` 255; lower it, or give the `raw_range` of a sensor that reads that \
+             high"
+        );
+        assert!(why("[all]\np_max = 255\n[taxel.7]\nbaseline = 300").unwrap_err().starts_with("line 4: `baseline`"));
+        let ranged = "[all]\nbaseline = 300\np_max = 255\nraw_range = [0, 255]";
+        assert!(why(ranged).unwrap_err().contains("`raw_range` ends at 255: no reading is above it"));
+        assert!(why(&format!("{ranged}\ninvert = true")).is_ok());
+        assert!(why("[all]\nbaseline = 5\ninvert = true\nraw_range = [5, 9]").unwrap_err().contains("below it"));
+        // A barometer that reads 24000 at rest.
+        assert!(why("[all]\nbaseline = 24000\np_max = 900\nraw_range = [0, 65535]").is_ok());
+        assert!(why("[all]\nbaseline = 244\ninvert = true\np_max = 200").is_ok());
+        assert!(why("[all]\np_max = 10\nbaseline = 244\n[taxel.3]\nbaseline = 1\n[taxel.7]\nbaseline = 2").is_ok());
+    }
+
+    #[test]
+    fn a_file_for_another_body_is_refused_by_name() {
+        let calibration = Calibration::parse("body = \"robots/hand.glb\"", &[]).unwrap();
+        for same in ["hand", "hand.glb", "/somewhere/hand.gltf"] {
+            assert!(calibration.check_body(same).is_ok(), "{same}");
+        }
+        let why = calibration.check_body("arm.glb").unwrap_err().to_string();
+        assert!(why.starts_with("the calibration is for body `robots/hand.glb`, and this is `arm.glb`"), "{why}");
+        let unknown = Calibration::parse("body = \"hand\"\n[taxel.9]\ngain = 2", &[1]).unwrap_err().to_string();
+        assert!(unknown.contains("[taxel.9]") && unknown.contains("(the file is for `hand`)"), "{unknown}");
+        assert!(Calibration::identity(3).check_body("anything").is_ok());
+    }
+}
