@@ -3,11 +3,16 @@
 //! The skins take turns, some frames each, so that whatever else the machine does falls on all of them; a robot has but one,
 //! and finds its memory as it left it.
 
+// The skins of `somatic bench`.
+#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
+#[path = "../src/experiments/shape.rs"]
+mod shape;
+
 use std::hint::black_box;
 use std::time::Instant;
 
+use crate::shape::Shape;
 use somatic::body::MemberSpec;
-use somatic::experiments::shape::Shape;
 use somatic::scene::{Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, Outputs, RawValue, Scene};
 

@@ -5,9 +5,14 @@
 //!     cargo bench --bench engine -- live   what has this in its name
 //!     cargo bench -- --max-time 5          longer, and so steadier
 
+// The skins of `somatic bench`.
+#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
+#[path = "../src/experiments/shape.rs"]
+mod shape;
+
+use crate::shape::Shape;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use somatic::experiments::shape::Shape;
 use somatic::{BackendKind, Body, Outputs};
 
 fn main() {

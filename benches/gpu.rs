@@ -7,11 +7,16 @@
 //! may be read, with the share of the copy bandwidth that their least bytes make; and whole calls, frames in memory to
 //! percepts in memory, in turns with empty ones: the same bytes up and down, as many groups, and nothing computed.
 
+// The skins of `somatic bench`.
+#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
+#[path = "../src/experiments/shape.rs"]
+mod shape;
+
 use std::time::{Duration, Instant};
 
+use crate::shape::Shape;
 use serde_json::{Value, json};
 use somatic::backend::gpu::{Bandwidth, EmptyCall, adapters, bandwidth, device_time};
-use somatic::experiments::shape::Shape;
 use somatic::{BackendKind, Body, Outputs, Result};
 
 /// Sensors, fields, members, and of one field more.

@@ -47,8 +47,16 @@
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
 
+#[cfg(test)]
+extern crate self as somatic;
+
 #[macro_use]
 mod setters;
+// The skins of `somatic bench`.
+#[cfg(all(test, feature = "cli"))]
+#[allow(dead_code, unreachable_pub, reason = "tests of the library need some of it")]
+#[path = "experiments/shape.rs"]
+mod shape;
 
 pub mod author;
 pub mod backend;
@@ -56,10 +64,9 @@ pub mod body;
 pub mod bundled;
 mod engine;
 pub mod error;
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod experiments;
 pub mod field;
+#[cfg(feature = "cli")]
+pub mod figure;
 #[cfg(feature = "cli")]
 mod ink;
 #[doc(hidden)]
@@ -77,8 +84,6 @@ pub mod signal;
 pub mod sink;
 pub mod source;
 mod stage;
-#[cfg(feature = "cli")]
-pub mod survey;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 pub mod wire;

@@ -1,6 +1,8 @@
 //! The command `somatic`: parse, call, exit code.
 
 mod cli;
+mod experiments;
+mod survey;
 
 use std::process::ExitCode;
 

@@ -1,5 +1,11 @@
 //! Once it runs, the `cpu` backend allocates nothing for a frame, but for the tasks of one that is shared among cores.
 
+// The skins of `somatic bench`.
+#[cfg(feature = "cli")]
+#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
+#[path = "../src/experiments/shape.rs"]
+mod shape;
+
 use somatic::{BackendKind, Body, Calibration, Engine, Options, Outputs, RawValue, Scene, bundled};
 
 /// Allocations of 100 frames, one a call, after some that make room.
@@ -50,7 +56,7 @@ fn allocations_are_counted() {
 #[cfg(feature = "cli")]
 #[test]
 fn a_frame_that_is_shared_allocates_its_tasks_alone() {
-    use somatic::experiments::shape::Shape;
+    use crate::shape::Shape;
     let shape = Shape { sensors: 5000, fields: 4400, members: 16, wide: 0, local: true, frames: 1, seed: 1 };
     let made = allocations(&shape.body(), Outputs::CENTROID | Outputs::ORIENTATION, None);
     let others = rayon::current_num_threads() as u64 - 1;

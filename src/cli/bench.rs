@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::experiments::dump;
+use crate::experiments::shape::Shape;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use serde_json::json;
-use somatic::experiments::dump;
-use somatic::experiments::shape::Shape;
 use somatic::output::OutputFolder;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use console::style;
 use serde_json::json;
 use somatic::source::{Lines, Source, SourceSpec};
-use somatic::survey::{Findings, Found, Survey, Wishes};
 use somatic::{Body, Calibration, Error, Result};
 
 use super::feed::{Arrival, Feed, ReadMode};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
+use crate::experiments;
 use clap::Args;
 use somatic::error::Result;
-use somatic::experiments;
 
 use super::bar::Bar;
 use super::files::FilesRead;

@@ -7,9 +7,9 @@ use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use clap::Args;
 use somatic::signal::{FsrCircuit, Wiring};
-use somatic::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};

@@ -4,12 +4,12 @@ use serde_json::{Map, Value, json};
 
 use super::npy;
 use super::shape::Shape;
-use crate::body::Body;
-use crate::error::{Error, Result};
-use crate::field::{Field, FieldSet};
-use crate::output::OutputFolder;
-use crate::percept::{Flags, Outputs, Percept, Percepts, Precision};
-use crate::signal::Frame;
+use somatic::body::Body;
+use somatic::error::{Error, Result};
+use somatic::field::{Field, FieldSet};
+use somatic::output::OutputFolder;
+use somatic::percept::{Flags, Outputs, Percept, Percepts, Precision};
+use somatic::signal::Frame;
 
 /// The files that [`write()`] writes for `shape` and `outputs`.
 #[must_use]
@@ -140,7 +140,7 @@ fn name_of(output: Outputs) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::BackendKind;
+    use somatic::backend::BackendKind;
 
     #[test]
     fn every_output_but_touches_is_an_array() {

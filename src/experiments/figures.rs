@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use super::trial::{self, Moment, Signal, Trial};
-use crate::body::Body;
-use crate::error::Result;
-use crate::field::FieldSet;
-use crate::ink::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
-use crate::signal::FsrCircuit;
+use somatic::body::Body;
+use somatic::error::Result;
+use somatic::field::FieldSet;
+use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
+use somatic::signal::FsrCircuit;
 
 /// Simulations that users can run, too.
 const TAPS: &str = include_str!("../../examples/simulations/taps.toml");

@@ -12,10 +12,10 @@ mod trial;
 use std::path::PathBuf;
 
 use self::table::Table;
-use crate::body::Body;
-use crate::bundled;
-use crate::error::{Error, Result};
-use crate::output::OutputFolder;
+use somatic::body::Body;
+use somatic::bundled;
+use somatic::error::{Error, Result};
+use somatic::output::OutputFolder;
 
 /// The files that [`write()`] writes.
 pub const FILES: [&str; 8] =

@@ -2,8 +2,8 @@
 
 use std::io::{BufWriter, Write as _};
 
-use crate::error::{Error, Result};
-use crate::output::OutputPath;
+use somatic::error::{Error, Result};
+use somatic::output::OutputPath;
 
 /// A number that an array can hold, little-endian.
 pub(super) trait Number: Copy {

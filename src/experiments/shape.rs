@@ -4,14 +4,19 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};
 
-use crate::author::random::Random;
-use crate::backend::BackendKind;
-use crate::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Taxel};
-use crate::engine::{Engine, Options};
-use crate::error::{Error, Result};
-use crate::percept::{Column, Outputs};
-use crate::scene::{Coverage, Knobs, Scene};
-use crate::signal::{Frame, RawValue};
+// The library's own random numbers.
+#[allow(clippy::duplicate_mod, reason = "the library's own tests have both")]
+#[path = "../author/random.rs"]
+mod random;
+
+use self::random::Random;
+use somatic::backend::BackendKind;
+use somatic::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Taxel};
+use somatic::error::{Error, Result};
+use somatic::percept::{Column, Outputs};
+use somatic::scene::{Coverage, Knobs, Scene};
+use somatic::signal::{Frame, RawValue};
+use somatic::{Engine, Options};
 
 /// How many of what; the rest follows from it and the seed.
 ///
@@ -190,8 +195,8 @@ impl Shape {
     /// The backend cannot run here.
     pub fn engine(&self, body: &Body, backend: BackendKind, outputs: Outputs) -> Result<Engine> {
         // Its frames repeat, and what repeats is not to be left out of a measurement.
-        let scene = Scene { outputs, knobs: Knobs { coverage: Coverage::All, ..Knobs::default() }, ..Scene::default() };
-        Engine::new(body, Options { scene, backend, batch: self.frames, ..Options::default() })
+        let scene = Scene::default().outputs(outputs).knobs(Knobs::default().coverage(Coverage::All));
+        Engine::new(body, Options::default().scene(scene).backend(backend).batch(self.frames))
     }
 }
 

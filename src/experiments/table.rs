@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::metric::{Errors, across, between_lines};
 use super::trial::{self, Moment, Signal, Trial};
-use crate::body::Body;
-use crate::error::Result;
-use crate::percept::Flags;
+use somatic::body::Body;
+use somatic::error::Result;
+use somatic::percept::Flags;
 
 const SPEEDS_MM_S: [f64; 3] = [5.0, 20.0, 80.0];
 const NOISES_COUNTS: [f64; 3] = [0.0, 1.0, 3.0];

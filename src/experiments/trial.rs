@@ -2,14 +2,14 @@
 
 use std::array;
 
-use crate::backend::BackendKind;
-use crate::body::Body;
-use crate::engine::{Engine, Options};
-use crate::error::Result;
-use crate::percept::{Outputs, Percept};
-use crate::scene::{FilterBy, MotionFilter, Scene};
-use crate::signal::{Frame, FsrCircuit, RawValue};
-use crate::source::{SimulatedSource, Source as _, Truth};
+use somatic::backend::BackendKind;
+use somatic::body::Body;
+use somatic::error::Result;
+use somatic::percept::{Outputs, Percept};
+use somatic::scene::{FilterBy, MotionFilter, Scene};
+use somatic::signal::{Frame, FsrCircuit, RawValue};
+use somatic::source::{SimulatedSource, Source as _, Truth};
+use somatic::{Engine, Options};
 
 /// The paper's two ways from counts to a calibrated sensor value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +46,9 @@ impl Signal {
 }
 
 /// From about the noise of a frame to half of the sensors' pitch.
-const FILTER: MotionFilter =
-    MotionFilter { low_m: Some(0.5e-3), high_m: Some(6e-3), by: FilterBy::Distance, time_constant_s: 0.15 };
+fn filter() -> MotionFilter {
+    MotionFilter::default().low_m(0.5e-3).high_m(6e-3).by(FilterBy::Distance).time_constant_s(0.15)
+}
 
 /// One frame: readings, forces, truth, and the field's percept from each of [`Signal::ALL`].
 #[derive(Clone, Debug)]
@@ -134,19 +135,12 @@ impl Series {
     fn with_percepts(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
         let mut percepts = Vec::with_capacity(2);
         for frames in &self.signals {
-            let scene = Scene {
-                outputs: Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED,
-                filter: FILTER,
-                fields: vec![field.to_owned()],
-                ..Scene::default()
-            };
-            let options = Options {
-                scene,
-                calibration: None,
-                backend: BackendKind::Reference,
-                batch: frames.len(),
-                ..Options::default()
-            };
+            let scene = Scene::default()
+                .outputs(Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED)
+                .filter(filter())
+                .fields(vec![field.to_owned()]);
+            let options =
+                Options::default().scene(scene).calibration(None).backend(BackendKind::Reference).batch(frames.len());
             let mut engine = Engine::new(source.body(), options)?;
             engine.set_channels(source.taxels())?;
             let batch = engine.process(frames)?;

@@ -305,7 +305,7 @@ impl Outputs {
     pub const FILTERED: Self = Self::of_stage("filter");
 
     /// What the stage *motion* gives.
-    pub(crate) const MOTION: Self = Self::of_stage("motion");
+    pub const MOTION: Self = Self::of_stage("motion");
 
     /// What stage `stage` gives.
     pub(crate) const fn of_stage(stage: &str) -> Self {

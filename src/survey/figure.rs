@@ -1,8 +1,8 @@
 //! A survey's findings as a picture: where every sensor rests, and how far it goes.
 
 use super::{Findings, Found};
-use crate::error::Result;
-use crate::ink::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
+use somatic::error::Result;
+use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
 
 const TRAVEL: Colour = [120, 170, 220];
 const DEAD: Colour = [225, 150, 60];

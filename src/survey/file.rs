@@ -83,7 +83,7 @@ fn commonest(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::Calibration;
+    use somatic::signal::Calibration;
 
     fn found(id: u32, baseline: Option<f64>) -> Found {
         let full = baseline.map(|baseline| baseline - 0.5);

@@ -13,8 +13,8 @@ mod figure;
 mod file;
 pub mod tuning;
 
-use crate::error::{Error, Result};
-use crate::signal::RawValue;
+use somatic::error::{Error, Result};
+use somatic::signal::RawValue;
 
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
@@ -162,12 +162,6 @@ impl Survey {
                 self.whole_numbers &= value.fract() == 0.0;
             }
         }
-    }
-
-    /// Frames at rest so far.
-    #[must_use]
-    pub fn rest_frames(&self) -> usize {
-        self.rest_frames
     }
 
     /// What follows from what was seen.

@@ -9,8 +9,8 @@
 //! at least so firm. So what is chosen is looked at anew, in rounds, until every press is where it should be.
 
 use super::{MIN_TRAVEL_BANDS, Pressed, Survey, Wishes, rest_of};
-use crate::error::Result;
-use crate::signal::{FsrCircuit, RawValue};
+use somatic::error::Result;
+use somatic::signal::{FsrCircuit, RawValue};
 
 /// Share of the range that a firm press leaves unused.
 pub const HEADROOM: f64 = 1.0 / 16.0;

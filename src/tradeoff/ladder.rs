@@ -36,7 +36,7 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
 mod tests {
     use super::*;
     use crate::backend::BackendKind;
-    use crate::experiments::shape::Shape;
+    use crate::shape::Shape;
 
     fn plan(outputs: Outputs) -> Plan {
         let shape = Shape { sensors: 64, fields: 8, members: 8, wide: 0, local: true, frames: 2, seed: 1 };

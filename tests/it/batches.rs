@@ -1,6 +1,6 @@
 //! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
 
-use somatic::experiments::shape::Shape;
+use crate::shape::Shape;
 use somatic::scene::{Arithmetic, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor, Scene};
 

@@ -31,6 +31,10 @@ mod properties;
 mod random;
 mod real;
 mod recordings;
+// The skins of `somatic bench`.
+#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
+#[path = "../../src/experiments/shape.rs"]
+mod shape;
 mod simulated;
 mod skipped;
 #[path = "../skips/mod.rs"]

@@ -66,7 +66,8 @@ impl Paths {
     fn file_of(&self, named: &Named, depth: usize) -> Option<&Path> {
         let mut rest = named.segments.as_slice();
         let mut module = match rest.first()?.as_str() {
-            "crate" => Vec::new(),
+            // The command, which is not of the library, names that.
+            "crate" | "somatic" => Vec::new(),
             "self" | "super" => named.within.clone(),
             child => {
                 let path = [&named.within[..], &[child.to_owned()]].concat();
@@ -75,7 +76,7 @@ impl Paths {
         };
         while let Some(first) = rest.first() {
             match first.as_str() {
-                "crate" | "self" => {}
+                "crate" | "somatic" | "self" => {}
                 "super" => {
                     module.pop();
                 }

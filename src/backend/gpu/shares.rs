@@ -89,10 +89,10 @@ mod tests {
     use super::super::tests::{percepts_of, percepts_of_odd_values};
     use super::super::{Gpu, adapter};
     use super::*;
-    use crate::experiments::shape::Shape;
     use crate::field::FieldSet;
     use crate::percept::{Flags, Outputs};
     use crate::scene::{Arithmetic, Knobs, Scene};
+    use crate::shape::Shape;
     use crate::signal::{Calibration, RawValue};
 
     /// The device; where there is none, that is a skip.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::survey::tuning::{Tuned, Tuning};
 use console::style;
 use serde_json::{Value, json};
 use somatic::signal::{FsrCircuit, Wiring};
-use somatic::survey::tuning::{Tuned, Tuning};
 use somatic::{Error, Result};
 
 use super::session::TunedChannel;

@@ -7,85 +7,91 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{FAMILY, cannot};
 use crate::error::Result;
+use crate::ink::{self, FAMILY, cannot};
 
 /// Dots drawn for each pixel of a size below: plotters has whole dots only, and small figures would show it.
 const SCALE: u32 = 2;
 
 /// Red, green, blue.
-pub(crate) type Colour = [u8; 3];
-pub(crate) type Point = (f64, f64);
+pub type Colour = [u8; 3];
+/// x, y.
+pub type Point = (f64, f64);
 
 /// A shape in a panel's coordinates; what is called a width, radius or size is in pixels.
 #[derive(Clone, Debug)]
-pub(crate) enum Mark {
+#[expect(missing_docs, reason = "a shape's parts are named by what they are")]
+pub enum Mark {
     /// Lines, each through some points.
-    Lines {
-        runs: Vec<Vec<Point>>,
-        width: f64,
-    },
-    Dashed {
-        from: Point,
-        to: Point,
-    },
-    Dots {
-        points: Vec<Point>,
-        radius: f64,
-    },
+    Lines { runs: Vec<Vec<Point>>, width: f64 },
+    /// A dashed line.
+    Dashed { from: Point, to: Point },
+    /// A dot at every point.
+    Dots { points: Vec<Point>, radius: f64 },
     /// A filled circle whose radius is in the panel's unit.
-    Disc {
-        centre: Point,
-        radius: f64,
-    },
-    Plus {
-        at: Point,
-        size: f64,
-    },
-    Asterisk {
-        at: Point,
-        size: f64,
-    },
+    Disc { centre: Point, radius: f64 },
+    /// The sign `+`.
+    Plus { at: Point, size: f64 },
+    /// The sign `*`.
+    Asterisk { at: Point, size: f64 },
 }
 
-/// A mark, and what the legend calls it.
+/// A mark with a colour.
 #[derive(Clone, Debug)]
-pub(crate) struct Layer {
-    pub(crate) mark: Mark,
-    pub(crate) colour: Colour,
-    pub(crate) name: Option<&'static str>,
+pub struct Layer {
+    /// The shape.
+    pub mark: Mark,
+    /// Its colour.
+    pub colour: Colour,
+    /// Its name in the legend, if it is listed there.
+    pub name: Option<&'static str>,
 }
 
 /// An axis with ticks at chosen places.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
-    pub(crate) label: &'static str,
-    pub(crate) range: [f64; 2],
-    pub(crate) ticks: Vec<f64>,
+pub struct Axis {
+    /// Its name, with the unit.
+    pub label: &'static str,
+    /// The values at its ends.
+    pub range: [f64; 2],
+    /// The values that are marked.
+    pub ticks: Vec<f64>,
 }
 
+/// A plot with a title and two axes.
 #[derive(Clone, Debug)]
-pub(crate) struct Panel {
-    pub(crate) title: String,
-    pub(crate) x: Axis,
-    pub(crate) y: Axis,
-    pub(crate) layers: Vec<Layer>,
+pub struct Panel {
+    /// The title, above it.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// What is drawn, the first at the bottom.
+    pub layers: Vec<Layer>,
 }
 
-/// How a figure's panels stand, and the size of what each of them plots into, pixels.
+/// How a figure's panels are arranged, and the size of each panel's plot, pixels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Arrangement {
+#[expect(missing_docs, reason = "sizes are named by what they are")]
+pub enum Arrangement {
+    /// One below the other.
     Stacked { width: u32, height: u32 },
+    /// One beside the other.
     SideBySide { side: u32 },
 }
 
+/// Panels with a title and a legend.
 #[derive(Clone, Debug)]
-pub(crate) struct Figure {
-    pub(crate) title: &'static str,
-    pub(crate) panels: Vec<Panel>,
+pub struct Figure {
+    /// The title, above all panels.
+    pub title: &'static str,
+    /// The panels.
+    pub panels: Vec<Panel>,
     /// What the legend has before the panels' named layers.
-    pub(crate) key: Vec<Layer>,
-    pub(crate) arrangement: Arrangement,
+    pub key: Vec<Layer>,
+    /// How the panels are arranged.
+    pub arrangement: Arrangement,
 }
 
 const TITLE: u32 = 30;
@@ -137,7 +143,10 @@ impl Figure {
     }
 
     /// As SVG, text being text.
-    pub(crate) fn svg(&self) -> Result<String> {
+    ///
+    /// # Errors
+    /// It cannot be drawn.
+    pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         let (width, height) = self.size();
         self.draw(&SVGBackend::with_string(&mut text, (SCALE * width, SCALE * height)).into_drawing_area())?;
@@ -145,16 +154,19 @@ impl Figure {
     }
 
     /// As PNG.
-    pub(crate) fn png(&self) -> Result<Vec<u8>> {
+    ///
+    /// # Errors
+    /// It cannot be drawn.
+    pub fn png(&self) -> Result<Vec<u8>> {
         let (width, height) = self.size();
         let (width, height) = (SCALE * width, SCALE * height);
         let mut pixels = vec![0; (3 * width * height) as usize];
         self.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area())?;
-        super::png(&pixels, [width, height])
+        ink::png(&pixels, [width, height])
     }
 
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
-        super::font()?;
+        ink::font()?;
         area.fill(&WHITE).map_err(cannot)?;
         let (width, height) = self.size();
         let title = text(16, HPos::Center);

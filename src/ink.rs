@@ -1,7 +1,5 @@
 //! What pictures share: a font that comes along, words on pixels, and PNG. No font of the system is needed.
 
-pub(crate) mod figure;
-
 use std::sync::OnceLock;
 
 use plotters::prelude::*;
