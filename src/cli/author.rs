@@ -13,9 +13,9 @@ use somatic::{Error, Result, bundled};
 
 use super::bar::Bar;
 use super::files::FilesRead;
+use super::stdio::{DONE, print};
 use super::table::{plain, right, shown};
 use super::words::{bullet, count, millimetres};
-use super::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:

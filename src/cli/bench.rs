@@ -15,10 +15,10 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
 use super::files::FilesRead;
-use super::run::stop_on_signal;
+use super::interrupt::stop_on_signal;
 use super::scene::{output, outputs_help, outputs_or_usual};
+use super::stdio::{DONE, print, say};
 use super::words::count;
-use super::{DONE, print, say};
 
 const EXAMPLES: &str = "\
 Examples:

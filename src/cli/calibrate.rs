@@ -11,14 +11,15 @@ use serde_json::json;
 use somatic::source::{Lines, Source, SourceSpec};
 use somatic::{Body, Calibration, Error, Result};
 
+use super::bodies::load_body;
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
+use super::interrupt::stop_on_signal;
 use super::plot::Plot;
 use super::ports::LineFlags;
-use super::run::stop_on_signal;
+use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, right, shown};
 use super::words::{bullet, count};
-use super::{DONE, load_body, print, say};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -136,7 +137,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         say(&format!("never processed: {loss}"));
     }
     say(&format!("wrote {}", output.display()));
-    Ok(if lost.is_empty() { DONE } else { super::LOST })
+    Ok(if lost.is_empty() { DONE } else { LOST })
 }
 
 /// The first of `sources`.

@@ -1,8 +1,10 @@
 //! `somatic completions`: what shells need to complete the command.
 
-use clap::{Args, CommandFactory as _};
+use clap::Args;
 use clap_complete::Shell;
 use somatic::Result;
+
+use super::stdio::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -17,9 +19,10 @@ pub(super) struct Arguments {
     shell: Shell,
 }
 
-pub(super) fn completions(arguments: &Arguments) -> Result<u8> {
+/// Prints the script for `command`.
+pub(super) fn completions(arguments: &Arguments, command: &mut clap::Command) -> Result<u8> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut super::Arguments::command(), "somatic", &mut script);
-    super::print(&String::from_utf8_lossy(&script))?;
-    Ok(super::DONE)
+    clap_complete::generate(arguments.shell, command, "somatic", &mut script);
+    print(&String::from_utf8_lossy(&script))?;
+    Ok(DONE)
 }

@@ -12,9 +12,9 @@ use somatic::{Error, Frame, Result};
 use super::attached::{body_bytes, file_name};
 use super::bar::Bar;
 use super::files::FilesRead;
-use super::run::stop_on_signal;
+use super::interrupt::stop_on_signal;
+use super::stdio::{DONE, LOST, say};
 use super::words::count;
-use super::{DONE, LOST, say};
 
 const EXAMPLES: &str = "\
 Examples:

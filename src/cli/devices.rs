@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use somatic::error::Result;
 use somatic::source::{PortSummary, serial_ports};
 
+use super::stdio::{DONE, print};
 use super::table::{plain, shown};
 use super::words::{bullet, count};
-use super::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -8,9 +8,9 @@ use somatic::source::{CsvSource, Source as _, SourceSpec};
 use somatic::{Error, Frame, Result};
 
 use super::bar::Bar;
+use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, right, shown};
 use super::words::{number, span};
-use super::{DONE, LOST, print, say};
 
 const EXAMPLES: &str = "\
 Examples:

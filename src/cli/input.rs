@@ -1,10 +1,14 @@
 //! The input of a run.
 
-use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, Source, SourceSpec};
-use somatic::{Error, Result, bundled};
+use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, SimulatedSource, Source, SourceSpec};
+use somatic::{Body, Error, Result, bundled};
 
-use super::check_body_name;
+use super::attached;
+use super::bodies::{check_body_name, load_body};
 use super::scene::RunOptions;
+
+/// Frames a call for recordings, unless told otherwise.
+pub(super) const RECORDED_BATCH: usize = 256;
 
 /// A source, or the bundled touch.
 pub(super) struct Input {
@@ -57,6 +61,22 @@ impl Input {
             return Err(Error::usage("--from, --to and --loop are for recordings; live frames come when they come"));
         }
         Ok(input)
+    }
+
+    /// The body that `asked` names, or that of the input.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(super) fn body(&self, asked: &RunOptions) -> Result<Body> {
+        match (&asked.body, &self.spec) {
+            (Some(body), _) => load_body(body),
+            (None, Some(SourceSpec::Sim(path))) => Ok(SimulatedSource::open(path)?.body().clone()),
+            (None, Some(SourceSpec::Mcap(path))) => match attached::body(path)? {
+                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
+                None => load_body("hand"),
+            },
+            (None, _) => load_body("hand"),
+        }
     }
 
     pub(super) fn is_bundled(&self) -> bool {

@@ -1,15 +1,17 @@
 //! `somatic inspect`: what a body holds, for people and, as JSON, for programs.
 
+mod inspection;
 mod json;
 mod report;
 
 use clap::Args;
-use somatic::author::{Coverage, Finding, coverage, lint};
-use somatic::body::Body;
+use somatic::author::{coverage, lint};
 use somatic::error::Result;
-use somatic::field::{Field, FieldSet};
+use somatic::field::FieldSet;
 
-use super::{DONE, FAILED, load_body, print};
+use self::inspection::Inspection;
+use super::bodies::load_body;
+use super::stdio::{DONE, FAILED, print};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -52,15 +54,4 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
         false => report::text(&seen),
     })?;
     Ok(if arguments.strict && !seen.findings.is_empty() { FAILED } else { DONE })
-}
-
-/// What is reported about a body.
-struct Inspection {
-    body: Body,
-    fields: Vec<Field>,
-    coverage: Coverage,
-    /// A line each; those of reading first.
-    findings: Vec<String>,
-    /// Findings of the lint.
-    odd: Vec<Finding>,
 }

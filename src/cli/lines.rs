@@ -11,7 +11,7 @@ use somatic::{Error, Result};
 
 use super::latency::Latency;
 use super::repeats::Repeats;
-use super::say;
+use super::stdio::say;
 use super::words::count;
 
 /// Number of messages shown below the table.

@@ -111,7 +111,7 @@ impl View {
         drop(self.screen);
         if let Some(table) = self.table {
             // A terminal that has gone needs no summary.
-            let _ = super::print(&table.summary(&self.pace));
+            let _ = super::stdio::print(&table.summary(&self.pace));
         }
     }
 }

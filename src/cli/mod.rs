@@ -1,11 +1,13 @@
 //! The command line: one file per subcommand, and what they share.
 
 mod attached;
+mod attachments;
 mod author;
 mod bar;
 mod bench;
 #[cfg(unix)]
 mod board;
+mod bodies;
 mod calibrate;
 mod completions;
 mod convert;
@@ -16,6 +18,7 @@ mod files;
 mod info;
 mod input;
 mod inspect;
+mod interrupt;
 #[cfg(unix)]
 mod keys;
 mod latency;
@@ -32,24 +35,17 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
+mod stdio;
 mod table;
 mod tradeoff;
 mod tune;
 mod words;
 
-use std::io::{self, Write as _};
-use std::path::Path;
+use clap::{CommandFactory as _, Parser, Subcommand};
+use somatic::Result;
 
-use clap::{Parser, Subcommand};
-use somatic::error::nearest;
-use somatic::{Body, Error, Result, bundled};
-
-/// Exit code: everything was done.
-const DONE: u8 = 0;
-/// Exit code: what was asked for does not hold.
-const FAILED: u8 = 1;
-/// Exit code: done, but some input was never processed.
-const LOST: u8 = 3;
+pub(crate) use self::stdio::say;
+use self::stdio::{DONE, print};
 
 /// What `somatic` alone prints.
 const GREETING: &str = concat!(
@@ -145,40 +141,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Calibrate(arguments) => calibrate::calibrate(arguments),
         Command::Tune(arguments) => tune::tune(arguments),
         Command::Devices(arguments) => devices::devices(arguments),
-        Command::Completions(arguments) => completions::completions(arguments),
+        Command::Completions(arguments) => completions::completions(arguments, &mut Arguments::command()),
     }
-}
-
-/// Tells the user `line` on standard error. That nobody may listen there is no reason to stop.
-pub(crate) fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "somatic: {line}");
-}
-
-/// Writes `text` to standard output. A reader that has gone is a normal end.
-fn print(text: &str) -> Result<()> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Error::failed(format!("cannot write: {e}")).at("standard output"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The body in the file `name`, or the bundled one of that name where there is no such file.
-fn load_body(name: &str) -> Result<Body> {
-    check_body_name(name)?;
-    match bundled::body(name) {
-        // A link of this name to a serial port is no body.
-        Some(bytes) if !Path::new(name).is_file() => Body::from_bytes(name, bytes),
-        _ => Body::load(name),
-    }
-}
-
-/// Refuses a `name` that is neither a file nor a bundled body, but nearly one of those.
-fn check_body_name(name: &str) -> Result<()> {
-    let near = nearest(name, bundled::BODIES).filter(|&near| near != name && !Path::new(name).is_file());
-    near.map_or(Ok(()), |near| {
-        Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name))
-    })
 }

@@ -9,7 +9,7 @@ use somatic::error::Result;
 
 use super::bar::Bar;
 use super::files::FilesRead;
-use super::{DONE, print};
+use super::stdio::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:

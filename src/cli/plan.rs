@@ -11,9 +11,10 @@ use somatic::{Error, Result};
 
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
+use super::bodies::load_body;
 use super::input::Input;
 use super::scene::{RunOptions, grouped};
-use super::{DONE, print};
+use super::stdio::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -54,8 +55,8 @@ pub(super) fn plan(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let input = Input::named_or_none(&asked)?;
     let body = match &input {
-        Some(input) => asked.body_for(input)?,
-        None => super::load_body(asked.body.as_deref().unwrap_or("hand"))?,
+        Some(input) => input.body(&asked)?,
+        None => load_body(asked.body.as_deref().unwrap_or("hand"))?,
     };
     let bill = Bill::of(&asked, input.as_ref(), &body)?;
     print(&if arguments.json { format!("{}\n", bill.json()) } else { bill.text() })?;

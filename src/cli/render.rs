@@ -10,8 +10,9 @@ use somatic::field::FieldSet;
 use somatic::picture::{self, Options, View};
 use somatic::scene::choose_fields;
 
+use super::bodies::load_body;
 use super::files::FilesRead;
-use super::{DONE, load_body};
+use super::stdio::DONE;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -1,30 +1,30 @@
 //! `somatic run`: from a source through an engine to sinks.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use console::Term;
 use somatic::signal::Unfit;
 use somatic::sink::{FieldNames, Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
 
-use super::attached;
+use super::attachments::attachments;
 use super::doubts::Doubts;
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
-use super::input::Input;
+use super::input::{Input, RECORDED_BATCH};
+use super::interrupt::stop_on_signal;
 #[cfg(unix)]
-use super::keys::{self, Keys};
+use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::repeats::Repeats;
 use super::scene::{RunOptions, grouped};
+use super::stdio::{DONE, FAILED, LOST, say};
 use super::tradeoff::{say_kept, settled};
-use super::{DONE, FAILED, LOST, say, words};
+use super::words;
 
 const FIRST_EXAMPLES: &str = "\
 Examples:
@@ -56,9 +56,6 @@ t in seconds, raw values by taxel id, and, if links move, where each is in the w
 metres and a quaternion qx,qy,qz,qw. With --source csv:- it is a row under t,<taxel id>,...
 At a terminal a table of the touched fields is shown until q or Ctrl-C; into a pipe goes a line
 of JSON a frame.";
-
-/// Frames a call for recordings, unless told otherwise.
-pub(super) const RECORDED_BATCH: usize = 256;
 
 /// Turn touch frames into percepts, live or from a recording.
 #[derive(Args)]
@@ -104,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     if sinks.is_empty() {
         outputs.add_standard_output()?;
     }
-    let body = asked.body_for(&input)?;
+    let body = input.body(&asked)?;
     // Why a body without a layout cannot be run is said once, by the error.
     let has_layout = !(body.taxels.is_empty() && body.fields.is_empty());
     for finding in body.findings.iter().filter(|_| !asked.quiet && has_layout) {
@@ -169,7 +166,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         all_fields: asked.all_fields,
         taxels: source.taxels(),
         body: Some(&body),
-        attached: if records { attached::files(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
+        attached: if records { attachments(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
         parts: asked.record.clone(),
     };
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
@@ -397,22 +394,4 @@ impl UnfitReport {
 fn tell_doubts(engine: &Engine, doubts: &mut Option<Doubts>) {
     let doubts = doubts.take();
     doubts.iter().flat_map(|doubts| doubts.of_frames(engine.plan())).for_each(|doubt| say(&doubt));
-}
-
-/// A flag that the first Ctrl-C or termination signal sets; the second ends the process at once.
-pub(super) fn stop_on_signal() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            for term in [Term::stdout(), Term::stderr()].into_iter().filter(Term::is_term) {
-                let _ = term.show_cursor();
-            }
-            #[cfg(unix)]
-            keys::restore();
-            std::process::exit(130);
-        }
-    })
-    .map_err(|e| Error::failed(format!("cannot listen for Ctrl-C: {e}")))?;
-    Ok(stop)
 }

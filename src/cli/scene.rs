@@ -11,7 +11,6 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use somatic::error::nearest;
 use somatic::keys;
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
@@ -20,11 +19,11 @@ use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
+pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
 pub(super) use self::groups::{first, grouped};
-use super::input::Input;
+use super::attached;
 use super::ports::LineFlags;
-use super::{attached, load_body};
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -235,17 +234,6 @@ pub(super) fn outputs_help() -> String {
     format!("Compute only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
 }
 
-pub(super) fn output(name: &str) -> Result<Outputs> {
-    Outputs::named(name).ok_or_else(|| {
-        let names: Vec<String> = Outputs::all().names().collect();
-        let hint = match nearest(name, names.iter().map(String::as_str)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("there are {}", names.join(", ")),
-        };
-        Error::usage(format!("there is no output `{name}`; {hint}"))
-    })
-}
-
 /// All of `named`, or the default outputs where none are.
 pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
     named.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
@@ -354,23 +342,6 @@ impl RunOptions {
     /// How boards on serial lines are read.
     pub(super) fn line_flags(&self) -> LineFlags {
         LineFlags { wiring: self.wiring.clone(), live_rate: self.live_rate, board_rate: self.board_rate }
-    }
-
-    /// The body that is meant.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub(super) fn body_for(&self, input: &Input) -> Result<Body> {
-        match (&self.body, &input.spec) {
-            (Some(body), _) => load_body(body),
-            // A simulation says what body it is on.
-            (None, Some(SourceSpec::Sim(path))) => Ok(SimulatedSource::open(path)?.body().clone()),
-            (None, Some(SourceSpec::Mcap(path))) => match attached::body(path)? {
-                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
-                None => load_body("hand"),
-            },
-            (None, _) => load_body("hand"),
-        }
     }
 
     /// The recording whose body and calibration are used, which is so where no body is named.

@@ -7,7 +7,7 @@ use somatic::source::{SimulatedSource, write_recording};
 use somatic::{Error, Result};
 
 use super::files::FilesRead;
-use super::{DONE, say};
+use super::stdio::{DONE, say};
 
 const EXAMPLES: &str = "\
 Examples:

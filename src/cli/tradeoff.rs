@@ -1,5 +1,6 @@
 //! `somatic tradeoff`: what each knob costs and gives, on one's own body, recording and machine.
 
+mod measured;
 mod settled;
 mod write_scene;
 
@@ -8,24 +9,21 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use console::style;
-use somatic::signal::Frame;
-use somatic::source::{SimulatedSource, Source, SourceSpec};
-use somatic::tradeoff::{
-    CallMode, Errors, MeasureOptions, Measurement, Pick, Report, Store, Target, TestFrames, measure, plot_png, plot_svg,
-};
-use somatic::{BackendKind, Body, Engine, Error, Options, OutputPath, Result};
+use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, measure, plot_png, plot_svg};
+use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
+use self::measured::{measure_options, missed, played, software};
 use self::settled::driver;
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::input::Input;
+use super::interrupt::stop_on_signal;
 use super::plot::Plot;
-use super::run::{RECORDED_BATCH, stop_on_signal};
 use super::scene::{RunOptions, first, grouped};
+use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, right, shown};
 use super::words::{count, number};
-use super::{DONE, FAILED, print, say};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -104,7 +102,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
             "a trade is measured on a recording or a simulation, again and again; name one as --source",
         ));
     }
-    let body = asked.body_for(&input)?;
+    let body = input.body(&asked)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(&body, &ids, 1)?;
     let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
@@ -150,70 +148,6 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
 
 fn picked(way: CallMode) -> String {
     format!("picked ({})", way.word())
-}
-
-/// What `pick` misses of `target`, which nothing grants.
-fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
-    let combination = pick.row.combination()?;
-    Ok(format!("no knobs reach {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
-}
-
-/// Why a GPU is not chosen unless it is asked for, where all there are compute on the CPU.
-fn software() -> Option<String> {
-    #[cfg(feature = "gpu")]
-    {
-        let adapters = somatic::backend::gpu::adapters();
-        let names: Vec<&str> = adapters.iter().map(|adapter| &adapter.name[..]).collect();
-        let is_software = !adapters.is_empty() && adapters.iter().all(|adapter| adapter.kind == "software");
-        is_software
-            .then(|| format!("gpu: {} computes on the same CPU; ask for it with --backend gpu", names.join(", ")))
-    }
-    #[cfg(not(feature = "gpu"))]
-    None
-}
-
-/// What is measured for `asked`.
-fn measure_options(asked: &RunOptions, options: &Options, seconds: f64) -> Result<MeasureOptions> {
-    let backends = match options.backend {
-        BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
-        BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
-        BackendKind::Reference => {
-            return Err(Error::usage("the reference has no knobs to compare; take another backend, or auto"));
-        }
-        kind => vec![kind],
-    };
-    let batch = asked.batch.map_or(RECORDED_BATCH, |batch| batch as usize);
-    Ok(MeasureOptions { seconds, batch, ways: CallMode::ALL.to_vec(), backends })
-}
-
-/// The first frames of `input`, up to `most`, and the truth where it knows it.
-fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize) -> Result<TestFrames> {
-    let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
-    let mut take =
-        |source: &mut dyn Source, truth: &mut dyn FnMut() -> Option<Vec<somatic::source::Truth>>| -> Result<()> {
-            played.taxels = source.taxels().to_vec();
-            let mut frame = Frame::missing(0.0, played.taxels.len());
-            while played.frames.len() < most && source.next_frame(&mut frame)? {
-                played.frames.push(frame.clone());
-                played.truth.extend(truth());
-            }
-            Ok(())
-        };
-    if let Some(SourceSpec::Sim(path)) = &input.spec {
-        let mut source = SimulatedSource::open(path)?;
-        let mut frame = Frame::missing(0.0, source.taxels().len());
-        played.taxels = source.taxels().to_vec();
-        while played.frames.len() < most && source.next_frame(&mut frame)? {
-            played.frames.push(frame.clone());
-            played.truth.push(source.truth().to_vec());
-        }
-    } else {
-        take(&mut *input.open(ids, asked)?, &mut || None)?;
-    }
-    if played.frames.is_empty() {
-        return Err(Error::failed("there is no frame in it").at(&played.source));
-    }
-    Ok(played)
 }
 
 fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {
@@ -280,25 +214,6 @@ fn text(report: &Report, all: bool) -> String {
         text += &shown(&table);
     }
     text
-}
-
-/// What `somatic plan` calls a row.
-pub(super) fn in_words(row: &Measurement) -> String {
-    let [centroid, orientation] = row.judged();
-    let mut words = vec![format!("{:.2} µs a frame, p99 {:.2} µs", row.p50_us, row.p99_us)];
-    if centroid.compared > 0 {
-        words.push(format!("centroid within {} mm", number(centroid.p99)));
-    }
-    if orientation.compared > 0 {
-        words.push(format!("orientation within {}°", number(orientation.p99)));
-    }
-    words.join(", ")
-}
-
-/// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
-pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> TestFrames {
-    let frames = super::plan::pressed(body.taxels.len(), 32);
-    TestFrames { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
 }
 
 /// Says once which fields stay in charts that the scene does not ask for.

@@ -13,11 +13,12 @@ use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};
+use super::bodies::load_body;
 use super::calibrate::name_of;
 use super::files::FilesRead;
+use super::interrupt::stop_on_signal;
 use super::ports::LineFlags;
-use super::run::stop_on_signal;
-use super::{DONE, FAILED, load_body, print, say};
+use super::stdio::{DONE, FAILED, print, say};
 
 const EXAMPLES: &str = "\
 Examples:

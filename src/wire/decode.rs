@@ -268,9 +268,16 @@ impl Decoder {
         }
         let parsed = if long { Err(Corruption::Long) } else { parse(&mut self.waiting) };
         match parsed {
-            Ok(packet) => {
+            Ok(mut packet) => {
                 self.counts.packets += 1;
-                on(self.frame_counts.add(packet));
+                match &mut packet {
+                    Event::Frame { head, order, .. } => *order = self.frame_counts.count(head, true),
+                    Event::Identity { head, order, .. } | Event::Answer { head, order, .. } => {
+                        *order = self.frame_counts.count(head, false);
+                    }
+                    Event::Command { .. } | Event::Corrupt { .. } => {}
+                }
+                on(packet);
             }
             Err(why) => {
                 let is_valid = matches!(why, Corruption::Version(_) | Corruption::Kind(_) | Corruption::Contents);
@@ -283,7 +290,7 @@ impl Decoder {
     }
 }
 
-/// The packet in `coded`, without its place in the frame_counts.
+/// The packet in `coded`, without its order.
 fn parse(coded: &mut [u8]) -> Result<Event<'_>, Corruption> {
     let length = cobs::decode_in_place(coded).map_err(|_| Corruption::Code)?;
     if length < COMMAND_HEAD_BYTES + CHECKSUM_BYTES {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::decode::Event;
 use super::format::Head;
 
 /// A packet's time and losses relative to the earlier packets of its board.
@@ -50,19 +49,8 @@ impl FrameCounts {
         self.boards.get(&board)
     }
 
-    /// Counts `event` and fills in its order.
-    pub(super) fn add<'a>(&mut self, mut event: Event<'a>) -> Event<'a> {
-        match &mut event {
-            Event::Frame { head, order, .. } => *order = self.count(head, true),
-            Event::Identity { head, order, .. } | Event::Answer { head, order, .. } => {
-                *order = self.count(head, false);
-            }
-            Event::Command { .. } | Event::Corrupt { .. } => {}
-        }
-        event
-    }
-
-    fn count(&mut self, head: &Head, is_frame: bool) -> PacketOrder {
+    /// Counts a packet, which is a frame or not, and returns its order.
+    pub(super) fn count(&mut self, head: &Head, is_frame: bool) -> PacketOrder {
         let after = head.sequence.wrapping_add(u32::from(is_frame));
         let counts = self.boards.entry(head.board).or_insert_with(|| BoardCounts {
             boot: head.boot,

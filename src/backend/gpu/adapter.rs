@@ -26,6 +26,11 @@ impl Device {
         ))
     }
 
+    /// Whether a processor stands in for a GPU.
+    pub(crate) fn is_processor(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Keeps what went wrong, if it is the first that did.
     pub(crate) fn note(&self, what: &str) {
         self.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| what.to_owned());

@@ -1,6 +1,5 @@
 //! How many frames a submission takes, and what is more than any takes.
 
-use super::BLOCK;
 use super::adapter::Device;
 use super::columns::Columns;
 use super::over_fields::{self, BY_PART};
@@ -9,6 +8,8 @@ use crate::error::{Error, Result};
 use crate::scene::Plan;
 use crate::stage::layout;
 
+/// Frames of which shaders take all lanes.
+pub(super) const FRAMES_A_BLOCK: usize = 4 * layout::LANES as usize;
 /// Bytes of raw values in a submission, about: enough for the device to be busy, little enough to stay in caches and to
 /// have several on their way.
 const ENOUGH: usize = 4 << 20;
@@ -36,11 +37,11 @@ pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) 
         )));
     }
     let in_blocks = |frames: usize| match frames {
-        BLOCK.. => frames / BLOCK * BLOCK,
+        FRAMES_A_BLOCK.. => frames / FRAMES_A_BLOCK * FRAMES_A_BLOCK,
         // The largest power of two that is not more.
         _ => 1 << frames.max(1).ilog2(),
     };
-    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(BLOCK, MOST);
+    let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(FRAMES_A_BLOCK, MOST);
     let held = in_blocks(limit / quad.max(of_parts) * 4);
     // What comes back, in one buffer.
     let back = cells + if plan.stages().touches { 2 * quad } else { 0 };

@@ -35,9 +35,10 @@ use glam::DVec2;
 pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
 use self::adapter::Device;
+use self::capacity::FRAMES_A_BLOCK;
 use self::columns::{Columns, NOTHING};
 use self::over_fields::{Bound, OverFields};
-use self::pack::Form;
+use self::pack::{Form, HEADER, Packer, STEP};
 use self::ring::{SETS, Set};
 use self::shaders::Values;
 use self::shares::Shares;
@@ -48,15 +49,6 @@ use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::{layout, motion};
-
-/// Invocations a group, as `shaders/shared/layout.wgsl` has it.
-const GROUP: u32 = 64;
-/// Bytes before the raw values in the upload buffer: the batch's uniform block.
-const HEADER: u64 = size_of::<layout::Batch>() as u64;
-/// Bytes of a frame's step, which follow.
-const STEP: u64 = size_of::<layout::Step>() as u64;
-/// Frames of a full block.
-const BLOCK: usize = 4 * layout::LANES as usize;
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -76,17 +68,13 @@ pub(crate) struct Gpu {
     stages: Vec<Stage>,
     /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
     careful: (usize, Vec<Stage>),
-    /// How raw values go up.
-    form: Form,
+    packer: Packer,
     columns: Columns,
     results: wgpu::Buffer,
     /// Per taxel and frame, where they are read back.
     pressures: Option<wgpu::Buffer>,
     /// Per field, the power of two that its lengths are counted in, m.
     units_m: Vec<f32>,
-    /// The batch's steps and some values as the device reads them; kept so that a call allocates nothing.
-    packed_steps: Vec<layout::Step>,
-    packed: Vec<RawValue>,
     /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
     memory: [wgpu::Buffer; 2],
 }
@@ -221,7 +209,7 @@ impl Gpu {
         let back = frames * fields * 4 * columns.read().len() as u64;
         let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
         // Calls that fit into one submission never have another on its way.
-        let sets = if capacity < BLOCK { 1 } else { SETS };
+        let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
         device.check()?;
         Ok(Self {
@@ -237,13 +225,11 @@ impl Gpu {
             taxels,
             stages,
             careful,
-            form,
+            packer: Packer::new(form, plan.channels(), capacity),
             columns,
             results,
             pressures: wanted.touches.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
-            packed_steps: Vec::with_capacity(capacity),
-            packed: Vec::new(),
             memory: [touched, last],
         })
     }
@@ -251,8 +237,10 @@ impl Gpu {
     /// Sends `raw`, which is at most the capacity and starts at frame `first` of a call, with set `set`, which is free.
     fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
         let header = header(&self.plan, raw.frames as u32);
-        self.pack(set, raw, &header)?;
         let (upload, readback) = (&self.ring[set].upload, &self.ring[set].readback);
+        let bytes = self.packer.bytes(raw.frames) as u64;
+        let mapped = upload.get_mapped_range_mut(0..pack::values_at(raw.frames) + bytes);
+        self.packer.pack(raw, &header, mapped.map_err(|e| self.device.lost(&e))?.slice(..));
         upload.unmap();
         let frames = raw.frames as u64;
         let steps = frames * STEP;
@@ -265,7 +253,6 @@ impl Gpu {
         if self.plan.stages().motion || self.plan.has_changes() {
             encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
         }
-        let bytes = self.raw_bytes(raw.frames) as u64;
         encoder.copy_buffer_to_buffer(upload, pack::values_at(raw.frames), &self.raw, 0, bytes);
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
@@ -357,7 +344,7 @@ impl Backend for Gpu {
         if !is_plain(&self.plan) {
             let (replaced, careful) = std::mem::take(&mut self.careful);
             self.stages.splice(..replaced, careful);
-            self.form = Form::Rows;
+            self.packer.form = Form::Rows;
         }
     }
 
@@ -405,11 +392,6 @@ fn readback<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer) -> Result<
     device.check()?;
     let bytes = copy.get_mapped_range(..).map_err(|e| device.lost(&e))?;
     Ok(bytemuck::pod_collect_to_vec(&bytes))
-}
-
-/// Whether a processor stands in for a GPU.
-fn is_processor(device: &Device) -> bool {
-    device.info.device_type == wgpu::DeviceType::Cpu
 }
 
 /// Whether raw values are pressures, with nothing to check but that they are numbers.

@@ -4,7 +4,6 @@ use wgpu::BindingResource;
 
 use super::adapter::Device;
 use super::columns::Columns;
-use super::is_processor;
 use super::members::MemberTable;
 use super::shaders::{self, Abreast, Shader, Values};
 use super::shares::{Share, Shares};
@@ -58,7 +57,7 @@ pub(super) fn most_members(device: &Device) -> usize {
 /// Members of a wide field's part on `device`, at most unless it has very many, however many frames a call has, as sums depend on it: many parts keep a GPU's
 /// processors busy, few take less joining.
 pub(super) fn of_part(device: &Device) -> usize {
-    if is_processor(device) { 8 * layout::WIDE } else { layout::WIDE }
+    if device.is_processor() { 8 * layout::WIDE } else { layout::WIDE }
 }
 
 impl OverFields {

@@ -3,12 +3,15 @@
 
 use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
-use super::{Gpu, HEADER, STEP};
 use crate::backend::cpu::read;
 use crate::backend::{RawBatch, Rows};
-use crate::error::Result;
 use crate::signal::RawValue;
 use crate::stage::layout;
+
+/// Bytes before the raw values in the upload buffer: the batch's uniform block.
+pub(super) const HEADER: u64 = size_of::<layout::Batch>() as u64;
+/// Bytes of a frame's step, which follow.
+pub(super) const STEP: u64 = size_of::<layout::Step>() as u64;
 
 /// How raw values go up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,30 +34,37 @@ impl Form {
     }
 }
 
-impl Gpu {
-    /// Bytes that the raw values of `frames` frames go up in.
-    pub(super) fn raw_bytes(&self, frames: usize) -> usize {
-        self.form.bytes(self.plan.channels(), frames)
+/// Packs frames; it keeps its memory, so that a call allocates nothing.
+pub(super) struct Packer {
+    pub(super) form: Form,
+    channels: usize,
+    steps: Vec<layout::Step>,
+    row: Vec<RawValue>,
+}
+
+impl Packer {
+    /// For calls of up to `frames` frames of `channels` values.
+    pub(super) fn new(form: Form, channels: usize, frames: usize) -> Self {
+        Self { form, channels, steps: Vec::with_capacity(frames), row: Vec::new() }
     }
 
-    /// Fills a set's upload buffer.
-    pub(super) fn pack(&mut self, set: usize, raw: &RawBatch<'_>, header: &layout::Batch) -> Result<()> {
-        self.packed_steps.clear();
-        self.packed_steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
-        let steps = HEADER as usize + cast_slice::<_, u8>(&self.packed_steps).len();
-        let values = values_at(raw.frames) as usize;
-        let end = values + self.raw_bytes(raw.frames);
-        let mapped = self.ring[set].upload.get_mapped_range_mut(0..end as u64);
-        let mut mapped = mapped.map_err(|e| self.device.lost(&e))?;
-        let mut mapped = mapped.slice(..);
+    /// Bytes that the raw values of `frames` frames go up in.
+    pub(super) fn bytes(&self, frames: usize) -> usize {
+        self.form.bytes(self.channels, frames)
+    }
+
+    /// Fills an upload buffer, of which `mapped` is as much as `raw` takes.
+    pub(super) fn pack(&mut self, raw: &RawBatch<'_>, header: &layout::Batch, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
+        self.steps.clear();
+        self.steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
+        let steps = HEADER as usize + cast_slice::<_, u8>(&self.steps).len();
         mapped.slice(..HEADER as usize).copy_from_slice(bytes_of(header));
-        mapped.slice(HEADER as usize..steps).copy_from_slice(cast_slice(&self.packed_steps));
-        let mapped = mapped.slice(values..);
+        mapped.slice(HEADER as usize..steps).copy_from_slice(cast_slice(&self.steps));
+        let mapped = mapped.slice(values_at(raw.frames) as usize..);
         match self.form {
-            Form::Quads => pack_quads(raw, self.plan.channels(), &mut self.packed, mapped),
-            Form::Rows | Form::One => pack_rows(raw, self.plan.channels(), &mut self.packed, mapped),
+            Form::Quads => pack_quads(raw, self.channels, &mut self.row, mapped),
+            Form::Rows | Form::One => pack_rows(raw, self.channels, &mut self.row, mapped),
         }
-        Ok(())
     }
 }
 

@@ -6,8 +6,8 @@ use std::time::Instant;
 use super::adapter::{self, Device};
 use super::pack::Form;
 use super::ring::Set;
-use super::stage::Over;
-use super::{GROUP, Gpu, header};
+use super::stage::{GROUP, Over};
+use super::{Gpu, header};
 use crate::error::Result;
 use crate::scene::Plan;
 use crate::stage::layout;
@@ -120,7 +120,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let batch = header(plan, frames as u32);
     gpu.device.queue.write_buffer(&gpu.batch, 0, bytemuck::bytes_of(&batch));
     let clock = Clock::new(&gpu.device);
-    let up = gpu.raw_bytes(frames);
+    let up = gpu.packer.bytes(frames);
     let mut set = gpu.ring.swap_remove(0);
     {
         // Every taxel pressed.
@@ -167,7 +167,7 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let members = (plan.members.len() * size_of::<layout::Member>()) as u64;
     let slots = (frames * plan.slots()) as u64;
     let results = cells * 4 * gpu.columns.count() as u64;
-    let pressures = if gpu.form != Form::Rows { 0 } else { 2 * slots * 5 };
+    let pressures = if gpu.packer.form != Form::Rows { 0 } else { 2 * slots * 5 };
     let least_bytes = bytes_up + pressures + members + results;
     Ok(DeviceTime { frames, programs_s, by_device: clock.is_some(), least_bytes, bytes_up, bytes_down })
 }
@@ -206,7 +206,7 @@ impl EmptyCall {
         let groups = gpu.stages.iter().map(|stage| stage.over.groups(&batch));
         let groups = groups.max_by_key(|groups| groups.iter().product::<u32>()).unwrap_or([1, 1, 1]);
         let bytes_down = (frames * plan.fields.len() * 4 * gpu.columns.read().len()) as u64;
-        Ok(Self { pipeline, groups, values: vec![0; gpu.raw_bytes(frames)], bytes_down, gpu })
+        Ok(Self { pipeline, groups, values: vec![0; gpu.packer.bytes(frames)], bytes_down, gpu })
     }
 
     /// From the host's first byte to its last.

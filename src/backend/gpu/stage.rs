@@ -2,10 +2,12 @@
 
 use bytemuck::{Pod, cast_slice};
 
-use super::GROUP;
 use super::adapter::Device;
 use super::shaders::Shader;
 use crate::stage::layout;
+
+/// Invocations a group, as `shaders/shared/layout.wgsl` has it.
+pub(super) const GROUP: u32 = 64;
 
 /// Quads that an invocation of calibrate takes at most, as its shader says.
 pub(super) const TURNS: u32 = 4;

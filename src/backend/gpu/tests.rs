@@ -9,9 +9,9 @@ use super::columns::NOTHING;
 use super::pack::Form;
 use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, narrow_fields, wide_fields};
 use super::skips::skip;
-use super::stage::{folded, pipeline};
+use super::stage::{GROUP, folded, pipeline};
 
-use super::{GROUP, Gpu, adapter};
+use super::{Gpu, adapter};
 use crate::backend::{Backend, BackendState, RawBatch, Rows, Step};
 use crate::body::Body;
 use crate::field::FieldSet;
@@ -273,11 +273,11 @@ fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
     careful.taxels[0].dead_band = 1e-30;
     for frames in [1, 7, 70, 300] {
         let mut gpu = Gpu::on(device.clone(), &plan, frames).unwrap();
-        assert!(gpu.form != Form::Rows);
+        assert!(gpu.packer.form != Form::Rows);
         let percepts = percepts_of_odd_values(&mut gpu, frames);
         gpu.restore(&BackendState::initial(&plan)).unwrap();
         gpu.recalibrate(&careful);
-        assert!(gpu.form == Form::Rows);
+        assert!(gpu.packer.form == Form::Rows);
         assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames");
         let faulty = (0..frames)
             .flat_map(|frame| percepts.frame(frame))

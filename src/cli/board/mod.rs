@@ -17,10 +17,12 @@ use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
 use self::station::{LineSettings, Station};
+use super::bodies::load_body;
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
-use super::run::stop_on_signal;
-use super::{DONE, load_body, print, words};
+use super::interrupt::stop_on_signal;
+use super::stdio::{DONE, print};
+use super::words;
 
 const EXAMPLES: &str = "\
 Examples:

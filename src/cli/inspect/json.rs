@@ -5,7 +5,7 @@ use somatic::author::Finding;
 use somatic::body::Body;
 use somatic::field::{Field, WORLD};
 
-use super::Inspection;
+use super::inspection::Inspection;
 
 /// One object and a newline.
 pub(super) fn text(seen: &Inspection) -> String {

@@ -7,7 +7,7 @@ use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, WORLD};
 
-use super::Inspection;
+use super::inspection::Inspection;
 use crate::cli::table::{plain, right, shown};
 use crate::cli::words::{bullet, count, millimetres};
 

@@ -5,8 +5,7 @@ use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result};
 
 use super::timed::{Played, measured, pressed};
-use crate::cli::input::Input;
-use crate::cli::run::RECORDED_BATCH;
+use crate::cli::input::{Input, RECORDED_BATCH};
 use crate::cli::scene::RunOptions;
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;

@@ -7,10 +7,21 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use somatic::error::nearest;
 use somatic::scene::MotionFilter;
 use somatic::{Error, Outputs, Result};
 
-use super::output;
+/// The output called `name`.
+pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
+    Outputs::named(name).ok_or_else(|| {
+        let names: Vec<String> = Outputs::all().names().collect();
+        let hint = match nearest(name, names.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are {}", names.join(", ")),
+        };
+        Error::usage(format!("there is no output `{name}`; {hint}"))
+    })
+}
 
 // As a schema says it.
 /// One text, or a list of them.

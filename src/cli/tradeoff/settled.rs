@@ -4,10 +4,10 @@ use somatic::scene::{Coverage, OrientationBy};
 use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day, measure};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::{in_words, made_up, measure_options, missed, played, software};
+use super::measured::{in_words, made_up, measure_options, missed, played, software};
 use crate::cli::input::Input;
-use crate::cli::say;
 use crate::cli::scene::RunOptions;
+use crate::cli::stdio::say;
 
 /// Seconds of a brief measurement, and its frames.
 const BRIEF_S: f64 = 1.0;

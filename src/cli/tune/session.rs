@@ -12,7 +12,8 @@ use somatic::source::{BoardState, Lines, SerialSource};
 use somatic::{Error, Frame, Result};
 
 use crate::cli::feed::{Arrival, Feed};
-use crate::cli::{say, words};
+use crate::cli::stdio::say;
+use crate::cli::words;
 
 /// Boards without progress for this long are given up.
 const BOARD_TIMEOUT: Duration = Duration::from_secs(6);

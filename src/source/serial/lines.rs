@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::merge::BoardFrame;
-use super::taps::{self, ChannelTap};
+use super::taps::{self, ChannelTap, TapTrouble};
 use crate::error::Error;
 use crate::signal::Wiring;
 
@@ -98,6 +98,21 @@ impl fmt::Display for Notice {
 pub struct Lines(pub(super) Arc<Shared>);
 
 impl Lines {
+    /// The potentiometers, one per channel, board by board in the order of the wiring.
+    #[must_use]
+    pub fn taps(&self) -> Vec<Vec<ChannelTap>> {
+        self.0.lock().taps.clone()
+    }
+
+    /// Requests `tap` on a channel of the wiring's board at index `board`, now and after every restart of the board;
+    /// [`Lines::taps`] has the result. Does nothing if there is no such channel.
+    pub fn set_tap(&self, board: usize, channel: usize, tap: u8) {
+        let mut state = self.0.lock();
+        if let Some(channel) = state.taps.get_mut(board).and_then(|channels| channels.get_mut(channel)) {
+            (channel.wanted, channel.trouble) = (Some(tap), None);
+        }
+    }
+
     /// The notices since the last call.
     #[must_use]
     pub fn notices(&self) -> Vec<Notice> {
@@ -224,6 +239,17 @@ impl Shared {
 }
 
 impl State {
+    /// The next channel of `board` to set, and its tap.
+    pub(super) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
+        (0..).zip(&self.taps[board]).find_map(|(channel, tap)| Some((channel, tap.due()?)))
+    }
+
+    /// Stops requesting taps of `board`. Returns the number of channels without the requested tap.
+    pub(super) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
+        let due = self.taps[board].iter_mut().filter(|tap| tap.due().is_some());
+        due.map(|tap| tap.trouble = Some(why)).count()
+    }
+
     /// The next frame of a board.
     pub(super) fn take(&mut self) -> Option<(BoardFrame, Instant)> {
         let (mut frame, read_at) = self.queue.pop_front()?;

@@ -1,7 +1,7 @@
 //! The state machine of one line: finds the board and its speed, checks it against the wiring, and reports problems.
 //! No I/O, no clock.
 
-mod board;
+mod board_checks;
 mod taps;
 
 use std::sync::Arc;

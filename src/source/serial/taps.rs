@@ -1,13 +1,12 @@
 //! The taps of the boards' potentiometers: requested and confirmed.
 
-use super::lines::{Lines, State};
 use crate::signal::Wiring;
 
 /// The potentiometer of a board's channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ChannelTap {
-    /// The tap requested by the wiring or [`Lines::set_tap`].
+    /// The tap requested by the wiring or [`super::Lines::set_tap`].
     pub wanted: Option<u8>,
     /// The tap confirmed by the board since its last start.
     pub set: Option<u8>,
@@ -57,36 +56,6 @@ impl ChannelTap {
 pub(super) fn wanted(wiring: &Wiring) -> Vec<Vec<ChannelTap>> {
     let tap = |wanted: &Option<u8>| ChannelTap { wanted: *wanted, ..ChannelTap::default() };
     wiring.boards().iter().map(|board| board.taps.iter().map(tap).collect()).collect()
-}
-
-impl Lines {
-    /// The potentiometers, one per channel, board by board in the order of the wiring.
-    #[must_use]
-    pub fn taps(&self) -> Vec<Vec<ChannelTap>> {
-        self.0.lock().taps.clone()
-    }
-
-    /// Requests `tap` on a channel of the wiring's board at index `board`, now and after every restart of the board;
-    /// [`Lines::taps`] has the result. Does nothing if there is no such channel.
-    pub fn set_tap(&self, board: usize, channel: usize, tap: u8) {
-        let mut state = self.0.lock();
-        if let Some(channel) = state.taps.get_mut(board).and_then(|channels| channels.get_mut(channel)) {
-            (channel.wanted, channel.trouble) = (Some(tap), None);
-        }
-    }
-}
-
-impl State {
-    /// The next channel of `board` to set, and its tap.
-    pub(super) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
-        (0..).zip(&self.taps[board]).find_map(|(channel, tap)| Some((channel, tap.due()?)))
-    }
-
-    /// Stops requesting taps of `board`. Returns the number of channels without the requested tap.
-    pub(super) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
-        let due = self.taps[board].iter_mut().filter(|tap| tap.due().is_some());
-        due.map(|tap| tap.trouble = Some(why)).count()
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,38 @@
+//! The files that `run` attaches to a recording of its own.
+
+use std::path::Path;
+
+use somatic::recording::{BODY, CALIBRATION, SCENE};
+use somatic::{Body, Error, Result};
+
+use super::attached::{self, body_bytes, file_name};
+use super::scene::RunOptions;
+
+/// The files to attach to a recording of this run: name, media type, bytes.
+///
+/// # Errors
+/// One of them cannot be read.
+pub(super) fn attachments(
+    asked: &RunOptions,
+    body: &Body,
+    scene: Option<&Path>,
+) -> Result<Vec<(String, String, Vec<u8>)>> {
+    let text = |path: &Path| std::fs::read(path).map_err(|e| Error::io(path, &e));
+    let recording = asked.recording()?;
+    let inherited = recording.as_deref().map(attached::body).transpose()?.flatten();
+    let (name, bytes) = match inherited {
+        Some(body) => body,
+        None => (file_name(&body.name), body_bytes(&body.name)?),
+    };
+    let mut files = vec![(name, BODY.to_owned(), bytes)];
+    let calibration = match &asked.calibration {
+        Some(path) => Some(text(path)?),
+        None => asked.own_calibration()?.map(|(_, text)| text.into_bytes()),
+    };
+    let toml = "application/toml".to_owned();
+    files.extend(calibration.map(|bytes| (CALIBRATION.to_owned(), toml.clone(), bytes)));
+    if let Some(scene) = scene {
+        files.push((SCENE.to_owned(), toml, text(scene)?));
+    }
+    Ok(files)
+}

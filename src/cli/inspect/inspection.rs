@@ -1,0 +1,16 @@
+//! What is reported about a body.
+
+use somatic::author::{Coverage, Finding};
+use somatic::body::Body;
+use somatic::field::Field;
+
+/// What is reported about a body.
+pub(super) struct Inspection {
+    pub(super) body: Body,
+    pub(super) fields: Vec<Field>,
+    pub(super) coverage: Coverage,
+    /// A line each; those of reading first.
+    pub(super) findings: Vec<String>,
+    /// Findings of the lint.
+    pub(super) odd: Vec<Finding>,
+}
