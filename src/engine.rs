@@ -202,7 +202,7 @@ impl Engine {
                 ))
             })?;
             if std::mem::replace(&mut taken[taxel], true) {
-                return Err(Error::failed(format!("taxel id {id} is there twice")));
+                return Err(Error::failed(format!("taxel id {id} appears twice")));
             }
             taxel_of_value.push(taxel);
         }

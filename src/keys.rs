@@ -124,7 +124,7 @@ impl Text<'_> {
     /// Refuses `key`, which `why` has no use for.
     pub(crate) fn refuse<T>(self, key: &str, value: Option<&Spanned<T>>, why: impl Display) -> Result<()> {
         match value {
-            Some(value) => Err(self.wrong(value.span(), format!("`{key}` means nothing {why}; remove it"))),
+            Some(value) => Err(self.wrong(value.span(), format!("`{key}` has no effect {why}; remove it"))),
             None => Ok(()),
         }
     }

@@ -19,7 +19,7 @@ impl Length {
         }
         let found = UNITS.iter().find_map(|&(unit, metres)| Some((text.strip_suffix(unit)?, metres)));
         let (number, unit_m) = found.map_or((text, None), |(number, metres)| (number, Some(metres)));
-        let number = number.trim_end().parse().map_err(|_| format!("`{text}` is no length"))?;
+        let number = number.trim_end().parse().map_err(|_| format!("`{text}` is not a length"))?;
         Ok(Some(Self { number, unit_m }))
     }
 }

@@ -19,13 +19,13 @@ pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
 /// The text of the calibration in the recording at `path`.
 ///
 /// # Errors
-/// The recording cannot be read, or the calibration is no text.
+/// The recording cannot be read, or the calibration is not text.
 pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
     let mut reader = Reader::open(path)?;
     let found = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
     let Some(attached) = found else { return Ok(None) };
     let text = String::from_utf8(reader.bytes_of(&attached)?);
-    text.map(Some).map_err(|_| Error::failed("the attached calibration is no text").at(path.display()))
+    text.map(Some).map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))
 }
 
 /// The body `name`, a file or a bundled one, as a self-contained `.glb`.

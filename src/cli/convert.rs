@@ -100,7 +100,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         say(&format!("a CSV has no place for poses: those of {} are left out", count(posed, "frame")));
     }
     if is_csv && source.has_stale() {
-        say("a CSV has no word for what is stale: it is missing there");
+        say("a CSV cannot mark stale values: they are missing there");
     }
     if is_csv && !attached.is_empty() {
         let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();

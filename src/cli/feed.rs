@@ -81,7 +81,7 @@ impl Feed {
             None => match self.arrivals.recv_timeout(wait) {
                 Ok(arrival) => arrival,
                 Err(RecvTimeoutError::Timeout) => return None,
-                Err(RecvTimeoutError::Disconnected) => Arrival::Failed(Error::failed("the source broke down")),
+                Err(RecvTimeoutError::Disconnected) => Arrival::Failed(Error::failed("the source failed")),
             },
         };
         let Arrival::Frames(mut frames, mut info) = first else { return Some(first) };

@@ -147,7 +147,7 @@ fn text(name: &str, known: &Known) -> String {
         },
     );
     if rhythm.backwards > 0 {
-        line("backwards", format!("time does not go on {} times", rhythm.backwards));
+        line("backwards", format!("time does not advance {} times", rhythm.backwards));
     }
     if survey.posed > 0 {
         line("poses", format!("in {} frames", survey.posed));

@@ -111,7 +111,7 @@ impl LineReport {
             let awaited = accounts.iter().filter(|account| account.state == BoardState::Awaited);
             let awaited: Vec<String> = awaited.map(|account| account.board.to_string()).collect();
             if !awaited.is_empty() && answered {
-                say(&format!("never heard of: board {}", awaited.join(", ")));
+                say(&format!("no packets from: board {}", awaited.join(", ")));
             }
             if !self.latency.is_empty() {
                 say(&format!("from the last byte read to the percept written: {}", self.latency.words()));

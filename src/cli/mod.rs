@@ -72,14 +72,14 @@ Examples:
   somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
-  somatic render robot.glb -o robot.png         where they are
-  somatic plan --outputs centroid               what that computes, what not, and what it costs
-  somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs that are so true, here
-  somatic simulate touch.toml -o touch.csv      a touch of your own, and the truth beside it
-  somatic tune --source serial:/dev/ttyUSB0 -o hand.toml   its sensors' potentiometers
-  somatic board --link /tmp/hand                a hand on a serial line, made of software
+  somatic render robot.glb -o robot.png         a picture of them
+  somatic plan --outputs centroid               what is computed, what is not, and the cost
+  somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs within a tolerance, here
+  somatic simulate touch.toml -o touch.csv      a simulated touch, with the truth
+  somatic tune --source serial:/dev/ttyUSB0 -o hand.toml   set the sensors' potentiometers
+  somatic board --link /tmp/hand                a simulated hand on a serial line
   somatic info touch.mcap                       how long a recording is, and what is in it
-  somatic bench --sensors 1000 --fields 100     how fast this machine is
+  somatic bench --sensors 1000 --fields 100     the speed of this machine
   somatic devices                               which GPUs and serial ports it has
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";

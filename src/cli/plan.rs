@@ -23,8 +23,8 @@ Examples:
   somatic plan robot.scene.toml --json | jq '.stages[] | select(.runs) | [.stage, .us]'
   somatic plan --schema > scene.schema.json      for editors that know JSON Schema
 
-Measured times are of now and here, on the source's first frames where it is a recording, else
-with every taxel pressed. A stage's time is what a plan with it takes more than a plan without.";
+Times are measured now, on this machine: on the first frames of a recording, else with every
+taxel pressed. A stage's time is what a plan with it takes more than a plan without.";
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]

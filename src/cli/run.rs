@@ -345,7 +345,7 @@ fn serve(
             Ok(Flow::Open) => index += 1,
             Ok(Flow::Closed) => sinks.remove(index).finish()?,
             Err(error) if live && sinks.len() > 1 => {
-                say(&format!("{error}; going on without it"));
+                say(&format!("{error}; continuing without it"));
                 *failed = true;
                 drop(sinks.remove(index));
             }

@@ -46,7 +46,7 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
     let truth = match &arguments.truth {
         Some(truth) => truth.clone(),
         None if frames_to.is_file() => arguments.output.with_extension("truth.csv"),
-        None => return Err(Error::usage("nothing lies beside a pipe or a device; name the --truth too").at(output)),
+        None => return Err(Error::usage("the output is a pipe or a device; give --truth a file").at(output)),
     };
     let calibration = frames_to.is_file().then(|| arguments.output.with_extension("calibration.toml"));
     let truth_to = outputs.add(&truth)?;

@@ -29,8 +29,8 @@ const EXAMPLES: &str = "\
 Examples:
   somatic tradeoff                                       the bundled touch on the bundled hand
   somatic tradeoff --source sim:examples/simulations/rod.toml --plot rod.svg     against the truth
-  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write   the fastest that is so true
-  somatic tradeoff robot.scene.toml --budget 100us                     the truest that is so fast
+  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write   the fastest within it
+  somatic tradeoff robot.scene.toml --budget 100us                     the most accurate within it
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
 Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is
@@ -83,14 +83,14 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let target = asked.accuracy.target();
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
-        return Err(Error::usage(format!("--seconds {} is no time span; give seconds over 0", arguments.seconds)));
+        return Err(Error::usage(format!("--seconds {} is not a time span; give seconds over 0", arguments.seconds)));
     }
     let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
     let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
         (Some(_), true) if target.is_empty() => {
-            return Err(Error::usage("--write writes what is picked; say by what with --within or --budget"));
+            return Err(Error::usage("--write needs --within or --budget, which pick what to write"));
         }
         // The one input that is written: to change it is what is asked for.
         (Some(path), true) => Some((path, OutputPath::edit(path)?)),
@@ -98,9 +98,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     };
     let input = Input::named(&asked)?;
     if !input.is_recording() {
-        return Err(Error::usage(
-            "a trade is measured on a recording or a simulation, again and again; name one as --source",
-        ));
+        return Err(Error::usage("a trade is measured on a recording or a simulation; name one as --source"));
     }
     let body = input.body(&asked)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
@@ -124,7 +122,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         && let Some(recording) = input.recording()
         && let Err(e) = store.keep(&body, &options, &driver(), &recording, &report)
     {
-        say(&format!("what was measured is not kept: {e}"));
+        say(&format!("cannot save the measurements: {e}"));
     }
     let way = if asked.batch.is_some_and(|batch| batch > 1) { CallMode::Batch } else { CallMode::Live };
     let pick = if target.is_empty() { None } else { target.pick(&report, way) };

@@ -92,7 +92,7 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("only boards on serial lines have potentiometers; give --source serial:PORT"));
     }
     if press.is_none() && !std::io::stdin().is_terminal() {
-        return Err(Error::usage("nobody can press Enter here; say with --press how many seconds sensors are pressed"));
+        return Err(Error::usage("standard input is not a terminal; give --press SECONDS"));
     }
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();

@@ -49,7 +49,7 @@ pub(super) fn seconds(text: &str) -> Result<Duration> {
     let unit = |suffix: &str, factor: f64| Some(text.strip_suffix(suffix)?.trim().parse::<f64>().ok()? * factor);
     let span = unit("ms", 1e-3).or_else(|| unit("min", 60.0)).or_else(|| unit("s", 1.0));
     span.and_then(|s| Duration::try_from_secs_f64(s).ok())
-        .ok_or_else(|| Error::usage(format!("--for `{text}` is no time; write 2s, 500ms or 10min")))
+        .ok_or_else(|| Error::usage(format!("--for `{text}` is not a time; write 2s, 500ms or 10min")))
 }
 
 /// A line of a list for people: a mark, and `text` between words onto as many lines as a terminal needs.

@@ -49,7 +49,7 @@ impl Engine {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
             if frame.values.len() != self.intake.width() {
                 let (got, want) = (frame.values.len(), self.intake.width());
-                return Err(at(Error::failed(format!("it has {got} values where {want} belong"))));
+                return Err(at(Error::failed(format!("it has {got} values, and {want} are expected"))));
             }
             if let Some((name, _)) = frame.pose.iter().find(|(name, _)| !self.links.index_of.contains_key(name)) {
                 let near = nearest(name, self.links.index_of.keys().map(String::as_str));

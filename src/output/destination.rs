@@ -60,7 +60,7 @@ impl Destination {
                 _ => at = next,
             }
         }
-        Err(io::Error::other("too many links, one after the other"))
+        Err(io::Error::other("too many symbolic links"))
     }
 
     fn there(at: PathBuf, metadata: &Metadata) -> Self {

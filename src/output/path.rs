@@ -106,7 +106,7 @@ impl OutputPaths {
     fn take(&mut self, name: &Path, identity: Identity, is_stream: bool) -> Result<()> {
         self.refuse_input(name, &identity)?;
         if let Some((other, _)) = self.outputs.iter().find(|(_, known)| *known == identity) {
-            let what = format!("the output {} is the same file; give each output one of its own", other.display());
+            let what = format!("the output {} is the same file; give each output its own file", other.display());
             return Err(Error::usage(what).at(name.display()));
         }
         if !is_stream {
@@ -127,5 +127,5 @@ impl OutputPaths {
 }
 
 pub(super) fn already_exists(name: &Path) -> Error {
-    Error::failed("it is there already; choose another name, or say --force").at(name.display())
+    Error::failed("it exists; choose another name, or give --force").at(name.display())
 }

@@ -62,7 +62,10 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     let below = labels.key(shown.key(fields), [width, height]);
     let taken = labels.above() + below;
     if height <= taken + 40 {
-        return Err(Error::usage(format!("no room is left for the body; make it higher than {} pixels", taken + 40)));
+        return Err(Error::usage(format!(
+            "the picture is too low for the body; give a height over {} pixels",
+            taken + 40
+        )));
     }
     let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
     // Include the discs and their rims.
@@ -146,7 +149,10 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     let points: Vec<DVec3> = around.chain([DVec3::ZERO]).collect();
     let taken = labels.above() + below;
     if height <= taken + 40 {
-        return Err(Error::usage(format!("no room is left for the chart; make it higher than {} pixels", taken + 40)));
+        return Err(Error::usage(format!(
+            "the picture is too low for the chart; give a height over {} pixels",
+            taken + 40
+        )));
     }
     let arrangement =
         Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], labels.above(), labels.above_view());

@@ -95,7 +95,7 @@ impl FromStr for View {
                 || format!("there are {} and all", names().collect::<Vec<_>>().join(", ")),
                 |near| format!("did you mean `{near}`?"),
             );
-            Error::usage(format!("`{text}` is no view: {hint}"))
+            Error::usage(format!("`{text}` is not a view: {hint}"))
         })
     }
 }

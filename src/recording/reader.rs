@@ -77,7 +77,7 @@ impl Reader {
     fn of(name: &str, file: File) -> Result<Self, Opening> {
         let wrong = |what: &str| Opening::Wrong(what.to_owned());
         let Some(mut records) = Records::of(file)? else {
-            return Err(wrong("this is no MCAP file; its first bytes are others"));
+            return Err(wrong("this is not an MCAP file: its first bytes differ"));
         };
         let has_end = records.has_end()?;
         let mut reader = Self {
@@ -405,12 +405,12 @@ impl Reader {
     }
 
     fn tell_cut(&mut self, bytes: u64) {
-        let what = if bytes > 0 { format!("; {bytes} bytes of a chunk begun") } else { String::new() };
+        let what = if bytes > 0 { format!("; {bytes} bytes of an incomplete chunk") } else { String::new() };
         let missing = match self.last_s {
             Some(t_s) => format!("what came after t = {t_s} s is missing"),
-            None => "no frame of it is whole".to_owned(),
+            None => "it has no complete frame".to_owned(),
         };
-        self.losses.push(format!("{}: it was never ended: {missing}{what}", self.name));
+        self.losses.push(format!("{}: it is cut off: {missing}{what}", self.name));
     }
 
     /// Says what is to be said when nothing more comes; once.
@@ -429,7 +429,7 @@ impl Reader {
         let frames = match self.whole {
             0 => "no frame is whole".to_owned(),
             1 => "1 frame is whole".to_owned(),
-            whole => format!("{whole} frames are whole"),
+            whole => format!("{whole} frames are intact"),
         };
         self.losses.push(format!("{}: damaged in {places} {when}: {bytes} bytes not read, {frames}", self.name));
     }

@@ -15,7 +15,7 @@ pub fn choose_fields(fields: &FieldSet, globs: &[String]) -> Result<Vec<usize>> 
         let glob = GlobBuilder::new(glob)
             .literal_separator(true)
             .build()
-            .map_err(|e| Error::usage(format!("`{glob}` is no glob over field names: {}", e.kind())))?;
+            .map_err(|e| Error::usage(format!("`{glob}` is not a glob over field names: {}", e.kind())))?;
         set.add(glob);
     }
     let set = set.build().map_err(|e| Error::usage(e.to_string()))?;

@@ -53,7 +53,7 @@ impl MotionFilter {
     pub fn with_window(self, text: &str) -> Result<Self> {
         let wrong = |what: &str| {
             Error::usage(format!(
-                "`{text}` is no window of lengths: {what}; write one like 0.5mm..20mm, 0.5mm.. or ..20mm"
+                "`{text}` is not a window of lengths: {what}; write one like 0.5mm..20mm, 0.5mm.. or ..20mm"
             ))
         };
         let (low, high) = text.split_once("..").ok_or_else(|| wrong("two dots are missing"))?;
@@ -98,7 +98,7 @@ impl MotionFilter {
         }
         if !(self.time_constant_s.is_finite() && self.time_constant_s >= 0.0) {
             return Err(Error::usage(format!(
-                "a filter time of {} is no time span; give seconds from 0",
+                "a filter time of {} is not a time span; give seconds from 0",
                 self.time_constant_s
             )));
         }
@@ -156,9 +156,9 @@ mod tests {
             ("1..2", "has no unit"),
             ("1mm..2", "has no unit"),
             ("1..", "has no unit"),
-            ("one..2mm", "`one` is no length"),
+            ("one..2mm", "`one` is not a length"),
             ("1mm...2mm", "the smaller first"),
-            ("1mm..2km", "`2km` is no length"),
+            ("1mm..2km", "`2km` is not a length"),
             ("3mm..1mm", "give the smaller first"),
             ("-1mm..2mm", "from -1 mm"),
             ("nan..2mm", "from NaN mm"),

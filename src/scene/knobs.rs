@@ -180,12 +180,10 @@ impl Knobs {
         let refuse = |what: &str| Err(Error::usage(format!("{what}; leave one of them out")));
         let on_change = self.cadence == Cadence::OnChange;
         if on_change && has_changes {
-            return refuse(
-                "cadence on-change keeps a field while its values stay, and letter `change` is how they do not",
-            );
+            return refuse("with cadence on-change, letter `change` would never fall to 0");
         }
         if on_change && outputs.intersects(Outputs::FILTERED) {
-            return refuse("cadence on-change says which motion counts, and so do outputs filtered_*");
+            return refuse("cadence on-change and outputs filtered_* both decide which motion counts");
         }
         let either = Outputs::ORIENTATION | Outputs::AXIS;
         if self.orientation_by != OrientationBy::AsAsked && !outputs.intersects(either) {

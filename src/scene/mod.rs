@@ -85,10 +85,12 @@ impl Scene {
     fn check_threshold(&self) -> Result<()> {
         let threshold = self.change_threshold;
         if !(threshold.is_finite() && threshold >= 0.0) {
-            return Err(Error::usage(format!("a change threshold is a pressure from 0, not {threshold}")));
+            return Err(Error::usage(format!(
+                "the change threshold is {threshold}; it must be a pressure of 0 or more"
+            )));
         }
         if threshold > 0.0 && self.knobs.coverage != Coverage::Touched {
-            return Err(Error::usage("a change threshold is for the gate of coverage touched; ask for that too"));
+            return Err(Error::usage("a change threshold needs coverage touched; ask for that too"));
         }
         Ok(())
     }

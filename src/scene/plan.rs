@@ -138,11 +138,11 @@ impl Plan {
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
-            let what = "the body has no taxels: put some on it with `somatic author`, as by --taxels 500";
+            let what = "the body has no taxels: add some, as with `somatic author --taxels 500`";
             return Err(Error::failed(what).at(&body.name));
         }
         if fields.fields.is_empty() {
-            return Err(Error::failed("the body has no fields: make some with `somatic author`").at(&body.name));
+            return Err(Error::failed("the body has no fields: add some with `somatic author`").at(&body.name));
         }
         calibration.check_body(&body.name)?;
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));

@@ -92,7 +92,7 @@ impl Wiring {
             for (channel, taxel) in board.taxels.iter().enumerate().filter_map(|(c, taxel)| Some((c, (*taxel)?))) {
                 if let Some((id, before)) = channel_of.insert(taxel, (board.id, channel)) {
                     let what = format!(
-                        "taxel {taxel} hangs on channel {channel} of board {}, and on channel {before} of board {id}",
+                        "taxel {taxel} is on channel {channel} of board {} and on channel {before} of board {id}",
                         board.id
                     );
                     return Err(text.wrong(keys.id.span(), what));
@@ -226,7 +226,7 @@ impl BoardKeys {
             }
         }
         if taxels.iter().all(Option::is_none) {
-            return Err(text.wrong(self.id.span(), format!("nothing hangs on board {id}; give `taxels`")));
+            return Err(text.wrong(self.id.span(), format!("board {id} has no taxels; give `taxels`")));
         }
         Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels, taps })
     }

@@ -105,7 +105,7 @@ impl CsvSource {
             }
             (false, Some(rate)) if rate.is_finite() && rate > 0.0 => Time::Rate(rate),
             (false, Some(rate)) => {
-                return Err(Error::usage(format!("--rate {rate} is no frame rate; give a positive number of Hz")));
+                return Err(Error::usage(format!("--rate {rate} is not a frame rate; give a positive number of Hz")));
             }
             (false, None) => Time::Column,
         };
@@ -122,7 +122,7 @@ impl CsvSource {
         }
         // Checked last, so that a file without any header gets the header's message.
         if !has_time && rate_hz.is_none() {
-            return Err(Error::usage("the recording has no column `t`; say how fast it was recorded with --rate HZ"));
+            return Err(Error::usage("the recording has no column `t`; give its frame rate with --rate HZ"));
         }
         if self.taxels.is_empty() {
             return Err(Error::failed("the header names no taxel; it should be `t,<taxel id>,<taxel id>,...`"));
@@ -245,7 +245,7 @@ fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
     } else {
         "the header is `t,<taxel id>,<taxel id>,...`, and ids are whole numbers"
     };
-    Err(Error::failed(format!("column {column} is headed `{}`, which is no taxel id; {remedy}", shortened(&word))))
+    Err(Error::failed(format!("column {column} is headed `{}`, which is not a taxel id; {remedy}", shortened(&word))))
 }
 
 /// Whether `line` looks like CSV: `t`, numbers and blanks, separated by commas.
@@ -477,7 +477,7 @@ mod tests {
         assert!(why("t,4\n0,1\"\"2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `1\"\"2` has a quote"));
         // A comma for the decimal point, as some spreadsheets write it.
         assert!(why("t,4\n0,\"1,5\"\n1,2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `\"1` has"));
-        assert!(why("t,\"4\n0,1\n", None).contains("column 2 is headed `\"4`, which is no taxel id; ids stand"));
+        assert!(why("t,\"4\n0,1\n", None).contains("column 2 is headed `\"4`, which is not a taxel id; ids stand"));
     }
 
     #[test]

@@ -119,7 +119,7 @@ impl NdjsonSource {
                 Ok(false)
             }
             Err(_) if is_csv_row(line) => {
-                Err(Error::failed("this is CSV, and `-` reads a line of JSON a frame; say --source csv:-")
+                Err(Error::failed("this is CSV, and `-` reads a line of JSON a frame; use --source csv:-")
                     .at(format!("line {}", self.line_number)))
             }
             Err(e) => Err(explained(&e, self.line_number)),
@@ -200,7 +200,7 @@ impl<'de> Visitor<'de> for FrameSeed<'_> {
                 }
             };
             if std::mem::replace(seen, true) {
-                return Err(A::Error::custom(format!("`{key}` is there twice; give it once")));
+                return Err(A::Error::custom(format!("`{key}` appears twice; give it once")));
             }
         }
         if !has_time {
@@ -286,7 +286,7 @@ impl<'de> Visitor<'de> for ValuesSeed<'_> {
                 continue;
             };
             if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
-                return Err(A::Error::custom(format!("taxel {id} is there twice; give each taxel once")));
+                return Err(A::Error::custom(format!("taxel {id} appears twice; give each taxel once")));
             }
             self.frame.values[index] = map.next_value_seed(ValueSeed { id })?;
         }
@@ -312,7 +312,7 @@ impl Visitor<'_> for IdSeed {
     }
 
     fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<u32, E> {
-        key.parse().map_err(|_| E::custom(format!("`{key}` is no taxel id; ids are whole numbers in quotes")))
+        key.parse().map_err(|_| E::custom(format!("`{key}` is not a taxel id; ids are whole numbers in quotes")))
     }
 }
 
@@ -390,7 +390,7 @@ impl<'de> Visitor<'de> for PosesSeed<'_> {
         while let Some(link) = map.next_key::<String>()? {
             let pose = map.next_value_seed(PoseSeed { link: &link })?;
             if self.poses.iter().any(|(known, _)| *known == link) {
-                return Err(A::Error::custom(format!("the pose of `{link}` is there twice; give it once")));
+                return Err(A::Error::custom(format!("the pose of `{link}` appears twice; give it once")));
             }
             self.poses.push((link, pose));
         }
@@ -500,7 +500,7 @@ mod tests {
         let second = |line: &str| why(&format!("{{\"t\":0}}\n{line}\n"));
         assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").starts_with("stdin: line 2, column"));
         assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").contains("taxel 4 is there twice"));
-        assert!(second("{\"t\":1,\"values\":{\"palm\":1}}").contains("`palm` is no taxel id"));
+        assert!(second("{\"t\":1,\"values\":{\"palm\":1}}").contains("`palm` is not a taxel id"));
         assert!(second("{\"t\":1,\"values\":{\"4\":\"1\"}}").contains("without quotes"));
         assert!(second("{\"t\":1,\"values\":{\"4\":true}}").contains("for taxel 4"));
         assert!(second("{\"t\":1,\"values\":[1,2]}").contains("values by taxel id"));
@@ -545,7 +545,7 @@ mod tests {
     #[test]
     fn csv_is_told_from_json() {
         for line in ["t,4,7", "0.5, 1,-2e3,", "\u{feff}t,4", "4,7\r"] {
-            assert!(why(&format!("{line}\n0,1,2\n")).ends_with("say --source csv:-"), "{}", why(line));
+            assert!(why(&format!("{line}\n0,1,2\n")).ends_with("use --source csv:-"), "{}", why(line));
         }
         for line in ["hello, world", "7", "{\"t\":0,}", "[0,1,2]"] {
             assert!(!why(&format!("{line}\n")).contains("csv:-"), "{line}");

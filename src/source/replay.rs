@@ -56,7 +56,7 @@ impl Replay {
         let Cut { from_s, to_s, .. } = cut;
         if !from_s.is_finite() || from_s < 0.0 || to_s.is_nan() || to_s <= from_s {
             return Err(Error::usage(format!(
-                "from {from_s} s to {to_s} s is no part of a recording; give seconds from its start, the first below the second"
+                "from {from_s} s to {to_s} s is not a part of a recording; give seconds from its start, the first below the second"
             )));
         }
         let source = open()?;

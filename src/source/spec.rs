@@ -102,7 +102,7 @@ impl SourceSpec {
                     Ok(baud) if baud > 0 && !port.is_empty() => {
                         Self::Serial { port: port.to_owned(), baud: Some(baud) }
                     }
-                    _ => return bad(format!("`{baud}` is no baud rate; write serial:PORT@115200")),
+                    _ => return bad(format!("`{baud}` is not a baud rate; write serial:PORT@115200")),
                 },
             },
         })

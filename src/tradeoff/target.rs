@@ -42,7 +42,7 @@ fn quantity(text: &str, what: &str, example: &str, units: &[(&str, f64)]) -> Res
     });
     found.ok_or_else(|| {
         let units = names.join(", ");
-        Error::usage(format!("`{text}` is no {what}; write a number over 0 and one of {units}, such as {example}"))
+        Error::usage(format!("`{text}` is not a {what}; write a number over 0 and one of {units}, such as {example}"))
     })
 }
 
@@ -88,7 +88,9 @@ impl Target {
                 }
             };
             if place.is_some() {
-                return Err(Error::usage(format!("`{text}` says one thing twice; write such as \"0.5 mm, 2 deg\"")));
+                return Err(Error::usage(format!(
+                    "`{text}` gives one quantity twice; write such as \"0.5 mm, 2 deg\""
+                )));
             }
         }
         Ok(target)

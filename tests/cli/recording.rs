@@ -434,7 +434,7 @@ fn damage_is_placed_in_time_whoever_reads() {
         let left = all.len() - (end - first);
         let said = fails(3, &["info", text_of(&path)]);
         assert!(said.contains(&format!("damaged in one place {when}: ")), "{when}: {said}");
-        assert!(said.contains(&format!("{left} frames are whole")), "{left}: {said}");
+        assert!(said.contains(&format!("{left} frames are intact")), "{left}: {said}");
         let (count, losses) = count_of(&path);
         assert!(count == left && said.contains(&losses[0]), "{losses:?}");
         let (_, told) = json(&path);

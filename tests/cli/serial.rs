@@ -327,7 +327,7 @@ fn what_is_wrong_with_a_line_is_named() {
 
     let other = Boards::start(&["--board", "7", "--for", "30s"]);
     let (line, code) = named(&[&format!("serial:{}", other.ports[0])], &[]);
-    assert!(line.contains("board 7 is here, and the wiring has board 1") && code == Some(1), "{line}");
+    assert!(line.contains("board 7 is on this line, and the wiring has board 1") && code == Some(1), "{line}");
 
     // The wiring of the paper's hand has the same taxels on other channels.
     let plain = Boards::start(&["--for", "30s"]);

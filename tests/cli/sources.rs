@@ -123,7 +123,7 @@ fn a_source_that_is_written_otherwise_is_named_as_it_should_be() {
     for input in ["t,4\n0,5\n", "0.5,1,2,\n"] {
         let output = fed(&["--source", "-"], input);
         let what =
-            "somatic: error: stdin: line 1: this is CSV, and `-` reads a line of JSON a frame; say --source csv:-\n";
+            "somatic: error: stdin: line 1: this is CSV, and `-` reads a line of JSON a frame; use --source csv:-\n";
         assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(1), what));
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn text(seen: &Inspection) -> String {
     }
     text += "\n";
     if findings.is_empty() {
-        return text + "nothing odd was found\n";
+        return text + "no findings\n";
     }
     text += &format!("{}\n", style(count(findings.len() as u64, "finding")).bold());
     for finding in findings {

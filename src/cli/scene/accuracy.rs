@@ -159,10 +159,7 @@ impl Accuracy {
     pub(super) fn check(&self, backend: Option<&str>, outputs: Outputs) -> Result<(), (&'static str, Error)> {
         let target = self.target();
         if let Some(knob) = self.knob().filter(|_| !target.is_empty()) {
-            let what = format!(
-                "`{knob}` is a knob, and {} leaves the knobs to be chosen; give one or the other",
-                target.words()
-            );
+            let what = format!("`{knob}` sets a knob that {} chooses; give one or the other", target.words());
             return Err((knob, Error::usage(what)));
         }
         if target.centroid_m.is_some() && outputs.is_empty() {

@@ -16,14 +16,14 @@ impl RunOptions {
         }
         if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
             return Err(Error::usage(format!(
-                "--speed {speed} is no speed; give a positive number, 1 for as recorded"
+                "--speed {speed} is not a speed; give a positive number, 1 for as recorded"
             )));
         }
         if let Some(age) = self.max_age.filter(|age| !(age.is_finite() && *age >= 0.0)) {
-            return Err(Error::usage(format!("--max-age {age} is no time span; give seconds from 0")));
+            return Err(Error::usage(format!("--max-age {age} is not a time span; give seconds from 0")));
         }
         if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
-            return Err(Error::usage(format!("--max-gap {gap} is no time span; give seconds over 0")));
+            return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
         }
         if self.verify && self.change_threshold.is_some_and(|threshold| threshold > 0.0) {
             return Err(Error::usage(

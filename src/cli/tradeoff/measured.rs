@@ -13,7 +13,7 @@ use crate::cli::words::number;
 /// What `pick` misses of `target`, which nothing grants.
 pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
     let combination = pick.row.combination()?;
-    Ok(format!("no knobs reach {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
+    Ok(format!("no knobs meet {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
 }
 
 /// Why a GPU is not chosen unless it is asked for, where all there are compute on the CPU.

@@ -86,7 +86,7 @@ pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &
         }
     };
     let Some(pick) = target.pick(&report, way) else {
-        return Err(Error::failed(format!("nothing was measured that could grant {}", target.words())));
+        return Err(Error::failed(format!("no measurement meets {}", target.words())));
     };
     if !pick.missed.is_empty() {
         return Err(Error::failed(missed(&target, &pick)?));

@@ -19,7 +19,7 @@ fn with(text: &str, combination: &Combination, target: &Target) -> Result<String
     let [backend, arithmetic, ..] = combination.words();
     let Knobs { charts, orientation_by, coverage, cadence, .. } = combination.knobs;
     let table = document.entry("accuracy").or_insert_with(|| Item::Table(Table::new()));
-    let Some(table) = table.as_table_like_mut() else { return Err(Error::failed("`accuracy` is no table")) };
+    let Some(table) = table.as_table_like_mut() else { return Err(Error::failed("`accuracy` is not a table")) };
     for key in ["centroid", "orientation", "budget"] {
         table.remove(key);
     }

@@ -116,7 +116,7 @@ impl TuningSession {
         let mut tuning = Tuning::new(&sensors);
         self.mark_failed_taps(&mut tuning);
         if accounts.iter().all(|account| account.state == BoardState::Awaited) {
-            return Err(Error::failed("no board is there; `somatic devices` shows the ports"));
+            return Err(Error::failed("no board answered; `somatic devices` shows the ports"));
         }
         let taps = self.lines.taps();
         if self.places.iter().all(|at| taps[at.board][usize::from(at.channel)].set.is_none()) {

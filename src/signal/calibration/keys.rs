@@ -225,7 +225,7 @@ pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: Text<'_>) -> Result<
     ];
     match starts.into_iter().find_map(|(key, span)| Some((key, span?.start))) {
         Some((key, start)) if !is_fsr => {
-            let what = format!("`{key}` is for sensors of one kind; say `sensor = \"fsr\"` too");
+            let what = format!("`{key}` is for the paper's circuit; add `sensor = \"fsr\"`");
             Err(text.wrong(start..start, what))
         }
         _ => Ok(()),

@@ -135,7 +135,7 @@ fn check(ports: &[(String, Option<u32>)], ids: &[u32], wiring: &Wiring) -> Resul
     for board in wiring.boards() {
         let strange = board.taxels.iter().enumerate().find(|(_, taxel)| taxel.is_some_and(|id| !there.contains(&id)));
         if let Some((channel, Some(id))) = strange {
-            let what = format!("taxel {id} hangs here, which the body does not have; is it the right body?");
+            let what = format!("the body has no taxel {id}; is it the right body?");
             return Err(Error::failed(what).at(format!("wiring: board {}: channel {channel}", board.id)));
         }
     }
@@ -147,7 +147,7 @@ fn pace(live_rate_hz: Option<f64>) -> Result<Pace> {
         None => Ok(Pace::Fastest),
         Some(0.0) => Ok(Pace::Arrival),
         Some(hz) if (0.001..=1e5).contains(&hz) => Ok(Pace::Every(hz.recip())),
-        Some(hz) => Err(Error::usage(format!("--live-rate {hz} is no rate; give 0.001 to 100000 Hz, or 0"))),
+        Some(hz) => Err(Error::usage(format!("--live-rate {hz} is not a rate; give 0.001 to 100000 Hz, or 0"))),
     }
 }
 
@@ -156,7 +156,7 @@ fn rate_mhz(hz: f64) -> Result<u32> {
         return Ok((hz * 1e3).round() as u32);
     }
     Err(Error::usage(format!(
-        "--board-rate {hz} is no rate; give 0.001 to 1000000 Hz, or 0 for as many as the line takes"
+        "--board-rate {hz} is not a rate; give 0.001 to 1000000 Hz, or 0 for as many as the line takes"
     )))
 }
 

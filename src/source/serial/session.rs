@@ -270,7 +270,7 @@ impl LineState {
             self.bad(format!("the board speaks version {version} of the protocol; this program speaks version 1"));
         } else if self.bytes > 0 {
             self.bad(format!(
-                "something sends bytes, but no board is understood at {baud} baud or any usual rate; \
+                "bytes arrive, but no valid packets at {baud} baud or any usual rate; \
                  is it another device?"
             ));
         } else {
@@ -370,14 +370,14 @@ impl LineState {
             let (found, own) = (self.baud, self.config.baud);
             if self.config.fixed {
                 self.bad(format!(
-                    "the board speaks at {found} baud, not {own}; write serial:{}@{found}",
+                    "the board sends at {found} baud, not {own}; write serial:{}@{found}",
                     self.config.port
                 ));
                 self.set_stage(Stage::NothingFound, own, now);
                 return false;
             }
             self.config.baud = found;
-            self.notify(&format!("the board speaks at {found} baud; taken instead of {own}"));
+            self.notify(&format!("the board sends at {found} baud; taken instead of {own}"));
         }
         if self.stage != Stage::Speaking {
             (self.stage, self.since) = (Stage::Speaking, now);

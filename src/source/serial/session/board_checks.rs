@@ -69,7 +69,7 @@ impl LineState {
         let ids: Vec<String> = self.config.wiring.boards().iter().map(|board| board.id.to_string()).collect();
         let known =
             if ids.len() == 1 { format!("has board {}", ids[0]) } else { format!("has boards {}", ids.join(", ")) };
-        self.bad(format!("board {id} is here, and the wiring {known}; give --wiring a file that has it"));
+        self.bad(format!("board {id} is on this line, and the wiring {known}; give --wiring a file that has it"));
     }
 
     /// Accepts a board that sends frames but does not answer, if its channels fit.
@@ -94,7 +94,7 @@ impl LineState {
         let mut state = shared.lock();
         if let Some(other) = state.claim(board, *line) {
             drop(state);
-            self.bad(format!("board {id} is here and on line {} as well; give one of them another id", other + 1));
+            self.bad(format!("board {id} answers on line {} too; give one of them another id", other + 1));
             return false;
         }
         state.set_verdict(*line, Verdict::Good);
@@ -109,7 +109,7 @@ impl LineState {
             // Its clock has gone on, unless a packet says that it has restarted.
             state.notify(format!("{port}: board {id} is back"));
         } else if was_away || was_bad {
-            state.notify(format!("{port}: board {id} is there"));
+            state.notify(format!("{port}: board {id} found"));
         }
         if self.joined != Some((board, id)) {
             if let Some((other, _)) = self.joined {
