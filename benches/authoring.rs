@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rstar::RTree;
-use somatic::author::{Placed, SurfacePoint, place_apart, place_by_density, place_evenly, widest_radius};
+use somatic::author::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
 use somatic::body::Topology;
 use somatic::field::geodesic::{LogMap, SurfacePlace};
 
@@ -153,17 +153,17 @@ fn main() {
     };
     for count in [1_000, 10_000, 100_000] {
         let widest = 2.0 * widest_radius(area, count);
-        let placed = timed(|| place_evenly(&positions, &triangles, count, 1).unwrap());
+        let placed = timed(|| place_evenly(&positions, &triangles, count, 1, &mut |_| {}).unwrap());
         report("evenly, in widest spacings", placed, widest);
         let spacing = 0.75 * widest;
         let fitted = report(
             "apart, in given spacings",
-            timed(|| place_apart(&positions, &triangles, spacing, 1).unwrap()),
+            timed(|| place_apart(&positions, &triangles, spacing, 1, &mut |_| {}).unwrap()),
             spacing,
         );
         println!("  {:.3} of what would fit at most", (spacing / (2.0 * widest_radius(area, fitted))).powi(2));
-        let density = |p: &SurfacePoint| (4.0 * p.position.z).exp();
-        let placed = timed(|| place_by_density(&positions, &triangles, count, 1, density).unwrap());
+        let density = |p: &Placed| (4.0 * p.point.position.z).exp();
+        let placed = timed(|| place_by_density(&positions, &triangles, count, 1, density, &mut |_| {}).unwrap());
         report("by a density of e⁸:1, in widest even spacings", placed, widest);
     }
 }

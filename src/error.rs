@@ -3,9 +3,12 @@
 //! An [`Error`] is one line a person can act on: which file, where in it, what is wrong, what to do. Programs ask it
 //! questions ([`Error::is_usage`], [`Error::is_not_found`]) instead of matching on its insides.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::{fmt, io};
+
+use serde::de::DeserializeOwned;
 
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -109,6 +112,14 @@ impl Error {
     }
 }
 
+/// [`Error::failed`] with a formatted message.
+macro_rules! failed {
+    ($($what:tt)+) => {
+        $crate::error::Error::failed(format!($($what)+))
+    };
+}
+pub(crate) use failed;
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let line = match &self.place {
@@ -150,6 +161,65 @@ pub fn nearest<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, _, name)| name)
 }
 
+/// What to try instead of the unknown name `asked`: the nearest of the `known` names, or a list of them.
+#[must_use]
+pub fn suggestion<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: BTreeSet<&str> = known.into_iter().collect();
+    if let Some(near) = nearest(asked, known.iter().copied()) {
+        return format!("did you mean `{near}`?");
+    }
+    let first: Vec<&str> = known.iter().copied().take(MAX_SUGGESTIONS).collect();
+    match known.len() {
+        0 => "there is none".to_owned(),
+        count if count > first.len() => format!("it is one of {}, …", first.join(", ")),
+        _ => format!("it is one of {}", first.join(", ")),
+    }
+}
+
+/// Maximum number of names in a [`suggestion`].
+const MAX_SUGGESTIONS: usize = 30;
+
+/// The content of the TOML file `text`.
+///
+/// # Errors
+/// It is not TOML, or has other keys or values than a `T`. The error has the line and the column, and a suggestion for an
+/// unknown key.
+pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+    toml::from_str(text).map_err(|e| {
+        let start = e.span().map_or(0, |span| span.start);
+        Error::failed(explain(e.message())).at(place_in(text, start))
+    })
+}
+
+/// The line and the column of byte `offset` of `text`, from 1, for [`Error::at`].
+#[must_use]
+pub fn place_in(text: &str, offset: usize) -> String {
+    let before = String::from_utf8_lossy(&text.as_bytes()[..offset.min(text.len())]);
+    let line = 1 + before.matches('\n').count();
+    let column = 1 + before.rsplit('\n').next().map_or(0, |last| last.chars().count());
+    format!("line {line}, column {column}")
+}
+
+/// The message of the TOML parser in the words of this crate, with a suggestion for an unknown word.
+fn explain(message: &str) -> String {
+    if let Some(key) = message.strip_prefix("missing field ") {
+        return format!("{key} is missing");
+    }
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let kind = match message.split('`').next() {
+        Some("unknown field ") => "key",
+        Some("unknown variant ") => "choice",
+        _ => return message.to_owned(),
+    };
+    let Some(word) = quoted.next() else { return message.to_owned() };
+    let known: Vec<&str> = quoted.collect();
+    // The unit at the end of a key is often forgotten.
+    let with_unit = known.iter().find(|name| name.strip_prefix(word).is_some_and(|unit| unit.starts_with('_')));
+    let hint =
+        with_unit.map_or_else(|| suggestion(word, known.iter().copied()), |near| format!("did you mean `{near}`?"));
+    format!("there is no {kind} `{word}`; {hint}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -175,5 +245,18 @@ mod tests {
         assert_eq!(nearest("sorce", ["force", "source"]), Some("source"));
         assert_eq!(nearest("centriod", ["total", "centroid", "axis"]), Some("centroid"));
         assert_eq!(nearest("banana", ["total", "centroid", "axis"]), None);
+    }
+
+    #[test]
+    fn the_parsers_words_become_ours() {
+        assert_eq!(
+            explain("unknown field `rate`, expected one of `rate_hz`, `body`"),
+            "there is no key `rate`; did you mean `rate_hz`?"
+        );
+        assert_eq!(
+            explain("unknown variant `x`, expected `rod` or `ball`"),
+            "there is no choice `x`; it is one of ball, rod"
+        );
+        assert_eq!(explain("missing field `body`"), "`body` is missing");
     }
 }

@@ -1,4 +1,4 @@
-//! Files of keys, in TOML: one line with the place for whatever is wrong in one.
+//! Checks of values in TOML files; each error has its line and column.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -6,70 +6,37 @@ use std::ops::Range;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, parse_toml, place_in, suggestion};
 
 /// Larger numbers are not credible in any unit.
 const MAX_CREDIBLE: f64 = 1e9;
 
-/// A file's text, which knows on which line something stands.
+/// A file's text.
 #[derive(Clone, Copy)]
-pub struct Text<'a>(pub &'a str);
+pub(crate) struct Text<'a>(pub(crate) &'a str);
 
 impl Text<'_> {
-    /// What the text holds; an error has its line, and the nearest word to one that is not known.
+    /// The file's content.
     pub(crate) fn parse<T: DeserializeOwned>(self) -> Result<T> {
-        toml::from_str(self.0).map_err(|e| {
-            let span = e.span().unwrap_or(0..0);
-            self.wrong(span, explain(e.message()))
-        })
-    }
-
-    /// The same; an error has the column, too.
-    ///
-    /// # Errors
-    /// The text is no TOML, or has other keys or values than a `T`.
-    pub fn parse_to_the_column<T: DeserializeOwned>(self) -> Result<T> {
-        toml::from_str(self.0).map_err(|e| {
-            let (line, column) = self.place(e.span().map_or(0, |span| span.start));
-            Error::failed(explain(e.message())).at(format!("line {line}, column {column}"))
-        })
-    }
-
-    /// Line and column, from 1, of byte `offset`.
-    fn place(self, offset: usize) -> (usize, usize) {
-        let start = offset.min(self.0.len());
-        let before = self.0.as_bytes()[..start].rsplit(|&byte| byte == b'\n').next().unwrap_or_default();
-        (self.line(start), 1 + String::from_utf8_lossy(before).chars().count())
-    }
-
-    /// Line and column, from 1, of the key at the end of `path`, through tables from the top; `None` where it is not.
-    #[must_use]
-    pub fn place_of(self, path: &[&str]) -> Option<(usize, usize)> {
-        let mut table = toml::de::DeTable::parse(self.0).ok()?.into_inner();
-        let (last, tables) = path.split_last()?;
-        for name in tables {
-            let (_, value) = table.into_iter().find(|(key, _)| key.get_ref() == name)?;
-            table = match value.into_inner() {
-                toml::de::DeValue::Table(table) => table,
-                _ => return None,
-            };
-        }
-        let key = table.keys().find(|key| key.get_ref() == last)?;
-        Some(self.place(key.span().start))
+        parse_toml(self.0)
     }
 
     /// The error that `what` is wrong at `span`.
     pub(crate) fn wrong(self, span: Range<usize>, what: impl Into<String>) -> Error {
-        Error::failed(what).at(format!("line {}", self.line(span.start)))
+        self.put(span, Error::failed(what))
     }
 
-    /// The line, from 1, that byte `offset` is on.
-    pub(crate) fn line(self, offset: usize) -> usize {
-        let before = &self.0.as_bytes()[..offset.min(self.0.len())];
-        1 + before.iter().filter(|&&byte| byte == b'\n').count()
+    /// `error`, at `span`.
+    pub(crate) fn put(self, span: Range<usize>, error: Error) -> Error {
+        error.at(self.place(span))
     }
 
-    /// The number under `key`, if `fits` and not beyond belief.
+    /// Line and column of the start of `span`.
+    pub(crate) fn place(self, span: Range<usize>) -> String {
+        place_in(self.0, span.start)
+    }
+
+    /// The number under `key`, if it is credible and `fits`.
     fn number(self, key: &str, value: &Spanned<f64>, must: &str, fits: impl Fn(f64) -> bool) -> Result<f64> {
         let number = *value.get_ref();
         if fits(number) && number.abs() <= MAX_CREDIBLE {
@@ -104,7 +71,7 @@ impl Text<'_> {
         Err(self.wrong(value.span(), format!("`{key}` is {number}; it must be between {} and {last}", range.start)))
     }
 
-    /// Refuses times under `key` that are negative or do not increase.
+    /// Rejects times under `key` that are negative or do not increase.
     pub(crate) fn check_times(self, key: &str, span: Range<usize>, times: impl IntoIterator<Item = f64>) -> Result<()> {
         let mut before = None;
         for t_s in times {
@@ -121,7 +88,7 @@ impl Text<'_> {
         Ok(())
     }
 
-    /// Refuses `key`, which `why` has no use for.
+    /// Rejects `key` if it is given; `why` says where it has no meaning.
     pub(crate) fn refuse<T>(self, key: &str, value: Option<&Spanned<T>>, why: impl Display) -> Result<()> {
         match value {
             Some(value) => Err(self.wrong(value.span(), format!("`{key}` has no effect {why}; remove it"))),
@@ -129,62 +96,21 @@ impl Text<'_> {
         }
     }
 
-    /// That nothing is called `asked`, with the name among `known` that may be meant.
+    /// The error that nothing is called `asked`, with a suggestion from the `known` names.
     pub(crate) fn unknown<'n>(
         self,
         asked: &Spanned<String>,
         what: &str,
         known: impl IntoIterator<Item = &'n str>,
     ) -> Error {
-        let hint = nearest(asked.get_ref(), known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-        self.wrong(asked.span(), format!("{what} `{}`{hint}", asked.get_ref()))
+        let hint = suggestion(asked.get_ref(), known);
+        self.wrong(asked.span(), format!("there is no {what} `{}`; {hint}", asked.get_ref()))
     }
 }
 
-/// The parser's message, with the nearest word where it met one that it does not know.
-fn explain(message: &str) -> String {
-    if let Some(key) = message.strip_prefix("missing field ") {
-        return format!("{key} is missing");
-    }
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let kind = match message.split('`').next() {
-        Some("unknown field ") => "key",
-        Some("unknown variant ") => "choice",
-        _ => return message.to_owned(),
-    };
-    let Some(word) = quoted.next() else { return message.to_owned() };
-    let known: Vec<&str> = quoted.collect();
-    // A unit forgotten is a slip as well.
-    let with_unit =
-        known.iter().copied().find(|name| name.strip_prefix(word).is_some_and(|unit| unit.starts_with('_')));
-    match with_unit.or_else(|| nearest(word, known.iter().copied())) {
-        Some(near) => format!("there is no {kind} `{word}`; did you mean `{near}`?"),
-        None => format!("there is no {kind} `{word}`; it is one of {}", known.join(", ")),
-    }
-}
-
+/// `message` without its column.
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_key_is_found_where_it_stands() {
-        let text = Text("a = 1\n[b]\n  c.d = 2\n");
-        assert_eq!(text.place_of(&["a"]), Some((1, 1)));
-        assert_eq!(text.place_of(&["b", "c", "d"]), Some((3, 5)));
-        assert_eq!((text.place_of(&["b", "x"]), text.place_of(&["a", "c"]), text.place_of(&[])), (None, None, None));
-    }
-
-    #[test]
-    fn the_parsers_words_become_ours() {
-        assert_eq!(
-            explain("unknown field `rate`, expected one of `rate_hz`, `body`"),
-            "there is no key `rate`; did you mean `rate_hz`?"
-        );
-        assert_eq!(
-            explain("unknown variant `x`, expected `rod` or `ball`"),
-            "there is no choice `x`; it is one of rod, ball"
-        );
-        assert_eq!(explain("missing field `body`"), "`body` is missing");
-    }
+pub(crate) fn without_column(message: &str) -> String {
+    let (before, after) = message.split_once(", column ").unwrap_or((message, ""));
+    format!("{before}{}", after.trim_start_matches(|c: char| c.is_ascii_digit()))
 }

@@ -69,8 +69,7 @@ pub mod field;
 pub mod figure;
 #[cfg(feature = "cli")]
 mod ink;
-#[doc(hidden)]
-pub mod keys;
+mod keys;
 mod length;
 pub mod output;
 mod parallel;

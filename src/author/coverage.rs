@@ -4,7 +4,7 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use crate::body::{Body, Taxel};
+use crate::body::{Body, Taxel, area_vector};
 
 /// Number of samples of the surface: limits, and samples per taxel.
 const MIN_SAMPLES: usize = 20_000;
@@ -82,7 +82,7 @@ struct Sample {
 pub fn coverage(body: &Body) -> Coverage {
     let taxels = Taxels::of(body);
     let corners: Vec<(usize, [DVec3; 3])> = body.triangles_at_rest();
-    let area_of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).length() / 2.0;
+    let area_of = |corners: [DVec3; 3]| area_vector(corners).length() / 2.0;
     let mut links: Vec<LinkCoverage> =
         (0..body.links.len()).map(|link| LinkCoverage { link, area: 0.0, seen: 0.0 }).collect();
     corners.iter().for_each(|&(link, triangle)| links[link].area += area_of(triangle));
@@ -100,7 +100,7 @@ pub fn coverage(body: &Body) -> Coverage {
     for (link, triangle) in corners {
         up_to += area_of(triangle);
         let [a, b, c] = triangle;
-        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        let Some(normal) = area_vector(triangle).try_normalize() else { continue };
         // One sample per area `each`, also over small triangles.
         while (f64::from(taken) + 0.5) * each < up_to {
             let [beta, gamma] = within(taken);

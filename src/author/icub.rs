@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use crate::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 
 /// Rows of one triangle of the skin.
 const TRIANGLE_ROWS: u32 = 12;
@@ -104,11 +104,11 @@ impl IcubFile {
         }
         // Ids −1 beyond the last row are harmless.
         if let Some(last) = ids.iter().rposition(|&id| id != NO_TAXEL).filter(|&last| last >= raw.len()) {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "taxel2Repr gives row {last} the id {} and there are only {} rows: the file is cut short",
                 ids[last],
                 raw.len()
-            )));
+            ));
         }
         let mut rows: Vec<IcubRow> =
             raw.iter().enumerate().map(|(i, &row)| classify(row, ids.get(i).copied())).collect();
@@ -172,26 +172,20 @@ impl IcubFile {
         std::iter::once(whole).chain(below).collect()
     }
 
-    /// The taxels as a body's, on `link`, each with its channel plus `first_id` for an id; their areas are not known.
-    #[must_use]
-    pub fn body_taxels(&self, link: usize, first_id: u32) -> Vec<Taxel> {
-        let taxel = |(channel, taxel): (u32, &IcubTaxel)| Taxel {
-            id: first_id + channel,
-            link,
-            position_in_link: taxel.position_in_link,
-            normal_in_link: taxel.normal_in_link,
-            area: 0.0,
-            modality: taxel.modality,
-        };
-        self.taxels().map(taxel).collect()
-    }
-
     /// A body of one link without a surface, called as the part is, with the file's taxels and [`IcubFile::fields`].
     #[must_use]
     pub fn to_glb(&self) -> Glb {
         let mut glb = Glb::new();
         let link = glb.node(&self.part, None, DVec3::ZERO);
-        let taxels = self.body_taxels(0, 0);
+        let taxel = |(id, taxel): (u32, &IcubTaxel)| Taxel {
+            id,
+            link: 0,
+            position_in_link: taxel.position_in_link,
+            normal_in_link: taxel.normal_in_link,
+            area: 0.0,
+            modality: taxel.modality,
+        };
+        let taxels: Vec<Taxel> = self.taxels().map(taxel).collect();
         glb.taxels(&format!("{} taxels", self.part), Some(link), &taxels, None);
         for field in self.fields(0) {
             let first = field.members.keys().next();
@@ -260,9 +254,7 @@ fn header(lines: &[&str]) -> Result<(String, Vec<i64>)> {
     if let Some(sampling) = value("spatial_sampling")
         && sampling != "taxel"
     {
-        return Err(Error::failed(format!(
-            "its `spatial_sampling` is `{sampling}`; only files with a row a `taxel` can be read"
-        )));
+        return Err(failed!("its `spatial_sampling` is `{sampling}`; only files with a row a `taxel` can be read"));
     }
     // The list may run over several lines.
     let text = lines.join(" ");
@@ -271,23 +263,23 @@ fn header(lines: &[&str]) -> Result<(String, Vec<i64>)> {
     let (list, _) = list.ok_or_else(|| Error::failed("its `taxel2Repr` should be a list in parentheses"))?;
     let id = |word: &str| match word.parse::<i64>() {
         Ok(id) if id >= THERMAL => Ok(id),
-        _ => Err(Error::failed(format!("`{word}` in taxel2Repr is no id; ids are -2, -1, or count from 0"))),
+        _ => Err(failed!("`{word}` in taxel2Repr is no id; ids are -2, -1, or count from 0")),
     };
     Ok((part.to_owned(), list.split_whitespace().map(id).collect::<Result<_>>()?))
 }
 
 /// A row's position and normal.
 fn row(line: &str) -> Result<[DVec3; 2]> {
-    let wrong = || Error::failed(format!("`{line}` is no row; six numbers belong there, x y z nx ny nz"));
+    let wrong = || failed!("`{line}` is no row; six numbers belong there, x y z nx ny nz");
     let words: Vec<&str> = line.split_whitespace().collect();
     let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
     let Some(&[x, y, z, nx, ny, nz]) = numbers.as_deref() else { return Err(wrong()) };
     let (position, normal) = (DVec3::new(x, y, z), DVec3::new(nx, ny, nz));
     if !position.is_finite() || !normal.is_finite() {
-        return Err(Error::failed(format!("`{line}` has a number that is not finite")));
+        return Err(failed!("`{line}` has a number that is not finite"));
     }
     if position.abs().max_element() > MAX_COORDINATE_M || normal.abs().max_element() > MAX_COORDINATE_M {
-        return Err(Error::failed(format!("`{line}` is over {MAX_COORDINATE_M} m away; positions are in metres")));
+        return Err(failed!("`{line}` is over {MAX_COORDINATE_M} m away; positions are in metres"));
     }
     Ok([position, normal])
 }

@@ -3,11 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::grid::Grid;
-use super::place::{Placed, Progress};
+use super::placed::{Placed, Progress, SurfacePoint, same_side};
 use super::rest_surface::RestSurface;
-use super::{SurfacePoint, sample_neighbours};
-use crate::body::{NONE, SurfaceIndex, Topology, next};
-use crate::error::{Error, Result};
+use crate::body::{NONE, SurfaceIndex, Topology, area_vector, next};
+use crate::error::{Error, Result, failed};
 use crate::field::geodesic::{LogMap, SurfacePlace};
 
 /// First distance limit over the straight distance: half a circle, and a margin.
@@ -85,8 +84,7 @@ impl Lattice {
             }
             let shortest = map.reach(&place).map_or(0.0, |way| way.distance_m);
             if shortest >= length * (1.0 - DETOUR_TOLERANCE) {
-                let [a, b, c] = topology.corners(place.triangle);
-                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let normal = area_vector(topology.corners(place.triangle)).normalize_or_zero();
                 let point = SurfacePoint { position: place.position(topology), normal, area: cell_area };
                 found.push((length, Placed { point, triangle, barycentric: place.barycentric }));
             }
@@ -99,7 +97,7 @@ impl Lattice {
         let index = SurfaceIndex::of_triangles(sound.iter().map(|&triangle| topology.corners(triangle)));
         let weighted = |&triangle: &u32| {
             let [a, b, c] = topology.corners(triangle);
-            let area = (b - a).cross(c - a).length();
+            let area = area_vector([a, b, c]).length();
             (area, (a + b + c) * (area / 3.0))
         };
         let (area, sum) = sound.iter().map(weighted).fold((0.0, DVec3::ZERO), |(a, s), (b, t)| (a + b, s + t));
@@ -110,8 +108,7 @@ impl Lattice {
 
     /// The distances to all of the triangles `near`.
     fn map<'t>(&self, topology: &'t Topology, start: SurfacePlace, near: &[u32]) -> Result<LogMap<'t>> {
-        let [a, b, c] = topology.corners(start.triangle);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = area_vector(topology.corners(start.triangle)).normalize_or_zero();
         let u = self.u.unwrap_or(if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X });
         let from = start.position(topology);
         let corners = near.iter().flat_map(|&triangle| topology.corners(triangle));
@@ -131,10 +128,10 @@ impl Lattice {
         let row_m = self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
         let (rows, columns) = ((extent / row_m).floor(), (extent / self.pitch_m).floor() + 1.0);
         if 4.0 * rows * columns > MAX_GRID_POINTS {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "a grid of {} m on a region that reaches {extent:.3} m has too many places; is `pitch` in metres?",
                 self.pitch_m
-            )));
+            ));
         }
         let (rows, columns) = (rows as i64, columns as i64);
         let mut cells = Vec::new();
@@ -162,7 +159,7 @@ impl Lattice {
             let meets = |&(p, j): &(DVec3, u32)| {
                 kept[j as usize]
                     && p.distance(positions[i]) < self.pitch_m / 2.0
-                    && sample_neighbours::same_side(&found[i].1, &found[j as usize].1)
+                    && same_side(&found[i].1, &found[j as usize].1)
             };
             kept[i] = !around.into_iter().flatten().any(meets);
         }
@@ -197,7 +194,7 @@ pub(super) fn walk(
     // A bound: a walk crosses a triangle again only after going around the surface.
     for _ in 0..100 * topology.triangles.len().max(100) {
         let corners = topology.corners(triangle);
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let normal = area_vector(corners).normalize_or_zero();
         let mut exit: Option<(f64, u32)> = None;
         for side in 0..3_u32 {
             let edge = 3 * triangle + side;

@@ -9,7 +9,7 @@
 //!
 //! // A sheet of 0.2 m × 0.1 m with 50 taxels on it.
 //! let corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)].map(|(x, y)| DVec3::new(x, y, 0.0));
-//! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1)?;
+//! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1, &mut |_| {})?;
 //! let shared: f64 = placed.iter().map(|p| p.point.area).sum();
 //! assert!(placed.len() == 50 && (shared - 0.02).abs() < 1e-9);
 //! # Ok::<(), somatic::Error>(())
@@ -18,13 +18,14 @@
 //! Results are the same on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties go to the lower index.
 
 mod coverage;
-mod glob;
 mod grid;
 pub mod group;
 pub mod icub;
 mod lattice;
 mod lint;
+mod origin;
 mod place;
+mod placed;
 mod points;
 pub(crate) mod random;
 mod recipe;
@@ -39,23 +40,11 @@ mod skin_weights;
 mod surface_search;
 mod voronoi;
 
-use glam::DVec3;
-
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use lint::{Finding, FindingKind, lint};
-pub use place::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
+pub use place::{place_apart, place_by_density, place_evenly, widest_radius};
+pub use placed::{Placed, Progress, SurfacePoint};
 pub use recipe::Recipe;
 pub use refresh::refresh;
 pub use skin::{Authored, PlaceReport, author};
 pub use skin_weights::{blend_skinning, heaviest_four};
-
-/// A point on a surface, in the coordinates of its mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    /// Its position, m.
-    pub position: DVec3,
-    /// Outward unit normal.
-    pub normal: DVec3,
-    /// The surface nearer to it than to other points, m².
-    pub area: f64,
-}

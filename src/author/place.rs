@@ -7,10 +7,10 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::SurfacePoint;
-use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack, points_on_same_side, same_side};
+use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, same_side};
+use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
 use super::scatter::Pieces;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 
 /// Samples per point.
 const OVERSAMPLING: usize = 5;
@@ -20,17 +20,6 @@ const PACKED_OVERSAMPLING: f64 = 9.0;
 
 /// Maximum number of points.
 const MAX_POINTS: f64 = 4e6;
-
-/// A point and its place on the mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
-    /// The point; its normal is that of the triangle.
-    pub point: SurfacePoint,
-    /// Index of the triangle.
-    pub triangle: usize,
-    /// Weights of the triangle's three corners, summing to 1.
-    pub barycentric: [f64; 3],
-}
 
 /// The radius, m, of `count` disks in the densest packing of a plane of `area` (m²). No placement of `count` points has a
 /// smallest spacing over twice this.
@@ -43,17 +32,12 @@ pub fn widest_radius(area: f64, count: usize) -> f64 {
 ///
 /// `positions` are in metres and `triangles` counter-clockwise seen from outside. Points with normals over 90° apart are
 /// no neighbours, so that both sides of a thin part get points. The points are in the order of the triangles; `seed`
-/// selects one of many equally good placements.
+/// selects one of many equally good placements. `progress` gets the share that is done.
 ///
 /// # Errors
-/// `count` is 0 or over 4 million, a triangle names a vertex that is not there, or the triangles have no finite,
-/// positive area.
-pub fn place_evenly(positions: &[DVec3], triangles: &[[u32; 3]], count: usize, seed: u64) -> Result<Vec<Placed>> {
-    evenly(positions, triangles, count, seed, &mut |_| {})
-}
-
-/// As [`place_evenly`]; `progress` gets the share that is done.
-pub(super) fn evenly(
+/// `count` is 0 or over 4 million, a triangle has a vertex that does not exist, or the triangles have no finite, positive
+/// area.
+pub fn place_evenly(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
@@ -67,7 +51,7 @@ pub(super) fn evenly(
     Ok(eliminate(&samples, &reaches, count, progress))
 }
 
-/// As [`evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
+/// As [`place_evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -76,12 +60,12 @@ pub(super) fn evenly_apart(
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<std::result::Result<Vec<Placed>, usize>> {
-    let placed = evenly(positions, triangles, count, seed, progress)?;
+    let placed = place_evenly(positions, triangles, count, seed, progress)?;
     let points: Vec<SurfacePoint> = placed.iter().map(|placed| placed.point).collect();
     if nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m) {
         return Ok(Ok(placed));
     }
-    let packed = apart(positions, triangles, spacing_m, seed, progress)?;
+    let packed = place_apart(positions, triangles, spacing_m, seed, progress)?;
     if packed.len() < count {
         return Ok(Err(packed.len()));
     }
@@ -98,17 +82,6 @@ pub(super) fn evenly_apart(
 /// # Errors
 /// As [`place_evenly`]; or `density` is negative or not finite somewhere, or 0 everywhere.
 pub fn place_by_density(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    count: usize,
-    seed: u64,
-    density: impl Fn(&SurfacePoint) -> f64,
-) -> Result<Vec<Placed>> {
-    by_density(positions, triangles, count, seed, |placed| density(&placed.point), &mut |_| {})
-}
-
-/// As [`place_by_density`], of a density by triangle and barycentric weights.
-pub(super) fn by_density(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
@@ -138,12 +111,7 @@ pub(super) fn by_density(
 /// # Errors
 /// `spacing_m` is not positive and finite, or so small that over 4 million points could fit; a triangle names a vertex
 /// that is not there, or the triangles have no finite, positive area.
-pub fn place_apart(positions: &[DVec3], triangles: &[[u32; 3]], spacing_m: f64, seed: u64) -> Result<Vec<Placed>> {
-    apart(positions, triangles, spacing_m, seed, &mut |_| {})
-}
-
-/// As [`place_apart`]; `progress` gets the share that is done.
-pub(super) fn apart(
+pub fn place_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     spacing_m: f64,
@@ -151,15 +119,15 @@ pub(super) fn apart(
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
     if !(spacing_m.is_finite() && spacing_m > 0.0) {
-        return Err(Error::failed(format!("taxels cannot lie {spacing_m} m apart; give a spacing over 0")));
+        return Err(failed!("taxels cannot lie {spacing_m} m apart; give a spacing over 0"));
     }
     let pieces = Pieces::whole(positions, triangles)?;
     let most = pieces.weight() * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m);
     if most > MAX_POINTS {
-        return Err(Error::failed(format!(
+        return Err(failed!(
             "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MAX_POINTS:.0e} that can be placed; is the \
              spacing in metres?"
-        )));
+        ));
     }
     let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
     let reaches = vec![spacing_m; samples.len()];
@@ -174,9 +142,7 @@ fn check_count(count: usize) -> Result<()> {
         return Err(Error::failed("no taxels were asked for; place at least one"));
     }
     if count as f64 > MAX_POINTS {
-        return Err(Error::failed(format!(
-            "{count} taxels are over the {MAX_POINTS:.0e} that can be placed at a time"
-        )));
+        return Err(failed!("{count} taxels are over the {MAX_POINTS:.0e} that can be placed at a time"));
     }
     Ok(())
 }
@@ -245,9 +211,6 @@ pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
     points.iter().enumerate().map(nearest).collect()
 }
 
-/// Called with the share of the work that is done.
-pub(super) type Progress<'a> = &'a mut dyn FnMut(f64);
-
 type Spot = GeomWithData<[f64; 3], usize>;
 
 #[cfg(test)]
@@ -290,7 +253,7 @@ mod tests {
     fn points_are_as_many_as_asked_and_keep_their_distance() {
         let (positions, triangles) = sheet(7, false);
         for (count, seed) in [(1, 1), (2, 1), (100, 1), (100, 2), (600, 3)] {
-            let placed = place_evenly(&positions, &triangles, count, seed).unwrap();
+            let placed = place_evenly(&positions, &triangles, count, seed, &mut |_| {}).unwrap();
             assert_eq!(placed.len(), count);
             let spacing = least_spacing(&placed);
             assert!(spacing >= 0.65 * 2.0 * widest_radius(1.0, count), "{count} points, seed {seed}: {spacing} m");
@@ -309,7 +272,7 @@ mod tests {
     #[test]
     fn a_placement_repeats_and_the_seed_changes_it() {
         let (positions, triangles) = sheet(3, false);
-        let place = |seed| place_evenly(&positions, &triangles, 80, seed).unwrap();
+        let place = |seed| place_evenly(&positions, &triangles, 80, seed, &mut |_| {}).unwrap();
         assert_eq!(place(5), place(5));
         assert_ne!(place(5), place(6));
     }
@@ -317,7 +280,7 @@ mod tests {
     #[test]
     fn both_sides_of_a_thin_sheet_get_their_own() {
         let (positions, triangles) = sheet(5, true);
-        let placed = place_evenly(&positions, &triangles, 400, 9).unwrap();
+        let placed = place_evenly(&positions, &triangles, 400, 9, &mut |_| {}).unwrap();
         let front: Vec<&Placed> = placed.iter().filter(|p| p.point.normal.z > 0.0).collect();
         assert!((190..=210).contains(&front.len()), "{} of 400 in front", front.len());
         assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(2.0, 400));
@@ -328,7 +291,7 @@ mod tests {
     #[test]
     fn areas_share_the_surface_and_points_lie_on_their_triangles() {
         let (positions, triangles) = sheet(4, false);
-        let placed = place_evenly(&positions, &triangles, 120, 4).unwrap();
+        let placed = place_evenly(&positions, &triangles, 120, 4, &mut |_| {}).unwrap();
         let sum: f64 = placed.iter().map(|p| p.point.area).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum} m²");
         assert!(placed.iter().all(|p| (0.2 / 120.0..3.0 / 120.0).contains(&p.point.area)));
@@ -349,7 +312,7 @@ mod tests {
         let (upright, others) = sheet(6, false);
         positions.extend(upright.into_iter().map(|p| DVec3::new(0.0, p.y, -p.x)));
         triangles.extend(others.into_iter().map(|[a, b, c]| [first + a, first + c, first + b]));
-        let placed = place_evenly(&positions, &triangles, 300, 2).unwrap();
+        let placed = place_evenly(&positions, &triangles, 300, 2, &mut |_| {}).unwrap();
         let mut least = f64::INFINITY;
         for (i, a) in placed.iter().enumerate() {
             least = placed[..i].iter().map(|b| a.point.position.distance(b.point.position)).fold(least, f64::min);
@@ -361,12 +324,12 @@ mod tests {
     fn a_density_sets_how_many_there_are_and_how_far_apart() {
         // Nine times as dense on the right half, on triangles that are larger than the spacing there; none at the top.
         let (positions, triangles) = sheet(4, false);
-        let density = |p: &SurfacePoint| match p.position {
+        let density = |p: &Placed| match p.point.position {
             p if p.y > 0.75 => 0.0,
             p if p.x > 0.5 => 9.0,
             _ => 1.0,
         };
-        let placed = place_by_density(&positions, &triangles, 1000, 3, density).unwrap();
+        let placed = place_by_density(&positions, &triangles, 1000, 3, density, &mut |_| {}).unwrap();
         assert_eq!(placed.len(), 1000);
         let (right, left): (Vec<Placed>, Vec<Placed>) = placed.iter().partition(|p| p.point.position.x > 0.5);
         assert!(placed.iter().all(|p| p.point.position.y <= 0.75));
@@ -378,14 +341,16 @@ mod tests {
         let area: f64 = left.iter().map(|p| p.point.area).sum();
         assert!((area - 0.375).abs() < 0.02, "{area} m²");
 
-        let why = |density: f64| place_by_density(&positions, &triangles, 9, 3, |_| density).unwrap_err().to_string();
+        let why = |density: f64| {
+            place_by_density(&positions, &triangles, 9, 3, |_| density, &mut |_| {}).unwrap_err().to_string()
+        };
         assert!(why(-1.0).contains("density") && why(f64::NAN).contains("NaN") && why(0.0).contains("everywhere"));
     }
 
     #[test]
     fn a_density_that_is_the_same_everywhere_is_no_density() {
         let (positions, triangles) = sheet(4, false);
-        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5).unwrap();
+        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5, &mut |_| {}).unwrap();
         assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(1.0, 300));
         let area: f64 = placed.iter().map(|p| p.point.area).sum();
         assert!((area - 1.0).abs() < 1e-9, "{area} m²");
@@ -395,7 +360,7 @@ mod tests {
     fn with_a_spacing_as_many_as_fit_keep_it() {
         let (positions, triangles) = sheet(5, true);
         for (spacing, seed) in [(0.05, 1), (0.05, 2), (0.3, 1), (3.0, 1)] {
-            let placed = place_apart(&positions, &triangles, spacing, seed).unwrap();
+            let placed = place_apart(&positions, &triangles, spacing, seed, &mut |_| {}).unwrap();
             assert!(least_spacing(&placed) >= spacing, "{} m", least_spacing(&placed));
             // Nobody fits in between: every place on the sheet has one within the spacing, but for the samples' own
             // distance, of which there are nine for each disk of the densest packing.
@@ -407,16 +372,16 @@ mod tests {
             let covered = placed.len() as f64 * std::f64::consts::PI * spacing * spacing / 4.0 / 2.0;
             assert!(spacing > 0.1 || covered > 0.547, "{covered}");
         }
-        let why = |spacing: f64| place_apart(&positions, &triangles, spacing, 1).unwrap_err().to_string();
+        let why = |spacing: f64| place_apart(&positions, &triangles, spacing, 1, &mut |_| {}).unwrap_err().to_string();
         assert!(why(0.0).contains("spacing") && why(f64::NAN).contains("spacing") && why(1e-6).contains("metres"));
     }
 
     #[test]
     fn what_has_no_surface_gets_no_taxels() {
         let (positions, triangles) = sheet(1, false);
-        assert!(place_evenly(&positions, &triangles, 0, 1).is_err());
-        assert!(place_evenly(&positions, &[], 5, 1).is_err());
-        assert!(place_evenly(&positions, &[[0, 0, 1]], 5, 1).is_err());
-        assert!(place_evenly(&positions, &[[0, 1, 9]], 5, 1).is_err());
+        assert!(place_evenly(&positions, &triangles, 0, 1, &mut |_| {}).is_err());
+        assert!(place_evenly(&positions, &[], 5, 1, &mut |_| {}).is_err());
+        assert!(place_evenly(&positions, &[[0, 0, 1]], 5, 1, &mut |_| {}).is_err());
+        assert!(place_evenly(&positions, &[[0, 1, 9]], 5, 1, &mut |_| {}).is_err());
     }
 }

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::glob::Globs;
 use super::icub::IcubFile;
-use super::place::Placed;
+use super::placed::{Placed, SurfacePoint};
+use super::recipe_values::Globs;
 use super::rest_surface::RestSurface;
-use super::{SurfacePoint, recipe, voronoi};
-use crate::body::{MAX_TAXEL_ID, Modality, SurfaceIndex};
-use crate::error::{Error, Result, nearest};
+use super::{recipe, voronoi};
+use crate::body::{Body, MAX_TAXEL_ID, Modality, SurfaceIndex};
+use crate::error::{Error, Result, failed, suggestion};
 use crate::field::geodesic::barycentric;
 
 /// A given place.
@@ -33,17 +33,14 @@ pub(super) struct Snapped {
 
 /// The places of the marks called `names`, sorted by name, `tip.2` before `tip.10`.
 pub(super) fn of_marks(rest_surface: &RestSurface<'_>, names: &Globs) -> Result<Vec<GivenPoint>> {
-    let mut marks: Vec<_> = rest_surface.details.marks.iter().filter(|mark| names.is_match(&mark.name)).collect();
+    let mut marks: Vec<_> = rest_surface.details.marks.iter().filter(|mark| names.matches(&mark.name)).collect();
     if marks.is_empty() {
         let known = rest_surface.details.marks.iter().map(|mark| mark.name.as_str());
-        let hint = nearest(names.first(), known).map_or_else(
-            || "put empties or points there and name them so".to_owned(),
-            |near| format!("did you mean `{near}`?"),
-        );
-        return Err(Error::failed(format!(
-            "no empty and no mesh of points is called `{}`; {hint} (from Blender, export with `Loose Points` on)",
-            names.text()
-        )));
+        let asked = names.listed();
+        return Err(failed!(
+            "no empty and no mesh of points is called `{asked}`; {} (from Blender, export with `Loose Points` on)",
+            suggestion(&asked, known)
+        ));
     }
     marks.sort_by_key(|mark| natural(&mark.name));
     let given = marks.iter().flat_map(|mark| {
@@ -96,24 +93,21 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
     let broken = |e: &csv::Error| {
         let row = e.position().map_or(0, csv::Position::line);
-        Error::failed(format!("it is no table: {e}; give the columns id,x,y,z")).at(format!("line {row}"))
+        failed!("not a valid table: {e}; give the columns id,x,y,z").at(format!("line {row}"))
     };
     let header = reader.headers().map_err(|e| broken(&e))?.clone();
     if let Some(unknown) = header.iter().find(|own| !COLUMNS.iter().any(|known| own.eq_ignore_ascii_case(known))) {
-        return Err(Error::failed(format!(
+        return Err(failed!(
             "there is no column `{unknown}` in a table of taxels; it may have {}: rename or remove it",
             COLUMNS.join(", ")
-        ))
+        )
         .at("line 1"));
     }
     let column = |name: &str| header.iter().position(|own| own.eq_ignore_ascii_case(name));
     let needed = |name: &str| {
-        let wrong = || {
-            Error::failed(format!(
-                "there is no column `{name}`; the first line names id,x,y,z and, if need be, link and area"
-            ))
-        };
-        column(name).ok_or_else(wrong)
+        let what =
+            format!("there is no column `{name}`; the first line names id, x, y, z and optionally link and area");
+        column(name).ok_or_else(|| Error::failed(what))
     };
     let (id, places) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?]);
     let (link, area) = (column("link"), column("area"));
@@ -124,13 +118,12 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
         let line = row.position().map_or(0, csv::Position::line);
         let at = |e: Error| e.at(format!("line {line}"));
         let cell = |column: usize| row.get(column).unwrap_or_default();
-        let id: u32 = cell(id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
-            at(Error::failed(format!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(id))))
-        })?;
+        let id: u32 =
+            cell(id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
+                at(failed!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(id)))
+            })?;
         if let Some(before) = seen.insert(id, line) {
-            return Err(at(Error::failed(format!(
-                "id {id} stands on line {before} already; give each taxel one of its own"
-            ))));
+            return Err(at(failed!("id {id} is on line {before} already; give each taxel its own")));
         }
         let mut position = [0.0; 3];
         for (value, &column) in position.iter_mut().zip(&places) {
@@ -138,17 +131,12 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
                 .parse()
                 .ok()
                 .filter(|x: &f64| x.is_finite())
-                .ok_or_else(|| at(Error::failed(format!("`{}` is no coordinate; give metres", cell(column)))))?;
+                .ok_or_else(|| at(failed!("`{}` is no coordinate; give metres", cell(column))))?;
         }
         let mut position = DVec3::from_array(position);
         if let Some(name) = link.map(cell).filter(|name| !name.is_empty()) {
-            let links = &rest_surface.body.links;
-            let link = rest_surface.body.link_index(name).ok_or_else(|| {
-                let hint = nearest(name, links.iter().map(|link| link.name.as_str()));
-                let hint = hint.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
-                at(Error::failed(format!("the body has no link `{name}`{hint}")))
-            })?;
-            position = links[link].world_from_link.transform_point3(position);
+            let link = find_link(rest_surface.body, name).map_err(at)?;
+            position = rest_surface.body.links[link].world_from_link.transform_point3(position);
         }
         let area_m2 =
             area.map(cell).filter(|text| !text.is_empty()).map(|text| area_of(text).map_err(at)).transpose()?;
@@ -165,12 +153,16 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
     Ok(given)
 }
 
+/// The link called `name`.
+fn find_link(body: &Body, name: &str) -> Result<usize> {
+    let hint = || suggestion(name, body.links.iter().map(|link| link.name.as_str()));
+    body.link_index(name).ok_or_else(|| failed!("the body has no link `{name}`; {}", hint()))
+}
+
 /// Parses an area, m².
 fn area_of(text: &str) -> Result<f64> {
     let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
-    area.ok_or_else(|| {
-        Error::failed(format!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
-    })
+    area.ok_or_else(|| failed!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
 }
 
 /// The places of the taxels of `modality` in the iCub's position file at `path`, in the frame of `link` or of the link that
@@ -185,14 +177,8 @@ pub(super) fn of_icub(
     let place = |e: Error| e.at(path.display());
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
     let mut file = IcubFile::read(&text).map_err(place)?;
-    let links = &rest_surface.body.links;
-    let name = link.unwrap_or(&file.part);
-    let link = rest_surface.body.link_index(name).ok_or_else(|| {
-        let near = nearest(name, links.iter().map(|link| link.name.as_str()));
-        let hint = near.map_or("say which it is by `link`".to_owned(), |near| format!("did you mean `{near}`?"));
-        Error::failed(format!("the body has no link `{name}`; {hint}"))
-    })?;
-    let world_from_link = links[link].world_from_link;
+    let link = find_link(rest_surface.body, link.unwrap_or(&file.part))?;
+    let world_from_link = rest_surface.body.links[link].world_from_link;
     let chosen = file.taxels().filter(|(_, taxel)| taxel.modality == modality);
     let given: Vec<GivenPoint> = chosen
         .map(|(channel, taxel)| GivenPoint {
@@ -203,7 +189,7 @@ pub(super) fn of_icub(
         })
         .collect();
     if given.is_empty() {
-        return Err(place(Error::failed(format!("it has no taxel for {}", modality.name()))));
+        return Err(place(failed!("it has no taxel for {}", modality.name())));
     }
     let others = file.taxels().count() - given.len();
     let mut notes = std::mem::take(&mut file.notes);
@@ -231,12 +217,12 @@ pub(super) fn snap(
         let hit = hit.ok_or_else(|| Error::failed("the surface has no area to put taxels on"))?;
         let moved_m = hit.position.distance(place.position_in_world);
         if moved_m > within_m {
-            return Err(Error::failed(format!(
-                "{} lies {} from the surface, farther than the {} of `within`; put it right, or allow more",
+            return Err(failed!(
+                "{} lies {} from the surface, farther than the {} of `within`; correct it, or raise `within`",
                 place.name,
                 recipe::shown(moved_m),
                 recipe::shown(within_m)
-            )));
+            ));
         }
         let triangle = triangles[hit.triangle];
         let barycentric = barycentric(rest_surface.corners(triangle), hit.position);

@@ -1,68 +1,92 @@
 //! Values in recipes: lengths with units, globs, ranges of ids.
 
-use std::fmt;
+use std::str::FromStr;
 
-use serde::de::{Deserialize, Deserializer, Error as _, SeqAccess, Visitor};
+use globset::{GlobBuilder, GlobSet, GlobSetBuilder};
+use serde::Deserialize;
 
-use super::glob;
+use crate::error::{Error, Result, failed};
 
 /// A length over 0: a number of metres, or text with a unit, like `"8 mm"`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "NumberOrText")]
 pub struct Length {
     /// In m.
     pub metres: f64,
 }
 
-impl<'de> Deserialize<'de> for Length {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Reader;
-        impl Visitor<'_> for Reader {
-            type Value = f64;
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a length is a number of metres, or text like \"8 mm\"")]
+enum NumberOrText {
+    Number(f64),
+    Text(String),
+}
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a length: a number of metres, or text like \"8 mm\"")
-            }
-
-            fn visit_f64<E: serde::de::Error>(self, metres: f64) -> Result<f64, E> {
-                Ok(metres)
-            }
-
-            fn visit_i64<E: serde::de::Error>(self, metres: i64) -> Result<f64, E> {
-                Ok(metres as f64)
-            }
-
-            fn visit_u64<E: serde::de::Error>(self, metres: u64) -> Result<f64, E> {
-                Ok(metres as f64)
-            }
-
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<f64, E> {
-                let read = crate::length::Length::parse(text.trim()).ok().flatten();
-                let metres = read.and_then(|length| Some(length.number * length.unit_m?));
-                metres.ok_or_else(|| {
-                    E::custom(format!("`{text}` is no length; write one like \"8 mm\" (um, mm, cm or m)"))
-                })
-            }
-        }
-        let metres = deserializer.deserialize_any(Reader)?;
+impl Length {
+    fn new(metres: f64) -> Result<Self> {
         if metres.is_finite() && metres > 0.0 {
             return Ok(Self { metres });
         }
-        Err(D::Error::custom(format!("a length of {metres} m makes no sense here; give one over 0")))
+        Err(failed!("a length of {metres} m is invalid; write one over 0"))
     }
 }
 
-/// One glob or several, of which any may match. `*` also matches slashes.
-#[derive(Clone, Debug)]
+impl FromStr for Length {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let read = crate::length::Length::parse(text.trim()).ok().flatten();
+        let metres = read.and_then(|length| Some(length.number * length.unit_m?));
+        let wrong = || failed!("`{text}` is not a length; write a number and um, mm, cm or m, like 8mm");
+        Self::new(metres.ok_or_else(wrong)?)
+    }
+}
+
+impl TryFrom<NumberOrText> for Length {
+    type Error = Error;
+
+    fn try_from(value: NumberOrText) -> Result<Self> {
+        match value {
+            NumberOrText::Number(metres) => Self::new(metres),
+            NumberOrText::Text(text) => text.parse(),
+        }
+    }
+}
+
+/// One name or a list of names.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(from = "OneOrMany")]
+pub(super) struct Names(pub(super) Vec<String>);
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "write a name, or a list of names")]
+enum OneOrMany {
+    One(String),
+    Many(Vec<String>),
+}
+
+impl From<OneOrMany> for Names {
+    fn from(names: OneOrMany) -> Self {
+        match names {
+            OneOrMany::One(name) => Self(vec![name]),
+            OneOrMany::Many(names) => Self(names),
+        }
+    }
+}
+
+/// Globs over names (`palm*`, `finger_?`), of which any may match. `*` also matches slashes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(try_from = "Names")]
 pub struct Globs {
     text: Vec<String>,
-    set: glob::Globs,
+    set: GlobSet,
 }
 
 impl Globs {
-    /// Whether any of them matches `name`.
+    /// Whether any of them matches `name`; a name always matches itself, even with brackets in it.
     #[must_use]
     pub fn matches(&self, name: &str) -> bool {
-        self.set.is_match(name)
+        self.set.is_match(name) || self.text.iter().any(|glob| glob == name)
     }
 
     /// The globs as text.
@@ -70,38 +94,33 @@ impl Globs {
     pub fn text(&self) -> &[String] {
         &self.text
     }
+
+    /// The globs in a message.
+    pub(super) fn listed(&self) -> String {
+        self.text.join("`, `")
+    }
 }
 
-impl<'de> Deserialize<'de> for Globs {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Reader;
-        impl<'de> Visitor<'de> for Reader {
-            type Value = Vec<String>;
+impl TryFrom<Names> for Globs {
+    type Error = Error;
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a glob like \"l_*\", or a list of them")
-            }
-
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Vec<String>, E> {
-                Ok(vec![text.to_owned()])
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<String>, A::Error> {
-                let mut text = Vec::new();
-                while let Some(next) = list.next_element()? {
-                    text.push(next);
-                }
-                Ok(text)
-            }
+    fn try_from(Names(text): Names) -> Result<Self> {
+        let mut set = GlobSetBuilder::new();
+        let wrong = |e: &globset::Error| {
+            let glob = e.glob().unwrap_or_default();
+            failed!("`{glob}` is not a valid glob: {}", e.kind())
+        };
+        for glob in &text {
+            set.add(GlobBuilder::new(glob).build().map_err(|e| wrong(&e))?);
         }
-        let text = deserializer.deserialize_any(Reader)?;
-        let set = glob::Globs::new(&text).map_err(D::Error::custom)?;
+        let set = set.build().map_err(|e| wrong(&e))?;
         Ok(Self { text, set })
     }
 }
 
 /// A taxel's id, or an inclusive range of ids, like `"10..=20"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "IdOrRange")]
 pub struct Ids {
     /// The lowest.
     pub first: u32,
@@ -109,34 +128,26 @@ pub struct Ids {
     pub last: u32,
 }
 
-impl<'de> Deserialize<'de> for Ids {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Reader;
-        impl Visitor<'_> for Reader {
-            type Value = Ids;
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "write a taxel's id from 0 up, or a range of ids like \"10..=20\"")]
+enum IdOrRange {
+    Id(u32),
+    Range(String),
+}
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a taxel's id, or a range of ids like \"10..=20\"")
-            }
+impl TryFrom<IdOrRange> for Ids {
+    type Error = Error;
 
-            fn visit_i64<E: serde::de::Error>(self, id: i64) -> Result<Ids, E> {
-                let id = u32::try_from(id).map_err(|_| E::custom(format!("{id} is no taxel id; they count from 0")))?;
-                Ok(Ids { first: id, last: id })
-            }
-
-            fn visit_u64<E: serde::de::Error>(self, id: u64) -> Result<Ids, E> {
-                self.visit_i64(i64::try_from(id).unwrap_or(i64::MAX))
-            }
-
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Ids, E> {
-                let ends = text.split_once("..=").and_then(|(first, last)| {
-                    Some(Ids { first: first.trim().parse().ok()?, last: last.trim().parse().ok()? })
-                });
-                ends.filter(|ids| ids.first <= ids.last)
-                    .ok_or_else(|| E::custom(format!("`{text}` is no range of taxel ids; write one like \"10..=20\"")))
-            }
-        }
-        deserializer.deserialize_any(Reader)
+    fn try_from(value: IdOrRange) -> Result<Self> {
+        let text = match value {
+            IdOrRange::Id(id) => return Ok(Self { first: id, last: id }),
+            IdOrRange::Range(text) => text,
+        };
+        let ends = text.split_once("..=").and_then(|(first, last)| {
+            Some(Self { first: first.trim().parse().ok()?, last: last.trim().parse().ok()? })
+        });
+        ends.filter(|ids| ids.first <= ids.last)
+            .ok_or_else(|| failed!("`{text}` is not a range of taxel ids; write one like \"10..=20\""))
     }
 }
 
@@ -152,7 +163,7 @@ mod tests {
     }
 
     fn read(text: &str) -> Result<Words, String> {
-        toml::from_str(text).map_err(|e: toml::de::Error| e.message().to_owned())
+        crate::error::parse_toml(text).map_err(|e| e.to_string())
     }
 
     #[test]

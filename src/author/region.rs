@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::glob::Globs;
-use super::recipe::Origin;
+use super::origin::Origin;
+use super::recipe_values::Globs;
 use super::rest_surface::RestSurface;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Result, suggestion};
 
 /// The conditions for a triangle to be in a region; all must hold.
 #[derive(Clone, Debug)]
@@ -55,10 +55,7 @@ impl<'a> Regions<'a> {
             return Ok(());
         }
         let Some(region) = self.known.get(name) else {
-            let near = nearest(name, self.known.keys().map(String::as_str));
-            let hint = near
-                .map_or_else(|| "write a [regions] table for it".to_owned(), |near| format!("did you mean `{near}`?"));
-            return Err(asked_at.wrong(format!("there is no region `{name}`; {hint}")));
+            return Err(asked_at.wrong(format!("there is no region `{name}`")));
         };
         if !above.insert(name.to_owned()) {
             return Err(
@@ -92,17 +89,17 @@ impl<'a> Regions<'a> {
             .zip(details)
             .map(|(surface, part)| {
                 let named = region.node.as_ref().is_none_or(|globs| {
-                    globs.is_match(&surface.name) || part.mesh.as_ref().is_some_and(|mesh| globs.is_match(mesh))
+                    globs.matches(&surface.name) || part.mesh.as_ref().is_some_and(|mesh| globs.matches(mesh))
                 });
                 let material = region
                     .material
                     .as_ref()
-                    .is_none_or(|globs| part.material.as_ref().is_some_and(|name| globs.is_match(name)));
+                    .is_none_or(|globs| part.material.as_ref().is_some_and(|name| globs.matches(name)));
                 (named, material)
             })
             .collect();
         let links: Vec<bool> = (rest_surface.body.links.iter())
-            .map(|link| region.node.as_ref().is_some_and(|globs| globs.is_match(&link.name)))
+            .map(|link| region.node.as_ref().is_some_and(|globs| globs.matches(&link.name)))
             .collect();
         let is_in = |triangle: usize| {
             let (named, material) = by_part[rest_surface.origin[triangle].0 as usize];
@@ -123,22 +120,11 @@ impl<'a> Regions<'a> {
     fn why_empty(&self, name: &str, region: &Region) -> String {
         let rest_surface = self.rest_surface;
         let mut reasons = Vec::new();
-        let list = |names: BTreeSet<&str>| {
-            let shown: Vec<&str> = names.iter().copied().take(12).collect();
-            let more = if names.len() > shown.len() { ", …" } else { "" };
-            format!("{}{more}", shown.join(", "))
-        };
         let mut look = |globs: &Option<Globs>, what: &str, names: BTreeSet<&str>| {
-            let Some(globs) = globs else { return };
-            if names.iter().any(|name| globs.is_match(name)) {
-                return;
+            if let Some(globs) = globs.as_ref().filter(|globs| !names.iter().any(|name| globs.matches(name))) {
+                let asked = globs.listed();
+                reasons.push(format!("no {what} is called `{asked}`; {}", suggestion(&asked, names)));
             }
-            let hint = match nearest(globs.first(), names.iter().copied()) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None if names.is_empty() => "there is none with a name".to_owned(),
-                None => format!("there is {}", list(names)),
-            };
-            reasons.push(format!("no {what} is called `{}`; {hint}", globs.text()));
         };
         let mut nodes: BTreeSet<&str> =
             rest_surface.body.surfaces.iter().map(|surface| surface.name.as_str()).collect();
@@ -155,13 +141,8 @@ impl<'a> Regions<'a> {
             let (low, high) =
                 all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
             reasons
-                .push(format!("no triangle has all that it asks for; the skin lies between {low:.3} and {high:.3} m"));
+                .push(format!("no triangle meets all conditions; the surface lies between {low:.3} and {high:.3} m"));
         }
         format!("region `{name}` is empty: {}", reasons.join("; "))
     }
-}
-
-/// The error for a place without any triangle.
-pub(super) fn nothing_left(name: &str) -> Error {
-    Error::failed(format!("place `{name}` has no skin: its regions are all kept bare"))
 }

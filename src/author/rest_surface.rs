@@ -4,10 +4,10 @@ use std::cell::OnceCell;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::place::Placed;
-use super::{blend_skinning, heaviest_four};
-use crate::body::{Body, Details, Home, Modality, Skinning, Taxel, Topology};
-use crate::error::{Error, Result, nearest};
+use super::placed::Placed;
+use super::skin_weights::{blend_skinning, heaviest_four};
+use crate::body::{Body, Details, Home, Modality, Paint, Skinning, Taxel, Topology, area_vector};
+use crate::error::{Result, failed, suggestion};
 
 /// All surfaces of a body as one mesh.
 pub(super) struct RestSurface<'a> {
@@ -109,60 +109,34 @@ impl<'a> RestSurface<'a> {
 
     /// The area of `triangle`, m².
     pub(super) fn area(&self, triangle: usize) -> f64 {
-        let [a, b, c] = self.corners(triangle);
-        (b - a).cross(c - a).length() / 2.0
+        area_vector(self.corners(triangle)).length() / 2.0
     }
 
     /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it.
     ///
     /// # Errors
-    /// No part has such an attribute, or it has several numbers and `name` has no channel.
+    /// No part has such an attribute.
     pub(super) fn painted(&self, name: &str) -> Result<Vec<Option<f64>>> {
-        let (attribute, channel) = match name.rsplit_once('.') {
-            Some((attribute, channel)) => {
-                let place = ["rgba", "xyzw", "0123"].iter().find_map(|names| names.find(channel));
-                let place = place.filter(|_| channel.len() == 1).ok_or_else(|| {
-                    Error::failed(format!("`{name}` ends in no number of a colour; write r, g, b or a after the dot"))
-                })?;
-                (attribute, Some(place))
-            }
-            None => (name, None),
-        };
         let mut values = vec![None; self.positions.len()];
-        let (mut known, mut found) = (Vec::new(), false);
+        let mut found = false;
         for (part, &first) in self.details.parts.iter().zip(&self.first_vertex) {
-            known.extend(part.paints.iter().map(|paint| paint.name.as_str()));
-            let Some(paint) = part.paints.iter().find(|paint| paint.name == attribute) else { continue };
+            let column = part.paints.iter().find_map(|paint| Some((paint, paint.column(name)?)));
+            let Some((paint, column)) = column else { continue };
             found = true;
-            let place = match channel {
-                None if paint.width > 1 => {
-                    return Err(Error::failed(format!(
-                        "`{name}` has {} numbers a vertex; say which one, as in `{name}.r`",
-                        paint.width
-                    )));
-                }
-                Some(place) if place >= paint.width => {
-                    return Err(Error::failed(format!("`{attribute}` has only {} numbers a vertex", paint.width)));
-                }
-                place => place.unwrap_or(0),
-            };
             for (vertex, row) in paint.values.chunks_exact(paint.width).enumerate() {
-                values[first as usize + vertex] = Some(f64::from(row[place]));
+                values[first as usize + vertex] = Some(f64::from(row[column]));
             }
         }
         if found {
             return Ok(values);
         }
-        known.sort_unstable();
-        known.dedup();
-        Err(Error::failed(match (nearest(attribute, known.iter().copied()), &known[..]) {
-            (Some(near), _) => format!("no mesh has an attribute `{attribute}`; did you mean `{near}`?"),
-            (None, []) => format!(
-                "no mesh has an attribute `{attribute}`, nor any that is painted; from Blender, export with `Attributes` on \
-                 and the name beginning with an underscore"
-            ),
-            (None, known) => format!("no mesh has an attribute `{attribute}`; there is {}", known.join(", ")),
-        }))
+        let known: Vec<String> =
+            self.details.parts.iter().flat_map(|part| &part.paints).flat_map(Paint::names).collect();
+        let hint = match known.is_empty() {
+            true => "in Blender begin its name with an underscore, and export with `Attributes` on".to_owned(),
+            false => suggestion(name, known.iter().map(String::as_str)),
+        };
+        Err(failed!("no mesh has an attribute `{name}`; {hint}"))
     }
 
     /// The taxel `id` at `placed`, whose triangle is one of this surface.
@@ -173,8 +147,8 @@ impl<'a> RestSurface<'a> {
         let first = self.first_vertex[part];
         let corners = self.triangles[placed.triangle].map(|v| v - first);
         let at = |corner: usize| surface.positions[corners[corner] as usize] * placed.barycentric[corner];
-        let [a, b, c] = surface.triangles[index as usize].map(|v| surface.positions[v as usize]);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let in_mesh = surface.triangles[index as usize].map(|v| surface.positions[v as usize]);
+        let normal = area_vector(in_mesh).normalize_or_zero();
         let carriers =
             self.skinning[part].as_ref().map(|skinning| blend_skinning(skinning, corners, placed.barycentric));
         let (link, link_from_mesh) = match (&surface.home, &carriers) {

@@ -6,9 +6,8 @@ use std::collections::{BTreeMap, BinaryHeap};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::SurfacePoint;
 use super::grid::{Grid, GridPoint};
-use super::place::{Placed, Progress};
+use super::placed::{Placed, Progress, same_side};
 
 /// Samples per unit of parallel work.
 const CHUNK: usize = 4096;
@@ -16,21 +15,8 @@ const CHUNK: usize = 4096;
 /// Initial capacity for neighbours of a sample; with five samples per point there are 18 on average.
 const EXPECTED_NEIGHBOURS: usize = 20;
 
-/// cos 90° with a tolerance for rounding: the two faces at a box's edge are neighbours, those of a sharper edge are not.
-const MIN_NORMAL_COSINE: f64 = -1e-9;
-
 /// Maximum number of grids, each with twice the cell size of the one before.
 const MAX_GRID_LEVELS: i32 = 24;
-
-/// Whether two samples are on the same side of a part: normals over 90° apart belong to two sides of a thin part.
-pub(super) fn same_side(a: &Placed, b: &Placed) -> bool {
-    points_on_same_side(&a.point, &b.point)
-}
-
-/// The same for two points.
-pub(super) fn points_on_same_side(a: &SurfacePoint, b: &SurfacePoint) -> bool {
-    a.normal.dot(b.normal) > MIN_NORMAL_COSINE
-}
 
 /// Per sample its neighbours: samples on the same side within the smaller of both reaches, with a value computed from
 /// distance and reach.

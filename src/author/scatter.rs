@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::SurfacePoint;
-use super::place::Placed;
+use super::placed::{Placed, SurfacePoint};
 use super::random::Random;
-use crate::error::{Error, Result};
+use crate::body::area_vector;
+use crate::error::{Error, Result, failed};
 
 /// Maximum number of subdivisions of a triangle.
 const MAX_CUTS: u32 = 12;
@@ -31,16 +31,12 @@ pub(super) struct Pieces {
     weight_up_to: Vec<f64>,
 }
 
-fn area_of([a, b, c]: [DVec3; 3]) -> f64 {
-    (b - a).cross(c - a).length() / 2.0
+fn area_of(corners: [DVec3; 3]) -> f64 {
+    area_vector(corners).length() / 2.0
 }
 
 fn at([a, b, c]: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     a * weights[0] + b * weights[1] + c * weights[2]
-}
-
-fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// The corners of each triangle.
@@ -51,7 +47,7 @@ fn corners(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[DVec3; 3]
         .enumerate()
         .map(|(index, &[a, b, c])| match (corner(a), corner(b), corner(c)) {
             (Some(a), Some(b), Some(c)) => Ok([a, b, c]),
-            _ => Err(Error::failed(format!("triangle {index} names a vertex that is not there"))),
+            _ => Err(failed!("triangle {index} names a vertex that is not there")),
         })
         .collect()
 }
@@ -79,17 +75,18 @@ impl Pieces {
             let own = piece.within.map(|corner| at(triangle, corner));
             let middle = SurfacePoint {
                 position: (own[0] + own[1] + own[2]) / 3.0,
-                normal: normal_of(triangle),
+                normal: area_vector(triangle).normalize_or_zero(),
                 area: area_of(own),
             };
             let [p, q, r] = piece.within;
             let barycentric = std::array::from_fn(|k| (p[k] + q[k] + r[k]) / 3.0);
             piece.density = density(&Placed { point: middle, triangle: piece.triangle as usize, barycentric });
             if !(piece.density.is_finite() && piece.density >= 0.0) {
-                return Err(Error::failed(format!(
+                return Err(failed!(
                     "the density of taxels is {} at {}; it should be a number from 0 up",
-                    piece.density, middle.position
-                )));
+                    piece.density,
+                    middle.position
+                ));
             }
             Ok((piece, middle.area))
         };
@@ -160,7 +157,11 @@ impl Pieces {
                     }
                 };
                 let position = at(triangle, barycentric);
-                let point = SurfacePoint { position, normal: normal_of(triangle), area: share / piece.density };
+                let point = SurfacePoint {
+                    position,
+                    normal: area_vector(triangle).normalize_or_zero(),
+                    area: share / piece.density,
+                };
                 Placed { point, triangle: piece.triangle as usize, barycentric }
             })
             .collect()

@@ -4,19 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::SurfacePoint;
-use super::group::painted::FilePaint;
-use super::group::{Grouper, Grouping, group as group_by};
+use super::group::{FilePaint, Grouper, Grouping, group as group_by};
 use super::lattice::Lattice;
-use super::lint::listed;
-use super::place::{self, Placed, Progress, nearest_on_its_side};
+use super::origin::Origin;
+use super::place::{evenly_apart, nearest_on_its_side, place_apart, place_by_density, place_evenly};
+use super::placed::{Placed, Progress, SurfacePoint};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
-use super::recipe::{Origin, PlaceSpec, Placement, Recipe, shown};
+use super::recipe::{PlaceSpec, Placement, Recipe, shown};
 use super::refresh::refresh;
-use super::region::{Regions, nothing_left};
+use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
-use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel};
-use crate::error::{Error, Result};
+use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel, listed};
+use crate::error::{Error, Result, failed};
 use crate::field::unions;
 
 /// Progress before and after placing taxels.
@@ -75,7 +74,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         if let Some(finding) = body.findings.first() {
             return Err(Error::failed(finding).at(file.name()));
         }
-        let what = "it has no taxels, and none are asked for; say how many (`--taxels 500`), or write a recipe with a [[place]]";
+        let what = "it has no taxels; give a number of taxels (`--taxels 500`), or a recipe with a [[place]]";
         return Err(Error::usage(what).at(file.name()));
     }
     if body.surfaces.is_empty() && !recipe.places.is_empty() {
@@ -85,7 +84,9 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     let mut notes = std::mem::take(&mut file.notes);
     if !body.taxels.is_empty() {
         notes.append(&mut body.findings);
-        notes.extend(refresh_file(&mut file, &body, &details)?);
+        let mut now = body.clone();
+        notes.extend(refresh(&mut now));
+        notes.extend(file.amend(&body, &now, &details)?);
         (body, details) = file.read()?;
     }
     let keeps_fields = asks_nothing && !body.fields.is_empty();
@@ -111,7 +112,8 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
             region.iter_mut().zip(&bare).for_each(|(own, bare)| *own &= !bare);
         }
         if !region.contains(&true) {
-            return Err(place.at.put(nothing_left(&place.name)));
+            let what = format!("place `{}` has no surface left: all of its regions are `bare`", place.name);
+            return Err(place.at.wrong(what));
         }
         let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
         let tick = &mut |done: f64| progress(PROGRESS_OPENED + share * (index as f64 + done));
@@ -145,14 +147,6 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     Ok(Authored { file, body, places: reports, notes })
 }
 
-/// Updates the taxels and fields of `file` that stay. Returns a line for each change.
-fn refresh_file(file: &mut Original, body: &Body, details: &Details) -> Result<Vec<String>> {
-    let mut now = body.clone();
-    let mut notes = refresh(&mut now);
-    notes.extend(file.amend(body, &now, details)?);
-    Ok(notes)
-}
-
 fn place_taxels(
     rest_surface: &RestSurface<'_>,
     region: &[bool],
@@ -170,30 +164,30 @@ fn place_taxels(
     };
     Ok(match &place.how {
         Placement::Evenly { count, apart_m: None } => {
-            sampled(place::evenly(positions, &triangles, *count, seed, progress)?)
+            sampled(place_evenly(positions, &triangles, *count, seed, progress)?)
         }
         Placement::Evenly { count, apart_m: Some(apart_m) } => {
             let area: f64 = chosen.iter().map(|&triangle| rest_surface.area(triangle)).sum();
             let wrong = |most: String| {
-                Error::failed(format!(
+                failed!(
                     "{count} taxels do not fit {} apart on {:.1} cm²; {most}, or ask for a smaller spacing",
                     shown(*apart_m),
                     area * 1e4
-                ))
+                )
             };
             // The densest packing on both sides of thin parts.
             let most = area * 2.0 / (3.0_f64.sqrt() * apart_m * apart_m);
             if *count as f64 > most + 1.0 {
                 return Err(wrong(format!("not even the densest packing holds over {most:.0}")));
             }
-            match place::evenly_apart(positions, &triangles, *count, *apart_m, seed, progress)? {
+            match evenly_apart(positions, &triangles, *count, *apart_m, seed, progress)? {
                 Ok(placed) => sampled(placed),
                 Err(fit) => return Err(wrong(format!("ask for at most {fit}"))),
             }
         }
         Placement::Apart { spacing_m } => {
             check_fits(rest_surface, &chosen, "spacing", *spacing_m)?;
-            sampled(place::apart(positions, &triangles, *spacing_m, seed, progress)?)
+            sampled(place_apart(positions, &triangles, *spacing_m, seed, progress)?)
         }
         Placement::Density { count, attribute } => {
             let painted = rest_surface.painted(attribute)?;
@@ -201,7 +195,7 @@ fn place_taxels(
                 let corners = triangles[p.triangle].map(|v| painted[v as usize].unwrap_or(0.0));
                 corners.iter().zip(p.barycentric).map(|(value, weight)| value * weight).sum()
             };
-            sampled(place::by_density(positions, &triangles, *count, seed, density, progress)?)
+            sampled(place_by_density(positions, &triangles, *count, seed, density, progress)?)
         }
         Placement::Grid { hexagonal, pitch_m, origin, u } => {
             check_fits(rest_surface, &chosen, "pitch", *pitch_m)?;
@@ -244,12 +238,12 @@ fn check_fits(rest_surface: &RestSurface<'_>, chosen: &[usize], key: &str, lengt
     if length_m <= across_m {
         return Ok(());
     }
-    Err(Error::failed(format!(
+    Err(failed!(
         "a {key} of {} is wider than what it is for, which is {} across; numbers are metres: for millimetres write \"{} mm\"",
         shown(length_m),
         shown(across_m),
         length_m
-    )))
+    ))
 }
 
 /// The note on taxels without an area.
@@ -344,7 +338,7 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
     let are = if loose.len() == 1 { "taxel is" } else { "taxels are" };
     (!loose.is_empty()).then(|| {
         format!(
-            "{} {are} in no field, so that nothing is felt there; put them into a [[fields]]: {}",
+            "{} {are} in no field, so touches there are not reported; add them to a [[fields]]: {}",
             loose.len(),
             listed(&loose)
         )

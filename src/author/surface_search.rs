@@ -26,29 +26,26 @@ pub(super) struct SurfaceSearch<'a> {
 
 impl<'a> SurfaceSearch<'a> {
     pub(super) fn of(body: &'a Body) -> Self {
-        let in_world = |surface: &'a Surface| match &surface.home {
-            Home::Rigid { link, link_from_mesh } => {
-                Some(surface.corners_through(body.links[*link].world_from_link * *link_from_mesh))
-            }
-            Home::Skinned { .. } => None,
-        };
-        let rigid: Vec<[DVec3; 3]> = body.surfaces.iter().filter_map(in_world).flatten().collect();
-        let largest = body.surfaces.iter().map(|surface| {
-            let of_points = |way: DAffine3| {
-                let places = surface.positions.iter().map(|&p| way.transform_point3(p).abs().max_element());
-                places.fold(0.0, f64::max)
+        let (mut rigid, mut skinned, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
+        for surface in &body.surfaces {
+            // Coordinates are rounded in the mesh and in the taxels' node.
+            let mut measure = |way: DAffine3| {
+                let far = surface.positions.iter().map(|&p| way.transform_point3(p).abs().max_element());
+                largest = far.fold(largest, f64::max);
             };
             match &surface.home {
-                // Coordinates are rounded in the mesh and in the taxels' node.
-                Home::Rigid { link_from_mesh, .. } => of_points(*link_from_mesh),
-                Home::Skinned { joints, .. } => joints.iter().map(|&(_, way)| of_points(way)).fold(0.0, f64::max),
+                Home::Rigid { link, link_from_mesh } => {
+                    measure(*link_from_mesh);
+                    rigid.extend(surface.corners_through(body.links[*link].world_from_link * *link_from_mesh));
+                }
+                Home::Skinned { joints, .. } => {
+                    joints.iter().for_each(|&(_, way)| measure(way));
+                    skinned.push((surface, Vec::new()));
+                }
             }
-        });
-        let tolerance_m = ON_SURFACE_M + ROUNDING * largest.fold(0.0, f64::max);
-        let skinned = body.surfaces.iter().filter(|surface| matches!(surface.home, Home::Skinned { .. }));
-        let mut surface_search =
-            Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned: Vec::new(), tolerance_m };
-        surface_search.skinned = skinned.map(|surface| (surface, Vec::new())).collect();
+        }
+        let tolerance_m = ON_SURFACE_M + ROUNDING * largest;
+        let mut surface_search = Self { body, rigid: SurfaceIndex::of_triangles(rigid), skinned, tolerance_m };
         for link in 0..body.links.len() {
             if body.taxels.iter().any(|taxel| taxel.link == link) {
                 surface_search.add_link(link);

@@ -12,10 +12,9 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::lattice::{inward, walk};
-use super::place::Placed;
+use super::placed::{Placed, points_on_same_side};
 use super::rest_surface::RestSurface;
-use super::sample_neighbours::points_on_same_side;
-use crate::body::{NONE, SurfaceIndex, Topology};
+use crate::body::{NONE, SurfaceIndex, Topology, area_vector};
 use crate::field::geodesic::{LogMap, SurfacePlace};
 
 /// Taxels nearer to each other than this are coincident, m.
@@ -122,7 +121,8 @@ impl<'a> Sites<'a> {
         let mut limit_m = (REACH_OF_SIXTH * sixth).min(REACH_OF_SECOND * second);
         let start = Some(self.places[site]).filter(|place| place.triangle != NONE).map(inward)?;
         for doubling in 0..=MAX_DOUBLINGS {
-            let u = self.normal(start.triangle).any_orthonormal_vector();
+            let normal = area_vector(self.topology.corners(start.triangle)).normalize_or_zero();
+            let u = normal.any_orthonormal_vector();
             let map = LogMap::new(self.topology, start, u, limit_m).ok()?;
             let around = self.around(site, &map, limit_m);
             if around.len() >= 2.min(near.len()) || (doubling == MAX_DOUBLINGS && !around.is_empty()) {
@@ -132,11 +132,6 @@ impl<'a> Sites<'a> {
             limit_m *= 2.0;
         }
         None
-    }
-
-    fn normal(&self, triangle: u32) -> DVec3 {
-        let [a, b, c] = self.topology.corners(triangle);
-        (b - a).cross(c - a).normalize_or_zero()
     }
 
     /// The sites within `limit_m` of `site` on `map`, the nearest first.
@@ -171,31 +166,18 @@ fn tree(positions: impl Iterator<Item = DVec3>) -> RTree<Spot> {
     RTree::bulk_load(positions.zip(0..).map(|(p, index)| Spot::new(p.to_array(), index)).collect())
 }
 
-/// What lies beyond a side of a cell.
+/// A neighbouring taxel, or the mirror image of one where the layout ends.
 #[derive(Clone, Copy, PartialEq)]
-enum Beyond {
-    /// The initial square.
-    Nothing,
-    /// A neighbouring taxel.
-    Taxel(DVec2),
-    /// The mirror image of a neighbour, where the layout ends.
-    Image(DVec2),
+struct Neighbour {
+    point: DVec2,
+    is_image: bool,
 }
 
-impl Beyond {
-    fn point(self) -> Option<DVec2> {
-        match self {
-            Self::Nothing => None,
-            Self::Taxel(point) | Self::Image(point) => Some(point),
-        }
-    }
-}
-
-/// A side of a cell: its start, and what lies beyond it.
+/// A side of a cell: its start, and the neighbour beyond it; `None` for a side of the initial square.
 #[derive(Clone, Copy)]
 struct Side {
     from: DVec2,
-    beyond: Beyond,
+    beyond: Option<Neighbour>,
 }
 
 /// A convex polygon around the origin, counter-clockwise.
@@ -205,24 +187,24 @@ impl Cell {
     /// The cell of a taxel with the neighbours `around`, the nearest first, up to `limit_m`.
     fn new(around: &[DVec2], limit_m: f64) -> Self {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        let side = |(x, y)| Side { from: DVec2::new(x, y) * limit_m, beyond: Beyond::Nothing };
+        let side = |(x, y)| Side { from: DVec2::new(x, y) * limit_m, beyond: None };
         let mut cell = Self(corners.map(side).to_vec());
-        around.iter().for_each(|&neighbour| cell.cut(Beyond::Taxel(neighbour)));
-        let images: Vec<DVec2> = cell.beside().filter_map(|side| side.beyond.point()).map(|point| -point).collect();
+        around.iter().for_each(|&neighbour| cell.cut(Neighbour { point: neighbour, is_image: false }));
+        let images: Vec<DVec2> = cell.beside().map(|(_, neighbour)| -neighbour.point).collect();
         // The third nearest is typical: the nearest may be too near, others across a gap.
         let usual_m = around.get(2).or(around.last()).map_or(0.0, |neighbour| neighbour.length());
         let open: Vec<DVec2> = images.into_iter().filter(|&image| cell.is_open(image, usual_m, around)).collect();
-        open.into_iter().for_each(|image| cell.cut(Beyond::Image(image)));
+        open.into_iter().for_each(|image| cell.cut(Neighbour { point: image, is_image: true }));
         let pitch_m = around.first().map_or(0.0, |nearest| nearest.length());
         cell.close(pitch_m);
         cell
     }
 
-    /// Its sides towards taxels and images, without rounding errors.
-    fn beside(&self) -> impl Iterator<Item = &Side> {
-        (0..self.0.len()).map(|side| (&self.0[side], self.end(side))).filter_map(|(side, end)| {
-            let length = side.beyond.point()?.length();
-            (side.from.distance(end) > MIN_SIDE * length).then_some(side)
+    /// Its sides with a neighbour beyond them, without rounding errors.
+    fn beside(&self) -> impl Iterator<Item = (usize, Neighbour)> {
+        let sides = self.0.iter().enumerate().filter_map(|(index, side)| Some((index, side.beyond?)));
+        sides.filter(|&(index, neighbour)| {
+            self.0[index].from.distance(self.end(index)) > MIN_SIDE * neighbour.point.length()
         })
     }
 
@@ -230,9 +212,9 @@ impl Cell {
         self.0[(side + 1) % self.0.len()].from
     }
 
-    /// Cuts off the part nearer to the point `beyond` than to the origin.
-    fn cut(&mut self, beyond: Beyond) {
-        let Some(point) = beyond.point() else { return };
+    /// Cuts off the part nearer to `neighbour` than to the origin.
+    fn cut(&mut self, neighbour: Neighbour) {
+        let point = neighbour.point;
         let distance_beyond = |p: DVec2| p.dot(point) - point.length_squared() / 2.0;
         if self.0.iter().all(|side| distance_beyond(side.from) <= 0.0) {
             return;
@@ -246,7 +228,7 @@ impl Cell {
                 kept.push(*side);
             }
             if before <= 0.0 && after > 0.0 {
-                kept.push(Side { from: crossing(), beyond });
+                kept.push(Side { from: crossing(), beyond: Some(neighbour) });
             }
             if before > 0.0 && after <= 0.0 {
                 kept.push(Side { from: crossing(), ..*side });
@@ -267,20 +249,16 @@ impl Cell {
 
     /// Closes the cell at half of `pitch_m` where it is still open: at the end of a row, or at a sharp corner.
     fn close(&mut self, pitch_m: f64) {
-        let sides: Vec<Side> = self.beside().copied().collect();
-        let meet = |side: &Side, next: &Side| {
-            let index = self.0.iter().position(|own| own.from == side.from && own.beyond == side.beyond);
-            index.is_some_and(|index| self.end(index).distance(next.from) <= MIN_SIDE * pitch_m)
-        };
+        let sides: Vec<(usize, Neighbour)> = self.beside().collect();
         let mut images = Vec::new();
-        for (index, side) in sides.iter().enumerate() {
-            let next = &sides[(index + 1) % sides.len()];
-            let (Some(a), Some(b)) = (side.beyond.point(), next.beyond.point()) else { continue };
-            let both_real = matches!((side.beyond, next.beyond), (Beyond::Taxel(_), Beyond::Taxel(_)));
+        for (number, &(side, own)) in sides.iter().enumerate() {
+            let (next_side, next) = sides[(number + 1) % sides.len()];
+            let (a, b) = (own.point, next.point);
+            let meet = || self.end(side).distance(self.0[next_side].from) <= MIN_SIDE * pitch_m;
             let turn = libm::atan2(a.perp_dot(b), a.dot(b)).rem_euclid(TAU);
             let turn = if sides.len() == 1 { TAU } else { turn };
             // The gap between two adjacent taxels is not open.
-            if turn < MAX_SIDE_TURN || (both_real && sides.len() > 1 && meet(side, next)) {
+            if turn < MAX_SIDE_TURN || (!own.is_image && !next.is_image && sides.len() > 1 && meet()) {
                 continue;
             }
             let missing = (turn / FRAC_PI_2 - 1e-6).ceil() - 1.0;
@@ -289,12 +267,12 @@ impl Cell {
                 images.push(DVec2::new(cos, sin).rotate(a).normalize() * pitch_m);
             }
         }
-        images.into_iter().for_each(|image| self.cut(Beyond::Image(image)));
+        images.into_iter().for_each(|image| self.cut(Neighbour { point: image, is_image: true }));
     }
 
     /// Its extent in the unit direction `direction`.
     fn reach(&self, direction: DVec2) -> f64 {
-        let sides = self.0.iter().filter_map(|side| side.beyond.point());
+        let sides = self.0.iter().filter_map(|side| Some(side.beyond?.point));
         let across = sides.filter(|point| point.dot(direction) > 0.0);
         across.map(|point| point.length_squared() / 2.0 / point.dot(direction)).fold(f64::INFINITY, f64::min)
     }

@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::details::Details;
 use super::document::Document;
 use super::json_edit::JsonEdit;
-use super::layout::{FIELD_KEY, NORMAL, TAXEL_ID};
+use super::layout::{FIELD_KEY, FieldSpec, NORMAL, TAXEL_ID};
+use super::model::Body;
 use super::original::Original;
-use super::read::custom;
-use super::{Body, FieldSpec};
+use super::primitives::custom;
 use crate::error::Result;
 
 /// New columns of taxel attributes: by mesh and primitive, the name (without underscore) and one number per point.
@@ -38,7 +38,7 @@ impl Original {
         let meshes = edit.list("meshes");
         let mut added: BTreeMap<(usize, usize), Vec<(String, String)>> = BTreeMap::new();
         for ((mesh, primitive), name, accessor) in accessors {
-            let primitives = edit.member(&meshes[mesh], "primitives").map_or_else(Vec::new, |s| edit.elements(&s));
+            let primitives = edit.list_in(&meshes[mesh], "primitives");
             let Some(attributes) = primitives.get(primitive).and_then(|p| edit.member(p, "attributes")) else {
                 continue;
             };

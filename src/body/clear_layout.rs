@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use super::json_edit::{JsonEdit, Span};
 use super::layout::{FIELD_KEY, TAXEL_ID};
 use super::original::{Original, set_length};
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 
 /// Prefixes of extensions that do not refer to nodes by number.
 const EXTENSIONS_WITHOUT_NODES: [&str; 6] =
@@ -27,8 +27,17 @@ struct OldLayout {
     mixed: Vec<usize>,
 }
 
-/// Removes the fields from `original`, and unless `keep_taxels` the taxels.
-pub(super) fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result<()> {
+impl Original {
+    /// Removes its fields, and unless `keep_taxels` its taxels.
+    ///
+    /// # Errors
+    /// They cannot be removed, because an extension may refer to later nodes by number.
+    pub fn clear_layout(&mut self, keep_taxels: bool) -> Result<()> {
+        clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
+    }
+}
+
+fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result<()> {
     let edit = JsonEdit::new(&original.text);
     let old = find(&edit, keep_taxels);
     if old.nodes.is_empty() && old.emptied.is_empty() && old.mixed.is_empty() {
@@ -36,15 +45,15 @@ pub(super) fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result
     }
     let count = edit.list("nodes").len();
     let shifts = old.nodes.first().is_some_and(|&first| count - first > old.nodes.len());
-    let used = edit.member(&edit.root(), "extensionsUsed").map_or_else(Vec::new, |list| edit.elements(&list));
+    let used = edit.list("extensionsUsed");
     let used = used.iter().map(|span| edit.get(span).trim_matches('"'));
     let numbering_extension =
         used.into_iter().find(|name| !EXTENSIONS_WITHOUT_NODES.iter().any(|known| name.starts_with(known)));
     if let Some(name) = numbering_extension.filter(|_| shifts) {
-        return Err(Error::failed(format!(
+        return Err(failed!(
             "its old layout stands between nodes that the extension {name} may number; remove the taxels and fields in an \
              editor, or start from the file without them"
-        )));
+        ));
     }
     let text = emptied(edit, &old);
     let (text, end) = without(JsonEdit::new(&text), &old);
@@ -55,29 +64,16 @@ pub(super) fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result
     Ok(())
 }
 
-fn numbers(edit: &JsonEdit<'_>, span: &Span, key: &str) -> Vec<usize> {
-    let list = edit.member(span, key).map_or_else(Vec::new, |list| edit.elements(&list));
-    list.iter().filter_map(|span| edit.number(span)).collect()
-}
-
-fn number(edit: &JsonEdit<'_>, span: &Span, key: &str) -> Option<usize> {
-    edit.member(span, key).and_then(|span| edit.number(&span))
-}
-
 fn is_taxels(edit: &JsonEdit<'_>, primitive: &Span) -> bool {
     let attributes = edit.member(primitive, "attributes").map_or_else(Vec::new, |span| edit.members(&span));
-    number(edit, primitive, "mode") == Some(0)
+    edit.number_in(primitive, "mode") == Some(0)
         && attributes.iter().any(|(key, _)| key.strip_prefix('_') == Some(TAXEL_ID))
-}
-
-fn primitives(edit: &JsonEdit<'_>, mesh: &Span) -> Vec<Span> {
-    edit.member(mesh, "primitives").map_or_else(Vec::new, |list| edit.elements(&list))
 }
 
 fn find(edit: &JsonEdit<'_>, keep_taxels: bool) -> OldLayout {
     let (nodes, meshes) = (edit.list("nodes"), edit.list("meshes"));
     let taxels_of = |mesh: &Span| {
-        let primitives = primitives(edit, mesh);
+        let primitives = edit.list_in(mesh, "primitives");
         let taxels = primitives.iter().filter(|primitive| is_taxels(edit, primitive)).count();
         (taxels, primitives.len())
     };
@@ -90,11 +86,14 @@ fn find(edit: &JsonEdit<'_>, keep_taxels: bool) -> OldLayout {
     };
     old.meshes = (0..meshes.len()).filter(|&mesh| all_taxels(mesh)).collect();
 
-    let needed = needed_nodes(edit);
-    let children: Vec<Vec<usize>> = nodes.iter().map(|node| numbers(edit, node, "children")).collect();
+    let needed: BTreeSet<usize> = node_numbers(edit).iter().filter_map(|span| edit.number(span)).collect();
+    let children: Vec<Vec<usize>> = nodes
+        .iter()
+        .map(|node| edit.list_in(node, "children").iter().filter_map(|span| edit.number(span)).collect())
+        .collect();
     let mut layout = Vec::new();
     for (index, node) in nodes.iter().enumerate() {
-        let mesh = number(edit, node, "mesh");
+        let mesh = edit.number_in(node, "mesh");
         let is_field = edit.member(node, "extras").is_some_and(|extras| edit.member(&extras, FIELD_KEY).is_some());
         let shows_taxels = mesh.is_some_and(all_taxels);
         if is_field || shows_taxels {
@@ -118,20 +117,15 @@ fn find(edit: &JsonEdit<'_>, keep_taxels: bool) -> OldLayout {
     old
 }
 
-/// Nodes used by skins and animations.
-fn needed_nodes(edit: &JsonEdit<'_>) -> BTreeSet<usize> {
-    node_numbers(edit).iter().filter_map(|span| edit.number(span)).collect()
-}
-
 /// Places of node numbers in skins and animations.
 fn node_numbers(edit: &JsonEdit<'_>) -> Vec<Span> {
     let mut spans = Vec::new();
     for skin in edit.list("skins") {
         spans.extend(edit.member(&skin, "skeleton"));
-        spans.extend(edit.member(&skin, "joints").map_or_else(Vec::new, |list| edit.elements(&list)));
+        spans.extend(edit.list_in(&skin, "joints"));
     }
     for animation in edit.list("animations") {
-        let channels = edit.member(&animation, "channels").map_or_else(Vec::new, |list| edit.elements(&list));
+        let channels = edit.list_in(&animation, "channels");
         let targets = channels.iter().filter_map(|channel| edit.member(channel, "target"));
         spans.extend(targets.filter_map(|target| edit.member(&target, "node")));
     }
@@ -142,7 +136,7 @@ fn node_numbers(edit: &JsonEdit<'_>) -> Vec<Span> {
 fn emptied(mut edit: JsonEdit<'_>, old: &OldLayout) -> String {
     let (nodes, meshes) = (edit.list("nodes"), edit.list("meshes"));
     for &index in &old.emptied {
-        let shows_taxels = number(&edit, &nodes[index], "mesh").is_some_and(|mesh| old.meshes.contains(&mesh));
+        let shows_taxels = edit.number_in(&nodes[index], "mesh").is_some_and(|mesh| old.meshes.contains(&mesh));
         if shows_taxels {
             edit.remove_members(&nodes[index], |key| key == "mesh" || key == "skin");
         }
@@ -151,7 +145,7 @@ fn emptied(mut edit: JsonEdit<'_>, old: &OldLayout) -> String {
         }
     }
     for &index in &old.mixed {
-        let all = primitives(&edit, &meshes[index]);
+        let all = edit.list_in(&meshes[index], "primitives");
         let gone: Vec<bool> = all.iter().map(|primitive| is_taxels(&edit, primitive)).collect();
         if let Some(list) = edit.member(&meshes[index], "primitives") {
             edit.remove_elements(&list, |i| gone[i]);
@@ -179,8 +173,8 @@ fn without(mut edit: JsonEdit<'_>, old: &OldLayout) -> (String, Option<usize>) {
     for (owner, key) in owners.chain(scenes.iter().map(|scene| (scene, "nodes"))) {
         let Some(list) = edit.member(owner, key) else { continue };
         let elements = edit.elements(&list);
-        let goes = |i: usize| is_number_in(&edit, &elements[i], &old.nodes);
-        let gone: Vec<bool> = (0..elements.len()).map(goes).collect();
+        let goes = |span: &Span| edit.number(span).is_some_and(|node| old.nodes.contains(&node));
+        let gone: Vec<bool> = elements.iter().map(goes).collect();
         if gone.iter().all(|&gone| gone) {
             // glTF allows no empty list.
             edit.remove_members(owner, |member| member == key);
@@ -215,10 +209,6 @@ fn without(mut edit: JsonEdit<'_>, old: &OldLayout) -> (String, Option<usize>) {
     (edit.apply(), tail.end)
 }
 
-fn is_number_in(edit: &JsonEdit<'_>, span: &Span, set: &BTreeSet<usize>) -> bool {
-    edit.number(span).is_some_and(|number| set.contains(&number))
-}
-
 /// The lengths of the lists without unused elements at their ends.
 struct Tail {
     meshes: usize,
@@ -236,10 +226,10 @@ impl Tail {
         }
         let used_by = |meshes: &[Span]| {
             let mut used = BTreeSet::new();
-            for primitive in meshes.iter().flat_map(|mesh| primitives(edit, mesh)) {
-                used.extend(number(edit, &primitive, "indices"));
+            for primitive in meshes.iter().flat_map(|mesh| edit.list_in(mesh, "primitives")) {
+                used.extend(edit.number_in(&primitive, "indices"));
                 let mut sets: Vec<Span> = edit.member(&primitive, "attributes").into_iter().collect();
-                sets.extend(edit.member(&primitive, "targets").map_or_else(Vec::new, |list| edit.elements(&list)));
+                sets.extend(edit.list_in(&primitive, "targets"));
                 let members = sets.iter().flat_map(|set| edit.members(set));
                 used.extend(members.filter_map(|(_, span)| edit.number(&span)));
             }
@@ -247,10 +237,10 @@ impl Tail {
         };
         let freed = used_by(&meshes[kept_meshes..]);
         let mut used = used_by(&meshes[..kept_meshes]);
-        used.extend(edit.list("skins").iter().filter_map(|skin| number(edit, skin, "inverseBindMatrices")));
+        used.extend(edit.list("skins").iter().filter_map(|skin| edit.number_in(skin, "inverseBindMatrices")));
         for animation in edit.list("animations") {
-            let samplers = edit.member(&animation, "samplers").map_or_else(Vec::new, |list| edit.elements(&list));
-            used.extend(samplers.iter().flat_map(|s| ["input", "output"].map(|key| number(edit, s, key))).flatten());
+            let samplers = edit.list_in(&animation, "samplers");
+            used.extend(samplers.iter().flat_map(|s| ["input", "output"].map(|key| edit.number_in(s, key))).flatten());
         }
         let accessors = edit.list("accessors");
         let goes = |accessor: usize| freed.contains(&accessor) && !used.contains(&accessor);
@@ -260,7 +250,7 @@ impl Tail {
         }
 
         let views = edit.list("bufferViews");
-        let views_of = |accessor: &Span| number(edit, accessor, "bufferView");
+        let views_of = |accessor: &Span| edit.number_in(accessor, "bufferView");
         let freed: BTreeSet<usize> = accessors[kept_accessors..].iter().filter_map(views_of).collect();
         let mut used: BTreeSet<usize> = accessors[..kept_accessors].iter().filter_map(views_of).collect();
         for sparse in accessors[..kept_accessors].iter().filter_map(|accessor| edit.member(accessor, "sparse")) {
@@ -272,9 +262,9 @@ impl Tail {
         while kept_views > 0 && freed.contains(&(kept_views - 1)) && !used.contains(&(kept_views - 1)) {
             kept_views -= 1;
         }
-        let start = |view: &Span| number(edit, view, "byteOffset").unwrap_or(0);
+        let start = |view: &Span| edit.number_in(view, "byteOffset").unwrap_or(0);
         let first = views[kept_views..].iter().map(start).min();
-        let last = views[..kept_views].iter().map(|view| start(view) + number(edit, view, "byteLength").unwrap_or(0));
+        let last = views[..kept_views].iter().map(|view| start(view) + edit.number_in(view, "byteLength").unwrap_or(0));
         let end = first.filter(|&first| last.max().unwrap_or(0) <= first);
         Self { meshes: kept_meshes, accessors: kept_accessors, views: kept_views, end }
     }

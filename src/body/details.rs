@@ -6,10 +6,11 @@ use json::mesh::{Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::Document;
+use super::glb::Skinning;
+use super::model::Body;
 use super::nodes::Nodes;
-pub use super::read::TaxelSource;
-use super::read::{Sources, attribute, from_document};
-use super::{Body, Skinning};
+use super::primitives::attribute;
+use super::read::{TaxelSource, from_document};
 use crate::error::{Error, Result};
 
 /// Details of a file's surfaces, marks and taxels.
@@ -53,6 +54,27 @@ pub struct Paint {
     pub values: Vec<f32>,
 }
 
+impl Paint {
+    /// The names of a vertex's numbers, as in a recipe: `_DENSITY`; `COLOR_0.r`, `COLOR_0.g`, ….
+    pub(crate) fn names(&self) -> Vec<String> {
+        match self.width {
+            1 => vec![self.name.clone()],
+            width => "rgba".chars().take(width).map(|channel| format!("{}.{channel}", self.name)).collect(),
+        }
+    }
+
+    /// Which of a vertex's numbers is called `name`.
+    pub(crate) fn column(&self, name: &str) -> Option<usize> {
+        let rest = name.strip_prefix(&self.name)?;
+        let column = match rest.strip_prefix('.') {
+            None => (rest.is_empty() && self.width == 1).then_some(0)?,
+            Some(channel) if channel.len() == 1 => ["rgba", "xyzw", "0123"].iter().find_map(|all| all.find(channel))?,
+            Some(_) => return None,
+        };
+        (column < self.width).then_some(column)
+    }
+}
+
 /// Places marked by hand: an empty node, or the points of a mesh that are no taxels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
@@ -66,8 +88,7 @@ pub struct Mark {
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
     let document = Document::parse(bytes, None)?;
     let nodes = Nodes::of(&document)?;
-    let mut sources = Sources::default();
-    let body = from_document(name, &document, &nodes, Some(&mut sources))?;
+    let (body, sources) = from_document(name, &document, &nodes)?;
     let mut parts = Vec::with_capacity(sources.surfaces.len());
     for (&(node, primitive), surface) in sources.surfaces.iter().zip(&body.surfaces) {
         let part = part(&document, &nodes, node, primitive, surface.positions.len());

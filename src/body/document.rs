@@ -11,7 +11,7 @@ use gltf::json;
 use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, Validate};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 
 /// Maximum number of elements of an accessor without data; more mean a damaged file.
 const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
@@ -28,7 +28,7 @@ impl Document {
         let (text, chunk) = split(bytes)?;
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
         let root: json::Root = json::deserialize::from_slice(text)
-            .map_err(|e| Error::failed(format!("not a glTF: its JSON does not hold what glTF asks for: {e}")))?;
+            .map_err(|e| failed!("not a glTF: its JSON does not hold what glTF asks for: {e}"))?;
         refuse_unsupported_extensions(&root)?;
         validate(&root)?;
         let mut chunk = chunk;
@@ -40,11 +40,11 @@ impl Document {
                 None => Vec::new(),
             };
             if (bytes.len() as u64) < buffer.byte_length.0 {
-                return Err(Error::failed(format!(
+                return Err(failed!(
                     "buffer {index} holds {} of its {} bytes: the file is cut short; export or copy it again",
                     bytes.len(),
                     buffer.byte_length.0
-                )));
+                ));
             }
             buffers.push(bytes);
         }
@@ -59,14 +59,14 @@ impl Document {
     /// The numbers of accessor `index`, row by row, and the number of columns.
     pub(crate) fn numbers(&self, index: usize) -> Result<(usize, Vec<f32>)> {
         let Some(Checked::Valid(shape)) = self.root.accessors.get(index).map(|accessor| accessor.type_) else {
-            return Err(Error::failed(format!("accessor {index} is of no type that glTF has")));
+            return Err(failed!("accessor {index} is of no type that glTF has"));
         };
         let flat = match shape {
             Type::Scalar => self.floats::<1>(index)?.into_flattened(),
             Type::Vec2 => self.floats::<2>(index)?.into_flattened(),
             Type::Vec3 => self.floats::<3>(index)?.into_flattened(),
             Type::Vec4 => self.floats::<4>(index)?.into_flattened(),
-            _ => return Err(Error::failed(format!("accessor {index} holds matrices"))),
+            _ => return Err(failed!("accessor {index} holds matrices")),
         };
         Ok((shape.multiplicity(), flat))
     }
@@ -95,7 +95,7 @@ impl Document {
             ComponentType::U8 => &|b| u32::from(b[0]),
             ComponentType::U16 => &|b| u32::from(u16::from_le_bytes([b[0], b[1]])),
             ComponentType::U32 => &|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-            _ => return Err(Error::failed(format!("accessor {index} should hold unsigned integers"))),
+            _ => return Err(failed!("accessor {index} should hold unsigned integers")),
         };
         Ok(elements.rows(number))
     }
@@ -113,7 +113,7 @@ impl Document {
     }
 
     fn elements_of(&self, index: usize) -> Result<Elements<'_>> {
-        let damaged = |what: &str| Error::failed(format!("{what}: the file is damaged; export it again"));
+        let damaged = |what: &str| failed!("{what}: the file is damaged; export it again");
         let accessor = self.root.accessors.get(index).ok_or_else(|| damaged("there is no such accessor"))?;
         let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
             return Err(damaged("its type is none that glTF has"));
@@ -156,11 +156,8 @@ impl Document {
 
     /// `count` elements of `size` bytes from a buffer view, contiguous.
     fn strided(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Cow<'_, [u8]>> {
-        let beyond = || {
-            Error::failed(format!(
-                "it reaches beyond bufferView {view}: the file is damaged or cut short; export it again"
-            ))
-        };
+        let beyond =
+            || failed!("it reaches beyond bufferView {view}: the file is damaged or cut short; export it again");
         let view = self.root.buffer_views.get(view).ok_or_else(beyond)?;
         let buffer = self.buffers.get(view.buffer.value()).ok_or_else(beyond)?;
         let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).map_err(|_| beyond())?;
@@ -203,10 +200,7 @@ impl Elements<'_> {
         if self.width == width {
             return Ok(());
         }
-        Err(Error::failed(format!(
-            "it has {} numbers an element where {width} belong; export the mesh again",
-            self.width
-        )))
+        Err(failed!("it has {} numbers an element where {width} belong; export the mesh again", self.width))
     }
 
     fn rows<T: Copy + Default, const N: usize>(&self, number: &dyn Fn(&[u8]) -> T) -> Vec<[T; N]> {
@@ -237,9 +231,7 @@ pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
         Some("urdf" | "xacro") => "a URDF, which only names mesh files; import those",
         _ => return Ok(()),
     };
-    Err(Error::failed(format!(
-        "this is {what} in Blender (File ▸ Import) and export a .glb (File ▸ Export ▸ glTF 2.0)"
-    )))
+    Err(failed!("this is {what} in Blender (File ▸ Import) and export a .glb (File ▸ Export ▸ glTF 2.0)"))
 }
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
@@ -296,11 +288,8 @@ fn refuse_unsupported_extensions(root: &json::Root) -> Result<()> {
     ];
     for name in &root.extensions_required {
         let remedy = match name.as_str() {
-            "KHR_draco_mesh_compression" => {
-                "its meshes are compressed with Draco; export without compression, or run `gltf-transform copy IN OUT`"
-            }
-            "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-                "its meshes are compressed with meshopt; export without compression, or run `gltf-transform copy IN OUT`"
+            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                "its meshes are compressed; export without compression, or run `gltf-transform copy IN OUT`"
             }
             "KHR_mesh_quantization" => {
                 "its meshes are quantized; export without, or run `gltf-transform dequantize IN OUT`"
@@ -308,7 +297,7 @@ fn refuse_unsupported_extensions(root: &json::Root) -> Result<()> {
             name if KNOWN.contains(&name) => continue,
             _ => "it needs an extension that is not supported here; export without it",
         };
-        return Err(Error::failed(format!("{remedy} (extension {name})")));
+        return Err(failed!("{remedy} (extension {name})"));
     }
     Ok(())
 }
@@ -320,9 +309,9 @@ fn validate(root: &json::Root) -> Result<()> {
     for (mesh, primitive) in root.meshes.iter().enumerate().flat_map(|(i, m)| m.primitives.iter().map(move |p| (i, p)))
     {
         if primitive.attributes.get(&positions).is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "not a sound glTF: the positions of mesh {mesh} point at something that is not in the file; export it again"
-            )));
+            ));
         }
     }
     let mut first = None;
@@ -343,7 +332,7 @@ fn validate(root: &json::Root) -> Result<()> {
                 json::validation::Error::Oversize => "is larger than this machine can address",
                 _ => "is not what glTF allows",
             };
-            Err(Error::failed(format!("not a sound glTF: `{path}` {what}; export it again")))
+            Err(failed!("not a sound glTF: `{path}` {what}; export it again"))
         }
     }
 }
@@ -357,19 +346,16 @@ pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
         }
         return base64::engine::general_purpose::STANDARD
             .decode(body)
-            .map_err(|e| Error::failed(format!("its data URI is not base64: {e}; export it again")));
+            .map_err(|e| failed!("its data URI is not base64: {e}; export it again"));
     }
     if uri.contains("://") {
-        return Err(Error::failed(format!(
-            "it lies at {uri}, and nothing is fetched from a network; save it beside the file"
-        )));
+        return Err(failed!("it lies at {uri}, and nothing is fetched from a network; save it beside the file"));
     }
-    let folder = folder.ok_or_else(|| {
-        Error::failed(format!("it lies in a file of its own, `{uri}`; give a .glb, which holds everything"))
-    })?;
+    let folder =
+        folder.ok_or_else(|| failed!("it lies in a file of its own, `{uri}`; give a .glb, which holds everything"))?;
     let name = percent_encoding::percent_decode_str(uri)
         .decode_utf8()
-        .map_err(|_| Error::failed(format!("its name `{uri}` is not UTF-8; rename it")))?;
+        .map_err(|_| failed!("its name `{uri}` is not UTF-8; rename it"))?;
     let path = folder.join(name.as_ref());
     let kind = std::fs::metadata(&path).map_err(|e| Error::io(&path, &e))?;
     if !kind.is_file() {

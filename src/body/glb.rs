@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
-use super::layout::{AREA, FIELD_KEY, MODALITY, NORMAL, TAXEL_ID};
-use super::{FieldSpec, Taxel};
+use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
+use super::model::Taxel;
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
 
@@ -267,19 +267,7 @@ impl Glb {
             let length = self.bin.len().next_multiple_of(4);
             json.insert("buffers".into(), json!([{"byteLength": length}]));
         }
-        let mut bin = self.bin.clone();
-        bin.resize(bin.len().next_multiple_of(4), 0);
-        let text = serde_json::to_vec(&json).expect("JSON values print");
-        if text.len() + bin.len() > u32::MAX as usize - 64 {
-            return Err(Error::failed("the body would pass the 4 GiB that a .glb can hold; split it"));
-        }
-        gltf::binary::Glb {
-            header: gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 },
-            json: text.into(),
-            bin: (!bin.is_empty()).then(|| bin.into()),
-        }
-        .to_vec()
-        .map_err(|e| Error::failed(e.to_string()))
+        container(&serde_json::to_string(&json).expect("JSON values print"), &self.bin, &[])
     }
 
     /// Writes the file to `output` atomically.
@@ -289,4 +277,32 @@ impl Glb {
     pub fn save(&self, output: OutputPath) -> Result<()> {
         output.write(&self.to_bytes()?)
     }
+}
+
+/// A `.glb` of the JSON `text`, the buffer `bin` and `rest`, further chunks.
+///
+/// # Errors
+/// It would pass the 4 GiB that a `.glb` can hold.
+pub(super) fn container(text: &str, bin: &[u8], rest: &[u8]) -> Result<Vec<u8>> {
+    let (text_end, bin_length) = (20 + text.len().next_multiple_of(4), bin.len().next_multiple_of(4));
+    let length = text_end + if bin.is_empty() { 0 } else { 8 + bin_length } + rest.len();
+    let Ok(whole) = u32::try_from(length) else {
+        return Err(Error::failed("the body would pass the 4 GiB that a .glb can hold; split it"));
+    };
+    let mut bytes = Vec::with_capacity(length);
+    bytes.extend(b"glTF");
+    for number in [2, whole, text_end as u32 - 20] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend(b"JSON");
+    bytes.extend(text.as_bytes());
+    bytes.resize(text_end, b' ');
+    if !bin.is_empty() {
+        bytes.extend((bin_length as u32).to_le_bytes());
+        bytes.extend(b"BIN\0");
+        bytes.extend(bin);
+        bytes.resize(text_end + 8 + bin_length, 0);
+    }
+    bytes.extend(rest);
+    Ok(bytes)
 }

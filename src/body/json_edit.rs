@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
@@ -31,30 +31,6 @@ impl<'de> Deserialize<'de> for Members<'de> {
             }
         }
         deserializer.deserialize_map(Collect)
-    }
-}
-
-struct Elements<'a>(Vec<&'a RawValue>);
-
-impl<'de> Deserialize<'de> for Elements<'de> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Collect;
-        impl<'de> Visitor<'de> for Collect {
-            type Value = Elements<'de>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
-                let mut elements = Vec::new();
-                while let Some(element) = list.next_element()? {
-                    elements.push(element);
-                }
-                Ok(Elements(elements))
-            }
-        }
-        deserializer.deserialize_seq(Collect)
     }
 }
 
@@ -97,13 +73,18 @@ impl<'a> JsonEdit<'a> {
 
     /// The elements of the list at `span`; none where there is no list.
     pub(super) fn elements(&self, span: &Span) -> Vec<Span> {
-        let elements = serde_json::from_str::<Elements<'a>>(self.get(span)).map(|elements| elements.0);
-        elements.unwrap_or_default().into_iter().map(|raw| self.span(raw)).collect()
+        let elements: Vec<&'a RawValue> = serde_json::from_str(self.get(span)).unwrap_or_default();
+        elements.into_iter().map(|raw| self.span(raw)).collect()
     }
 
     /// The elements of the list that is the member `key` of the root.
     pub(super) fn list(&self, key: &str) -> Vec<Span> {
-        self.member(&self.root(), key).map_or_else(Vec::new, |span| self.elements(&span))
+        self.list_in(&self.root(), key)
+    }
+
+    /// The elements of the list that is the member `key` of the object at `span`.
+    pub(super) fn list_in(&self, span: &Span, key: &str) -> Vec<Span> {
+        self.member(span, key).map_or_else(Vec::new, |list| self.elements(&list))
     }
 
     /// The whole number at `span`.
@@ -111,15 +92,37 @@ impl<'a> JsonEdit<'a> {
         self.get(span).parse().ok()
     }
 
+    /// The whole number that is the member `key` of the object at `span`.
+    pub(super) fn number_in(&self, span: &Span, key: &str) -> Option<usize> {
+        self.number(&self.member(span, key)?)
+    }
+
     pub(super) fn replace(&mut self, span: Span, with: String) {
         self.changes.push((span, with));
     }
 
     /// Adds `elements` to the end of the list at `span`.
-    pub(super) fn append(&mut self, span: &Span, elements: &[String]) {
+    fn append(&mut self, span: &Span, elements: &[String]) {
         if !elements.is_empty() {
             let first = if self.elements(span).is_empty() { "" } else { "," };
             self.changes.push((span.end - 1..span.end - 1, format!("{first}{}", elements.join(","))));
+        }
+    }
+
+    /// Adds `elements` to the end of the list that is the member `key` of the object at `span`, which is created if needed.
+    pub(super) fn append_to(&mut self, span: &Span, key: &str, elements: &[String]) {
+        match self.member(span, key) {
+            Some(list) => self.append(&list, elements),
+            None if elements.is_empty() => {}
+            None => self.extend(span, &[(key.to_owned(), format!("[{}]", elements.join(",")))]),
+        }
+    }
+
+    /// Sets the member `key` of the object at `span`.
+    pub(super) fn set(&mut self, span: &Span, key: &str, value: String) {
+        match self.member(span, key) {
+            Some(old) => self.replace(old, value),
+            None => self.extend(span, &[(key.to_owned(), value)]),
         }
     }
 

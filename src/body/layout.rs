@@ -151,7 +151,7 @@ impl FieldSpec {
                 return Err(bad(format!("member {id} has a chart coordinate that is not finite")));
             }
             if members.insert(id, MemberSpec { weight, uv }).is_some() {
-                return Err(bad(format!("member {id} is there twice; give each taxel once")));
+                return Err(bad(format!("member {id} appears twice; give each taxel once")));
             }
         }
         Ok(Self {

@@ -7,9 +7,9 @@ use gltf::json;
 
 use super::document::Document;
 use super::layout::FIELD_KEY;
-use super::read::is_taxels;
-use super::{Link, rigid_part};
-use crate::error::{Error, Result};
+use super::model::{Link, rigid_part};
+use super::primitives::is_taxels;
+use crate::error::{Error, Result, failed};
 
 /// Maximum coordinate, m; sums and products of smaller ones do not overflow.
 pub(super) const MAX_COORDINATE_M: f64 = 1e9;
@@ -33,10 +33,10 @@ impl<'a> Nodes<'a> {
         for (index, node) in raw.iter().enumerate() {
             for child in node.children.iter().flatten() {
                 if parent[child.value()].replace(index).is_some() {
-                    return Err(Error::failed(format!(
+                    return Err(failed!(
                         "node {} has two parents: the file is damaged; export it again",
                         child.value()
-                    )));
+                    ));
                 }
             }
         }
@@ -53,13 +53,13 @@ impl<'a> Nodes<'a> {
         for &node in &in_order {
             let local = local_transform(&raw[node]);
             if !local.is_finite() {
-                return Err(Error::failed(format!("node {node} has a transform that is not finite; export it again")));
+                return Err(failed!("node {node} has a transform that is not finite; export it again"));
             }
             world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
             if !is_in_range(&world_from_node[node]) {
-                return Err(Error::failed(format!(
+                return Err(failed!(
                     "node {node} is moved or scaled by over {MAX_COORDINATE_M:e}; check the scene's units and export it again"
-                )));
+                ));
             }
         }
         let field = raw.iter().enumerate().map(|(index, node)| field_text(index, node)).collect::<Result<Vec<_>>>()?;
@@ -139,7 +139,7 @@ fn field_text(index: usize, node: &json::Node) -> Result<Option<String>> {
         Some(serde_json::Value::String(text)) => Ok(Some(text.clone())),
         Some(_) => {
             let name = node.name.clone().unwrap_or_else(|| format!("node_{index}"));
-            Err(Error::failed(format!("`{FIELD_KEY}` should be one string; docs/layout.md says what is in it"))
+            Err(failed!("`{FIELD_KEY}` should be one string; docs/layout.md says what is in it")
                 .at(format!("field node `{name}`")))
         }
     }

@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 
 use super::details::{self, Details};
 use super::document::{Document, fetch, refuse_other_formats, split};
-use super::glb::{BaseFile, Glb};
-use super::json_edit::{JsonEdit, Span};
-use super::{Body, clear_layout};
+use super::glb::{BaseFile, Glb, container};
+use super::json_edit::JsonEdit;
+use super::model::Body;
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
 
@@ -24,7 +24,7 @@ const UNIT_KEY: &str = "somatic_unit";
 /// A glTF file that is to get a layout.
 #[derive(Clone, Debug)]
 pub struct Original {
-    name: String,
+    pub(super) name: String,
     pub(super) text: String,
     /// The one buffer.
     pub(super) bin: Vec<u8>,
@@ -77,16 +77,13 @@ impl Original {
             self.bin = chunk.unwrap_or_default().to_vec();
             return Ok(());
         };
-        let length = |edit: &JsonEdit<'_>, span: &Span| {
-            let length = edit.member(span, "byteLength").and_then(|span| edit.number(&span));
-            length.ok_or_else(|| Error::failed("a buffer has no length; export the file again"))
-        };
         let is_alone = spans.len() == 1 && edit.member(&first, "uri").is_none();
         let mut bases = Vec::with_capacity(buffers.len());
         for (mut bytes, span) in buffers.into_iter().zip(&spans) {
             // Bytes after a buffer's length are ignored; a chunk may be padded.
             if !is_alone {
-                bytes.truncate(length(&edit, span)?);
+                let length = edit.number_in(span, "byteLength");
+                bytes.truncate(length.ok_or_else(|| Error::failed("a buffer has no length; export the file again"))?);
             }
             self.bin.resize(self.bin.len().next_multiple_of(4), 0);
             bases.push(self.bin.len());
@@ -100,13 +97,8 @@ impl Original {
             let base = edit.number(&buffer).and_then(|index| bases.get(index)).copied().unwrap_or(0);
             if base > 0 {
                 edit.replace(buffer, "0".to_owned());
-                match edit.member(&view, "byteOffset") {
-                    Some(span) => {
-                        let offset = edit.number(&span).unwrap_or(0);
-                        edit.replace(span, (base + offset).to_string());
-                    }
-                    None => edit.extend(&view, &[("byteOffset".to_owned(), base.to_string())]),
-                }
+                let offset = base + edit.number_in(&view, "byteOffset").unwrap_or(0);
+                edit.set(&view, "byteOffset", offset.to_string());
             }
         }
         edit.remove_members(&first, |key| key == "uri");
@@ -158,7 +150,7 @@ impl Original {
             }
         }
         if !views.is_empty() {
-            add_to_list(&mut edit, "bufferViews", &views);
+            edit.append_to(&edit.root(), "bufferViews", &views);
             set_length(&mut edit, self.bin.len());
             self.text = edit.apply();
         }
@@ -168,14 +160,6 @@ impl Original {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// Removes its fields, and unless `keep_taxels` its taxels.
-    ///
-    /// # Errors
-    /// They cannot be removed, because an extension may refer to later nodes by number.
-    pub fn clear_layout(&mut self, keep_taxels: bool) -> Result<()> {
-        clear_layout::clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
     }
 
     /// Sets the unit of its numbers to `unit` of `metres`: adds a root node with that scale.
@@ -197,7 +181,7 @@ impl Original {
             return Ok(());
         }
         let mut is_root = vec![true; nodes.len()];
-        for child in nodes.iter().filter_map(|node| edit.member(node, "children")).flat_map(|c| edit.elements(&c)) {
+        for child in nodes.iter().flat_map(|node| edit.list_in(node, "children")) {
             if let Some(child) = edit.number(&child).and_then(|child| is_root.get_mut(child)) {
                 *child = false;
             }
@@ -222,7 +206,7 @@ impl Original {
         if !unseen.is_empty() {
             wrappers.push(wrapper(&unseen).to_string());
         }
-        add_to_list(&mut edit, "nodes", &wrappers);
+        edit.append_to(&edit.root(), "nodes", &wrappers);
         self.text = edit.apply();
         Ok(())
     }
@@ -249,7 +233,7 @@ impl Original {
         for key in LAYOUT_LISTS {
             let elements = addition.json.get(key).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
             let written: Vec<String> = elements.iter().map(ToString::to_string).collect();
-            add_to_list(&mut edit, key, &written);
+            edit.append_to(&edit.root(), key, &written);
         }
         let nodes = edit.list("nodes");
         let mut adopted = addition.before.adopted.clone();
@@ -257,19 +241,13 @@ impl Original {
         for children in adopted.chunk_by(|a, b| a.0 == b.0) {
             let written: Vec<String> = children.iter().map(|(_, child)| child.to_string()).collect();
             let Some(parent) = nodes.get(children[0].0) else { continue };
-            match edit.member(parent, "children") {
-                Some(list) => edit.append(&list, &written),
-                None => edit.extend(parent, &[("children".to_owned(), format!("[{}]", written.join(",")))]),
-            }
+            edit.append_to(parent, "children", &written);
         }
         let in_scene = addition.json["scenes"][0]["nodes"].as_array().map_or(&[][..], Vec::as_slice);
         let in_scene: Vec<String> = in_scene.iter().map(ToString::to_string).collect();
-        let shown = edit.member(&edit.root(), "scene").and_then(|span| edit.number(&span)).unwrap_or(0);
-        if let Some(scene) = edit.list("scenes").get(shown).filter(|_| !in_scene.is_empty()) {
-            match edit.member(scene, "nodes") {
-                Some(list) => edit.append(&list, &in_scene),
-                None => edit.extend(scene, &[("nodes".to_owned(), format!("[{}]", in_scene.join(",")))]),
-            }
+        let shown = edit.number_in(&edit.root(), "scene").unwrap_or(0);
+        if let Some(scene) = edit.list("scenes").get(shown) {
+            edit.append_to(scene, "nodes", &in_scene);
         }
         if !addition.bin.is_empty() {
             self.bin.resize(addition.before.bytes, 0);
@@ -284,27 +262,7 @@ impl Original {
     /// # Errors
     /// It would pass the 4 GiB that a `.glb` can hold.
     pub fn to_glb(&self) -> Result<Vec<u8>> {
-        let (text, bin) = (self.text.len().next_multiple_of(4), self.bin.len().next_multiple_of(4));
-        let length = 20 + text + if bin > 0 { 8 + bin } else { 0 } + self.rest.len();
-        let Ok(whole) = u32::try_from(length) else {
-            return Err(Error::failed("the body would pass the 4 GiB that a .glb can hold; split it"));
-        };
-        let mut bytes = Vec::with_capacity(length);
-        bytes.extend(b"glTF");
-        for number in [2, whole, text as u32] {
-            bytes.extend(number.to_le_bytes());
-        }
-        bytes.extend(b"JSON");
-        bytes.extend(self.text.as_bytes());
-        bytes.resize(20 + text, b' ');
-        if bin > 0 {
-            bytes.extend((bin as u32).to_le_bytes());
-            bytes.extend(b"BIN\0");
-            bytes.extend(&self.bin);
-            bytes.resize(28 + text + bin, 0);
-        }
-        bytes.extend(&self.rest);
-        Ok(bytes)
+        container(&self.text, &self.bin, &self.rest)
     }
 
     /// The whole file as a `.gltf` with an embedded buffer.
@@ -330,22 +288,11 @@ impl Original {
     }
 }
 
-/// Adds `elements` to the list `key` of the root, which is created if needed.
-fn add_to_list(edit: &mut JsonEdit<'_>, key: &str, elements: &[String]) {
-    let root = edit.root();
-    match edit.member(&root, key) {
-        Some(list) => edit.append(&list, elements),
-        None if elements.is_empty() => {}
-        None => edit.extend(&root, &[(key.to_owned(), format!("[{}]", elements.join(",")))]),
-    }
-}
-
 /// Sets the length of the one buffer.
 pub(super) fn set_length(edit: &mut JsonEdit<'_>, length: usize) {
-    let buffer = edit.list("buffers").first().cloned();
-    match buffer.and_then(|buffer| edit.member(&buffer, "byteLength")) {
-        Some(span) => edit.replace(span, length.to_string()),
-        None => add_to_list(edit, "buffers", &[json!({"byteLength": length}).to_string()]),
+    match edit.list("buffers").first() {
+        Some(buffer) => edit.set(buffer, "byteLength", length.to_string()),
+        None => edit.append_to(&edit.root(), "buffers", &[json!({"byteLength": length}).to_string()]),
     }
 }
 

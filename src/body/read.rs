@@ -9,10 +9,12 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::{Document, refuse_other_formats};
-use super::layout::{AREA, MODALITY, NORMAL, TAXEL_ID};
+use super::layout::{AREA, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
+use super::model::{Body, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
 use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
-use super::{Body, FieldSpec, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel, repair};
-use crate::error::{Error, Result};
+use super::primitives::{attribute, custom, has_mode, is_taxels};
+use super::repair;
+use crate::error::{Error, Result, failed};
 
 /// Places in the file of what was read, for writing.
 #[derive(Default)]
@@ -40,21 +42,38 @@ pub struct TaxelSource {
     pub link_from_mesh: DAffine3,
 }
 
+impl Body {
+    /// Reads the body in the `.glb` or `.gltf` at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no valid glTF, is compressed, or its layout is inconsistent; with the place.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let name = path.display().to_string();
+        read(&name, &bytes, path.parent()).map_err(|e| e.at(name))
+    }
+
+    /// Reads the body in `bytes`, a whole `.glb` (or a `.gltf` that holds its own buffers), called `name` in messages.
+    ///
+    /// # Errors
+    /// As [`Body::load`].
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
+        read(name, bytes, None).map_err(|e| e.at(name))
+    }
+}
+
 /// Reads the body called `name` from a whole file's bytes.
-pub(super) fn body(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
+fn read(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
     refuse_other_formats(name, bytes)?;
     let document = Document::parse(bytes, folder)?;
     let nodes = Nodes::of(&document)?;
-    from_document(name, &document, &nodes, None)
+    from_document(name, &document, &nodes).map(|(body, _)| body)
 }
 
 /// Reads the body called `name` from `document`, and where its parts come from.
-pub(super) fn from_document(
-    name: &str,
-    document: &Document,
-    nodes: &Nodes<'_>,
-    mut sources: Option<&mut Sources>,
-) -> Result<Body> {
+pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) -> Result<(Body, Sources)> {
+    let mut sources = Sources::default();
     let mut body = Body {
         name: name.to_owned(),
         links: nodes.links(),
@@ -64,35 +83,15 @@ pub(super) fn from_document(
         findings: Vec::new(),
     };
     for &node in &nodes.in_order {
-        read_meshes(document, nodes, node, &mut body, sources.as_deref_mut())?;
+        read_meshes(document, nodes, node, &mut body, &mut sources)?;
     }
     complete_normals(&mut body)?;
-    if let (Some(order), Some(sources)) = (repair::renumber(&mut body)?, sources) {
+    if let Some(order) = repair::renumber(&mut body)? {
         sources.taxels = order.into_iter().map(|index| sources.taxels[index]).collect();
     }
     body.fields = read_fields(document, nodes, &mut body)?;
     repair::suggest_export_options(document, &mut body);
-    Ok(body)
-}
-
-pub(super) fn attribute(primitive: &Primitive, semantic: &Semantic) -> Option<usize> {
-    primitive
-        .attributes
-        .iter()
-        .find(|(key, _)| matches!(key, Checked::Valid(s) if s == semantic))
-        .map(|(_, accessor)| accessor.value())
-}
-
-pub(super) fn custom(primitive: &Primitive, name: &str) -> Option<usize> {
-    attribute(primitive, &Semantic::Extras(name.to_owned()))
-}
-
-fn has_mode(primitive: &Primitive, mode: Mode) -> bool {
-    matches!(primitive.mode, Checked::Valid(own) if own == mode)
-}
-
-pub(super) fn is_taxels(primitive: &Primitive) -> bool {
-    has_mode(primitive, Mode::Points) && custom(primitive, TAXEL_ID).is_some()
+    Ok((body, sources))
 }
 
 /// Per joint of a skinned node its link, and link_from_mesh.
@@ -109,11 +108,11 @@ fn joints_of(
         None => Vec::new(),
     };
     if skin.inverse_bind_matrices.is_some() && inverse_binds.len() < skin.joints.len() {
-        return Err(Error::failed(format!(
+        return Err(failed!(
             "the skin has {} inverse bind matrices for {} joints; export the file again",
             inverse_binds.len(),
             skin.joints.len()
-        )));
+        ));
     }
     let mut joints = Vec::with_capacity(skin.joints.len());
     for (index, joint) in skin.joints.iter().enumerate() {
@@ -125,10 +124,10 @@ fn joints_of(
             None => DAffine3::IDENTITY,
         };
         if !is_in_range(&joint_from_mesh) {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "the inverse bind matrix of joint `{}` is not finite or beyond {MAX_COORDINATE_M:e}; export the file again",
                 links[link].name
-            )));
+            ));
         }
         joints.push((link, links[link].link_from_node * joint_from_mesh));
     }
@@ -146,11 +145,11 @@ fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, jo
         };
         let (indices, weights) = (document.integers::<4>(indices)?, document.floats::<4>(weights)?);
         if indices.len() != points || weights.len() != points {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "{} joint and {} weight rows for {points} vertices; export the file again",
                 indices.len(),
                 weights.len()
-            )));
+            ));
         }
         for (best, (indices, weights)) in best.iter_mut().zip(indices.iter().zip(&weights)) {
             for (&joint, &weight) in indices.iter().zip(weights) {
@@ -161,7 +160,7 @@ fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, jo
         }
     }
     if let Some((_, joint)) = best.iter().find(|(_, joint)| *joint >= joints) {
-        return Err(Error::failed(format!("a vertex hangs on joint {joint} of {joints}; export the file again")));
+        return Err(failed!("a vertex hangs on joint {joint} of {joints}; export the file again"));
     }
     Ok(best.into_iter().map(|(_, joint)| joint).collect())
 }
@@ -171,7 +170,7 @@ fn read_meshes(
     nodes: &Nodes<'_>,
     node: usize,
     body: &mut Body,
-    mut sources: Option<&mut Sources>,
+    sources: &mut Sources,
 ) -> Result<()> {
     let Some(mesh) = nodes.raw[node].mesh else { return Ok(()) };
     let mesh_name = document.root.meshes[mesh.value()].name.clone();
@@ -186,9 +185,9 @@ fn read_meshes(
         let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
         let positions = document.floats::<3>(positions).map_err(in_place)?;
         if let Some(bad) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(in_place(Error::failed(format!(
+            return Err(in_place(failed!(
                 "vertex {bad} has a position that is not a finite number; repair the mesh and export it again"
-            ))));
+            )));
         }
         let heaviest = match &joints {
             Some(joints) if !joints.is_empty() => {
@@ -207,28 +206,26 @@ fn read_meshes(
             position.abs().max_element() > MAX_COORDINATE_M
         });
         if let Some((vertex, _)) = far {
-            return Err(in_place(Error::failed(format!(
+            return Err(in_place(failed!(
                 "vertex {vertex} lies over {MAX_COORDINATE_M:e} m away; check the scene's units and export it again"
-            ))));
+            )));
         }
         if is_taxels(primitive) {
             let taxels = read_taxels(document, primitive, &positions, of_point).map_err(in_place)?;
-            if let Some(sources) = sources.as_deref_mut() {
-                let source = |(point, taxel): (usize, &Taxel)| TaxelSource {
-                    mesh: mesh.value(),
-                    primitive: index,
-                    point,
-                    id: taxel.id,
-                    link_from_mesh: of_point(point).1,
-                };
-                sources.taxels.extend(taxels.iter().enumerate().map(source));
-            }
+            let source = |(point, taxel): (usize, &Taxel)| TaxelSource {
+                mesh: mesh.value(),
+                primitive: index,
+                point,
+                id: taxel.id,
+                link_from_mesh: of_point(point).1,
+            };
+            sources.taxels.extend(taxels.iter().enumerate().map(source));
             body.taxels.extend(taxels);
             continue;
         }
         let triangles = read_triangles(document, primitive, positions.len()).map_err(in_place)?;
         if triangles.is_empty() {
-            if let Some(sources) = sources.as_deref_mut().filter(|_| has_mode(primitive, Mode::Points)) {
+            if has_mode(primitive, Mode::Points) {
                 let in_world = |(point, p): (usize, &[f32; 3])| {
                     let (link, link_from_mesh) = of_point(point);
                     let world_from_mesh = body.links[link].world_from_link * link_from_mesh;
@@ -238,9 +235,7 @@ fn read_meshes(
             }
             continue;
         }
-        if let Some(sources) = sources.as_deref_mut() {
-            sources.surfaces.push((node, index));
-        }
+        sources.surfaces.push((node, index));
         let home = match &joints {
             Some(joints) if !heaviest.is_empty() => Home::Skinned { joints: joints.clone(), heaviest },
             _ => Home::Rigid { link: carrier, link_from_mesh: link_from_node },
@@ -265,9 +260,7 @@ fn read_triangles(document: &Document, primitive: &Primitive, vertices: usize) -
         None => (0..u32::try_from(vertices).unwrap_or(u32::MAX)).collect(),
     };
     if let Some(beyond) = order.iter().find(|&&i| i as usize >= vertices) {
-        return Err(Error::failed(format!(
-            "a triangle names vertex {beyond} of {vertices}: the file is damaged; export it again"
-        )));
+        return Err(failed!("a triangle names vertex {beyond} of {vertices}: the file is damaged; export it again"));
     }
     let triangles: Vec<[u32; 3]> = match mode {
         Mode::Triangles => order.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
@@ -291,17 +284,15 @@ fn read_taxels(
     let column = |name: &str| -> Result<Option<Vec<f32>>> {
         let Some(accessor) = custom(primitive, name) else { return Ok(None) };
         if !document.is_scalar_float(accessor) {
-            return Err(Error::failed(format!(
-                "attribute _{name} is not SCALAR FLOAT; docs/layout.md says why it must be"
-            )));
+            return Err(failed!("attribute _{name} is not SCALAR FLOAT; docs/layout.md says why it must be"));
         }
         let column: Vec<f32> = document.floats::<1>(accessor)?.into_iter().map(|[x]| x).collect();
         if column.len() != positions.len() {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "attribute _{name} has {} values for {} points; export the file again",
                 column.len(),
                 positions.len()
-            )));
+            ));
         }
         Ok(Some(column))
     };
@@ -312,9 +303,7 @@ fn read_taxels(
     let mut taxels = Vec::with_capacity(ids.len());
     for (point, (&id, position)) in ids.iter().zip(positions).enumerate() {
         if !(id >= 0.0 && id <= MAX_TAXEL_ID as f32 && id.fract() == 0.0) {
-            return Err(Error::failed(format!(
-                "point {point} has taxel id {id}; ids are whole numbers from 0 to {MAX_TAXEL_ID}"
-            )));
+            return Err(failed!("point {point} has taxel id {id}; ids are whole numbers from 0 to {MAX_TAXEL_ID}"));
         }
         let (link, link_from_mesh) = of_point(point);
         let normal = match &normals {
@@ -329,7 +318,7 @@ fn read_taxels(
         let stretched = cofactor * if mirrored { -normal } else { normal };
         let area = areas.as_ref().map_or(0.0, |areas| f64::from(areas[point]));
         if !(area.is_finite() && area >= 0.0) {
-            return Err(Error::failed(format!("taxel {id} has area {area}; areas are m², 0 where unknown")));
+            return Err(failed!("taxel {id} has area {area}; areas are m², 0 where unknown"));
         }
         let stretch = if normal == DVec3::ZERO { 1.0 } else { stretched.length() };
         let modality = modalities.as_ref().map_or(0.0, |m| m[point]);
@@ -354,12 +343,12 @@ fn complete_normals(body: &mut Body) -> Result<()> {
         }
     }
     for (link, taxels) in without {
-        let surface = body.surface_in_link(link, None);
+        let surface = body.surface_in_link(link);
         if surface.is_empty() {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "taxel {} has no normal, and there is no surface to take it from; add _NX, _NY, _NZ or a mesh",
                 body.taxels[taxels[0]].id
-            )));
+            ));
         }
         body.findings.push(format!(
             "{} taxels on link `{}` have no normal of their own; taken from the surface",
@@ -383,7 +372,7 @@ fn read_fields(document: &Document, nodes: &Nodes<'_>, body: &mut Body) -> Resul
     }
     fields.sort_by(|a, b| a.name.cmp(&b.name));
     if let Some(pair) = fields.windows(2).find(|pair| pair[0].name == pair[1].name) {
-        return Err(Error::failed(format!("two fields are called `{}`; rename one", pair[0].name)));
+        return Err(failed!("two fields are called `{}`; rename one", pair[0].name));
     }
     repair::remove_absent_members(body, &mut fields);
     parents_first(fields)
@@ -399,13 +388,13 @@ fn parents_first(fields: Vec<FieldSpec>) -> Result<Vec<FieldSpec>> {
         while let Some(parent) = &at.parent {
             depth += 1;
             at = names.get(parent.as_str()).map(|&i| &fields[i]).ok_or_else(|| {
-                Error::failed(format!(
+                failed!(
                     "field `{}` has the parent `{parent}`, which is no field of this body; name one that is",
                     at.name
-                ))
+                )
             })?;
             if depth > fields.len() {
-                return Err(Error::failed(format!("field `{}` is its own ancestor; break the ring", field.name)));
+                return Err(failed!("field `{}` is its own ancestor; break the ring", field.name));
             }
         }
         depths.push(depth);

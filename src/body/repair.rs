@@ -8,11 +8,12 @@ use json::mesh::Mode;
 use json::validation::Checked;
 
 use super::document::Document;
-use super::read::is_taxels;
-use super::{Body, FieldSpec, MAX_TAXEL_ID};
-use crate::error::{Error, Result};
+use super::layout::FieldSpec;
+use super::model::{Body, MAX_TAXEL_ID};
+use super::primitives::is_taxels;
+use crate::error::{Result, failed};
 
-/// Maximum number of ids and names listed in a finding.
+/// Maximum number of ids and names listed in a message.
 const MAX_LISTED: usize = 8;
 
 /// Sorts taxels by id, and gives new ids to duplicates, except the first in the file.
@@ -41,7 +42,7 @@ pub(super) fn renumber(body: &mut Body) -> Result<Option<Vec<usize>>> {
     let mut renumbered = Vec::with_capacity(later.len());
     for index in later {
         let Some(id) = free.next() else {
-            return Err(Error::failed(format!("there are more taxels than the {MAX_TAXEL_ID} ids; remove some")));
+            return Err(failed!("there are more taxels than the {MAX_TAXEL_ID} ids; remove some"));
         };
         let taxel = &mut body.taxels[index];
         renumbered.push(format!("{} on link `{}` is now {id}", taxel.id, body.links[taxel.link].name));
@@ -69,12 +70,11 @@ pub(super) fn remove_absent_members(body: &mut Body, fields: &mut [FieldSpec]) {
             continue;
         }
         field.members.retain(|id, _| !absent.contains(id));
-        let names: Vec<String> = absent.iter().map(u32::to_string).collect();
         let taxels = if absent.len() == 1 { "taxel" } else { "taxels" };
         body.findings.push(format!(
             "field `{}` names {taxels} {}, which the body does not have; left out",
             field.name,
-            listed(&names)
+            listed(&absent)
         ));
     }
 }
@@ -110,11 +110,11 @@ pub(super) fn suggest_export_options(document: &Document, body: &mut Body) {
     body.findings.insert(0, finding);
 }
 
-fn listed(words: &[String]) -> String {
-    match words.get(..MAX_LISTED) {
-        Some(first) if words.len() > MAX_LISTED => {
-            format!("{} and {} more", first.join(", "), words.len() - MAX_LISTED)
-        }
-        _ => words.join(", "),
+/// The first of `words`, and the number of the others.
+pub(crate) fn listed<T: ToString>(words: &[T]) -> String {
+    let first: Vec<String> = words.iter().take(MAX_LISTED).map(ToString::to_string).collect();
+    match words.len().saturating_sub(MAX_LISTED) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
     }
 }

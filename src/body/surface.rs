@@ -4,86 +4,13 @@ use glam::{DAffine3, DVec3};
 use rstar::primitives::{CachedEnvelope, GeomWithData};
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
-use super::Body;
-
-/// The triangles of one mesh, in the mesh's own coordinates.
-#[derive(Clone, Debug)]
-pub struct Surface {
-    /// Name of the node that shows it.
-    pub name: String,
-    /// Vertices in the mesh's coordinates.
-    pub positions: Vec<DVec3>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Its link or joints.
-    pub home: Home,
-}
-
-/// The link or joints that move a mesh.
-#[derive(Clone, Debug)]
-pub enum Home {
-    /// A rigid mesh of one link.
-    Rigid {
-        /// The link.
-        link: usize,
-        /// Takes mesh coordinates to the link's frame.
-        link_from_mesh: DAffine3,
-    },
-    /// A skinned mesh; its node's transform is ignored.
-    Skinned {
-        /// Per joint its link, and link_from_mesh at bind.
-        joints: Vec<(usize, DAffine3)>,
-        /// Per vertex the joint with the largest weight.
-        heaviest: Vec<usize>,
-    },
-}
-
-impl Surface {
-    /// Takes mesh coordinates to the frame of `link`: at bind for a skinned mesh, at rest for a rigid one.
-    pub(crate) fn link_from_mesh(&self, body: &Body, link: usize) -> Option<DAffine3> {
-        match &self.home {
-            Home::Rigid { link: carrier, link_from_mesh } => {
-                Some(body.rest_transform(link, *carrier) * *link_from_mesh)
-            }
-            Home::Skinned { joints, .. } => joints
-                .iter()
-                .find(|(joint, _)| *joint == link)
-                .or(joints.first())
-                .map(|(joint, joint_from_mesh)| body.rest_transform(link, *joint) * *joint_from_mesh),
-        }
-    }
-
-    /// The corners of its triangles, transformed by `way`, counter-clockwise seen from outside.
-    pub(crate) fn corners_through(&self, way: DAffine3) -> impl Iterator<Item = [DVec3; 3]> + '_ {
-        let mirrored = way.matrix3.determinant() < 0.0;
-        let points: Vec<DVec3> = self.positions.iter().map(|&p| way.transform_point3(p)).collect();
-        self.triangles.iter().map(move |triangle| {
-            let [a, b, c] = triangle.map(|v| points[v as usize]);
-            if mirrored { [a, c, b] } else { [a, b, c] }
-        })
-    }
-
-    /// The link of vertex `vertex`, or the one with the largest weight.
-    #[must_use]
-    pub fn carrier(&self, vertex: usize) -> usize {
-        match &self.home {
-            Home::Rigid { link, .. } => *link,
-            Home::Skinned { joints, heaviest } => joints[heaviest[vertex]].0,
-        }
-    }
-}
+use super::model::{Body, Home};
 
 impl Body {
-    /// A search index of the surface in the frame of `link`; with `reach`, of triangles near the ball (centre, radius).
+    /// A search index of the surface in the frame of `link`.
     #[must_use]
-    pub fn surface_in_link(&self, link: usize, reach: Option<(DVec3, f64)>) -> SurfaceIndex {
-        match reach {
-            Some((centre, radius)) => Nearest::new(self).around(link, centre, radius),
-            None => {
-                let sound = |triangle: &Triangle| triangle.unit_normal().is_some();
-                SurfaceIndex::new(self.triangles_in_link(link).map(Triangle).filter(sound).collect())
-            }
-        }
+    pub fn surface_in_link(&self, link: usize) -> SurfaceIndex {
+        SurfaceIndex::of_triangles(self.triangles_in_link(link))
     }
 
     /// The corners of all triangles in the frame of `link`, each counter-clockwise seen from outside.
@@ -152,8 +79,7 @@ impl<'a> Nearest<'a> {
             let within = (radius + slack(&link_from_mesh, *longest)).powi(2);
             let close = surface.corners_through(link_from_mesh);
             let close = close.filter(|[a, ..]| a.distance_squared(centre) <= within).map(Triangle);
-            let sound = |triangle: &Triangle| triangle.unit_normal().is_some();
-            near.extend(close.filter(|t| t.box_distance_squared(centre) <= radius * radius).filter(sound));
+            near.extend(close.filter(|t| t.box_distance_squared(centre) <= radius * radius));
         }
         SurfaceIndex::new(near)
     }
@@ -193,6 +119,11 @@ fn slack(link_from_mesh: &DAffine3, longest: f64) -> f64 {
     (x + y + z).sqrt() * longest * 3.0_f64.sqrt() * (1.0 + 1e-9)
 }
 
+/// The outward normal of a triangle, of twice its area.
+pub(crate) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
 /// Three corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
 struct Triangle([DVec3; 3]);
@@ -200,8 +131,7 @@ struct Triangle([DVec3; 3]);
 impl Triangle {
     /// The outward normal; `None` for a triangle without area.
     fn unit_normal(&self) -> Option<DVec3> {
-        let [a, b, c] = self.0;
-        (b - a).cross(c - a).try_normalize()
+        area_vector(self.0).try_normalize()
     }
 
     /// Squared distance of `p` from the bounding box: a lower bound for the triangle.
@@ -332,8 +262,7 @@ impl SurfaceIndex {
     /// The mean outward unit normal of the triangles within `within_m` of `p`.
     #[must_use]
     pub fn normal_around(&self, p: DVec3, within_m: f64) -> Option<DVec3> {
-        let around = self.tree.locate_within_distance(p.to_array(), within_m * within_m);
-        around.map(|triangle| triangle.data.0).sum::<DVec3>().try_normalize()
+        self.normals_within(p, within_m).sum::<DVec3>().try_normalize()
     }
 
     /// The outward unit normals of the triangles within `within_m` of `p`: on an edge, of both sides.

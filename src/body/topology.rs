@@ -3,7 +3,7 @@
 //! Exporters split vertices along seams, and real meshes have triangles without area, edges with three triangles and loose
 //! parts. These are handled and counted.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
@@ -99,7 +99,7 @@ impl Topology {
 
     /// Keeps valid triangles.
     fn take(&mut self, triangles: &[[u32; 3]]) {
-        let mut seen: HashMap<[u32; 3], ()> = HashMap::with_capacity(triangles.len());
+        let mut seen: HashSet<[u32; 3]> = HashSet::with_capacity(triangles.len());
         for (index, triangle) in triangles.iter().enumerate() {
             let corners = triangle.map(|v| self.welded.get(v as usize).copied().unwrap_or(NONE));
             let [a, b, c] = corners;
@@ -109,7 +109,7 @@ impl Topology {
             }
             let mut sorted = corners;
             sorted.sort_unstable();
-            if seen.insert(sorted, ()).is_some() {
+            if !seen.insert(sorted) {
                 self.flaws.doubled += 1;
                 continue;
             }
@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     /// A strip of squares, each of two triangles, along +x in the plane z = 0.
-    fn clear_layout(squares: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    fn strip(squares: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let positions = (0..=squares).flat_map(|x| [DVec3::new(x.into(), 0.0, 0.0), DVec3::new(x.into(), 1.0, 0.0)]);
         let triangles = (0..squares).flat_map(|s| [[2 * s, 2 * s + 2, 2 * s + 3], [2 * s, 2 * s + 3, 2 * s + 1]]);
         (positions.collect(), triangles.collect())
@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_seam_is_closed_and_a_gap_is_not() {
-        let (positions, triangles) = clear_layout(3);
+        let (positions, triangles) = strip(3);
         // Each triangle with corners of its own, the way that flat shading is exported.
         let soup: Vec<DVec3> = triangles.iter().flatten().map(|&v| positions[v as usize]).collect();
         let split: Vec<[u32; 3]> = (0..6).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn what_lies_across_an_edge_runs_the_other_way() {
-        let (positions, triangles) = clear_layout(4);
+        let (positions, triangles) = strip(4);
         let topology = Topology::new(&positions, &triangles);
         for edge in 0..24 {
             let beyond = topology.across[edge as usize];
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn flawed_triangles_are_counted_and_survived() {
-        let (mut positions, mut triangles) = clear_layout(2);
+        let (mut positions, mut triangles) = strip(2);
         let sound = triangles.len();
         positions.extend([DVec3::new(0.5, 0.0, 0.0), DVec3::NAN, DVec3::new(0.5, 0.5, 1.0)]);
         // Flat, doubled, not a number, a vertex too many, one corner twice.
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(topology.given[sound..], [9, 10]);
         triangles.push([4, 5, 6]);
         assert_eq!(Topology::new(&positions, &triangles).flaws.branching_edges, 2);
-        let (positions, mut triangles) = clear_layout(1);
+        let (positions, mut triangles) = strip(1);
         triangles[1].swap(0, 1);
         assert_eq!(Topology::new(&positions, &triangles).flaws.flipped_edges, 1);
     }

@@ -11,7 +11,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use somatic::keys;
+use somatic::error::parse_toml;
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{RecordPart, SinkSpec};
@@ -246,7 +246,7 @@ impl RunOptions {
     /// It cannot be read, or asks for what there is not: one line with its line and column.
     fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
-        let mut asked: Self = keys::Text(&text).parse_to_the_column().map_err(|e| e.at(path.display()))?;
+        let mut asked: Self = parse_toml(&text).map_err(|e| e.at(path.display()))?;
         asked.check_accuracy().map_err(|(key, e)| Accuracy::placed(&text, key, e).at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let there = |file: &Path| folder.join(file).display().to_string();

@@ -8,7 +8,7 @@ use glam::{DMat2, DVec2, DVec3};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::{Field, anchor_from_link};
+use super::set::{Field, anchor_from_link};
 use crate::body::{Body, SurfaceIndex};
 
 /// Number of members that are blended.

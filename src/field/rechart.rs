@@ -1,6 +1,8 @@
 //! Fields of a body with charts of another kind.
 
-use super::{Field, FieldSet, NoChart, Unroller, unions};
+use super::chart::NoChart;
+use super::set::{Field, FieldSet, unions};
+use super::unroll::Unroller;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
 use crate::error::Result;
 

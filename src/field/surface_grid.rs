@@ -5,12 +5,12 @@
 //! mesh.
 
 use glam::{DVec2, DVec3};
-
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::chart::Chart;
 use super::geodesic_surface::GeodesicSurface;
-use super::{Chart, Field, anchor_from_link};
+use super::set::{Field, anchor_from_link};
 use crate::body::{Body, ChartKind, Nearest, SurfaceIndex};
 
 /// Maximum number of a grid's nodes per side.
@@ -156,22 +156,13 @@ impl Grid {
     /// step in (u, v), and of the normal.
     fn slopes(&self, of: impl Fn(DVec3, DVec2) -> DVec3) -> (DVec2, DVec2) {
         let (mut point, mut normal) = (DVec2::ZERO, DVec2::ZERO);
-        let between = |a: (DVec3, DVec3), b: (DVec3, DVec3), step: DVec2| {
-            (of(b.0 - a.0, step).length() / step.length(), b.1.distance(a.1) / step.length())
-        };
-        for row in 0..self.rows {
-            for column in 0..self.columns {
-                let here = self.nodes[row * self.columns + column];
-                if column + 1 < self.columns {
-                    let right = self.nodes[row * self.columns + column + 1];
-                    let (p, n) = between(here, right, DVec2::X * self.cell_m.x);
-                    (point.x, normal.x) = (point.x.max(p), normal.x.max(n));
-                }
-                if row + 1 < self.rows {
-                    let above = self.nodes[(row + 1) * self.columns + column];
-                    let (p, n) = between(here, above, DVec2::Y * self.cell_m.y);
-                    (point.y, normal.y) = (point.y.max(p), normal.y.max(n));
-                }
+        for (index, here) in self.nodes.iter().enumerate() {
+            let right = Some(index + 1).filter(|right| right % self.columns != 0);
+            for (axis, next) in [(0, right), (1, Some(index + self.columns))] {
+                let Some(there) = next.and_then(|next| self.nodes.get(next)) else { continue };
+                let step = DVec2::AXES[axis] * self.cell_m[axis];
+                point[axis] = point[axis].max(of(there.0 - here.0, step).length() / step.length());
+                normal[axis] = normal[axis].max(there.1.distance(here.1) / step.length());
             }
         }
         (point, normal)

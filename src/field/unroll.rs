@@ -4,12 +4,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 
-use super::chart::frame;
+use super::chart::{NoChart, frame};
 use super::distortion::Distortion;
 use super::geodesic::{LogMap, SurfacePlace};
 use super::link_surface::Surfaces;
-use super::{NoChart, anchor_from_link};
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector};
 
 /// Maximum bend of a path at one point, 20°.
 const MAX_BEND: f64 = PI / 9.0;
@@ -60,15 +59,8 @@ impl<'a> Unroller<'a> {
         links.sort_unstable();
         links.dedup();
         let &[link] = &links[..] else { return Err(NoChart::SeveralLinks(links.len())) };
-        let anchor_from_taxel = anchor_from_link(body, Some(link), link);
-        let members: Vec<(DVec3, DVec3)> = taxels
-            .iter()
-            .map(|&taxel| &body.taxels[taxel])
-            .map(|taxel| {
-                let position = anchor_from_taxel.transform_point3(taxel.position_in_link);
-                (position, anchor_from_taxel.transform_vector3(taxel.normal_in_link))
-            })
-            .collect();
+        let point = |&taxel: &usize| (body.taxels[taxel].position_in_link, body.taxels[taxel].normal_in_link);
+        let members: Vec<(DVec3, DVec3)> = taxels.iter().map(point).collect();
         let surface = self.surfaces.in_link(link);
         let topology = &surface.topology;
         let locate = |(p, normal): (DVec3, DVec3)| surface.locate(p, normal).ok_or(NoChart::NoSurface);
@@ -126,8 +118,7 @@ impl Patch<'_> {
     /// `spec` with a geodesic chart around `origin`.
     fn chart_around(&self, spec: &FieldSpec, origin: SurfacePlace) -> Result<FieldSpec, NoChart> {
         let Self { topology, members, places, ids, u } = self;
-        let [a, b, c] = topology.corners(origin.triangle);
-        let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
+        let normal = area_vector(topology.corners(origin.triangle)).normalize_or(DVec3::Z);
         let [u, ..] = frame(normal, *u);
         let part = |place: &SurfacePlace| topology.part[place.triangle as usize];
         let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
@@ -167,8 +158,7 @@ impl Patch<'_> {
                 && rival.distance_m - way.distance_m < 0.5 * nearest(i)
                 && 2.0 * way.distance_m * (rival.apart_rad / 2.0).sin() > nearest(i)
             {
-                let (distance_m, apart_rad) = (way.distance_m, rival.apart_rad);
-                return Err(NoChart::CutLocus { taxel: id(i), distance_m, apart_rad });
+                return Err(NoChart::CutLocus { taxel: id(i), distance_m: way.distance_m });
             }
         }
         if let Some((a, b, factor)) = distortion.worst.filter(|&(.., factor)| factor > MAX_STRETCH) {

@@ -138,7 +138,7 @@ fn a_folder_is_made_for_the_files_that_were_asked_for() {
     };
     write(false).unwrap();
     assert_eq!(names_in(&destination), ["b"]);
-    assert!(write(false).unwrap_err().to_string().contains("b: it is there already"));
+    assert!(write(false).unwrap_err().to_string().contains("b: it exists"));
     write(true).unwrap();
 }
 

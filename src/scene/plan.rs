@@ -161,7 +161,7 @@ impl Plan {
             let hint =
                 near.map_or("`somatic inspect` lists the fields".into(), |near| format!("did you mean `{near}`?"));
             return Err(Error::failed(format!(
-                "the calibration has thresholds for field `{name}`, which is not there: {hint}"
+                "the calibration has thresholds for field `{name}`, which the body does not have: {hint}"
             ))
             .at(&body.name));
         }

@@ -499,12 +499,12 @@ mod tests {
     fn errors_name_line_and_what_is_wrong() {
         let second = |line: &str| why(&format!("{{\"t\":0}}\n{line}\n"));
         assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").starts_with("stdin: line 2, column"));
-        assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").contains("taxel 4 is there twice"));
+        assert!(second("{\"t\":1,\"values\":{\"4\":1,\"4\":1}}").contains("taxel 4 appears twice"));
         assert!(second("{\"t\":1,\"values\":{\"palm\":1}}").contains("`palm` is not a taxel id"));
         assert!(second("{\"t\":1,\"values\":{\"4\":\"1\"}}").contains("without quotes"));
         assert!(second("{\"t\":1,\"values\":{\"4\":true}}").contains("for taxel 4"));
         assert!(second("{\"t\":1,\"values\":[1,2]}").contains("values by taxel id"));
-        assert!(second("{\"t\":1,\"t\":1}").contains("`t` is there twice"));
+        assert!(second("{\"t\":1,\"t\":1}").contains("`t` appears twice"));
         assert!(second("{\"t\":1,\"vals\":{}}").contains("no `vals`"));
         assert!(second("{\"values\":{}}").contains("no `t`"));
         assert!(second("{\"t\":\"now\"}").starts_with("stdin: line 2"));

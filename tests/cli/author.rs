@@ -92,7 +92,7 @@ fn what_cannot_be_authored_is_one_line_and_leaves_nothing_behind() {
     one(2, &["author", text_of(&bare), "-o", out], "--taxels");
     one(2, &["author", "humanoid", "--region", "head", "-o", out], "--taxels");
     one(1, &["author", "humanoid", "--taxels", "0", "-o", out], "--taxels: 0 taxels");
-    one(2, &["author", "humanoid", "--spacing", "8", "-o", out], "--spacing: `8` has no unit");
+    one(2, &["author", "humanoid", "--spacing", "8", "-o", out], "--spacing: `8` is not a length; write a number and um");
     one(1, &["author", "humanoid", "--taxels", "100", "--spacing", "1m", "-o", out], "do not fit");
     one(1, &["author", "humanoid", "--taxels", "9", "--region", "haed", "-o", out], "did you mean `head`?");
     one(2, &["author", "humanoid", "--taxels", "9", "--unit", "inch", "-o", out], "--unit");
@@ -152,7 +152,7 @@ fn a_layout_that_stays_is_brought_up_to_date() {
     let seen = |path: &Path| -> Value { serde_json::from_str(&done(&["inspect", text_of(path), "--json"])).unwrap() };
     fails(1, &["inspect", text_of(&path), "--strict"]);
     let text = done(&["author", text_of(&path), "-o", text_of(&out), "--force"]);
-    for words in ["normals worked out again for 1 of 40 taxels: 5", "1 taxel has the id of another", "names taxel 1"] {
+    for words in ["normals recomputed for 1 of 40 taxels: 5", "1 taxel has the id of another", "names taxel 1"] {
         assert!(text.contains(words), "{words}: {text}");
     }
     let (before, after) = (seen("hand".as_ref()), seen(&out));

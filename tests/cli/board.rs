@@ -237,7 +237,7 @@ fn the_books_of_sixteen_bad_lines_balance() {
 fn what_makes_no_sense_is_said_in_a_line() {
     assert!(fails(2, &["board", "--faults", "nois=1"]).contains("did you mean `noise`"));
     assert!(fails(2, &["board", "--bits", "9"]).contains("8, 10, 12 or 16"));
-    assert!(fails(2, &["board", "--for", "2 parsecs"]).contains("no time"));
+    assert!(fails(2, &["board", "--for", "2 parsecs"]).contains("is not a time"));
     assert!(fails(2, &["board", "--boards", "41"]).contains("40 taxels"));
     assert!(fails(1, &["board", "--wiring", "none.toml"]).contains("none.toml: no such file"));
     let (_folder, path) = crate::file("there", "a file");

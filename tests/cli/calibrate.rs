@@ -54,7 +54,7 @@ fn a_survey_becomes_a_calibration_under_which_rest_is_nothing_and_a_press_is_fel
 
     // What is there stays, unless it is to be replaced.
     let before = std::fs::read_to_string(&toml).unwrap();
-    assert!(fails(1, &calibrate).contains("it is there already"));
+    assert!(fails(1, &calibrate).contains("it exists"));
     assert_eq!(std::fs::read_to_string(&toml).unwrap(), before);
     done(&[&calibrate[..], &["--force"]].concat());
 }

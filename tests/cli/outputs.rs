@@ -254,7 +254,7 @@ fn a_file_that_is_there_stays_unless_forced() {
         let name = format!("there{}", written.ending);
         std::fs::write(folder.path().join(&name), "mine").unwrap();
         let why = refused(folder.path(), 1, &written.arguments(&name), &[]);
-        let way_out = if written.flag == "--link" { "give --link another" } else { "it is there already" };
+        let way_out = if written.flag == "--link" { "give --link another" } else { "it exists" };
         assert!(why.contains(&name) && why.contains(way_out), "{why}");
         let nowhere = format!("no/such{}", written.ending);
         assert!(
@@ -267,7 +267,7 @@ fn a_file_that_is_there_stays_unless_forced() {
         std::fs::create_dir(folder.path().join("there")).unwrap();
         std::fs::write(folder.path().join("there").join(file), "mine").unwrap();
         let why = refused(folder.path(), 1, &arguments, &[]);
-        assert!(why.contains(file) && why.contains("it is there already"), "{why}");
+        assert!(why.contains(file) && why.contains("it exists"), "{why}");
         assert_eq!(all_in(&folder.path().join("there")).len(), 1, "nothing is written beside it");
         let output = run_in(folder.path(), &arguments, &["--force"]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -308,7 +308,7 @@ fn what_is_put_beside_an_output_is_an_output() {
         let why = refused(folder.path(), 2, &simulate(beside), &["--force"]);
         assert!(why.contains(&format!("{beside}: this is the input {beside}")), "{why}");
         let why = refused(folder.path(), 1, &simulate("sim.toml"), &[]);
-        assert!(why.contains(&format!("{beside}: it is there already")), "{why}");
+        assert!(why.contains(&format!("{beside}: it exists")), "{why}");
     }
 }
 
@@ -380,7 +380,7 @@ fn pipes_and_devices_are_written_as_they_are() {
     // Nothing is put beside a device.
     assert!(!Path::new("/dev/stdout.calibration.toml").exists() && !Path::new("/dev/stdout.truth.csv").exists());
     assert!(
-        refused(folder.path(), 2, &words("simulate sim.toml -o /dev/stdout"), &[]).contains("name the --truth too")
+        refused(folder.path(), 2, &words("simulate sim.toml -o /dev/stdout"), &[]).contains("give --truth a file")
     );
 
     // A named pipe, and what a shell hands over as /dev/fd/63.

@@ -184,7 +184,7 @@ fn a_part_of_a_recording_is_played_as_often_as_asked_for() {
     let looped = times(&["--from", "0.5", "--to", "0.53", "--loop=3"]);
     assert_eq!(looped.len(), 6);
     assert!(looped.windows(2).all(|pair| (pair[1] - pair[0] - 0.02).abs() < 1e-9), "{looped:?}");
-    assert!(fails(2, &["run", "--source", &source(&path), "--from", "2", "--to", "1"]).contains("no part"));
+    assert!(fails(2, &["run", "--source", &source(&path), "--from", "2", "--to", "1"]).contains("is not a part"));
     assert!(fails(2, &["run", "--source", "-", "--from", "2"]).contains("recordings"));
 }
 
@@ -194,7 +194,7 @@ fn what_is_in_the_way_of_a_recording_is_one_line() {
     let path = folder.path().join("a.mcap");
     std::fs::write(&path, "mine").unwrap();
     let why = fails(1, &["run", "--sink", &source(&path)]);
-    assert!(why.contains("it is there already") && why.contains("--force"), "{why}");
+    assert!(why.contains("it exists") && why.contains("--force"), "{why}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
     done(&["run", "--sink", &source(&path), "--force", "--record", "percepts"]);
     let why = fails(1, &["run", "--source", &source(&folder.path().join("no/a.mcap"))]);
@@ -203,7 +203,7 @@ fn what_is_in_the_way_of_a_recording_is_one_line() {
     let why = fails(2, &["run", "--source", &source(&path), "--sink", &source(&path), "--force"]);
     assert!(why.contains("name another file"), "{why}");
     std::fs::write(&path, "no MCAP at all").unwrap();
-    assert!(fails(1, &["run", "--source", &source(&path)]).contains("no MCAP file"));
+    assert!(fails(1, &["run", "--source", &source(&path)]).contains("not an MCAP file"));
     assert_eq!(files_in(folder.path()), ["a.mcap"]);
 }
 
@@ -238,7 +238,7 @@ fn a_full_disk_ends_a_recording_and_not_what_is_live() {
     assert_eq!(output.status.code(), Some(1));
     let said = stderr(&output);
     assert_eq!(said.lines().filter(|line| line.contains("a.mcap")).count(), 1, "{said}");
-    assert!(said.contains("cannot write") && said.contains("going on without it"), "{said}");
+    assert!(said.contains("cannot write") && said.contains("continuing without it"), "{said}");
     assert_eq!(frames(&String::from_utf8(output.stdout).unwrap()).len(), 600);
     // What fitted is there.
     let (code, info) = json(&folder.path().join("a.mcap"));
@@ -280,7 +280,7 @@ fn a_process_that_is_killed_loses_less_than_a_second() {
         let replay = output(&["run", "--source", &source(&path), "--backend", "cpu"]);
         assert_eq!(replay.status.code(), Some(3));
         let said = stderr(&replay);
-        assert_eq!(said.lines().filter(|line| line.contains("never ended")).count(), 1, "{said}");
+        assert_eq!(said.lines().filter(|line| line.contains("it is cut off")).count(), 1, "{said}");
         let replayed = frames(&String::from_utf8(replay.stdout).unwrap());
         assert!(!replayed.is_empty() && replayed[..] == delivered[..replayed.len()]);
         // And it can be given an end.
@@ -632,7 +632,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     assert!(reader.next_frame(&mut frame).unwrap());
     assert_eq!(frame.values, kept[150].values);
     let said = stderr(&output(&["convert", text_of(&place("a.mcap")), text_of(&place("c.csv"))]));
-    assert!(said.contains("no word for what is stale"), "{said}");
+    assert!(said.contains("cannot mark stale values"), "{said}");
 }
 
 /// Python with the format's own library, or why there is none.

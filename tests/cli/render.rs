@@ -98,7 +98,7 @@ fn what_cannot_be_drawn_is_told_in_a_line_and_leaves_nothing() {
         assert_eq!(why.lines().count(), 1, "{why}");
         why
     };
-    assert!(why(1, &[text_of(&path)]).contains("there already; choose another name, or say --force"));
+    assert!(why(1, &[text_of(&path)]).contains("it exists; choose another name, or give --force"));
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "not a picture");
     let other = folder.path().join("other.png");
     let other = text_of(&other);

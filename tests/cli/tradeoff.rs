@@ -85,11 +85,11 @@ fn what_nothing_reaches_is_said_with_by_how_much() {
     let output = with_cache(folder.path(), &[&rest[..], &BRIEF].concat());
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("no knobs reach 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
+    assert!(said.contains("no knobs meet 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
     let path = scene(folder.path(), "backend = \"cpu\"\n[accuracy]\nbudget = \"1 ns\"\n");
     let output = with_cache(folder.path(), &["run", &path, "--quiet"]);
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(1) && said.contains("no knobs reach 0.001 us"), "{said}");
+    assert!(output.status.code() == Some(1) && said.contains("no knobs meet 0.001 us"), "{said}");
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn contradictions_are_found_where_they_stand() {
     }
     assert!(fails(2, &["tradeoff", "--write", "--within", "1 mm"]).contains("name one"));
     assert!(fails(2, &["tradeoff", "--plot", "a.gif"]).contains("neither .svg nor .png"));
-    assert!(fails(2, &["tradeoff", "--source", "-"]).contains("again and again"));
+    assert!(fails(2, &["tradeoff", "--source", "-"]).contains("a recording or a simulation"));
 }
 
 #[cfg(feature = "gpu")]

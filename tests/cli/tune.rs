@@ -228,14 +228,14 @@ fn boards_that_set_no_taps_are_named_and_the_others_are_tuned() {
 fn what_makes_no_sense_is_said_before_anything_is_set() {
     let refused = |arguments: &[&str]| super::fails(2, &[&["tune"], arguments].concat());
     assert!(refused(&["--source", "a.csv", "--press", "3"]).contains("give --source serial:PORT"));
-    assert!(refused(&["--source", "serial:a"]).contains("nobody can press Enter"));
+    assert!(refused(&["--source", "serial:a"]).contains("is not a terminal; give --press"));
     assert!(refused(&["--source", "serial:a", "--press", "0"]).contains("times over 0"));
     assert!(refused(&["--source", "serial:a", "--press", "3", "--tap", "256"]).contains("256"));
     assert!(refused(&["--source", "serial:a", "--source", "-", "--press", "3"]).contains("only serial lines"));
     let (_folder, path) = super::file("there.toml", "mine");
     let why = super::fails(1, &["tune", "--source", "serial:a", "--press", "3", "-o", text_of(&path)]);
     assert!(
-        why.contains("it is there already")
+        why.contains("it exists")
             && why.contains("--force")
             && std::fs::read_to_string(&path).unwrap() == "mine"
     );

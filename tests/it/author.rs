@@ -83,7 +83,7 @@ fn lies_on_its_surface(body: &Body) {
         if own.is_empty() {
             continue;
         }
-        let surface = body.surface_in_link(link, None);
+        let surface = body.surface_in_link(link);
         for taxel in own {
             let hit = surface.nearest(taxel.position_in_link).unwrap();
             let off = hit.position.distance(taxel.position_in_link);
@@ -320,7 +320,10 @@ fn density_spacing_and_number_hold_together() {
     let both = made(&file, "[[place]]\ntaxels = 180\nspacing = \"9 mm\"\n");
     assert!(both.body.taxels.len() == 180 && both.places[0].least_spacing_m.unwrap() >= 0.009, "{:?}", both.places[0]);
     let line = why(&file, "[[place]]\ntaxels = 250\nspacing = \"9 mm\"\n");
-    assert!(line.starts_with("recipe.toml: line 2: 250 taxels do not fit 9.0 mm apart on 200.0 cm²"), "{line}");
+    assert!(
+        line.starts_with("recipe.toml: line 2, column 10: 250 taxels do not fit 9.0 mm apart on 200.0 cm²"),
+        "{line}"
+    );
     let line = why(&file, "[[place]]\ntaxels = 400\nspacing = \"9 mm\"\n");
     assert!(line.contains("densest packing"), "{line}");
 }
@@ -396,7 +399,7 @@ fn places_that_are_given_are_taken_to_the_surface() {
         csv(text);
         let line = author(file.clone(), &parse(table).unwrap(), |_| {}).unwrap_err().to_string();
         assert!(
-            line.starts_with("recipe.toml: line 3: ") && line.contains("taxels.csv") && !line.contains('\n'),
+            line.starts_with("recipe.toml: line 3, column 7: ") && line.contains("taxels.csv") && !line.contains('\n'),
             "{line}"
         );
         line
@@ -405,7 +408,7 @@ fn places_that_are_given_are_taken_to_the_surface() {
         refused("id,x,y,z\n0,1.05,0.02,0\n40,1.05,0.02,2.5\n")
             .contains("line 3: taxel 40 lies 2.50 m from the surface")
     );
-    assert!(refused("id,x,y,z\n1,1.05,0.02,0\n1,1.06,0.02,0\n").contains("id 1 stands on line 2 already"));
+    assert!(refused("id,x,y,z\n1,1.05,0.02,0\n1,1.06,0.02,0\n").contains("id 1 is on line 2 already"));
     assert!(refused("id,x,y\n1,1.05,0.02\n").contains("no column `z`"));
     assert!(refused("id,x,y,z\n1,1.05,zero,0\n").contains("`zero` is no coordinate"));
     assert!(refused("id,x,y,z,link\n1,1.05,0,0,shet\n").contains("did you mean `sheet`?"));
@@ -432,7 +435,7 @@ fn empties_and_points_become_taxels() {
     let by_hand = made(&file, "[[place]]\npoints = [\"tip*\", \"loose\"]\nwithin = 0.002\n");
     let x: Vec<f64> = by_hand.body.taxels.iter().map(|taxel| (taxel.position_in_link.x * 1e3).round()).collect();
     assert_eq!(x, [10.0, 20.0, 150.0, 100.0]);
-    assert!(why(&file, "[[place]]\npoints = \"tipp*\"\n").starts_with("recipe.toml: line 2: no empty"));
+    assert!(why(&file, "[[place]]\npoints = \"tipp*\"\n").starts_with("recipe.toml: line 2, column "));
     assert!(why(&file, "[[place]]\npoints = \"loose\"\nwithin = 0.0005\n").contains("point 0 of `loose` lies 1.0 mm"));
 }
 
@@ -441,12 +444,12 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
     let file = drafted(1.0, &json!({}));
     let palm = "[regions.palm]\nnode = \"sheet\"\n";
     for (text, line, word) in [
-        ("[[place]]\ntaxels = 0\n".to_owned(), 2, "0 taxels"),
-        ("[[place]]\ntaxels = -3\n".into(), 2, "negative"),
+        ("[[place]]\ntaxels = 0\n".to_owned(), 2, "between 1 and 4000000"),
+        ("[[place]]\ntaxels = -3\n".into(), 2, "between 1"),
         ("[[place]]\ntaxels = 99999999999\n".into(), 2, "4000000"),
         ("[[place]]\nspacing = \"0 mm\"\n".into(), 2, "over 0"),
-        ("[[place]]\nspacing = \"8\"\n".into(), 2, "no unit"),
-        ("[[place]]\nspacing = \"8 mn\"\n".into(), 2, "no length"),
+        ("[[place]]\nspacing = \"8\"\n".into(), 2, "mm, cm or m"),
+        ("[[place]]\nspacing = \"8 mn\"\n".into(), 2, "not a length"),
         ("[[place]]\nspacing = 1e-6\n".into(), 2, "is the spacing in metres?"),
         ("[[place]]\nregion = \"plam\"\ntaxels = 5\n".into(), 2, "write a [regions] table"),
         (format!("{palm}[[place]]\nregion = \"plam\"\ntaxels = 5\n"), 4, "did you mean `palm`?"),
@@ -456,7 +459,7 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         (
             "[regions.a]\nbox = [[5, 5, 5], [6, 6, 6]]\n[[place]]\nregion = \"a\"\ntaxels = 5\n".into(),
             1,
-            "the skin lies between",
+            "the surface lies between",
         ),
         ("[regions.a]\nbox = [[5, 5, 5], [4, 6, 6]]\n".into(), 2, "smaller numbers first"),
         (
@@ -466,7 +469,7 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ),
         ("[regions.a]\nexcept = \"a\"\n[[place]]\nregion = \"a\"\ntaxels = 5\n".into(), 1, "excludes itself"),
         ("[[place]]\ntaxels = 5\ndensity = \"_HAIR\"\n".into(), 2, "no mesh has an attribute `_HAIR`"),
-        ("[[place]]\ntaxels = 5\ndensity = \"COLOR_0\"\n".into(), 2, "`COLOR_0.r`"),
+        ("[[place]]\ntaxels = 5\ndensity = \"COLOR_0\"\n".into(), 2, "did you mean `COLOR_0."),
         ("[[place]]\ntaxels = 5\ndensity = \"COLOR_0.b\"\n".into(), 2, "0 everywhere"),
         ("[[place]]\ntaxels = 5\nfirst_id = 16777214\n".into(), 2, "lower `first_id`"),
         ("[[place]]\ntaxels = 5\nfirst_id = 16777217\n".into(), 3, "between 0 and"),
@@ -478,10 +481,10 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ("[[place]]\ntaxels = 5\n[[place]]\nname = \"b\"\nfirst_id = 4\ntaxels = 2\n".into(), 1, "`first_id = 100`"),
         (
             "[[place]]\ntaxels = 5\nfirst_id = 0\n[[place]]\nfirst_id = 9\ntaxels = 2\n".into(),
-            6,
+            4,
             "two places are called `skin`",
         ),
-        ("[[place]]\nname = \"x\"\n".into(), 1, "a place says how"),
+        ("[[place]]\nname = \"x\"\n".into(), 1, "add `taxels`"),
         ("[[place]]\ngrid = \"hexagonal\"\n".into(), 2, "`pitch`"),
         ("[[place]]\ngrid = \"hexagnal\"\n".into(), 2, "did you mean `hexagonal`?"),
         ("[[place]]\ngrid = \"hexagonal\"\npitch = 1e-6\n".into(), 2, "too many places"),
@@ -492,17 +495,20 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ),
         ("[[place]]\nspacing = 4\n".into(), 2, "write \"4 mm\""),
         ("[[place]]\ngrid = \"hexagonal\"\npitch = 4\n".into(), 2, "a pitch of 4.00 m"),
-        ("[[place]]\ntaxels = 5\npitch = 1\n".into(), 3, "`pitch` means nothing beside `taxels`"),
+        ("[[place]]\ntaxels = 5\npitch = 1\n".into(), 3, "`pitch` has no effect beside `taxels`"),
         ("[[place]]\ntaxels = 5\ncsv = \"a.csv\"\n".into(), 3, "remove `csv` or `taxels`"),
         ("[[place]]\ntaxls = 5\n".into(), 2, "did you mean `taxels`?"),
         ("[[place]]\ntaxels = 5\nmodality = \"presure\"\n".into(), 3, "did you mean `pressure`?"),
         ("unit = \"inch\"\n".into(), 1, "um, mm, cm or m"),
         ("existing = \"kep\"\n".into(), 1, "did you mean `keep`?"),
         ("seed = \n".into(), 1, ""),
-        ("bare = [\"palm\"]\n[regions.palm]\n[[place]]\ntaxels = 5\n".into(), 4, "kept bare"),
+        ("bare = [\"palm\"]\n[regions.palm]\n[[place]]\ntaxels = 5\n".into(), 4, "are `bare`"),
     ] {
         let told = why(&file, &text);
-        assert!(told.starts_with(&format!("recipe.toml: line {line}: ")) && told.contains(word), "{text}\n{told}");
+        assert!(
+            told.starts_with(&format!("recipe.toml: line {line}, column ")) && told.contains(word),
+            "{text}\n{told}"
+        );
     }
     assert!(why(&file, "").contains("no taxels"));
 }

@@ -192,7 +192,7 @@ fn a_taxel_moved_in_blender_is_found_and_its_normal_worked_out_again() {
             let stale: Vec<_> = findings.iter().filter(|f| f.kind == FindingKind::StaleNormal).collect();
             assert_eq!(stale.iter().map(|f| &f.taxels[..]).collect::<Vec<_>>(), [[id]], "{findings:?}");
             let notes = refresh(&mut after);
-            assert!(notes.iter().any(|note| note.contains("normals worked out again for 1 of")), "{notes:?}");
+            assert!(notes.iter().any(|note| note.contains("normals recomputed for 1 of")), "{notes:?}");
             assert!(!kinds(&after).contains(&FindingKind::StaleNormal));
         }
     }
@@ -210,7 +210,7 @@ fn the_chart_of_a_taxel_moved_in_blender_is_laid_again() {
         assert_same(&before, &edited(&python, &source, &[]));
         let mut after = edited(&python, &source, &["move", "42"]);
         assert_eq!(kinds(&after), [FindingKind::StaleChart], "on a plane the normal stays");
-        assert_eq!(refresh(&mut after), ["field `plate` charted again"]);
+        assert_eq!(refresh(&mut after), ["chart of field `plate` recomputed"]);
         let uv = |body: &Body, id: u32| body.fields[0].members[&id].uv.unwrap();
         for id in 0..100 {
             let ([u, v], [x, y]) = (uv(&after, id), uv(&before, id));

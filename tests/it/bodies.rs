@@ -85,7 +85,7 @@ fn volume(surface: &Surface) -> f64 {
 fn farthest_off_surface(body: &Body) -> f64 {
     let mut surfaces = BTreeMap::new();
     let offs = body.taxels.iter().map(|taxel| {
-        let surface = surfaces.entry(taxel.link).or_insert_with(|| body.surface_in_link(taxel.link, None));
+        let surface = surfaces.entry(taxel.link).or_insert_with(|| body.surface_in_link(taxel.link));
         surface.nearest(taxel.position_in_link).unwrap().position.distance(taxel.position_in_link)
     });
     offs.fold(0.0, f64::max)

@@ -129,5 +129,5 @@ fn what_changes_less_than_the_threshold_is_unheeded_and_does_not_add_up() {
     }
     let refused = |scene: Scene| of(scene).err().unwrap().to_string();
     assert!(refused(scene(Coverage::All, 1.0)).contains("coverage touched"));
-    assert!(refused(scene(Coverage::Touched, -1.0)).contains("a pressure from 0"));
+    assert!(refused(scene(Coverage::Touched, -1.0)).contains("a pressure of 0 or more"));
 }

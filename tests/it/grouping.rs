@@ -300,7 +300,7 @@ fn a_parent_is_named_without_a_longer_name() {
     assert!(why(&sheet, "[[fields]]\nname = \"a/b\"\nparent = \"a\"").contains("cannot stand below itself"));
     assert!(why(&sheet, "[[fields]]\nname = \"a\"\nparent = \"\"").contains("a level of it is empty"));
     let within = "[[fields]]\nname = \"a\"\n[[fields]]\nwithin = \"a\"\nparent = \"b\"\npatches = 2";
-    assert!(why(&sheet, within).contains("`parent` means nothing"));
+    assert!(why(&sheet, within).contains("`parent` has no effect"));
 }
 
 /// Two materials on a plate, and an attribute that rises along x.
@@ -357,13 +357,13 @@ fn a_field_around_a_limb_is_named_split_or_refused() {
     // By default it has no chart, and the note says what would help.
     let bare = grouped(&limb, "").unwrap();
     let [note] = &bare.notes[..] else { panic!("{:?}", bare.notes) };
-    assert!(note.contains("`limb` has no chart") && note.contains("`wrap = \"split\"`"), "{note}");
+    assert!(note.contains("`limb`: without a chart") && note.contains("`wrap = \"split\"`"), "{note}");
     assert!(complete(&limb, &bare).fields[0].chart.is_err());
 
     let split = |chart: &str| {
         let text = format!("[[fields]]\nname = \"arm\"\nchart = \"{chart}\"\nwrap = \"split\"");
         let grouping = grouped(&limb, &text).unwrap();
-        assert!(grouping.notes[0].contains("is split into"), "{:?}", grouping.notes);
+        assert!(grouping.notes[0].contains("split into"), "{:?}", grouping.notes);
         let complete = complete(&limb, &grouping);
         assert!(complete.fields[0].chart.is_err() && complete.fields[0].members.len() == limb.taxels.len());
         let parts = &complete.fields[1..];
@@ -439,14 +439,14 @@ fn taxels_without_a_surface_are_grouped_from_each_to_the_next() {
 fn rules_that_make_no_sense_are_named() {
     let sheet = plate(10, 10, |_, _| true);
     for (text, part) in [
-        ("name = \"a\"\npatches = 2\nrows = { of = 3 }", "several ways"),
-        ("", "makes nothing"),
+        ("name = \"a\"\npatches = 2\nrows = { of = 3 }", "it has several of"),
+        ("", "add a `name`"),
         ("patches = 0", "`patches`"),
         ("name = \"a\"\nlink = \"lims\"", "did you mean `limb`?"),
-        ("name = \"a\"\nmesh = \"x\"", "there are `plate`"),
-        ("name = \"a\"\nmaterial = \"x\"", "none at all"),
-        ("name = \"a\"\ntaxels = [900]", "no taxel 900 on this body; its ids run from 0 to 24"),
-        ("name = \"a\"\nwithin = \"b\"", "no field matches `b`"),
+        ("name = \"a\"\nmesh = \"x\"", "it is one of plate"),
+        ("name = \"a\"\nmaterial = \"x\"", "there is none"),
+        ("name = \"a\"\ntaxels = [900]", "no taxel from 900 to 900; its ids are from 0 to 24"),
+        ("name = \"a\"\nwithin = \"b\"", "no field of an earlier rule matches `b`"),
         ("name = \"a//b\"", "a level of it is empty"),
         ("radius = 0.1", "overlap"),
         ("radius = 0.1\noverlap = 1.0", "`overlap`"),
@@ -456,7 +456,7 @@ fn rules_that_make_no_sense_are_named() {
         ("name = \"a\"\nmodality = \"presure\"", "did you mean `pressure`?"),
         ("name = \"a\"\nweight = 0.0", "`weight`"),
         ("name = \"a\"\nu = [0, 0, 0]", "`u`"),
-        ("rows = { of = 0 }", "from 1"),
+        ("rows = { of = 0 }", "1 or more"),
     ] {
         let why = why(&sheet, &format!("[[fields]]\n{text}"));
         assert!(why.contains(part) && why.starts_with("field rule 1: "), "{text}: {why}");
@@ -483,7 +483,7 @@ fn real_and_hostile_meshes_are_grouped_or_named() {
             if corners.iter().any(|p| !p.is_finite()) {
                 continue;
             }
-            let Ok(placed) = place_evenly(&corners, &triangles, 150, 1) else { continue };
+            let Ok(placed) = place_evenly(&corners, &triangles, 150, 1, &mut |_| {}) else { continue };
             body.taxels = placed
                 .iter()
                 .zip(0..)

@@ -98,15 +98,8 @@ fn arrows_point_one_way() {
 
 #[test]
 fn no_files_use_each_other_in_a_circle() {
-    /// Rooms in which some files still do.
-    const WITH_CIRCLES: [&str; 3] = ["author", "body", "field"];
     let paths = paths();
-    let mut uses = paths.uses(false);
-    for (file, used) in &mut uses {
-        if let Some(room) = WITH_CIRCLES.into_iter().find(|room| file.starts_with(room)) {
-            used.retain(|other| !other.starts_with(room));
-        }
-    }
+    let uses = paths.uses(false);
     assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 500, "so many arrows are not seen");
     if let Some(circle) = circle(&uses) {
         panic!("these use each other: {circle:?}");
@@ -164,9 +157,9 @@ fn each_heavy_dependency_has_one_door() {
         ("csv", "source|author/points.rs"),
         ("clap", "cli"),
         ("comfy_table", "cli"),
-        ("toml", "keys.rs|signal|source/simulated|author/recipe"),
+        ("toml", "error.rs|keys.rs|signal|source/simulated|author/recipe|cli/scene/accuracy.rs"),
         ("rayon", "parallel.rs|backend/cpu/tests.rs|experiments|author/sample_neighbours.rs"),
-        ("globset", "scene|author/glob.rs"),
+        ("globset", "scene|author/recipe_values.rs"),
         ("fearless_simd", "backend/cpu"),
         ("plotters", "ink.rs|figure.rs|picture/labels.rs|tradeoff/plot.rs"),
         ("png", "ink.rs"),

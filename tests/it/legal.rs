@@ -86,7 +86,7 @@ fn strips_fans_and_lists_turn_the_same_way() {
             }
             primitive
         });
-        let surface = body.surface_in_link(0, None);
+        let surface = body.surface_in_link(0);
         for p in [DVec3::new(0.9, 0.8, 0.3), DVec3::new(0.2, 0.1, 0.3), DVec3::new(0.1, 0.3, 0.3)] {
             let hit = surface.nearest(p).unwrap();
             assert_eq!(hit.normal, DVec3::Z, "mode {mode}");
@@ -131,7 +131,7 @@ fn millimetres_come_out_in_metres() {
     assert!((taxel.normal_in_link - DVec3::Z).length() < 1e-12);
     // 1e-6 was square millimetres times a million less: areas are scaled as the points are.
     assert!((taxel.area / 1e-12 - 1.0).abs() < 1e-6, "{}", taxel.area);
-    let hit = body.surface_in_link(hand, None).nearest(DVec3::new(0.09, 0.001, 0.01)).unwrap();
+    let hit = body.surface_in_link(hand).nearest(DVec3::new(0.09, 0.001, 0.01)).unwrap();
     assert!((hit.position - DVec3::new(0.09, 0.001, 0.0)).length() < 1e-7);
 }
 
@@ -153,7 +153,7 @@ fn a_mirrored_node_keeps_its_outside_outside() {
     assert!((in_world(taxel.position_in_link) - DVec3::new(-0.25, 0.5, 0.0)).length() < 1e-12);
     let normal = link.world_from_link.transform_vector3(taxel.normal_in_link);
     assert!((normal - DVec3::Z).length() < 1e-12, "{normal}");
-    let hit = body.surface_in_link(0, None).nearest(taxel.position_in_link).unwrap();
+    let hit = body.surface_in_link(0).nearest(taxel.position_in_link).unwrap();
     assert!((hit.normal - taxel.normal_in_link).length() < 1e-12, "surface and taxel face the same way");
     assert!((hit.position - taxel.position_in_link).length() < 1e-12);
     assert!((taxel.area / 1e-6 - 1.0).abs() < 1e-6);

@@ -26,7 +26,7 @@ fn a_hand_of_25_joints() {
     // Every fingertip's own skin lies within two centimetres of its joint.
     for finger in ["thumb", "index-finger", "middle-finger", "ring-finger", "pinky-finger"] {
         let tip = body.link_index(&format!("{finger}-tip")).unwrap();
-        let hit = body.surface_in_link(tip, None).nearest(DVec3::ZERO).unwrap();
+        let hit = body.surface_in_link(tip).nearest(DVec3::ZERO).unwrap();
         assert!(hit.position.length() < 0.02, "{finger}: {}", hit.position);
     }
     let root = body.link_index("Armature").unwrap();
@@ -76,6 +76,6 @@ fn a_head_and_ten_cubes() {
     assert!((link.world_from_link.translation - DVec3::new(-4.0, 4.0, 0.0)).length() < 1e-6);
     assert!((link.world_from_link.matrix3.determinant() - 1.0).abs() < 1e-9);
     let cube = body.surfaces.iter().find(|s| s.name == "ChildScale").unwrap();
-    let hit = body.surface_in_link(child, None).nearest(DVec3::new(0.0, 3.0, 0.0)).unwrap();
+    let hit = body.surface_in_link(child).nearest(DVec3::new(0.0, 3.0, 0.0)).unwrap();
     assert!((hit.position.y - extent(cube).y / 4.0).abs() < 1e-6, "{}", hit.position);
 }

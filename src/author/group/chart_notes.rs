@@ -5,6 +5,9 @@ use crate::field::NoChart;
 /// A chart with more distortion is split, if requested, or reported.
 pub(super) const POOR_DISTORTION: f64 = 0.25;
 
+/// How to split a field.
+const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
+
 /// Problems with charts.
 #[derive(Default)]
 pub(super) struct ChartNotes {
@@ -18,75 +21,43 @@ pub(super) struct ChartNotes {
 
 impl ChartNotes {
     pub(super) fn lines(&self) -> Vec<String> {
-        let mut lines = self.of_split();
-        lines.extend(self.of_bare());
-        lines.extend(self.of_poor());
-        lines
-    }
-
-    fn of_split(&self) -> Vec<String> {
-        match &self.split[..] {
-            [] => Vec::new(),
-            [(name, parts, why)] => vec![format!("field `{name}` is split into {parts} parts: {why}")],
-            [(first, _, why), ..] => {
-                let each: Vec<String> =
-                    self.split.iter().map(|(name, parts, _)| format!("`{name}` into {parts}")).collect();
-                vec![format!("{} fields are split into parts: {}; `{first}`, as {why}", each.len(), each.join(", "))]
-            }
+        let mut lines = Vec::new();
+        if let [(_, _, why), ..] = &self.split[..] {
+            let names = fields(self.split.iter().map(|(name, ..)| name));
+            let parts: usize = self.split.iter().map(|(_, parts, _)| parts).sum();
+            lines.push(format!("{names} split into {parts} parts: {why}"));
         }
-    }
-
-    /// A line for each kind of reason.
-    fn of_bare(&self) -> Vec<String> {
-        let mut kinds = Vec::new();
-        for (_, why, is_parent) in &self.bare {
+        let mut rest: Vec<&(String, NoChart, bool)> = self.bare.iter().collect();
+        while let Some(&(_, why, is_parent)) = rest.first() {
             let kind = (Kind::of(why), *is_parent);
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-        }
-        let line = |of: &(Kind, bool)| {
-            let alike: Vec<_> = self.bare.iter().filter(|one| (Kind::of(&one.1), one.2) == *of).collect();
-            let (name, why, _) = alike.first()?;
-            let advice = match of {
+            let (alike, others) = rest.into_iter().partition(|one| (Kind::of(&one.1), one.2) == kind);
+            let alike: Vec<&(String, NoChart, bool)> = alike;
+            rest = others;
+            let advice = match kind {
                 (Kind::Links, _) => "; for a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
                 (Kind::Surface, _) => "",
                 (_, true) => "; use the fields below it",
-                _ => "; to split it, write `wrap = \"split\"` or `patches` in a recipe's [[fields]]",
+                _ => &format!("; {SPLIT}"),
             };
-            let why = plain(why);
-            if alike.len() == 1 {
-                return Some(format!("field `{name}` has no chart, thus no orientation: {why}{advice}"));
-            }
-            let names: Vec<&str> = alike.iter().map(|one| &one.0[..]).collect();
-            let names = names.join("`, `");
-            Some(match of.0 {
-                Kind::Wraps => {
-                    let (count, advice) = (alike.len(), advice.replace(" it", " them"));
-                    format!("{count} fields wrap around and have no chart, thus no orientation{advice}: `{names}`")
-                }
-                _ => format!("{} fields have no chart: `{names}`; `{name}`, as {why}{advice}", alike.len()),
-            })
-        };
-        kinds.iter().filter_map(line).collect()
+            let names = fields(alike.iter().map(|(name, ..)| name));
+            lines.push(format!("{names} without a chart, so without orientation: {}{advice}", plain(why)));
+        }
+        if let Some((worst, most)) = self.poor.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            let names = fields(self.poor.iter().map(|(name, _)| name));
+            let most = most * 100.0;
+            lines
+                .push(format!("{names} with a distorted chart, distances up to {most:.0} % off in `{worst}`; {SPLIT}"));
+        }
+        lines
     }
+}
 
-    fn of_poor(&self) -> Option<String> {
-        let worst = self.poor.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let off = |share: f64| format!("{:.0} %", share * 100.0);
-        let advice = "; for better ones write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
-        Some(match &self.poor[..] {
-            [(name, most)] => format!("distances in the chart of field `{name}` are up to {} off{advice}", off(*most)),
-            poor => {
-                let names: Vec<&str> = poor.iter().map(|(name, _)| &name[..]).collect();
-                let (count, worst) = (poor.len(), format!("{} in `{}`", off(worst.1), worst.0));
-                let names = names.join("`, `");
-                format!(
-                    "distances in {count} charts are over {} off, up to {worst}{advice}: `{names}`",
-                    off(POOR_DISTORTION)
-                )
-            }
-        })
+/// The names of fields in a note.
+fn fields<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+    match &names[..] {
+        [name] => format!("field {name}:"),
+        names => format!("fields {}:", names.join(", ")),
     }
 }
 
@@ -112,8 +83,7 @@ impl Kind {
 
 /// `why` without its own advice.
 pub(super) fn plain(why: &NoChart) -> String {
-    let why = why.to_string();
-    why.strip_suffix("; split it").map(str::to_owned).unwrap_or(why)
+    why.to_string().trim_end_matches("; split it").to_owned()
 }
 
 /// The advice for a refused field; `parts` is the number of parts of a split that works, if any up to `most` does.
@@ -121,7 +91,7 @@ pub(super) fn advice(why: &NoChart, parts: Option<usize>, is_parent: bool, most:
     match (why, parts) {
         (NoChart::SeveralLinks(_), _) => "; for a field on each link, write `each = \"link\"`".into(),
         (_, Some(parts)) => format!("; to split it into {parts} parts that have one, write `wrap = \"split\"`"),
-        _ if is_parent => "; ask for charts of the fields below it".into(),
+        _ if is_parent => "; request charts of the fields below it".into(),
         (NoChart::NoSurface, _) => String::new(),
         _ => format!("; no {most} parts or fewer have one: choose fewer taxels"),
     }
@@ -131,44 +101,22 @@ pub(super) fn advice(why: &NoChart, parts: Option<usize>, is_parent: bool, most:
 mod tests {
     use super::*;
 
-    fn lines(bare: &[(&str, NoChart, bool)], poor: &[(&str, f64)]) -> Vec<String> {
-        let bare = bare.iter().map(|(name, why, is_parent)| ((*name).to_owned(), why.clone(), *is_parent)).collect();
-        let poor = poor.iter().map(|(name, off)| ((*name).to_owned(), *off)).collect();
-        ChartNotes { split: Vec::new(), bare, poor }.lines()
-    }
-
     #[test]
     fn a_line_on_charts_says_what_to_write() {
-        let around = NoChart::CutLocus { taxel: 12, distance_m: 0.035, apart_rad: 2.9 };
+        let around = NoChart::CutLocus { taxel: 12, distance_m: 0.035 };
+        let bare = [("limb", around.clone(), false), ("arm", around, false), ("all", NoChart::SeveralLinks(3), true)];
+        let bare = bare.map(|(name, why, is_parent)| (name.to_owned(), why, is_parent)).to_vec();
+        let poor = vec![("palm".to_owned(), 0.3), ("back".to_owned(), 0.4)];
         assert_eq!(
-            lines(&[("limb", around.clone(), false)], &[]),
+            ChartNotes { split: vec![("leg".to_owned(), 2, "it wraps".to_owned())], bare, poor }.lines(),
             [
-                "field `limb` has no chart, thus no orientation: it goes all the way around a limb or a knob: two paths lead to \
-              taxel 12, 35.0 mm away, one on each side; to split it, write `wrap = \"split\"` or `patches` in a recipe's \
-              [[fields]]"
-            ]
-        );
-        assert_eq!(
-            lines(&[("arm", around, false), ("leg", NoChart::Wraps(2.0), false)], &[]),
-            [
-                "2 fields wrap around and have no chart, thus no orientation; to split them, write `wrap = \"split\"` or \
-              `patches` in a recipe's [[fields]]: `arm`, `leg`"
-            ]
-        );
-        assert_eq!(
-            lines(&[("all", NoChart::SeveralLinks(3), true)], &[("palm", 0.3)]),
-            [
-                "field `all` has no chart, thus no orientation: its taxels sit on 3 links that move against each other; for \
-                 a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
-                "distances in the chart of field `palm` are up to 30 % off; for better ones write `wrap = \"split\"` or \
-                 smaller `patches` in a recipe's [[fields]]",
-            ]
-        );
-        assert_eq!(
-            lines(&[], &[("palm", 0.3), ("back", 0.4)]),
-            [
-                "distances in 2 charts are over 25 % off, up to 40 % in `back`; for better ones write `wrap = \"split\"` or \
-              smaller `patches` in a recipe's [[fields]]: `palm`, `back`"
+                "field `leg`: split into 2 parts: it wraps",
+                "fields `limb`, `arm`: without a chart, so without orientation: it goes all the way around: two paths of 35.0 \
+                 mm lead to taxel 12; to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
+                "field `all`: without a chart, so without orientation: its taxels sit on 3 links that move against each \
+                 other; for a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
+                "fields `palm`, `back`: with a distorted chart, distances up to 40 % off in `back`; to split a field, write \
+                 `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
             ]
         );
     }

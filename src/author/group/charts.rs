@@ -4,7 +4,8 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
 use super::divide::numbered;
-use super::{ChartWish, FieldDraft, Grouper, Grouping, Wrap};
+use super::grouper::{FieldDraft, Grouper, Grouping};
+use super::rule::{ChartWish, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
 use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::recipe_values::Globs;
+use super::grouper::Grouper;
 use super::rule::{Each, FieldRule};
-use super::{Grouper, Painted};
+use crate::author::recipe_values::{Globs, Ids};
 use crate::body::Modality;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, failed, suggestion};
 use crate::field::LinkSurface;
 
 /// A taxel is selected if the attribute is above this.
@@ -24,17 +24,12 @@ impl Grouper<'_> {
             let missing =
                 lists.iter().find(|ids| !self.body.taxels.iter().any(|t| (ids.first..=ids.last).contains(&t.id)));
             if let Some(ids) = missing {
-                let (first, last) = (self.body.taxels.first(), self.body.taxels.last());
-                let span = match (first, last) {
-                    (Some(first), Some(last)) => format!("its ids run from {} to {}", first.id, last.id),
-                    _ => "it has none at all".into(),
+                let span = match &self.body.taxels[..] {
+                    [first, .., last] => format!("its ids are from {} to {}", first.id, last.id),
+                    few => format!("it has {}", few.len()),
                 };
-                let what = if ids.first == ids.last {
-                    format!("taxel {}", ids.first)
-                } else {
-                    format!("taxel {}..={}", ids.first, ids.last)
-                };
-                return Err(Error::failed(format!("`taxels`: there is no {what} on this body; {span}")));
+                let Ids { first, last } = ids;
+                return Err(failed!("`taxels`: the body has no taxel from {first} to {last}; {span}"));
             }
             let listed: BTreeSet<u32> =
                 lists.iter().flat_map(|ids| (ids.first..=ids.last).filter(|&id| has(id))).collect();
@@ -139,38 +134,10 @@ fn known<'n>(key: &str, globs: &Globs, thing: &str, names: impl Iterator<Item = 
     if names.clone().any(|name| globs.matches(name)) {
         return Ok(());
     }
-    Err(unknown(key, &globs.text().join("`, `"), thing, names))
+    Err(unknown(key, &globs.listed(), thing, names))
 }
 
 /// The error that `key` matches no `thing` of `names`.
-fn unknown<'n>(key: &str, asked: &str, thing: &str, names: impl Iterator<Item = &'n str> + Clone) -> Error {
-    let names: BTreeSet<&str> = names.collect();
-    let hint = match nearest(asked, names.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None if names.is_empty() => "there is none at all".to_owned(),
-        None => {
-            let some: Vec<String> = names.iter().take(6).map(|name| format!("`{name}`")).collect();
-            format!("there are {}{}", some.join(", "), if names.len() > 6 { ", …" } else { "" })
-        }
-    };
-    Error::failed(format!("`{key}`: no {thing} matches `{asked}`: {hint}"))
-}
-
-/// A body without materials and attributes.
-impl Painted for () {
-    fn materials(&self) -> Vec<String> {
-        Vec::new()
-    }
-
-    fn material(&self, _: usize, _: usize) -> Option<&str> {
-        None
-    }
-
-    fn attributes(&self) -> Vec<String> {
-        Vec::new()
-    }
-
-    fn attribute(&self, _: &str, _: usize, _: usize, _: [f64; 3]) -> Option<f64> {
-        None
-    }
+fn unknown<'n>(key: &str, asked: &str, thing: &str, names: impl Iterator<Item = &'n str>) -> Error {
+    failed!("`{key}`: no {thing} matches `{asked}`; {}", suggestion(asked, names))
 }

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::Grouper;
 use super::distances::LinkDistances;
+use super::grouper::Grouper;
 use super::patches::{patches, spread};
 use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 use crate::field::unions;
 
 /// Maximum rounds of Lloyd's iteration.
@@ -137,41 +137,38 @@ impl Grouper<'_> {
             _ => Vec::new(),
         };
         let mut discs = Vec::new();
-        for (number, seed) in seeds.iter().enumerate() {
-            let (link, nearest, at) = self.locate_seed(seed, &links);
+        let located: Vec<_> = seeds.iter().map(|seed| self.locate_seed(seed, &links)).collect();
+        for (number, &(link, nearest, at)) in located.iter().enumerate() {
+            let distances = &mut links[link];
             let radius_m = match radius_m {
                 Some(radius_m) => radius_m,
                 None => {
-                    let others: Vec<usize> = (0..seeds.len()).filter(|&other| other != number).collect();
-                    let all: Vec<f64> =
-                        links[link].all_from_taxel(nearest).into_iter().map(|reach| reach.distance_m).collect();
-                    let distances = &links[link];
-                    let distance = |&other: &usize| match seeds[other] {
-                        Seed::Taxel(taxel) => distances.taxels.iter().position(|&t| t == taxel).map(|i| all[i]),
-                        // A point counts as its nearest taxel.
-                        Seed::Point(_) => Some(self.locate_seed(&seeds[other], &links))
-                            .filter(|&(on, ..)| on == link)
-                            .map(|(_, i, _)| all[i]),
-                    };
-                    let least = others.iter().filter_map(distance).filter(|&d| d > 0.0).fold(f64::INFINITY, f64::min);
+                    let all = distances.all_from_taxel(nearest);
+                    // A point counts as its nearest taxel.
+                    let others = located.iter().enumerate().filter(|&(other, &(on, ..))| other != number && on == link);
+                    let apart = others.map(|(_, &(_, i, _))| all[i].distance_m).filter(|&distance| distance > 0.0);
+                    let least = apart.fold(f64::INFINITY, f64::min);
                     if least == f64::INFINITY {
-                        return Err(Error::failed(format!(
+                        return Err(failed!(
                             "seed {} has no other on its part of the surface to overlap with; give a `radius`",
                             number + 1
-                        )));
+                        ));
                     }
                     least / (2.0 * (1.0 - rule.overlap.unwrap_or(0.0)))
                 }
             };
-            let distances = &mut links[link];
-            let reached = from(distances, nearest, at, &mut self.unroller, radius_m);
-            let disc: Vec<usize> =
-                (0..distances.len()).filter(|&i| reached[i] <= radius_m).map(|i| distances.taxels[i]).collect();
+            let locate = |(link, p)| self.unroller.surfaces().in_link(link).locate(p, distances.points[nearest].1);
+            let reached = match at.and_then(locate) {
+                Some(place) => distances.near_place(&place, nearest, radius_m),
+                None => distances.near_taxel(nearest, radius_m),
+            };
+            let within = (0..distances.len()).filter(|&i| reached[i].distance_m <= radius_m);
+            let disc: Vec<usize> = within.map(|i| distances.taxels[i]).collect();
             if disc.is_empty() {
-                return Err(Error::failed(format!(
+                return Err(failed!(
                     "there is no taxel within {radius_m} m of seed {}; widen the `radius`, or move the seed",
                     number + 1
-                )));
+                ));
             }
             discs.push(disc);
         }
@@ -222,7 +219,7 @@ impl Grouper<'_> {
                 let mut taxels = Vec::new();
                 for id in ids {
                     let taxel = body.taxel_index(id).filter(|taxel| chosen.contains(taxel));
-                    let why = || Error::failed(format!("`seeds`: taxel {id} is not among those that the rule chooses"));
+                    let why = || failed!("`seeds`: taxel {id} is not among those that the rule chooses");
                     taxels.push(Seed::Taxel(taxel.ok_or_else(why)?));
                 }
                 Ok(taxels)
@@ -230,18 +227,15 @@ impl Grouper<'_> {
             Seeds::Fields(globs) => {
                 let specs: Vec<_> = self.made.iter().map(|made| made.spec.clone()).collect();
                 let named = specs.iter().zip(unions(&specs)).filter(|(spec, _)| globs.matches(&spec.name));
-                let middles: Vec<Seed> = named
-                    .filter_map(|(_, ids)| {
-                        let taxels: Vec<usize> = ids.into_iter().filter_map(|id| body.taxel_index(id)).collect();
-                        let taxels: Vec<usize> =
-                            taxels.into_iter().filter(|taxel| chosen.binary_search(taxel).is_ok()).collect();
-                        self.middle(&taxels)
-                    })
-                    .map(Seed::Taxel)
-                    .collect();
+                let chosen_of = |ids: BTreeSet<u32>| -> Vec<usize> {
+                    let taxels = ids.into_iter().filter_map(|id| body.taxel_index(id));
+                    taxels.filter(|taxel| chosen.binary_search(taxel).is_ok()).collect()
+                };
+                let middles = named.filter_map(|(_, ids)| self.middle(&chosen_of(ids)));
+                let middles: Vec<Seed> = middles.map(Seed::Taxel).collect();
                 if middles.is_empty() {
-                    let asked = globs.text().join("`, `");
-                    return Err(Error::failed(format!("`seeds`: no field matches `{asked}` and holds a chosen taxel")));
+                    let asked = globs.listed();
+                    return Err(failed!("`seeds`: no field that matches `{asked}` has a chosen taxel"));
                 }
                 Ok(middles)
             }
@@ -281,22 +275,6 @@ impl Grouper<'_> {
         // Empty rows count.
         runs.into_iter().map(|(run, taxels)| (format!("{stem}_{:0width$}", run + 1), taxels)).collect()
     }
-}
-
-/// Distances from a seed to the taxels of `distances`.
-fn from(
-    distances: &mut LinkDistances,
-    nearest: usize,
-    at: Option<(usize, DVec3)>,
-    unroller: &mut crate::field::Unroller<'_>,
-    limit_m: f64,
-) -> Vec<f64> {
-    let place = at.and_then(|(link, p)| unroller.surfaces().in_link(link).locate(p, distances.points[nearest].1));
-    let reached = match place {
-        Some(place) => distances.near_place(&place, nearest, limit_m),
-        None => distances.near_taxel(nearest, limit_m),
-    };
-    reached.into_iter().map(|reach| reach.distance_m).collect()
 }
 
 /// Children numbered from 1 with a fixed number of digits.

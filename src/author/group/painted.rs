@@ -1,16 +1,46 @@
 //! Materials and painted attributes of a body's file, for rules.
 
-use super::Painted;
-use crate::body::{Body, Details};
+use crate::body::{Body, Details, Paint};
+
+/// Materials and painted attributes of a body's surfaces. Surfaces and triangles are numbered as in [`Body::surfaces`].
+pub trait Painted {
+    /// The names of all materials.
+    fn materials(&self) -> Vec<String>;
+
+    /// The material of `triangle`.
+    fn material(&self, surface: usize, triangle: usize) -> Option<&str>;
+
+    /// The names of all painted attributes with one number per vertex, as in a recipe.
+    fn attributes(&self) -> Vec<String>;
+
+    /// Attribute `name` at `barycentric` of `triangle`; `None` if the surface does not have it.
+    fn attribute(&self, name: &str, surface: usize, triangle: usize, barycentric: [f64; 3]) -> Option<f64>;
+}
+
+/// A body without materials and attributes.
+impl Painted for () {
+    fn materials(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn material(&self, _: usize, _: usize) -> Option<&str> {
+        None
+    }
+
+    fn attributes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn attribute(&self, _: &str, _: usize, _: usize, _: [f64; 3]) -> Option<f64> {
+        None
+    }
+}
 
 /// Materials and painted attributes from the body's file.
 pub(in crate::author) struct FilePaint<'a> {
     pub(in crate::author) body: &'a Body,
     pub(in crate::author) details: &'a Details,
 }
-
-/// Names of the channels of a colour.
-const CHANNELS: [&str; 4] = ["r", "g", "b", "a"];
 
 impl Painted for FilePaint<'_> {
     fn materials(&self) -> Vec<String> {
@@ -22,24 +52,12 @@ impl Painted for FilePaint<'_> {
     }
 
     fn attributes(&self) -> Vec<String> {
-        let paints = self.details.parts.iter().flat_map(|part| &part.paints);
-        let names = paints.flat_map(|paint| match paint.width {
-            1 => vec![paint.name.clone()],
-            width => CHANNELS.iter().take(width).map(|channel| format!("{}.{channel}", paint.name)).collect(),
-        });
-        names.collect()
+        self.details.parts.iter().flat_map(|part| &part.paints).flat_map(Paint::names).collect()
     }
 
     fn attribute(&self, name: &str, surface: usize, triangle: usize, barycentric: [f64; 3]) -> Option<f64> {
         let paints = &self.details.parts.get(surface)?.paints;
-        let (paint, place) = paints.iter().find_map(|paint| {
-            if paint.width == 1 && paint.name == name {
-                return Some((paint, 0));
-            }
-            let channel = name.strip_prefix(&paint.name)?.strip_prefix('.')?;
-            let place = CHANNELS.iter().position(|own| *own == channel)?;
-            (place < paint.width).then_some((paint, place))
-        })?;
+        let (paint, place) = paints.iter().find_map(|paint| Some((paint, paint.column(name)?)))?;
         let corners = self.body.surfaces.get(surface)?.triangles.get(triangle)?;
         let at = |v: u32| paint.values.get(v as usize * paint.width + place).copied().map(f64::from);
         let values = [at(corners[0])?, at(corners[1])?, at(corners[2])?];

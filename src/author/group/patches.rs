@@ -20,13 +20,8 @@ impl Seeding {
 
     /// The taxel farthest from all seeds, and its distance; the first of equals.
     fn farthest(&self) -> (usize, f64) {
-        let mut best = (0, f64::NEG_INFINITY);
-        for (i, &distance) in self.nearest_m.iter().enumerate() {
-            if distance > best.1 {
-                best = (i, distance);
-            }
-        }
-        best
+        let all = self.nearest_m.iter().copied().enumerate();
+        all.reduce(|best, next| if next.1 > best.1 { next } else { best }).unwrap_or((0, f64::NEG_INFINITY))
     }
 
     /// Adds the farthest taxel as a seed; on a surface part without seeds, one at its rim.
@@ -35,11 +30,8 @@ impl Seeding {
         let is_first = limit_m == f64::INFINITY;
         if is_first {
             let from_here = distances.all_from_taxel(seed);
-            let finite = |reach: &&(usize, &TaxelDistance)| reach.1.distance_m < f64::INFINITY;
-            let rim = from_here.iter().enumerate();
-            let rim =
-                rim.filter(|r| finite(&r)).max_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m).then(b.0.cmp(&a.0)));
-            seed = rim.map_or(seed, |(i, _)| i);
+            let reached = from_here.iter().map(|way| way.distance_m).enumerate().filter(|way| way.1 < f64::INFINITY);
+            seed = reached.reduce(|best, next| if next.1 > best.1 { next } else { best }).map_or(seed, |(i, _)| i);
         }
         let reached = if is_first { distances.all_from_taxel(seed) } else { distances.near_taxel(seed, limit_m) };
         for (nearest, reach) in self.nearest_m.iter_mut().zip(&reached) {

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::super::recipe_values::{Globs, Ids, Length};
+use crate::author::recipe_values::{Globs, Ids, Length};
+use crate::error::{Error, Result};
 
 /// One rule: which taxels, and what fields they make. As a table of a recipe:
 ///
@@ -18,34 +19,12 @@ use super::super::recipe_values::{Globs, Ids, Length};
 /// overlap = 0.5
 /// ```
 ///
-/// **Which taxels.** `link`, `mesh`, `material` (globs or lists of them), `attribute` (a painted vertex attribute: over
-/// 0.5 where the taxel is), `modality` and `taxels` (ids and ranges, `[1, 2, "10..=20"]`); a taxel has to meet all that are
-/// given. Without `modality` and `taxels`, only taxels for pressure where there are any. With `within`, a glob over the
-/// fields that rules before this one made, the rule is applied in each of those by itself.
-///
-/// **What they make.** Without more, one field called `name`. Else that field, where there is a `name`, and below it, by one
-/// of these keys:
-///
-/// | key | children |
-/// |---|---|
-/// | `each = "link"`, `"mesh"` or `"material"` | one for each, with its name |
-/// | `patches = 8` or `{ of = 16 }` | so many compact patches, or as many as have about 16 taxels, by distance along the surface |
-/// | `radius = "20 mm"` | all within that distance along the surface of each of the `seeds`: ids, points `[x, y, z]` (m, in the world at rest) or a glob over fields, whose middles they are; without `seeds`, of seeds spread so that neighbouring discs share `overlap` of their width (0 to under 1; 0.5 and more leaves no taxel out) |
-/// | `seeds` with `overlap` | the same, each disc as wide as makes it share that much with the nearest other |
-/// | `rows = { of = 8, first = 0, stride = 32 }` | one for each run of 8 ids, from `first` (the lowest id) on, `stride` (8) apart |
-/// | `columns = { of = 8, first = 0 }` | one for each place in runs of 8 ids |
-///
-/// Patches and discs keep to one link each. Children are called by `stem` (`patch`, `disc`, `row`, `column`) and a number from
-/// one. Every level of a name is a field; one that no rule makes holds what is below it. With `parent`, the topmost level stands
-/// below that field: `parent = "body"` puts `left_arm/forearm` under `body` without a longer name.
-///
-/// **Charts.** `chart` is `"auto"` (a plane where that is true to length to 5 %, else the truer of both; one that is over 25 %
-/// off is split where `wrap` says so, else told), `"plane"`, `"geodesic"` or
-/// `"none"`; `u` the direction of +u in the anchor's frame. A field that has no such chart, as it goes around a limb, is by
-/// `wrap` given none (`"bare"`, which is what happens without the key to `auto`), split into children that have one
-/// (`"split"`), or an error that says what split would do (`"refuse"`, without the key where a chart is asked for by name).
+/// A taxel must meet all conditions that are given. A rule makes the field `name`, or with one of `each`, `patches`, `radius`,
+/// `seeds`, `rows` and `columns` children below it, called by `stem` and a number. Every level of a name is a field.
+/// `docs/authoring.md` describes all keys.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FieldRule {
     /// Name of the field, or of what its children stand below.
     pub name: Option<String>,
@@ -89,6 +68,44 @@ pub struct FieldRule {
     pub wrap: Option<Wrap>,
     /// Direction of +u in the anchor's frame.
     pub u: Option<[f64; 3]>,
+}
+
+impl FieldRule {
+    /// Checks that the rule is consistent by itself.
+    pub(super) fn check(&self) -> Result<()> {
+        let (radius, seeds, overlap) = (self.radius.is_some(), self.seeds.is_some(), self.overlap.is_some());
+        let discs = radius || seeds || overlap;
+        let divisions =
+            [self.each.is_some(), self.patches.is_some(), discs, self.rows.is_some(), self.columns.is_some()];
+        let divides = divisions.into_iter().filter(|&given| given).count();
+        let is_bad_weight = |weight: f64| !(1e-6..=1e6).contains(&weight);
+        let problems = [
+            (
+                divides > 1,
+                "it has several of `each`, `patches`, `radius`, `rows` and `columns`: keep one, and divide further by a rule `within`",
+            ),
+            (divides == 0 && self.name.is_none(), "add a `name`, or `each`, `patches`, `radius`, `rows` or `columns`"),
+            (matches!(self.patches, Some(Patches::Number(0) | Patches::Of { of: 0 })), "`patches` must be 1 or more"),
+            (self.parent.is_some() && self.within.is_some(), "`parent` has no effect beside `within`; remove one"),
+            (
+                self.rows.or(self.columns).is_some_and(|rows| rows.of == 0 || rows.stride == Some(0)),
+                "`of` and `stride` of rows must be 1 or more",
+            ),
+            (self.overlap.is_some_and(|share| !(0.0..1.0).contains(&share)), "`overlap` must be from 0 to under 1"),
+            (discs && !radius && !(seeds && overlap), "discs need a `radius`, or `seeds` and an `overlap`"),
+            (discs && !seeds && !overlap, "discs of a `radius` need `seeds` or an `overlap`"),
+            (radius && seeds && overlap, "remove one of `radius`, `seeds` and `overlap`"),
+            (self.weight.is_some_and(is_bad_weight), "`weight` must be from 1e-6 to 1e6"),
+            (
+                self.u.is_some_and(|u| !u.iter().all(|x| x.is_finite()) || u == [0.0; 3]),
+                "`u` must be a direction [x, y, z], not all 0",
+            ),
+        ];
+        match problems.into_iter().find(|(found, _)| *found) {
+            Some((_, what)) => Err(Error::failed(what)),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What children are made for each of.

@@ -1,4 +1,4 @@
-//! The checks, one per function.
+//! The checks of a layout, one per function.
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::super::surface_search::SurfaceSearch;
-use super::{Finding, FindingKind, listed};
-use crate::body::{Body, ChartKind, FieldSpec, Taxel};
+use super::finding::{Finding, FindingKind};
+use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed};
 use crate::field::{Field, Unroller};
 
 /// Minimum number of taxels of a field for orientation and axis.
@@ -27,14 +27,20 @@ const NORMAL_TOLERANCE_RAD: f64 = 1e-5;
 const UV_TOLERANCE_M: f64 = 1e-6;
 const UV_TOLERANCE_SHARE: f64 = 1e-5;
 
-impl Finding {
-    fn of_taxels(kind: FindingKind, taxels: Vec<u32>, what: String) -> Self {
-        Self { kind, taxels, fields: Vec::new(), worst: None, place: None, what }
-    }
-
-    fn of_fields(kind: FindingKind, fields: Vec<String>, what: String) -> Self {
-        Self { kind, taxels: Vec::new(), fields, worst: None, place: None, what }
-    }
+/// All problems of the layout of `body`, whose fields are `fields`.
+///
+/// A taxel is compared with the body's surface at rest, a skinned one with the mesh at bind. It is on the surface within
+/// 1 µm, beside rounding to single precision; its normal is current within 10⁻⁵ rad of a triangle's there.
+#[must_use]
+pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    findings.extend(empty(body));
+    findings.extend(small(fields));
+    findings.extend(unused(body, fields));
+    findings.extend(crowding(body));
+    findings.extend(against_surface(body));
+    findings.extend(stale_charts(body));
+    findings
 }
 
 /// A taxel's place for people.
@@ -46,20 +52,20 @@ fn count(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
-pub(super) fn empty(body: &Body) -> Vec<Finding> {
+fn empty(body: &Body) -> Vec<Finding> {
     let mut findings = Vec::new();
     if body.taxels.is_empty() {
-        let what = "the body has no taxels, so that it cannot be run";
+        let what = "the body has no taxels and cannot be run";
         findings.push(Finding::of_taxels(FindingKind::NoTaxels, Vec::new(), what.to_owned()));
     }
     if body.fields.is_empty() {
-        let what = "the body has no fields, so that it cannot be run";
+        let what = "the body has no fields and cannot be run";
         findings.push(Finding::of_fields(FindingKind::NoFields, Vec::new(), what.to_owned()));
     }
     findings
 }
 
-pub(super) fn small(fields: &[Field]) -> Option<Finding> {
+fn small(fields: &[Field]) -> Option<Finding> {
     let small: Vec<&Field> = fields.iter().filter(|field| field.members.len() < MIN_FIELD_TAXELS).collect();
     let least = small.iter().min_by_key(|field| field.members.len())?;
     let names: Vec<String> = small.iter().map(|field| field.name.clone()).collect();
@@ -70,7 +76,7 @@ pub(super) fn small(fields: &[Field]) -> Option<Finding> {
     Some(Finding { worst, place, ..Finding::of_fields(FindingKind::SmallField, names, what) })
 }
 
-pub(super) fn unused(body: &Body, fields: &[Field]) -> Option<Finding> {
+fn unused(body: &Body, fields: &[Field]) -> Option<Finding> {
     if fields.is_empty() {
         return None;
     }
@@ -81,12 +87,12 @@ pub(super) fn unused(body: &Body, fields: &[Field]) -> Option<Finding> {
         return None;
     }
     let taxels = count(loose.len(), "taxel");
-    let what = format!("{taxels} in no field, so that nothing is felt there: {}", listed(&loose));
+    let what = format!("{taxels} in no field, so touches there are not reported: {}", listed(&loose));
     Some(Finding::of_taxels(FindingKind::UnusedTaxel, loose, what))
 }
 
 /// Taxels at one place, and taxels far from all others.
-pub(super) fn crowding(body: &Body) -> Vec<Finding> {
+fn crowding(body: &Body) -> Vec<Finding> {
     let places: Vec<DVec3> = body
         .taxels
         .iter()
@@ -174,7 +180,7 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// Taxels off the surface, with normals that point inward, and with normals that are not the surface's.
-pub(super) fn against_surface(body: &Body) -> Vec<Finding> {
+fn against_surface(body: &Body) -> Vec<Finding> {
     let surface_search = SurfaceSearch::of(body);
     if surface_search.is_empty() {
         return Vec::new();
@@ -228,7 +234,7 @@ impl<'a> Worst<'a> {
 }
 
 /// Fields whose stored (u, v) differ from a newly computed chart, or that cannot have one any more.
-pub(super) fn stale_charts(body: &Body) -> Option<Finding> {
+fn stale_charts(body: &Body) -> Option<Finding> {
     let mut unroller = Unroller::new(body);
     let mut stale: Vec<String> = Vec::new();
     let mut worst: Option<(f64, String)> = None;
@@ -248,7 +254,7 @@ pub(super) fn stale_charts(body: &Body) -> Option<Finding> {
     }
     let by = worst.as_ref().map(|(most, place)| format!("; most {place}, {:.3} mm", most * 1e3)).unwrap_or_default();
     let fields = count(stale.len(), "field");
-    let what = format!("{fields} with a geodesic chart that the surface does not give: {}{by}", listed(&stale));
+    let what = format!("{fields} with a geodesic chart that differs from the surface's: {}{by}", listed(&stale));
     let (worst, place) = worst.unzip();
     Some(Finding { worst, place, ..Finding::of_fields(FindingKind::StaleChart, stale, what) })
 }

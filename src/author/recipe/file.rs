@@ -1,19 +1,24 @@
 //! Reads and checks a recipe's file.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::path::Path;
 
 use glam::DVec3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{DEFAULT_WITHIN_M, Origin, PlaceSpec, Placement, Recipe, SKIN, check_count, metres, unit_metres};
-use crate::author::glob::Globs;
+use super::spec::{MAX_COUNT, PlaceSpec, Placement, Recipe, SKIN, unit_metres};
 use crate::author::group::FieldRule;
+use crate::author::origin::Origin;
+use crate::author::recipe_values::{Globs, Length, Names};
 use crate::author::region::Region;
 use crate::body::{MAX_TAXEL_ID, Modality};
-use crate::error::{Result, nearest};
+use crate::error::{Error, Result, suggestion};
 use crate::keys::Text;
+
+/// Default maximum distance of a given place from the surface, m.
+const DEFAULT_WITHIN_M: f64 = 0.01;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,8 +49,8 @@ enum Existing {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RegionKeys {
-    node: Option<Spanned<Names>>,
-    material: Option<Spanned<Names>>,
+    node: Option<Globs>,
+    material: Option<Globs>,
     attribute: Option<Spanned<String>>,
     #[serde(rename = "box")]
     bounds: Option<Spanned<[[f64; 3]; 2]>>,
@@ -68,40 +73,17 @@ struct PlaceKeys {
     first_id: Option<Spanned<i64>>,
     modality: Option<Spanned<String>>,
     taxels: Option<Spanned<i64>>,
-    spacing: Option<Spanned<LengthKey>>,
+    spacing: Option<Spanned<Length>>,
     density: Option<Spanned<String>>,
     grid: Option<Spanned<GridName>>,
-    pitch: Option<Spanned<LengthKey>>,
+    pitch: Option<Spanned<Length>>,
     origin: Option<Spanned<[f64; 3]>>,
     u: Option<Spanned<[f64; 3]>>,
-    points: Option<Spanned<Names>>,
+    points: Option<Spanned<Globs>>,
     csv: Option<Spanned<String>>,
     icub: Option<Spanned<String>>,
     link: Option<Spanned<String>>,
-    within: Option<Spanned<LengthKey>>,
-}
-
-#[derive(Clone, Deserialize)]
-#[serde(untagged, expecting = "it is a name, or a list of names")]
-enum Names {
-    One(String),
-    Many(Vec<String>),
-}
-
-impl Names {
-    fn list(&self) -> Vec<String> {
-        match self {
-            Self::One(name) => vec![name.clone()],
-            Self::Many(names) => names.clone(),
-        }
-    }
-}
-
-#[derive(Clone, Deserialize)]
-#[serde(untagged, expecting = "a length is a number of metres, or a text like \"8 mm\"")]
-enum LengthKey {
-    Metres(f64),
-    Text(String),
+    within: Option<Spanned<Length>>,
 }
 
 /// A recipe's text and its name in messages.
@@ -112,189 +94,180 @@ struct RecipeText<'a> {
 }
 
 impl RecipeText<'_> {
-    /// The place of `value`.
-    fn origin<T>(self, value: &Spanned<T>) -> Origin {
-        Origin { file: self.name.to_owned(), line: format!("line {}", self.text.line(value.span().start)) }
+    fn origin(self, span: Range<usize>) -> Origin {
+        Origin(format!("{}: {}", self.name, self.text.place(span)))
     }
 
-    fn length(self, key: &str, value: &Spanned<LengthKey>) -> Result<f64> {
-        let wrong = |what: String| self.origin(value).wrong(format!("`{key}`: {what}"));
-        match value.get_ref() {
-            LengthKey::Metres(m) if m.is_finite() && *m > 0.0 => Ok(*m),
-            LengthKey::Metres(m) => Err(wrong(format!("{m} is no length over 0, in metres"))),
-            LengthKey::Text(text) => metres(text).map_err(wrong),
-        }
-    }
-
-    fn globs(self, names: Option<&Spanned<Names>>) -> Result<Option<Globs>> {
-        let globs = names.map(|names| Globs::new(&names.get_ref().list()).map_err(|e| self.origin(names).put(e)));
-        globs.transpose()
-    }
-
-    fn point(self, key: &str, value: &Spanned<[f64; 3]>) -> Result<DVec3> {
+    fn point(self, key: &str, value: Option<&Spanned<[f64; 3]>>) -> Result<Option<DVec3>> {
+        let Some(value) = value else { return Ok(None) };
         let point = DVec3::from_array(*value.get_ref());
-        let fits = point.is_finite();
-        if fits {
-            Ok(point)
-        } else {
-            Err(self.origin(value).wrong(format!("`{key}` is {point}; its numbers must be finite")))
-        }
+        let wrong = || self.text.wrong(value.span(), format!("`{key}` is {point}; its numbers must be finite"));
+        if point.is_finite() { Ok(Some(point)) } else { Err(wrong()) }
     }
 }
 
-pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Recipe> {
-    let recipe_text = RecipeText { name, text: Text(text) };
-    let file: File = recipe_text.text.parse().map_err(|e| e.at(name))?;
+/// The place of a key that is given.
+fn span<T>(key: Option<&Spanned<T>>) -> Option<Range<usize>> {
+    key.map(Spanned::span)
+}
+
+impl Recipe {
+    /// Reads the recipe in the TOML file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, or is inconsistent. One line says where.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        Self::parse(&path.display().to_string(), &text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// Reads the recipe in `text`, called `name` in messages; files that it names are looked for in `folder`.
+    ///
+    /// # Errors
+    /// As [`Recipe::load`].
+    pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Self> {
+        parse(RecipeText { name, text: Text(text) }, folder).map_err(|e| e.at(name))
+    }
+}
+
+fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
+    let text = recipe_text.text;
+    let file: File = text.parse()?;
     let mut recipe = Recipe { keeps_existing: file.existing == Existing::Keep, seed: file.seed, ..Recipe::none() };
     if let Some(unit) = &file.unit {
-        let metres = unit_metres(unit.get_ref()).map_err(|what| recipe_text.origin(unit).wrong(what))?;
+        let metres = unit_metres(unit.get_ref()).map_err(|e| text.wrong(unit.span(), e.to_string()))?;
         recipe.unit = Some((unit.get_ref().clone(), metres));
     }
-    for (name, keys) in &file.regions {
-        recipe.regions.insert(name.get_ref().clone(), region(recipe_text, name, keys)?);
-    }
-    let known = &recipe.regions;
-    let check = |names: &[String], at: &Origin| {
-        let Some(unknown) = names.iter().find(|name| !known.contains_key(*name)) else { return Ok(()) };
-        let hint = match nearest(unknown, known.keys().map(String::as_str)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "write a [regions] table for it".to_owned(),
+    let known: Vec<String> = file.regions.keys().map(|name| name.get_ref().clone()).collect();
+    let check = |names: &[String], at: Range<usize>| {
+        let Some(name) = names.iter().find(|name| !known.contains(name)) else { return Ok(()) };
+        let hint = match known.is_empty() {
+            true => "write a [regions] table for it".to_owned(),
+            false => suggestion(name, known.iter().map(String::as_str)),
         };
-        Err(at.wrong(format!("there is no region `{unknown}`; {hint}")))
+        Err(text.wrong(at, format!("there is no region `{name}`; {hint}")))
     };
-    for region in known.values() {
-        check(&region.except, &region.at)?;
+    for (name, keys) in file.regions {
+        if let Some(except) = &keys.except {
+            check(&except.get_ref().0, except.span())?;
+        }
+        let at = recipe_text.origin(keys.attribute.as_ref().map_or(name.span(), Spanned::span));
+        recipe.regions.insert(name.get_ref().clone(), region(text, keys, at)?);
     }
-    recipe.bare = file.bare.iter().map(|name| (name.get_ref().clone(), recipe_text.origin(name))).collect();
-    for (name, at) in &recipe.bare {
-        check(std::slice::from_ref(name), at)?;
+    for name in &file.bare {
+        check(std::slice::from_ref(name.get_ref()), name.span())?;
+        recipe.bare.push((name.get_ref().clone(), recipe_text.origin(name.span())));
     }
-    for keys in &file.place {
-        let place = place(recipe_text, keys, folder)?;
-        let at = keys.get_ref().region.as_ref().map_or_else(|| place.at.clone(), |region| recipe_text.origin(region));
-        check(&place.regions, &at)?;
+    for spanned in &file.place {
+        let keys = spanned.get_ref();
+        let place = place(recipe_text, spanned, folder)?;
+        check(&place.regions, span(keys.region.as_ref()).unwrap_or(spanned.span()))?;
         if recipe.places.iter().any(|other| other.name == place.name) {
-            let at = keys.get_ref().name.as_ref().map_or_else(|| place.at.clone(), |name| recipe_text.origin(name));
-            return Err(at.wrong(format!("two places are called `{}`; give one another `name`", place.name)));
+            let what = format!("two places are called `{}`; give one another `name`", place.name);
+            return Err(text.wrong(span(keys.name.as_ref()).unwrap_or(spanned.span()), what));
         }
         recipe.places.push(place);
     }
-    check_first_ids(recipe_text, &file.place, &recipe.places)?;
-    recipe.fields =
-        file.fields.into_iter().map(|table| (table.get_ref().clone(), recipe_text.origin(&table))).collect();
+    check_first_ids(text, &file.place, &recipe.places)?;
+    recipe.fields = file
+        .fields
+        .into_iter()
+        .map(|rule| {
+            let at = recipe_text.origin(rule.span());
+            (rule.into_inner(), at)
+        })
+        .collect();
     Ok(recipe)
 }
 
-fn region(recipe_text: RecipeText<'_>, name: &Spanned<String>, keys: &RegionKeys) -> Result<Region> {
-    let bounds = match &keys.bounds {
-        None => None,
-        Some(bounds) => {
-            let [low, high] = bounds.get_ref().map(DVec3::from_array);
-            if !(low.cmple(high).all() && low.is_finite() && high.is_finite()) {
-                let what =
-                    "`box` has its lower corner over its upper; give [[x, y, z], [x, y, z]], the smaller numbers first";
-                return Err(recipe_text.origin(bounds).wrong(what));
-            }
-            Some([low, high])
-        }
-    };
+fn region(text: Text<'_>, keys: RegionKeys, at: Origin) -> Result<Region> {
+    let bounds = keys.bounds.map(|bounds| {
+        let [low, high] = bounds.get_ref().map(DVec3::from_array);
+        let what =
+            "the lower corner of `box` is over its upper one; write [[x, y, z], [x, y, z]], smaller numbers first";
+        let fits = low.cmple(high).all() && low.is_finite() && high.is_finite();
+        if fits { Ok([low, high]) } else { Err(text.wrong(bounds.span(), what)) }
+    });
     Ok(Region {
-        node: recipe_text.globs(keys.node.as_ref())?,
-        material: recipe_text.globs(keys.material.as_ref())?,
-        attribute: keys.attribute.as_ref().map(|attribute| attribute.get_ref().clone()),
-        bounds,
-        except: keys.except.as_ref().map_or_else(Vec::new, |names| names.get_ref().list()),
-        at: keys.attribute.as_ref().map_or_else(|| recipe_text.origin(name), |attribute| recipe_text.origin(attribute)),
-    })
-}
-
-fn place(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path) -> Result<PlaceSpec> {
-    let keys = spanned.get_ref();
-    let at = recipe_text.origin(spanned);
-    let (how, at) = how(recipe_text, keys, &at, folder)?;
-    let regions = keys.region.as_ref().map_or_else(Vec::new, |names| names.get_ref().list());
-    let default_name = || regions.first().cloned().unwrap_or_else(|| SKIN.to_owned());
-    let first_id = match &keys.first_id {
-        None => 0,
-        Some(id) if how.has_ids() => {
-            return Err(recipe_text.origin(id).wrong("`first_id` means nothing where the table has ids; remove it"));
-        }
-        Some(id) => u32::try_from(*id.get_ref()).ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
-            recipe_text
-                .origin(id)
-                .wrong(format!("`first_id` is {}; ids lie between 0 and {MAX_TAXEL_ID}", id.get_ref()))
-        })?,
-    };
-    Ok(PlaceSpec {
-        name: keys.name.as_ref().map_or_else(default_name, |name| name.get_ref().clone()),
-        regions,
-        seed: keys.seed,
-        first_id,
-        modality: keys.modality.as_ref().map_or(Ok(Modality::Pressure), |name| modality(recipe_text, name))?,
-        how,
+        node: keys.node,
+        material: keys.material,
+        attribute: keys.attribute.map(Spanned::into_inner),
+        bounds: bounds.transpose()?,
+        except: keys.except.map_or_else(Vec::new, |names| names.into_inner().0),
         at,
     })
 }
 
-fn modality(recipe_text: RecipeText<'_>, name: &Spanned<String>) -> Result<Modality> {
-    let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity];
-    let found = known.into_iter().find(|modality| modality.name() == *name.get_ref());
-    let names = known.map(Modality::name);
-    found.ok_or_else(|| {
-        let hint = match nearest(name.get_ref(), names.iter().map(String::as_str)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("it is one of {}", names.join(", ")),
-        };
-        recipe_text.origin(name).wrong(format!("there is no modality `{}`; {hint}", name.get_ref()))
+fn place(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path) -> Result<PlaceSpec> {
+    let (text, keys) = (recipe_text.text, spanned.get_ref());
+    let (how, way_at) = how(recipe_text, spanned, folder)?;
+    if let Some(id) = keys.first_id.as_ref().filter(|_| how.has_ids()) {
+        return Err(text.wrong(id.span(), "`first_id` has no meaning where the table has ids; remove it"));
+    }
+    let modality = match &keys.modality {
+        None => Modality::Pressure,
+        Some(name) => {
+            let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity];
+            let names = known.map(Modality::name);
+            let found = known.into_iter().find(|modality| modality.name() == *name.get_ref());
+            found.ok_or_else(|| text.unknown(name, "modality", names.iter().map(String::as_str)))?
+        }
+    };
+    let regions = keys.region.as_ref().map_or_else(Vec::new, |names| names.get_ref().0.clone());
+    let default_name = || regions.first().cloned().unwrap_or_else(|| SKIN.to_owned());
+    Ok(PlaceSpec {
+        name: keys.name.as_ref().map_or_else(default_name, |name| name.get_ref().clone()),
+        seed: keys.seed,
+        first_id: text.int("first_id", keys.first_id.as_ref(), 0..i64::from(MAX_TAXEL_ID) + 1)?.unwrap_or(0),
+        modality,
+        how,
+        regions,
+        at: recipe_text.origin(way_at),
     })
 }
 
 /// How taxels are placed, and the place of that key.
-fn how(recipe_text: RecipeText<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path) -> Result<(Placement, Origin)> {
+fn how(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path) -> Result<(Placement, Range<usize>)> {
+    let (text, keys) = (recipe_text.text, spanned.get_ref());
     let ways = [
-        ("taxels", keys.taxels.as_ref().map(|key| recipe_text.origin(key))),
-        ("spacing", keys.spacing.as_ref().map(|key| recipe_text.origin(key))),
-        ("grid", keys.grid.as_ref().map(|key| recipe_text.origin(key))),
-        ("points", keys.points.as_ref().map(|key| recipe_text.origin(key))),
-        ("csv", keys.csv.as_ref().map(|key| recipe_text.origin(key))),
-        ("icub", keys.icub.as_ref().map(|key| recipe_text.origin(key))),
+        ("taxels", span(keys.taxels.as_ref())),
+        ("spacing", span(keys.spacing.as_ref())),
+        ("grid", span(keys.grid.as_ref())),
+        ("points", span(keys.points.as_ref())),
+        ("csv", span(keys.csv.as_ref())),
+        ("icub", span(keys.icub.as_ref())),
     ];
+    let none =
+        || text.wrong(spanned.span(), "add `taxels`, `spacing`, `grid`, `points`, `csv` or `icub` to this place");
     let mut given = ways.into_iter().filter_map(|(name, at)| Some((name, at?)));
-    let Some((way, way_at)) = given.next() else {
-        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points`, `csv` or `icub`"));
-    };
+    let (way, way_at) = given.next().ok_or_else(none)?;
     if let Some((other, other_at)) = given.next()
         && (way, other) != ("taxels", "spacing")
     {
-        return Err(other_at.wrong(format!("a place has one way: remove `{other}` or `{way}`")));
+        return Err(text.wrong(other_at, format!("a place is filled in one way: remove `{other}` or `{way}`")));
     }
-    // Optional keys, and the key that each belongs to.
+    // Further keys, and the keys that they belong to.
     let extras = [
-        ("density", keys.density.as_ref().map(|key| recipe_text.origin(key)), "taxels"),
-        ("pitch", keys.pitch.as_ref().map(|key| recipe_text.origin(key)), "grid"),
-        ("origin", keys.origin.as_ref().map(|key| recipe_text.origin(key)), "grid"),
-        ("u", keys.u.as_ref().map(|key| recipe_text.origin(key)), "grid"),
-        (
-            "within",
-            keys.within.as_ref().map(|key| recipe_text.origin(key)),
-            if ["csv", "icub"].contains(&way) { way } else { "points" },
-        ),
-        ("link", keys.link.as_ref().map(|key| recipe_text.origin(key)), "icub"),
+        ("density", span(keys.density.as_ref()), &["taxels"][..]),
+        ("pitch", span(keys.pitch.as_ref()), &["grid"]),
+        ("origin", span(keys.origin.as_ref()), &["grid"]),
+        ("u", span(keys.u.as_ref()), &["grid"]),
+        ("within", span(keys.within.as_ref()), &["points", "csv", "icub"]),
+        ("link", span(keys.link.as_ref()), &["icub"]),
     ];
-    if let Some((name, at, _)) = extras.into_iter().filter_map(|(n, at, of)| Some((n, at?, of))).find(|e| e.2 != way) {
-        return Err(at.wrong(format!("`{name}` means nothing beside `{way}`; remove it")));
+    for (name, at, of) in extras {
+        if let Some(at) = at.filter(|_| !of.contains(&way)) {
+            return Err(text.wrong(at, format!("`{name}` has no effect beside `{way}`; remove it")));
+        }
     }
-    let spacing_m = keys.spacing.as_ref().map(|key| recipe_text.length("spacing", key)).transpose()?;
-    let within_m = keys.within.as_ref().map_or(Ok(DEFAULT_WITHIN_M), |key| recipe_text.length("within", key))?;
-    let how = if let Some(taxels) = &keys.taxels {
-        let count =
-            u64::try_from(*taxels.get_ref()).map_err(|_| way_at.wrong("there are no negative numbers of taxels"));
-        let count = check_count(count?).map_err(|e| way_at.put(e))?;
+    let spacing_m = keys.spacing.as_ref().map(|spacing| spacing.get_ref().metres);
+    let within_m = keys.within.as_ref().map_or(DEFAULT_WITHIN_M, |within| within.get_ref().metres);
+    let how = if let Some(count) = text.int("taxels", keys.taxels.as_ref(), 1..MAX_COUNT as i64 + 1)? {
+        let count = count as usize;
         match (&keys.density, spacing_m) {
             (Some(density), Some(_)) => {
-                return Err(recipe_text
-                    .origin(density)
-                    .wrong("a place has `density` or `spacing`, not both; remove one"));
+                return Err(text.wrong(density.span(), "a place has `density` or `spacing`, not both; remove one"));
             }
             (Some(density), None) => Placement::Density { count, attribute: density.get_ref().clone() },
             (None, apart_m) => Placement::Evenly { count, apart_m },
@@ -302,29 +275,27 @@ fn how(recipe_text: RecipeText<'_>, keys: &PlaceKeys, at: &Origin, folder: &Path
     } else if let Some(spacing_m) = spacing_m {
         Placement::Apart { spacing_m }
     } else if let Some(grid) = &keys.grid {
-        let pitch =
-            keys.pitch.as_ref().ok_or_else(|| way_at.wrong("a grid needs its `pitch`, as in `pitch = \"5 mm\"`"))?;
+        let missing = || text.wrong(grid.span(), "a grid needs its `pitch`, as in `pitch = \"5 mm\"`");
         Placement::Grid {
             hexagonal: *grid.get_ref() == GridName::Hexagonal,
-            pitch_m: recipe_text.length("pitch", pitch)?,
-            origin: keys.origin.as_ref().map(|origin| recipe_text.point("origin", origin)).transpose()?,
-            u: keys.u.as_ref().map(|u| recipe_text.point("u", u)).transpose()?,
+            pitch_m: keys.pitch.as_ref().ok_or_else(missing)?.get_ref().metres,
+            origin: recipe_text.point("origin", keys.origin.as_ref())?,
+            u: recipe_text.point("u", keys.u.as_ref())?,
         }
     } else if let Some(icub) = &keys.icub {
         let link = keys.link.as_ref().map(|link| link.get_ref().clone());
         Placement::Icub { path: folder.join(icub.get_ref()), link, within_m }
     } else if let Some(csv) = &keys.csv {
         Placement::Table { path: folder.join(csv.get_ref()), within_m }
-    } else if let Some(names) = recipe_text.globs(keys.points.as_ref())? {
-        Placement::Marks { names, within_m }
     } else {
-        return Err(at.wrong("a place says how: give it `taxels`, `spacing`, `grid`, `points`, `csv` or `icub`"));
+        let names = keys.points.as_ref().ok_or_else(none)?.get_ref().clone();
+        Placement::Marks { names, within_m }
     };
     Ok((how, way_at))
 }
 
 /// Checks that each of several places that number their taxels has a `first_id`.
-fn check_first_ids(recipe_text: RecipeText<'_>, keys: &[Spanned<PlaceKeys>], places: &[PlaceSpec]) -> Result<()> {
+fn check_first_ids(text: Text<'_>, keys: &[Spanned<PlaceKeys>], places: &[PlaceSpec]) -> Result<()> {
     let counting: Vec<usize> = (0..places.len()).filter(|&i| !places[i].how.has_ids()).collect();
     if places.len() < 2 {
         return Ok(());
@@ -343,9 +314,12 @@ fn check_first_ids(recipe_text: RecipeText<'_>, keys: &[Spanned<PlaceKeys>], pla
     let given: BTreeMap<usize, u32> =
         counting.iter().filter(|&&i| keys[i].get_ref().first_id.is_some()).map(|&i| (i, places[i].first_id)).collect();
     let free = (0..).map(|n| n * step).find(|n| !given.values().any(|&id| id as usize / step == n / step));
-    Err(recipe_text.origin(&keys[without]).wrong(format!(
-        "place `{}` needs a `first_id`, so that its ids stay when other places come or go; write `first_id = {}`",
-        places[without].name,
-        free.unwrap_or(0)
-    )))
+    Err(text.wrong(
+        keys[without].span(),
+        format!(
+            "place `{}` needs a `first_id`, so that its ids do not depend on other places; write `first_id = {}`",
+            places[without].name,
+            free.unwrap_or(0)
+        ),
+    ))
 }

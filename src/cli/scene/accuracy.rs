@@ -1,12 +1,16 @@
 //! What is asked for of accuracy: a tolerance, a budget, or the knobs themselves.
 
+use std::collections::BTreeMap;
+
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
+use somatic::error::place_in;
 use somatic::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Target, angle, length, time};
-use somatic::{Error, Outputs, Result, keys};
+use somatic::{Error, Outputs, Result};
 
 use super::deserialize::word;
 
@@ -195,8 +199,13 @@ impl Accuracy {
 
     /// `error` at the place of `[accuracy]` key `key` in the scene file's `text`.
     pub(super) fn placed(text: &str, key: &str, error: Error) -> Error {
-        match keys::Text(text).place_of(&["accuracy", key]) {
-            Some((line, column)) => Error::failed(error.to_string()).at(format!("line {line}, column {column}")),
+        #[derive(Deserialize)]
+        struct Keys {
+            accuracy: BTreeMap<toml::Spanned<String>, IgnoredAny>,
+        }
+        let keys = toml::from_str(text).map_or_else(|_| BTreeMap::new(), |keys: Keys| keys.accuracy);
+        match keys.keys().find(|known| known.get_ref() == key) {
+            Some(known) => Error::failed(error.to_string()).at(place_in(text, known.span().start)),
             None => error,
         }
     }

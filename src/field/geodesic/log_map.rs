@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use super::SurfacePlace;
 use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 
 /// Number of windows at which a surface counts as too rough.
 const MAX_WINDOWS: usize = 2_000_000;
@@ -339,10 +339,10 @@ impl<'a> LogMap<'a> {
             return Ok(());
         }
         if self.followed == MAX_WINDOWS {
-            return Err(Error::failed(format!(
+            return Err(failed!(
                 "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
                 self.limit_m
-            )));
+            ));
         }
         let list = &mut self.entering[window.edge as usize / 3];
         self.windows[index as usize].before = std::mem::replace(list, index);

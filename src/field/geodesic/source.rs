@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use super::SurfacePlace;
-use crate::body::{NONE, Topology, next};
+use crate::body::{NONE, Topology, area_vector, next};
 
 /// A point with at least this barycentric weight is the corner.
 const CORNER_WEIGHT: f64 = 1.0 - 1e-9;
@@ -162,8 +162,8 @@ pub(super) fn towards(angle_rad: f64) -> DVec2 {
     DVec2::new(cos, sin)
 }
 
-fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a).normalize_or(DVec3::Z)
+fn normal_of(corners: [DVec3; 3]) -> DVec3 {
+    area_vector(corners).normalize_or(DVec3::Z)
 }
 
 fn tangents(normal: DVec3, wanted: DVec3) -> (DVec3, DVec3) {

@@ -73,7 +73,7 @@ impl Calibration {
             only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
         }
         only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
-        let taxels = drafts.into_iter().map(|draft| draft.finish(&curves)).collect::<Result<_>>()?;
+        let taxels = drafts.into_iter().map(|draft| draft.finish(&curves, text)).collect::<Result<_>>()?;
         check_checks(&file.checks)?;
         file.upkeep.check()?;
         let (contact, fields) = file.contact.read(text)?;
@@ -100,6 +100,7 @@ fn check_checks(checks: &Checks) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::keys::without_column;
     use crate::signal::{ChangeCalibration, ContactThresholds, FsrResponse, FsrSignal, Response};
 
     #[test]
@@ -115,7 +116,7 @@ mod tests {
 
     #[test]
     fn what_makes_no_sense_is_named_with_its_line() {
-        let why = |text: &str| Calibration::parse(text, &[3, 7]).unwrap_err().to_string();
+        let why = |text: &str| without_column(&Calibration::parse(text, &[3, 7]).unwrap_err().to_string());
         assert_eq!(
             why("[all]\ngain = 0"),
             "line 2: `gain` is 0; it must be over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)"
@@ -166,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_response_that_makes_no_sense_is_named_with_its_line() {
-        let why = |text: &str| Calibration::parse(text, &[3, 7]).unwrap_err().to_string();
+        let why = |text: &str| without_column(&Calibration::parse(text, &[3, 7]).unwrap_err().to_string());
         let curve = |raw: &str, p: &str| why(&format!("[curve.finger]\nraw = [{raw}]\np = [{p}]\n"));
         assert_eq!(
             curve("0, 1, 2", "0,\n9,\n8"),
@@ -182,7 +183,7 @@ mod tests {
             why(&format!("{table}curve = \"fingr\"")),
             "line 5: `curve` is `fingr`, which the file does not have: did you mean `finger`?"
         );
-        assert!(why("[taxel.3]\ncurve = \"a\"").contains("line 2: `curve` is `a`, which is not there: add a table"));
+        assert!(why("[taxel.3]\ncurve = \"a\"").contains("line 2: `curve` is `a`, which the file does not have: add a table"));
         assert!(why(&format!("{table}curve = \"finger\"\nsensor = \"fsr\"")).contains("line 5: `curve` and `sensor`"));
         let steep = "[curve.a]\nraw = [0, 0.1]\np = [0, 1]\n[all]\ncurve = \"a\"\ngain = 1e12";
         assert!(why(steep).starts_with("line 6: `gain`"), "{}", why(steep));
@@ -191,14 +192,14 @@ mod tests {
         assert!(why("[all]\nsensor = \"fsr\"\nsignal = \"log\"").starts_with("line 3: `signal` is `log`"));
         assert!(why("[all]\nsensor = \"fsr\"\nfull_scale_newton = nan").starts_with("line 3: `full_scale_newton`"));
         assert!(why("[all]\nsensor = \"piezo\"").starts_with("line 2: `sensor` is `piezo`"));
-        assert!(why("[all]\ntap = 3").starts_with("line 2: `tap` is for sensors of one kind"));
+        assert!(why("[all]\ntap = 3").starts_with("line 2: `tap` is for the paper's circuit"));
         assert!(why("[all]\nsensor = \"fsr\"\n[taxel.3]\nsensor = \"linear\"\ntap = 3").starts_with("line 5: `tap`"));
         assert!(why("[curv.a]\nraw = [0, 1]").contains("did you mean `curve`"));
     }
 
     #[test]
     fn a_baseline_that_leaves_nothing_to_feel_is_refused() {
-        let why = |text: &str| Calibration::parse(text, &[3, 7]).map_err(|e| e.to_string());
+        let why = |text: &str| Calibration::parse(text, &[3, 7]).map_err(|e| without_column(&e.to_string()));
         assert_eq!(
             why("[all]\nbaseline = 300\np_max = 255").unwrap_err(),
             "line 2: `baseline` is 300, above `p_max` 255; lower it, or give the `raw_range` of a sensor that reads that \

@@ -43,7 +43,7 @@ impl CurveKeys {
         Curve::checked(&numbers(&self.raw), &numbers(&self.p)).map_err(|error| {
             let column = if error.column == Column::Raw { &self.raw } else { &self.p };
             let span = column.get_ref().get(error.knot).map_or(column.span(), Spanned::span);
-            Error::failed(error.what).at(format!("[curve.{name}]")).at(format!("line {}", text.line(span.start)))
+            text.put(span, Error::failed(error.what).at(format!("[curve.{name}]")))
         })
     }
 }
@@ -54,9 +54,9 @@ pub(super) struct Draft {
     taxel: TaxelCalibration,
     kind: Kind,
     fsr: FsrResponse,
-    /// Lines of keys that are checked together with others at the end.
-    baseline_line: Option<usize>,
-    gain_line: Option<usize>,
+    /// Where keys are that are checked together with others at the end.
+    baseline_at: Option<usize>,
+    gain_at: Option<usize>,
     range_given: bool,
 }
 
@@ -167,8 +167,8 @@ impl Draft {
             }
             self.fsr.full_scale_newton = newton;
         }
-        self.baseline_line = keys.baseline.as_ref().map(|x| text.line(x.span().start)).or(self.baseline_line);
-        self.gain_line = keys.gain.as_ref().map(|x| text.line(x.span().start)).or(self.gain_line);
+        self.baseline_at = keys.baseline.as_ref().map(|x| x.span().start).or(self.baseline_at);
+        self.gain_at = keys.gain.as_ref().map(|x| x.span().start).or(self.gain_at);
         self.range_given |= keys.raw_range.is_some();
         Ok(())
     }
@@ -178,13 +178,14 @@ impl Draft {
     }
 
     /// The finished calibration, if its keys fit together.
-    pub(super) fn finish(self, curves: &[Curve]) -> Result<TaxelCalibration> {
+    pub(super) fn finish(self, curves: &[Curve], text: Text<'_>) -> Result<TaxelCalibration> {
         let mut taxel = self.taxel;
         match self.kind {
-            Kind::Linear => self.check_baseline()?,
+            Kind::Linear => self.check_baseline(text)?,
             Kind::Curve(index) => {
                 taxel.response = Response::Curve(index);
-                curves[index].scaled(taxel.gain).map_err(|e| e.at(format!("line {}", self.gain_line.unwrap_or(1))))?;
+                let at = self.gain_at.unwrap_or(0);
+                curves[index].scaled(taxel.gain).map_err(|e| text.put(at..at, e))?;
             }
             Kind::Fsr => {
                 taxel.response = Response::Fsr(self.fsr);
@@ -197,8 +198,8 @@ impl Draft {
     }
 
     /// Rejects a baseline at which no touch can be measured.
-    fn check_baseline(&self) -> Result<()> {
-        let Some(line) = self.baseline_line else { return Ok(()) };
+    fn check_baseline(&self, text: Text<'_>) -> Result<()> {
+        let Some(at) = self.baseline_at else { return Ok(()) };
         let TaxelCalibration { baseline, gain, p_max, raw_range: [low, high], .. } = self.taxel;
         let what = if self.range_given && gain > 0.0 && baseline >= high.into() {
             format!("`baseline` is {baseline}, and `raw_range` ends at {high}: no reading is above it")
@@ -212,7 +213,7 @@ impl Draft {
         } else {
             return Ok(());
         };
-        Err(Error::failed(what).at(format!("line {line}")))
+        Err(text.wrong(at..at, what))
     }
 }
 

@@ -302,7 +302,7 @@ fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
     }
     Body::load(folder.join(body.get_ref())).map_err(|e| {
         if e.is_not_found() {
-            text.unknown(body, "there is no body", bundled.map(|(name, _)| name))
+            text.unknown(body, "body", bundled.map(|(name, _)| name))
         } else {
             text.wrong(body.span(), e.to_string())
         }

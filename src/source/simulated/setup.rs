@@ -72,7 +72,7 @@ impl Setup<'_> {
         let indenter = self.indenter(keys)?;
         let (in_chart, waypoints) = self.waypoints(keys)?;
         let (link, field, frame) = if in_chart { self.on_field(keys)? } else { self.on_link(keys)? };
-        let surface = self.surfaces.entry(link).or_insert_with(|| Arc::new(self.body.surface_in_link(link, None)));
+        let surface = self.surfaces.entry(link).or_insert_with(|| Arc::new(self.body.surface_in_link(link)));
         let surface = Arc::clone(surface);
         if surface.is_empty() {
             return Err(self.text.wrong(keys.on.span(), "the body has no surface that could be touched"));
@@ -152,7 +152,7 @@ impl Setup<'_> {
                 let what = format!("`{on}` is a link, not a field; give its `path` as [x, y, z]");
                 return Err(self.text.wrong(keys.on.span(), what));
             }
-            return Err(self.text.unknown(&keys.on, "there is no field", self.names()));
+            return Err(self.text.unknown(&keys.on, "field", self.names()));
         };
         match (&field.chart, field.anchor) {
             (Ok(chart), Some(link)) if chart.kind == ChartKind::Geodesic => {
@@ -181,7 +181,7 @@ impl Setup<'_> {
                 let what = format!("`{on}` is a field, not a link; give its `path` as [u, v]");
                 Err(self.text.wrong(keys.on.span(), what))
             }
-            None => Err(self.text.unknown(&keys.on, "there is no link", self.names())),
+            None => Err(self.text.unknown(&keys.on, "link", self.names())),
         }
     }
 

@@ -1,0 +1,208 @@
+//! A requested layout.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use crate::author::group::FieldRule;
+use crate::author::origin::Origin;
+use crate::author::recipe_values::{Globs, Length, Names};
+use crate::author::region::Region;
+use crate::body::Modality;
+use crate::error::{Error, Result, failed};
+use crate::length;
+
+/// Which taxels to place on a body, and how to group them.
+///
+/// In a file it is TOML; a length is a number of metres or a text like `"8 mm"`.
+///
+/// ```
+/// use somatic::author::{Recipe, author};
+/// use somatic::body::Original;
+/// use somatic::bundled;
+///
+/// # fn main() -> somatic::Result<()> {
+/// let text = r#"
+///     [regions.head]
+///     node = "head"
+///
+///     [[place]]
+///     region = "head"
+///     taxels = 60
+/// "#;
+/// let recipe = Recipe::parse("recipe.toml", text, "".as_ref())?;
+/// let file = Original::from_bytes("humanoid", bundled::HUMANOID, None)?;
+/// let authored = author(file, &recipe, |_share| {})?;
+/// assert_eq!(authored.places[0].ids, Vec::from_iter(0..60));
+/// authored.file.to_glb()?; // or `save`
+/// # Ok(())
+/// # }
+/// ```
+///
+/// `docs/authoring.md` describes all keys.
+#[derive(Clone, Debug)]
+pub struct Recipe {
+    /// The unit of the mesh file's numbers, and its metres.
+    pub(in crate::author) unit: Option<(String, f64)>,
+    /// Regions that get no taxel from any place that samples.
+    pub(in crate::author) bare: Vec<(String, Origin)>,
+    /// Whether taxels that the file has stay.
+    pub(in crate::author) keeps_existing: bool,
+    pub(in crate::author) regions: BTreeMap<String, Region>,
+    pub(in crate::author) places: Vec<PlaceSpec>,
+    pub(in crate::author) fields: Vec<(FieldRule, Origin)>,
+    pub(super) seed: u64,
+}
+
+/// Taxels of one kind on some regions.
+#[derive(Clone, Debug)]
+pub(in crate::author) struct PlaceSpec {
+    pub(in crate::author) name: String,
+    /// Names of regions; none means all of the skin.
+    pub(in crate::author) regions: Vec<String>,
+    /// Its own seed, instead of the recipe's.
+    pub(in crate::author) seed: Option<u64>,
+    /// The first of its ids, which count up.
+    pub(in crate::author) first_id: u32,
+    pub(in crate::author) modality: Modality,
+    pub(in crate::author) how: Placement,
+    pub(in crate::author) at: Origin,
+}
+
+/// How taxels are placed.
+#[derive(Clone, Debug)]
+pub(in crate::author) enum Placement {
+    /// `count` as blue noise, with a minimum spacing if given.
+    Evenly { count: usize, apart_m: Option<f64> },
+    /// `count` by a painted density.
+    Density { count: usize, attribute: String },
+    /// As many as fit with a spacing.
+    Apart { spacing_m: f64 },
+    /// On a grid in a geodesic chart.
+    Grid { hexagonal: bool, pitch_m: f64, origin: Option<DVec3>, u: Option<DVec3> },
+    /// At empties or points with these names.
+    Marks { names: Globs, within_m: f64 },
+    /// At the places of a table.
+    Table { path: PathBuf, within_m: f64 },
+    /// At the places of an iCub position file, in the frame of `link`, or of the link that the file names.
+    Icub { path: PathBuf, link: Option<String>, within_m: f64 },
+}
+
+impl Placement {
+    /// Whether the places have ids.
+    pub(in crate::author) fn has_ids(&self) -> bool {
+        matches!(self, Self::Table { .. })
+    }
+
+    /// Whether places are sampled, which excludes bare regions.
+    pub(in crate::author) fn samples(&self) -> bool {
+        !matches!(self, Self::Marks { .. } | Self::Table { .. } | Self::Icub { .. })
+    }
+}
+
+impl Recipe {
+    /// The files that places are read from: tables and position files.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let named = self.places.iter().filter_map(|place| match &place.how {
+            Placement::Table { path, .. } | Placement::Icub { path, .. } => Some(path.clone()),
+            _ => None,
+        });
+        named.collect()
+    }
+
+    /// A recipe without taxels: the body's own are grouped.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            unit: None,
+            bare: Vec::new(),
+            keeps_existing: false,
+            regions: BTreeMap::new(),
+            places: Vec::new(),
+            fields: Vec::new(),
+            seed: 0,
+        }
+    }
+
+    /// A number of taxels as blue noise (`taxels`), a spacing (such as `8 mm`), or both, on the nodes, meshes or links whose
+    /// names match one of `nodes`; without any, on the whole surface.
+    ///
+    /// # Errors
+    /// Neither number nor spacing is given, or one is invalid.
+    pub fn simple(taxels: Option<u64>, spacing: Option<&str>, nodes: &[String]) -> Result<Self> {
+        let mut recipe = Self::none();
+        let usage = |flag: &str, e: &Error| Error::usage(e.to_string()).at(flag);
+        let spacing = spacing.map(|text| text.parse().map_err(|e| usage("--spacing", &e))).transpose()?;
+        let spacing_m = spacing.map(|length: Length| length.metres);
+        let (how, flag) = match (taxels, spacing_m) {
+            (Some(count), apart_m) => {
+                let wrong = || failed!("{count} taxels; ask for 1 to {MAX_COUNT}").at("--taxels");
+                let fits = usize::try_from(count).ok().filter(|count| (1..=MAX_COUNT).contains(count));
+                (Placement::Evenly { count: fits.ok_or_else(wrong)?, apart_m }, "--taxels")
+            }
+            (None, Some(spacing_m)) => (Placement::Apart { spacing_m }, "--spacing"),
+            (None, None) => {
+                return Err(Error::usage("give a number of taxels (--taxels) or their spacing (--spacing)"));
+            }
+        };
+        let name = if nodes.is_empty() { SKIN.to_owned() } else { nodes.join(", ") };
+        let mut regions = Vec::new();
+        if !nodes.is_empty() {
+            let at = Origin("--region".to_owned());
+            let node = Some(Globs::try_from(Names(nodes.to_vec())).map_err(|e| at.put(e))?);
+            let region = Region { node, material: None, attribute: None, bounds: None, except: Vec::new(), at };
+            recipe.regions.insert(name.clone(), region);
+            regions.push(name.clone());
+        }
+        recipe.places.push(PlaceSpec {
+            name,
+            regions,
+            seed: None,
+            first_id: 0,
+            modality: Modality::Pressure,
+            how,
+            at: Origin(flag.to_owned()),
+        });
+        Ok(recipe)
+    }
+
+    /// The same with another seed.
+    #[must_use]
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same with the mesh file's numbers in `unit`: `um`, `mm`, `cm` or `m`.
+    ///
+    /// # Errors
+    /// There is no such unit.
+    pub fn with_unit(self, unit: &str) -> Result<Self> {
+        Ok(Self { unit: Some((unit.to_owned(), unit_metres(unit)?)), ..self })
+    }
+
+    /// The seed of `place`, from its own or the recipe's seed and its name, so that it does not depend on other places.
+    pub(in crate::author) fn seed_of(&self, place: &PlaceSpec) -> u64 {
+        // FNV-1a.
+        let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3);
+        let name = place.name.bytes().fold(0xCBF2_9CE4_8422_2325, step);
+        place.seed.unwrap_or(self.seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ name
+    }
+}
+
+/// Default name of a place on the whole surface.
+pub(super) const SKIN: &str = "skin";
+
+/// Maximum number of taxels of a place.
+pub(super) const MAX_COUNT: usize = 4_000_000;
+
+/// The metres of `unit`.
+pub(super) fn unit_metres(unit: &str) -> Result<f64> {
+    length::unit(unit).ok_or_else(|| Error::usage(format!("there is no unit `{unit}`; it is um, mm, cm or m")))
+}
+
+/// `metres` as text.
+pub(in crate::author) fn shown(metres: f64) -> String {
+    if metres < 1.0 { format!("{:.1} mm", metres * 1e3) } else { format!("{metres:.2} m") }
+}
