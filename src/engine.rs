@@ -286,6 +286,14 @@ impl Engine {
         }
     }
 
+    /// The values that the last frame's percepts were made of, by the plan's channels (ascending taxel id), where they may
+    /// differ from the frame's own: values that were held, or rejected as faulty. `None` where every value passes unchanged.
+    #[must_use]
+    pub fn values_read(&self) -> Option<&[RawValue]> {
+        let channels = self.plan.channels();
+        self.picks.is_none().then(|| &self.raw[self.raw.len().saturating_sub(channels)..])
+    }
+
     /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds. After frames that
     /// were not compared, and after [`Engine::restore`], the reference goes on from the backend's state.
     ///

@@ -41,7 +41,8 @@
 //!
 //! # Features
 //!
-//! `cli` (default) is the command and what only it needs; `gpu` (default) is the WGSL backend. A robot that embeds the
+//! `cli` (default) is the command and what only it needs; `gpu` (default) is the WGSL backend; `page` (default) is the page
+//! that shows a run in a browser. A robot that embeds the
 //! library on its CPU goes without both, and builds in a fraction of the time.
 
 #![deny(missing_docs)]
@@ -62,6 +63,8 @@ pub mod author;
 pub mod backend;
 pub mod body;
 pub mod bundled;
+#[cfg(feature = "page")]
+mod colours;
 mod engine;
 pub mod error;
 pub mod field;
@@ -72,6 +75,8 @@ mod ink;
 mod keys;
 mod length;
 pub mod output;
+#[cfg(feature = "page")]
+pub mod page;
 mod parallel;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]

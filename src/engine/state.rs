@@ -93,6 +93,7 @@ impl Engine {
         if let Some((calibrations, taxels)) = &state.calibration {
             self.plan.calibrations.clone_from(calibrations);
             self.plan.taxels.clone_from(taxels);
+            self.plan.calibration_changes += 1;
             self.recalibrate(None);
         }
         self.backend.restore(&state.backend)?;

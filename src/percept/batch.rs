@@ -219,6 +219,13 @@ impl Percepts {
         })
     }
 
+    /// The quantity of `column` of field `field` in the batch's frame `frame`, its components first, if it is present.
+    #[must_use]
+    pub fn value(&self, frame: usize, field: usize, column: &Column) -> Option<[f64; 3]> {
+        let cell = frame * self.fields + field;
+        self.present[cell].contains(column.output).then(|| self.components(column, cell))
+    }
+
     /// The components of `column` in a cell, then zeros.
     fn components(&self, column: &Column, cell: usize) -> [f64; 3] {
         fn of<T: Copy + Into<f64>>(parts: &Components<T>, which: &[Component], cell: usize) -> [f64; 3] {

@@ -10,7 +10,7 @@ use super::members::{beside, surface, thresholds, unit_of, weights};
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
-use crate::field::{Chart, FieldSet, WORLD, neighbours};
+use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
 use crate::percept::Outputs;
 use crate::signal::{Calibration, Letter, Mark, Receptor, Response, TaxelCalibration};
 use crate::stage::calibrate::Table;
@@ -59,6 +59,8 @@ pub struct Plan {
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
     pub(crate) calibrations: Vec<TaxelCalibration>,
+    /// Counts the changes of these.
+    pub(crate) calibration_changes: u64,
     /// Per channel, m².
     pub(crate) areas: Vec<f64>,
     /// How many slots are calibrated from raw values: all channels in each signal, signal by signal. The slots after them
@@ -111,8 +113,14 @@ pub(crate) struct PlanField {
     /// Members' third coordinate in the unit.
     pub(crate) depths: Vec<f32>,
     pub(crate) origin_in_anchor: DVec3,
-    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "only a trade compares charts"))]
+    #[cfg_attr(
+        not(any(feature = "cli", feature = "page")),
+        expect(dead_code, reason = "only a trade and a page use it")
+    )]
     pub(crate) chart: Option<Chart>,
+    /// Why there is none.
+    #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "only a page says it"))]
+    pub(crate) no_chart: Option<NoChart>,
     /// The surface over the chart, where positions are wanted.
     pub(crate) surface: Option<Surface>,
 }
@@ -180,6 +188,7 @@ impl Plan {
             change_threshold: scene.change_threshold as f32,
             change_dead_band: calibration.change.dead_band,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
+            calibration_changes: 0,
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
             taxels: Vec::new(),
@@ -217,6 +226,7 @@ impl Plan {
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
+                no_chart: field.chart.as_ref().err().cloned(),
                 surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
@@ -265,6 +275,7 @@ impl Plan {
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
         for slot in (channel..self.calibrated).step_by(self.channels()) {
             let response = if unfit { layout::MASKED } else { made[slot].response };
+            self.calibration_changes += 1;
             self.taxels[slot] = layout::Taxel { baseline, response, ..made[slot] };
             self.calibrations[channel].mask = response == layout::MASKED;
         }

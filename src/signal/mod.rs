@@ -1,5 +1,6 @@
 //! Signals: the sensors' raw values, and their calibration.
 
+mod board_health;
 mod calibration;
 mod curve;
 mod frame;
@@ -10,6 +11,7 @@ mod response;
 mod upkeep;
 mod wiring;
 
+pub use board_health::BoardHealth;
 pub use calibration::{Calibration, ChangeCalibration, Checks, ContactThresholds, TaxelCalibration};
 pub use curve::Curve;
 pub(crate) use curve::slope;

@@ -1,0 +1,177 @@
+//! The body's surface as viewers draw it: vertices in their links' frames, with smooth normals.
+
+use std::collections::HashMap;
+
+use glam::{DAffine3, DVec3};
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use crate::body::{Body, Home, Taxel};
+
+/// Vertices closer than this share a normal, m.
+const WELD_M: f64 = 1e-6;
+/// cos 40°: vertices at one place whose own normals differ by more are at an edge, and keep their normals.
+const SMOOTH_COSINE: f64 = 0.766;
+/// The largest radius of the disc of a taxel of unknown area, m.
+const MAX_DEFAULT_RADIUS_M: f64 = 0.005;
+/// The radius of such a disc, of the distance to the nearest taxel.
+const DEFAULT_RADIUS_SHARE: f64 = 0.4;
+
+/// Triangles of all surfaces.
+#[derive(Debug, Default)]
+pub(super) struct Mesh {
+    /// By vertex, in the frame of its link, m.
+    pub(super) positions: Vec<DVec3>,
+    /// By vertex, outward, in the frame of its link.
+    pub(super) normals: Vec<DVec3>,
+    /// By vertex.
+    pub(super) links: Vec<usize>,
+    /// Counter-clockwise from outside.
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// The surfaces of `body`.
+    pub(super) fn new(body: &Body) -> Self {
+        let mut mesh = Self::default();
+        for surface in &body.surfaces {
+            let first = mesh.positions.len() as u32;
+            let (ways, of): (Vec<(usize, DAffine3)>, Option<&Vec<usize>>) = match &surface.home {
+                Home::Rigid { link, link_from_mesh } => (vec![(*link, *link_from_mesh)], None),
+                Home::Skinned { joints, heaviest } => (joints.clone(), Some(heaviest)),
+            };
+            for (vertex, &position) in surface.positions.iter().enumerate() {
+                let (link, link_from_mesh) = ways[of.map_or(0, |heaviest| heaviest[vertex])];
+                debug_assert_eq!(link, surface.carrier(vertex));
+                mesh.positions.push(link_from_mesh.transform_point3(position));
+                mesh.links.push(link);
+            }
+            let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);
+            mesh.triangles.extend(surface.triangles.iter().map(|triangle| {
+                let [a, b, c] = triangle.map(|corner| first + corner);
+                if mirrored { [a, c, b] } else { [a, b, c] }
+            }));
+        }
+        mesh.normals = mesh.smooth_normals(body);
+        mesh
+    }
+
+    /// The middle of the surface and the taxels of `body` at rest in the world, m.
+    pub(super) fn centre(&self, body: &Body) -> DVec3 {
+        let at = |link: usize, position| body.links[link].world_from_link.transform_point3(position);
+        let vertices = self.positions.iter().zip(&self.links).map(|(&position, &link)| at(link, position));
+        let taxels = body.taxels.iter().map(|taxel| at(taxel.link, taxel.position_in_link));
+        let box_of = vertices.chain(taxels).fold(None, |ends: Option<(DVec3, DVec3)>, p| {
+            Some(ends.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
+        });
+        box_of.map_or(DVec3::ZERO, |(low, high)| low + 0.5 * (high - low))
+    }
+
+    /// Area-weighted normals over the triangles around a place; across an edge those of its own side alone.
+    fn smooth_normals(&self, body: &Body) -> Vec<DVec3> {
+        let world =
+            |vertex: usize| body.links[self.links[vertex]].world_from_link.transform_point3(self.positions[vertex]);
+        let at_rest: Vec<DVec3> = (0..self.positions.len()).map(world).collect();
+        let mut own = vec![DVec3::ZERO; at_rest.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|corner| at_rest[corner as usize]);
+            let area_vector = (b - a).cross(c - a);
+            triangle.iter().for_each(|&corner| own[corner as usize] += area_vector);
+        }
+        let mut at_place: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+        for (vertex, position) in at_rest.iter().enumerate() {
+            let cell = (*position / WELD_M).round().to_array().map(|x| x as i64);
+            at_place.entry(cell).or_default().push(vertex);
+        }
+        let mut normals = vec![DVec3::ZERO; own.len()];
+        for vertices in at_place.values() {
+            for &vertex in vertices {
+                let alone = own[vertex].normalize_or_zero();
+                let alike = vertices.iter().map(|&other| own[other]);
+                let sum: DVec3 = alike.filter(|other| other.normalize_or_zero().dot(alone) >= SMOOTH_COSINE).sum();
+                let in_world = sum.try_normalize().unwrap_or(if alone == DVec3::ZERO { DVec3::Y } else { alone });
+                let link_from_world = body.links[self.links[vertex]].world_from_link.inverse();
+                normals[vertex] = link_from_world.transform_vector3(in_world).normalize_or(DVec3::Y);
+            }
+        }
+        normals
+    }
+}
+
+/// The radius of each taxel's disc, m: that of its area, or where that is unknown a part of the distance to the nearest
+/// other taxel of its link.
+pub(super) fn disc_radii_m(taxels: &[Taxel]) -> Vec<f64> {
+    let mut of_link: HashMap<usize, Vec<GeomWithData<[f64; 3], u32>>> = HashMap::new();
+    if taxels.iter().any(|taxel| taxel.area <= 0.0) {
+        for (index, taxel) in taxels.iter().enumerate() {
+            let point = GeomWithData::new(taxel.position_in_link.to_array(), index as u32);
+            of_link.entry(taxel.link).or_default().push(point);
+        }
+    }
+    let trees: HashMap<usize, RTree<_>> =
+        of_link.into_iter().map(|(link, points)| (link, RTree::bulk_load(points))).collect();
+    let radius = |(index, taxel): (usize, &Taxel)| {
+        if taxel.area > 0.0 {
+            return (taxel.area / std::f64::consts::PI).sqrt();
+        }
+        let near = trees[&taxel.link].nearest_neighbor_iter(taxel.position_in_link.to_array());
+        let distances = near
+            .filter(|other| other.data != index as u32)
+            .map(|other| DVec3::from_array(*other.geom()).distance(taxel.position_in_link));
+        // Taxels at the same place are one sensor to look at.
+        let nearest = { distances }.find(|distance| *distance > 1e-9);
+        nearest.map_or(MAX_DEFAULT_RADIUS_M, |distance| (DEFAULT_RADIUS_SHARE * distance).min(MAX_DEFAULT_RADIUS_M))
+    };
+    taxels.iter().enumerate().map(radius).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+
+    #[test]
+    fn the_mesh_is_the_bodys_surface_at_rest() {
+        for name in bundled::BODIES {
+            let body = Body::from_bytes(name, bundled::body(name).unwrap()).unwrap();
+            let mesh = Mesh::new(&body);
+            let triangles = body.triangles_at_rest();
+            assert_eq!(mesh.triangles.len(), triangles.len());
+            let at = |vertex: u32| {
+                let vertex = vertex as usize;
+                body.links[mesh.links[vertex]].world_from_link.transform_point3(mesh.positions[vertex])
+            };
+            let (mut agree, mut volume) = (0, 0.0);
+            for (corners, (_, expected)) in mesh.triangles.iter().zip(&triangles) {
+                let [a, b, c] = corners.map(at);
+                assert!([a, b, c].iter().zip(expected).all(|(p, q)| p.distance(*q) < 1e-9), "{name}");
+                volume += a.dot(b.cross(c)) / 6.0;
+                let outward = (b - a).cross(c - a);
+                let vertex = corners[0] as usize;
+                let world = body.links[mesh.links[vertex]].world_from_link;
+                agree += usize::from(world.transform_vector3(mesh.normals[vertex]).dot(outward) >= 0.0);
+            }
+            assert!(agree * 100 > triangles.len() * 98, "{name}: {agree} of {}", triangles.len());
+            assert!(volume > 0.0, "{name}: seen from outside");
+            assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn a_disc_has_its_area_or_a_stated_default() {
+        let taxel = |id, x: f64, area| Taxel {
+            id,
+            link: 0,
+            position_in_link: DVec3::new(x, 0.0, 0.0),
+            normal_in_link: DVec3::Y,
+            area,
+            modality: crate::body::Modality::Pressure,
+        };
+        let taxels =
+            [taxel(0, 0.0, 1e-4), taxel(1, 0.010, 0.0), taxel(2, 0.014, 0.0), taxel(3, 1.0, 0.0), taxel(4, 1.0, 0.0)];
+        let radii = disc_radii_m(&taxels);
+        let expected = [(1e-4 / std::f64::consts::PI).sqrt(), 0.4 * 0.004, 0.4 * 0.004, 0.005, 0.005];
+        assert!(radii.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{radii:?}");
+        assert_eq!(disc_radii_m(&taxels[1..2]), [0.005]);
+    }
+}

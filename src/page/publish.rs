@@ -1,0 +1,210 @@
+//! The engine's side: hands over frames, percepts and events without ever waiting for a viewer.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::exchange::{Exchange, Shared, WAITING_ROWS};
+use super::log::{Event, EventKind};
+use super::scene::PageScene;
+use super::series::{Series, Trail};
+use super::snapshot::Snapshot;
+use crate::percept::{Flags, Outputs, Percepts};
+use crate::scene::Plan;
+use crate::signal::{BoardHealth, Frame, RawValue};
+
+/// Events that wait for their log at most.
+const MAX_WAITING_EVENTS: usize = 4096;
+
+/// The newest frame of an engine's call, before its percepts.
+#[derive(Clone, Copy, Debug)]
+pub struct PageInput<'a> {
+    /// The frame.
+    pub frame: &'a Frame,
+    /// The values that its percepts are made of ([`crate::Engine::values_read`]).
+    pub values_read: Option<&'a [RawValue]>,
+    /// The engine's plan as it is after the call.
+    pub plan: &'a Plan,
+    /// When the frame arrived, if not just now.
+    pub arrived: Option<Instant>,
+    /// What the call took a frame, µs.
+    pub call_us: f32,
+    /// Number of the frame, if not the engine's.
+    pub number: Option<u64>,
+}
+
+/// Hands frames over to the server. In the steady state it neither allocates nor waits: what the server is just looking at
+/// is handed over with the next frame, or by [`Publisher::flush`].
+#[derive(Debug)]
+pub struct Publisher {
+    exchange: Arc<Exchange>,
+    snapshot: Box<Snapshot>,
+    /// Whether the snapshot has not been handed over.
+    is_new: bool,
+    /// By the plan's channels, where a frame has their values.
+    value_of: Vec<Option<usize>>,
+    index_of_link: HashMap<String, u32>,
+    /// By field.
+    in_contact: Vec<bool>,
+    /// Whether the next frame does not follow the last one.
+    jumped: bool,
+    number: Option<u64>,
+    published: u64,
+    events: Vec<Event>,
+    series: Arc<[Series]>,
+    /// Every index of these.
+    columns: Vec<usize>,
+    trail: Trail,
+}
+
+impl Publisher {
+    pub(super) fn new(exchange: Arc<Exchange>, scene: &PageScene) -> Self {
+        Self {
+            exchange,
+            snapshot: Box::new(Snapshot::new(&scene.plan)),
+            is_new: false,
+            value_of: scene.value_of.clone(),
+            index_of_link: scene.index_of_link.clone(),
+            in_contact: vec![false; scene.plan.fields.len()],
+            jumped: false,
+            number: None,
+            published: 0,
+            events: Vec::with_capacity(MAX_WAITING_EVENTS),
+            series: Arc::default(),
+            columns: Vec::new(),
+            trail: Trail::default(),
+        }
+    }
+
+    /// Number of viewers: where there are none, what is only for them can be left out.
+    #[must_use]
+    pub fn viewers(&self) -> usize {
+        self.exchange.viewers()
+    }
+
+    /// Takes the newest frame of a call; its percepts follow with [`Publisher::publish`].
+    pub fn read(&mut self, input: &PageInput<'_>) {
+        let snapshot = &mut *self.snapshot;
+        snapshot.t_s = input.frame.t_s;
+        snapshot.arrived = input.arrived.unwrap_or_else(Instant::now);
+        snapshot.call_us = input.call_us;
+        snapshot.take_baselines(input.plan);
+        self.number = input.number;
+        for (channel, (raw, value)) in snapshot.raw.iter_mut().zip(&self.value_of).enumerate() {
+            let own = value.and_then(|value| input.frame.values.get(value)).copied().unwrap_or_default();
+            *raw = match input.values_read.and_then(|values| values.get(channel)) {
+                // The engine makes no difference between stale and missing values.
+                Some(read) if !(read.is_missing() && own == RawValue::STALE) => *read,
+                _ => own,
+            };
+        }
+        snapshot.poses.clear();
+        let links = input.frame.pose.iter();
+        snapshot.poses.extend(links.filter_map(|(name, pose)| Some((*self.index_of_link.get(name)?, *pose))));
+    }
+
+    /// Takes the percepts of a call, and hands over its newest frame with them.
+    pub fn publish(&mut self, percepts: &Percepts) {
+        let Some(last) = percepts.frames().checked_sub(1) else { return };
+        self.note_contacts(percepts);
+        self.published += percepts.frames() as u64;
+        let snapshot = &mut *self.snapshot;
+        snapshot.number = self.number.unwrap_or_else(|| percepts.frame_number(last));
+        snapshot.published = self.published;
+        snapshot.percepts.clear();
+        snapshot.percepts.extend(percepts.touched(last));
+        snapshot.touches.clear();
+        if percepts.outputs().contains(Outputs::TOUCHES) {
+            for percept in &snapshot.percepts {
+                let touches = percepts.touches(last, percept.field).iter();
+                snapshot.touches.extend(touches.map(|touch| (percept.field as u32, *touch)));
+            }
+        }
+        for frame in 0..if self.series.is_empty() { 0 } else { percepts.frames() } {
+            let values = self.series.iter().map(|series| [series.value(percepts, frame); 2]);
+            self.trail.push([percepts.t_s(frame); 2], values);
+        }
+        self.is_new = true;
+        if let Some(shared) = self.exchange.clone().try_lock() {
+            self.hand_over(shared);
+        }
+    }
+
+    /// Says that the next frame does not follow the last one, as after a seek: what is touched in it begins no touch.
+    pub fn jump(&mut self) {
+        self.jumped = true;
+    }
+
+    /// Logs an event: a message about a board or another notice.
+    pub fn event(&mut self, kind: EventKind, t_s: f64, field: Option<usize>, text: String) {
+        self.add_event(Event { seq: 0, t_s, kind, field: field.map(|field| field as u32), text: Some(text) });
+    }
+
+    /// Replaces what is shown of the boards.
+    pub fn boards(&self, boards: Vec<BoardHealth>) {
+        self.exchange.lock().boards = Some(boards);
+        self.exchange.wake_for_viewers();
+    }
+
+    /// Hands over what could not be handed over yet. For the end of a source and whenever no frame follows soon.
+    pub fn flush(&mut self) {
+        if self.is_new || !self.events.is_empty() {
+            let exchange = Arc::clone(&self.exchange);
+            self.hand_over(exchange.lock());
+        }
+    }
+
+    /// Says that no more frames come, and why.
+    pub fn ended(&mut self, reason: &str) {
+        self.flush();
+        self.exchange.lock().ended = Some(reason.to_owned());
+        self.exchange.wake_for_viewers();
+    }
+
+    fn hand_over(&mut self, mut shared: std::sync::MutexGuard<'_, Shared>) {
+        self.events.drain(..).for_each(|event| shared.log.push(event));
+        if std::mem::take(&mut self.is_new) {
+            std::mem::swap(&mut self.snapshot, &mut shared.snapshot);
+            shared.is_new = true;
+        }
+        if Arc::ptr_eq(&self.series, &shared.series) {
+            shared.trail.append(&self.trail, &self.columns);
+            self.trail.clear();
+        } else {
+            self.series = Arc::clone(&shared.series);
+            self.columns = (0..self.series.len()).collect();
+            self.trail = Trail::new(self.series.len(), WAITING_ROWS);
+        }
+        drop(shared);
+        self.exchange.wake_for_viewers();
+    }
+
+    fn note_contacts(&mut self, percepts: &Percepts) {
+        let fields = percepts.fields().max(1);
+        for (frame, flags) in percepts.flags.chunks_exact(fields).enumerate() {
+            let jumped = std::mem::take(&mut self.jumped);
+            for (field, flags) in flags.iter().enumerate() {
+                let touched = !flags.contains(Flags::NO_CONTACT);
+                if self.in_contact[field] == touched {
+                    continue;
+                }
+                self.in_contact[field] = touched;
+                if !jumped {
+                    let kind = if touched { EventKind::Onset } else { EventKind::Release };
+                    let t_s = percepts.t_s(frame);
+                    self.add_event(Event { seq: 0, t_s, kind, field: Some(field as u32), text: None });
+                }
+            }
+        }
+    }
+
+    fn add_event(&mut self, event: Event) {
+        if self.events.len() == MAX_WAITING_EVENTS {
+            // They are in the log sooner than they would be lost uncounted.
+            let exchange = Arc::clone(&self.exchange);
+            let mut shared = exchange.lock();
+            self.events.drain(..).for_each(|event| shared.log.push(event));
+        }
+        self.events.push(event);
+    }
+}

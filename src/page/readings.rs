@@ -1,0 +1,187 @@
+//! Pressure and health of every taxel, from a frame's raw values: on the server's thread, and only for frames that a
+//! viewer gets.
+
+use super::snapshot::Snapshot;
+use crate::percept::Flags;
+use crate::scene::Plan;
+use crate::signal::RawValue;
+use crate::stage::calibrate::{UNUSABLE, reference};
+
+/// How a taxel is doing, as frames number it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Health {
+    Good,
+    Missing,
+    Stale,
+    Faulty,
+    Saturated,
+    OutOfRange,
+    /// By the calibration, by upkeep, or because no field of the run holds it.
+    LeftOut,
+}
+
+impl Health {
+    /// As messages spell it.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Missing => "missing",
+            Self::Stale => "stale",
+            Self::Faulty => "faulty",
+            Self::Saturated => "saturated",
+            Self::OutOfRange => "out of range",
+            Self::LeftOut => "left out",
+        }
+    }
+}
+
+/// What one taxel reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reading {
+    pub(super) raw: Option<f64>,
+    pub(super) pressure: Option<f64>,
+    pub(super) health: Health,
+}
+
+/// What all taxels of a scene read in one frame.
+#[derive(Debug)]
+pub(super) struct Readings {
+    plan: Plan,
+    /// By taxel; NaN where there is none.
+    pressures: Vec<f32>,
+    /// By taxel, as [`Health`].
+    health: Vec<u8>,
+    /// What they are made of.
+    raw: Vec<RawValue>,
+    /// Counts the frames that read differently from the one before.
+    changes: u64,
+}
+
+impl Readings {
+    /// Of `taxels` taxels, of which `plan` reads some.
+    pub(super) fn new(plan: Plan, taxels: usize) -> Self {
+        Self {
+            plan,
+            pressures: vec![f32::NAN; taxels],
+            health: vec![Health::LeftOut as u8; taxels],
+            raw: Vec::new(),
+            changes: 0,
+        }
+    }
+
+    pub(super) fn pressures(&self) -> &[f32] {
+        &self.pressures
+    }
+
+    pub(super) fn health(&self) -> &[u8] {
+        &self.health
+    }
+
+    pub(super) fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// Reads `snapshot`; the largest pressure in it.
+    pub(super) fn read(&mut self, snapshot: &Snapshot) -> f64 {
+        if self.take_baselines(snapshot) || self.raw != snapshot.raw {
+            self.raw.clone_from(&snapshot.raw);
+            self.changes += 1;
+            for channel in 0..self.raw.len() {
+                let reading = self.of_channel(channel, self.raw[channel]);
+                let taxel = self.plan.body_taxels[channel];
+                self.pressures[taxel] = reading.pressure.map_or(f32::NAN, |pressure| pressure as f32);
+                self.health[taxel] = reading.health as u8;
+            }
+        }
+        // NaN is no maximum.
+        f64::from(self.pressures.iter().copied().fold(0.0, f32::max))
+    }
+
+    /// What the taxel at index `taxel` reads in `snapshot`.
+    pub(super) fn taxel(&mut self, snapshot: &Snapshot, taxel: usize) -> Reading {
+        let Ok(channel) = self.plan.body_taxels.binary_search(&taxel) else {
+            return Reading { raw: None, pressure: None, health: Health::LeftOut };
+        };
+        if self.take_baselines(snapshot) {
+            // What is read of all taxels is of another calibration.
+            self.raw.clear();
+        }
+        self.of_channel(channel, snapshot.raw[channel])
+    }
+
+    fn take_baselines(&mut self, snapshot: &Snapshot) -> bool {
+        let changed = self.plan.calibration_changes != snapshot.calibration_changes;
+        if changed {
+            self.plan.calibration_changes = snapshot.calibration_changes;
+            for (taxel, &(baseline, mask)) in self.plan.calibrations.iter_mut().zip(&snapshot.baselines) {
+                (taxel.baseline, taxel.mask) = (baseline, mask);
+            }
+        }
+        changed
+    }
+
+    fn of_channel(&self, channel: usize, value: RawValue) -> Reading {
+        let taxel = &self.plan.calibrations[channel];
+        let pressure = reference(value, taxel, self.plan.curve_of(channel));
+        let flags = Flags::from_bits_truncate(pressure.status & !UNUSABLE);
+        let health = match () {
+            () if taxel.mask => Health::LeftOut,
+            () if value == RawValue::STALE => Health::Stale,
+            () if value.is_missing() => Health::Missing,
+            () if flags.contains(Flags::FAULTY_INPUT) => Health::Faulty,
+            () if flags.contains(Flags::SATURATED) => Health::Saturated,
+            () if flags.contains(Flags::OUT_OF_RANGE) => Health::OutOfRange,
+            () => Health::Good,
+        };
+        let is_usable = matches!(health, Health::Good | Health::Saturated | Health::OutOfRange);
+        Reading { raw: value.number(), pressure: is_usable.then_some(pressure.value), health }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::FieldSet;
+    use crate::scene::Scene;
+    use crate::{Body, Calibration, bundled};
+
+    #[test]
+    fn what_is_wrong_with_a_taxel_is_told_from_zero() {
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let text = format!("[all]\ngain = 0.5\np_max = 100\nraw_range = [-10, 500]\n[taxel.{}]\nmask = true", ids[6]);
+        let calibration = Calibration::parse(&text, &ids).unwrap();
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &Scene::default(), &calibration).unwrap();
+        let mut snapshot = Snapshot::new(&plan);
+        let values = [
+            (RawValue::new(40.0), Some(20.0), Health::Good),
+            (RawValue::MISSING, None, Health::Missing),
+            (RawValue::STALE, None, Health::Stale),
+            (RawValue::FAULTY, None, Health::Faulty),
+            (RawValue::new(400.0), Some(200.0), Health::Saturated),
+            (RawValue::new(-20.0), Some(0.0), Health::OutOfRange),
+            (RawValue::new(40.0), None, Health::LeftOut),
+            (RawValue::new(0.0), Some(0.0), Health::Good),
+        ];
+        for (raw, (value, ..)) in snapshot.raw.iter_mut().zip(values) {
+            *raw = value;
+        }
+        let mut readings = Readings::new(plan, body.taxels.len() + 1);
+        assert_eq!(readings.read(&snapshot), 200.0);
+        for (index, (_, pressure, health)) in values.into_iter().enumerate() {
+            assert_eq!(readings.health()[index], health as u8);
+            let seen = readings.pressures()[index];
+            assert_eq!((!seen.is_nan()).then_some(f64::from(seen)), pressure, "{health:?}");
+            let reading = readings.taxel(&snapshot, index);
+            assert_eq!((reading.pressure, reading.health), (pressure, health));
+        }
+        assert_eq!(readings.health()[body.taxels.len()], Health::LeftOut as u8);
+        assert_eq!(readings.changes(), 1);
+        readings.read(&snapshot);
+        assert_eq!(readings.changes(), 1, "nothing has changed");
+        (snapshot.baselines[0].0, snapshot.calibration_changes) = (20.0, 1);
+        readings.read(&snapshot);
+        assert_eq!((readings.changes(), readings.pressures()[0]), (2, 10.0));
+    }
+}

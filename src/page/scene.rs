@@ -1,0 +1,225 @@
+//! What a page shows, as far as it does not change: the first two messages that a viewer gets.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::encode::{Writer, no_link};
+use super::mesh::{Mesh, disc_radii_m};
+use super::message::{Counts, VERSION};
+use super::poses::Poses;
+use super::scale::Scale;
+use crate::body::{Body, ChartKind};
+use crate::colours::pressure_colours;
+use crate::percept::{Column, Flags, Unit};
+use crate::scene::{Plan, PlanField};
+use crate::signal::Wiring;
+
+/// The quantity of P where no calibration names another.
+const QUANTITY: &str = "count";
+
+/// What is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// Frames that come when they come.
+    Live,
+    /// A recording, which a player moves about in.
+    Recording {
+        /// Time of its first frame, s.
+        start_s: f64,
+        /// Time of its last frame, s.
+        end_s: f64,
+        /// Number of its frames.
+        frames: u64,
+    },
+}
+
+/// What a page says of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct PageInfo<'a> {
+    /// What people call the source.
+    pub source: &'a str,
+    /// What is shown.
+    pub mode: Mode,
+    /// The backend: its name, what it runs on, and why it was chosen.
+    pub backend: [&'a str; 3],
+    /// The ids of a frame's values, in their order.
+    pub taxels: &'a [u32],
+    /// Which taxel is on which channel of which board.
+    pub wiring: Option<&'a Wiring>,
+    /// The largest pressure of the recording, if known.
+    pub recorded_max: Option<f64>,
+}
+
+/// What a page shows of a body and a run.
+#[derive(Debug)]
+pub struct PageScene {
+    pub(super) plan: Plan,
+    pub(super) value_of: Vec<Option<usize>>,
+    pub(super) index_of_link: HashMap<String, u32>,
+    /// `welcome` without what changes: run and scale.
+    welcome: Value,
+    pub(super) mesh: Vec<u8>,
+    /// What places in the world are relative to, m.
+    pub(super) origin: DVec3,
+    pub(super) poses: Poses,
+    pub(super) counts: Counts,
+    /// What people call the fields.
+    pub(super) labels: Vec<String>,
+    /// By field, whether its places are in the world even where the frame has no pose.
+    pub(super) of_world: Vec<bool>,
+    pub(super) scale: Scale,
+}
+
+impl PageScene {
+    /// The scene of `body` under `plan`.
+    #[must_use]
+    pub fn new(body: &Body, plan: &Plan, info: &PageInfo<'_>) -> Self {
+        let mesh = Mesh::new(body);
+        let origin = mesh.centre(body);
+        let poses = Poses::new(body, origin);
+        let value_of_id: HashMap<u32, usize> = info.taxels.iter().enumerate().map(|(at, &id)| (id, at)).collect();
+        let of_channel = |&taxel: &usize| value_of_id.get(&body.taxels[taxel].id).copied();
+        let columns: Vec<&'static Column> = plan.outputs().columns().collect();
+        let time = match info.mode {
+            Mode::Live => Value::Null,
+            Mode::Recording { start_s, end_s, frames } => {
+                json!({"start_s": start_s, "end_s": end_s, "frames": frames})
+            }
+        };
+        let [backend, device, why] = info.backend;
+        let welcome = json!({
+            "type": "welcome",
+            "version": VERSION,
+            "somatic": env!("CARGO_PKG_VERSION"),
+            "mode": if info.mode == Mode::Live { "live" } else { "recording" },
+            "body": body.name,
+            "source": info.source,
+            "backend": {"name": backend, "device": device, "why": why},
+            "quantity": QUANTITY,
+            "time": time,
+            "origin": origin.to_array(),
+            "links": body.links.iter().map(|link| json!({"name": link.name, "parent": link.parent})).collect::<Vec<_>>(),
+            "channels": info.wiring.map(|wiring| channels(body, wiring)),
+            "fields": fields(body, plan),
+            "columns": columns.iter().map(|column| column_json(column)).collect::<Vec<_>>(),
+            "flags": flag_names(),
+            "colours": pressure_colours().to_vec(),
+        });
+        Self {
+            value_of: plan.body_taxels.iter().map(of_channel).collect(),
+            index_of_link: body.links.iter().zip(0..).map(|(link, index)| (link.name.clone(), index)).collect(),
+            welcome,
+            mesh: mesh_message(body, &mesh, &poses),
+            origin,
+            poses,
+            counts: Counts { taxels: body.taxels.len(), fields: plan.fields.len(), columns },
+            labels: (0..plan.fields.len()).map(|field| plan.label(field)).collect(),
+            of_world: plan.fields.iter().map(|field| field.anchor.is_none()).collect(),
+            scale: Scale::of(plan, info.recorded_max),
+            plan: plan.clone(),
+        }
+    }
+
+    /// The message `welcome`.
+    pub(super) fn welcome(&self, run: &str, scale: Scale) -> String {
+        let mut welcome = self.welcome.clone();
+        welcome["run"] = run.into();
+        welcome["scale"] = json!({"max": scale.max, "from": scale.from.word()});
+        welcome.to_string()
+    }
+}
+
+/// By taxel, its board and channel.
+fn channels(body: &Body, wiring: &Wiring) -> Vec<Option<[usize; 2]>> {
+    let mut of_id = HashMap::new();
+    for board in wiring.boards() {
+        for (channel, taxel) in board.taxels.iter().enumerate() {
+            of_id.extend(taxel.map(|taxel| (taxel, [usize::from(board.id), channel])));
+        }
+    }
+    body.taxels.iter().map(|taxel| of_id.get(&taxel.id).copied()).collect()
+}
+
+fn column_json(column: &Column) -> Value {
+    let unit = if column.unit == Unit::P { QUANTITY } else { column.unit.symbol() };
+    json!({"name": column.name, "unit": unit, "components": column.components, "help": column.help})
+}
+
+/// The flags' names by their bits.
+fn flag_names() -> Vec<Option<String>> {
+    let mut names = vec![None; 32 - Flags::all().bits().leading_zeros() as usize];
+    for (name, flag) in Flags::all().iter_names() {
+        names[flag.bits().trailing_zeros() as usize] = Some(name.to_lowercase());
+    }
+    names
+}
+
+/// The plan's fields, each in every letter.
+fn fields(body: &Body, plan: &Plan) -> Vec<Value> {
+    let parent_of: HashMap<&str, &str> =
+        body.fields.iter().filter_map(|spec| Some((spec.name.as_str(), spec.parent.as_deref()?))).collect();
+    let index_of: HashMap<(&str, usize), usize> =
+        plan.fields.iter().enumerate().map(|(index, field)| ((field.name.as_str(), field.letter), index)).collect();
+    let field = |(index, field): (usize, &PlanField)| {
+        // A field that is not computed is skipped.
+        let mut above = std::iter::successors(parent_of.get(field.name.as_str()), |name| parent_of.get(**name));
+        let parent = above.find_map(|name| index_of.get(&(*name, field.letter)));
+        let members = plan.members_of(field);
+        let weights = (!field.unweighted)
+            .then(|| (0..members.len()).map(|member| plan.weight(field, member)).collect::<Vec<f64>>());
+        let mark = plan.mark(index);
+        let letter: Vec<String> =
+            [mark.receptor.map(|r| r.to_string()), mark.signal.map(|s| s.to_string())].into_iter().flatten().collect();
+        json!({
+            "name": field.name,
+            "letter": (!letter.is_empty()).then(|| letter.join(" ")),
+            "label": plan.label(index),
+            "parent": parent,
+            "link": field.anchor,
+            "members": members.iter()
+                .map(|member| plan.body_taxels[plan.channel_of(member.slot as usize)]).collect::<Vec<_>>(),
+            "weights": weights,
+            "chart": chart(field),
+            "no_chart": field.no_chart.as_ref().map(ToString::to_string),
+        })
+    };
+    plan.fields.iter().enumerate().map(field).collect()
+}
+
+fn chart(field: &PlanField) -> Option<Value> {
+    let chart = field.chart.as_ref()?;
+    let unit_m = f64::from(field.unit_m);
+    let uv: Vec<[f64; 2]> = field.places.iter().map(|place| [place.x * unit_m, place.y * unit_m]).collect();
+    Some(json!({
+        "kind": if chart.kind == ChartKind::Geodesic { "geodesic" } else { "plane" },
+        "origin": field.origin_in_anchor.to_array(),
+        "u": chart.u_in_anchor.to_array(),
+        "v": chart.v_in_anchor.to_array(),
+        "normal": chart.normal_in_anchor.to_array(),
+        "uv": uv,
+    }))
+}
+
+/// The binary message of the mesh, the taxels and the links at rest.
+fn mesh_message(body: &Body, mesh: &Mesh, poses: &Poses) -> Vec<u8> {
+    let taxels = &body.taxels;
+    let mut to = Writer::new(1, 0);
+    for count in [mesh.positions.len(), mesh.triangles.len(), taxels.len(), body.links.len()] {
+        to.u32(count as u32);
+    }
+    let place = |to: &mut Writer, place: &DVec3| place.to_array().into_iter().for_each(|x| to.f32(x as f32));
+    mesh.positions.iter().for_each(|position| place(&mut to, position));
+    mesh.normals.iter().for_each(|normal| place(&mut to, normal));
+    mesh.links.iter().for_each(|&link| to.u32(link as u32));
+    mesh.triangles.iter().flatten().for_each(|&corner| to.u32(corner));
+    taxels.iter().for_each(|taxel| to.u32(taxel.id));
+    taxels.iter().for_each(|taxel| to.u32(no_link(Some(taxel.link))));
+    taxels.iter().for_each(|taxel| place(&mut to, &taxel.position_in_link));
+    taxels.iter().for_each(|taxel| place(&mut to, &taxel.normal_in_link));
+    disc_radii_m(taxels).into_iter().for_each(|radius| to.f32(radius as f32));
+    taxels.iter().for_each(|taxel| to.f32(taxel.area as f32));
+    poses.seven().iter().flatten().for_each(|&number| to.f32(number));
+    to.finish()
+}

@@ -1,0 +1,98 @@
+//! The server: one thread that waits for sockets and for the engine.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use super::exchange::{Exchange, Replies, ViewerId};
+use super::listen::Listen;
+use super::message::Request;
+use super::publish::Publisher;
+use super::scene::PageScene;
+use super::serve::Serving;
+use super::token::random_hex;
+use super::wake::Waits;
+use crate::error::{Error, Result};
+
+/// Requests that wait for the player at most.
+const MAX_REQUESTS: usize = 256;
+
+/// A server of the page. It ends when it is dropped.
+#[derive(Debug)]
+pub struct Server {
+    exchange: Arc<Exchange>,
+    requests: Option<Receiver<(ViewerId, Request)>>,
+    address: SocketAddr,
+    token: String,
+    listen: Listen,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Starts to serve `scene`; what there is to see comes from the publisher.
+    ///
+    /// # Errors
+    /// The address is taken, or the system has no random numbers for a token.
+    pub fn start(listen: &Listen, scene: PageScene) -> Result<(Self, Publisher)> {
+        let listener = listen.bind()?;
+        let ready = listener.set_nonblocking(true).and_then(|()| listener.local_addr());
+        let address = ready.map_err(|e| Error::failed(format!("cannot listen: {e}")))?;
+        let (token, run) = (random_hex()?, random_hex()?);
+        let (waits, waker) = Waits::new()?;
+        let exchange = Arc::new(Exchange::new(&scene.plan, waker));
+        let publisher = Publisher::new(Arc::clone(&exchange), &scene);
+        let (sender, requests): (SyncSender<_>, _) = sync_channel(MAX_REQUESTS);
+        let hosts = super::guard::Hosts::new(listen.allow_hosts());
+        let serving = Serving::new(listener, hosts, (token.clone(), run), scene, Arc::clone(&exchange), sender);
+        let thread = std::thread::Builder::new().name("page".to_owned()).spawn(move || serving.run(&waits));
+        let thread = thread.map_err(|e| Error::failed(format!("cannot start a thread: {e}")))?;
+        let listen = listen.clone();
+        let server = Self { exchange, requests: Some(requests), address, token, listen, thread: Some(thread) };
+        Ok((server, publisher))
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The page's address, with the token that lets a browser in.
+    #[must_use]
+    pub fn url(&self) -> String {
+        self.listen.url(self.address, &self.token)
+    }
+
+    /// What viewers ask for, in order, for a player to answer through [`Server::replies`]. Without a player the server
+    /// answers that frames come as they come. A second call gives none.
+    pub fn requests(&mut self) -> Option<Receiver<(ViewerId, Request)>> {
+        let requests = self.requests.take();
+        self.exchange.has_player.store(true, Ordering::Relaxed);
+        requests
+    }
+
+    /// Sends messages to viewers.
+    #[must_use]
+    pub fn replies(&self) -> Replies {
+        Replies(Arc::clone(&self.exchange))
+    }
+
+    /// Number of viewers.
+    #[must_use]
+    pub fn viewers(&self) -> usize {
+        self.exchange.viewers()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.exchange.stops.store(true, Ordering::Relaxed);
+        self.exchange.waker().wake();
+        if let Some(thread) = self.thread.take() {
+            // It has said on standard error why it failed.
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! A frame as the engine's thread hands it over: as little work as possible, in memory that is used again.
+
+use std::time::Instant;
+
+use crate::percept::{Percept, Touch};
+use crate::scene::Plan;
+use crate::signal::{Pose, RawValue};
+
+/// The newest frame of a call, and the percepts made of it.
+#[derive(Debug)]
+pub(super) struct Snapshot {
+    /// Number of the frame since the engine started.
+    pub(super) number: u64,
+    /// Frames that have been handed over, with this one.
+    pub(super) published: u64,
+    pub(super) t_s: f64,
+    /// When it arrived.
+    pub(super) arrived: Instant,
+    /// What a frame took in the engine's call, µs.
+    pub(super) call_us: f32,
+    /// By the plan's channels.
+    pub(super) raw: Vec<RawValue>,
+    /// How often the calibration had changed for the baselines.
+    pub(super) calibration_changes: u64,
+    /// By the plan's channels, the baseline and whether the taxel is left out.
+    pub(super) baselines: Vec<(f64, bool)>,
+    /// The links that the frame poses: world_from_link.
+    pub(super) poses: Vec<(u32, Pose)>,
+    /// Of the fields in contact, in their order.
+    pub(super) percepts: Vec<Percept>,
+    /// Of these fields, in their order.
+    pub(super) touches: Vec<(u32, Touch)>,
+}
+
+impl Snapshot {
+    /// Nothing yet, with room for what `plan` gives.
+    pub(super) fn new(plan: &Plan) -> Self {
+        let mut snapshot = Self {
+            number: 0,
+            published: 0,
+            t_s: 0.0,
+            arrived: Instant::now(),
+            call_us: f32::NAN,
+            raw: vec![RawValue::MISSING; plan.channels()],
+            calibration_changes: 0,
+            baselines: Vec::new(),
+            poses: Vec::new(),
+            percepts: Vec::with_capacity(plan.fields.len()),
+            touches: Vec::new(),
+        };
+        snapshot.take_baselines(plan);
+        snapshot
+    }
+
+    /// Takes over the calibration's baselines, if they have changed.
+    pub(super) fn take_baselines(&mut self, plan: &Plan) {
+        if self.baselines.is_empty() || self.calibration_changes != plan.calibration_changes {
+            self.calibration_changes = plan.calibration_changes;
+            self.baselines.clear();
+            self.baselines.extend(plan.calibrations.iter().map(|taxel| (taxel.baseline, taxel.mask)));
+        }
+    }
+}
