@@ -1,0 +1,136 @@
+/** What the user has chosen to see. */
+
+import { Observed, PALETTE } from "./dom.js";
+
+/** Which fields have marks on the body. */
+export const MARKS = /** @type {const} */ (["whole fields", "smallest fields", "chosen field", "none"]);
+
+export class Choices extends Observed {
+  constructor() {
+    super();
+    const system = matchMedia("(prefers-color-scheme: dark)");
+    this.dark = system.matches;
+    system.addEventListener("change", () => {
+      this.dark = system.matches;
+      this.tell("look");
+    });
+    /** The field that the user has clicked. @type {number | null} */
+    this.chosen = null;
+    /** The field that is shown while none is chosen: the one with a touch. @type {number | null} */
+    this.followed = null;
+    /** @type {number | null} */
+    this.hoveredField = null;
+    /** @type {number | null} */
+    this.hoveredTaxel = null;
+    /** @type {string | null} */
+    this.letter = null;
+    /** @type {typeof MARKS[number]} */
+    this.marks = "whole fields";
+    /** The body is translucent and hidden taxels show through it. */
+    this.xray = false;
+    this.body = true;
+    this.taxels = true;
+    /** Taxels have rings in the colour of their field. */
+    this.tint = false;
+    this.labels = true;
+  }
+
+  /** The field whose percept and chart are shown. */
+  get field() {
+    return this.chosen ?? this.followed;
+  }
+
+  /** @param {number | null} field */
+  choose(field) {
+    this.chosen = field;
+    this.tell("field");
+  }
+
+  /** @param {number | null} field */
+  hoverField(field) {
+    if (field === this.hoveredField) return;
+    this.hoveredField = field;
+    this.tell("hover");
+  }
+
+  /** @param {"xray" | "body" | "taxels" | "tint" | "labels"} name */
+  toggle(name) {
+    this[name] = !this[name];
+    this.tell("look");
+  }
+
+  /**
+   * Follows the strongest touch, and stays with a field as long as it is touched.
+   * @param {import("./model.js").Model} model
+   */
+  follow(model) {
+    const fields = model.welcome?.fields;
+    if (!fields || this.chosen !== null) return;
+    if (this.followed !== null && model.inContact.has(this.followed)) return;
+    let most = 0;
+    let best = this.followed;
+    for (const field of model.inContact.keys())
+      if (this.isWhole(model, field) && fields[field].chart && model.total(field) > most)
+        [most, best] = [model.total(field), field];
+    if (best === null) best = fields.findIndex((field) => field.chart && field.letter === this.letter);
+    if (best === this.followed || best < 0) return;
+    this.followed = best;
+    this.tell("field");
+  }
+
+  /**
+   * Whether a field is the largest with a chart among those above it.
+   * @param {import("./model.js").Model} model
+   * @param {number} index
+   */
+  isWhole(model, index) {
+    const fields = model.welcome?.fields ?? [];
+    if (!fields[index]?.chart || fields[index].letter !== this.letter) return false;
+    for (let above = fields[index].parent; above !== null; above = fields[above].parent)
+      if (fields[above].chart) return false;
+    return true;
+  }
+
+  /**
+   * The fields in contact that have marks.
+   * @param {import("./model.js").Model} model
+   */
+  marked(model) {
+    const fields = model.welcome?.fields ?? [];
+    const touched = [...model.inContact.keys()].filter((f) => fields[f]?.letter === this.letter);
+    /** @type {Set<number>} */
+    const marked = new Set();
+    if (this.marks === "whole fields") {
+      for (const f of touched) if (this.isWhole(model, f)) marked.add(f);
+    } else if (this.marks === "smallest fields") {
+      const above = new Set(touched.map((f) => fields[f].parent));
+      for (const f of touched) if (fields[f].chart && !above.has(f)) marked.add(f);
+    }
+    if (this.marks !== "none" && this.chosen !== null && model.inContact.has(this.chosen))
+      marked.add(this.chosen);
+    return [...marked];
+  }
+
+  /**
+   * Colours of the rings by taxel: the field that is chosen or hovered, or all whole fields.
+   * @param {import("./model.js").Model} model
+   */
+  rings(model) {
+    const fields = model.welcome?.fields ?? [];
+    /** @type {Map<number, number[]>} */
+    const rings = new Map();
+    if (this.tint) {
+      let colour = 0;
+      fields.forEach((field, f) => {
+        if (!this.isWhole(model, f)) return;
+        for (const taxel of field.members) rings.set(taxel, PALETTE[colour % PALETTE.length]);
+        colour++;
+      });
+    }
+    const accent = this.dark ? [126, 226, 214] : [0, 104, 96];
+    for (const f of [this.chosen, this.hoveredField])
+      if (f !== null) for (const taxel of fields[f]?.members ?? []) rings.set(taxel, accent);
+    if (this.hoveredTaxel !== null) rings.set(this.hoveredTaxel, this.dark ? [255, 255, 255] : [0, 0, 0]);
+    return rings;
+  }
+}

@@ -1,0 +1,239 @@
+/** The tree of fields: search, totals as bars, a click chooses, a second one looks at the field. */
+
+import { byId, make, setText } from "./dom.js";
+import { withUnit } from "./format.js";
+
+/** @typedef {{row: HTMLElement, bar: HTMLElement, value: HTMLElement, caret: HTMLElement, depth: number, open: boolean,
+ *   text: string, width: number, key: string}} Row */
+
+export class Fields {
+  /**
+   * @param {import("./model.js").Model} model
+   * @param {import("./choices.js").Choices} choices
+   * @param {(field: number) => void} lookAt
+   */
+  constructor(model, choices, lookAt) {
+    this.model = model;
+    this.choices = choices;
+    this.lookAt = lookAt;
+    this.tree = byId("tree", HTMLElement);
+    this.search = byId("search", HTMLInputElement);
+    this.letters = byId("letters", HTMLElement);
+    this.count = byId("field-count", HTMLElement);
+    this.onlyTouched = byId("only-touched", HTMLInputElement);
+    this.caption = byId("bar-scale", HTMLElement);
+    /** @type {Map<number, Row>} */
+    this.rows = new Map();
+    this.largest = 0;
+    model.on("scene", () => this.build());
+    choices.on("field", () => this.mark());
+    this.search.addEventListener("input", () => this.filter());
+    this.search.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") {
+        this.search.value = "";
+        this.filter();
+        this.search.blur();
+      } else if (event.key === "Enter") {
+        const first = this.visible()[0];
+        if (first !== undefined) this.choose(first);
+      }
+      event.stopPropagation();
+    });
+    this.onlyTouched.addEventListener("change", () => this.filter());
+    this.tree.addEventListener("keydown", (event) => this.key(event));
+    this.tree.addEventListener("pointerleave", () => choices.hoverField(null));
+  }
+
+  build() {
+    const fields = this.model.welcome?.fields ?? [];
+    const letters = [...new Set(fields.map((field) => field.letter))];
+    if (!letters.includes(this.choices.letter)) this.choices.letter = letters[0] ?? null;
+    this.letters.hidden = letters.length < 2;
+    this.letters.replaceChildren(
+      ...letters.map((letter) => {
+        const button = make("button", "", letter ?? "pressure");
+        button.setAttribute("aria-pressed", String(letter === this.choices.letter));
+        button.addEventListener("click", () => {
+          this.choices.letter = letter;
+          this.choices.followed = null;
+          this.choices.choose(null);
+          this.choices.tell("look");
+          this.build();
+        });
+        return button;
+      }),
+    );
+    this.rows.clear();
+    this.largest = 0;
+    const list = document.createDocumentFragment();
+    const indices = fields.map((_, i) => i).filter((i) => fields[i].letter === this.choices.letter);
+    /** @type {Map<number | null, number[]>} */
+    const below = new Map();
+    for (const i of indices) below.set(fields[i].parent, [...(below.get(fields[i].parent) ?? []), i]);
+    const roots = below.get(null) ?? [];
+    const many = indices.length > 40;
+    const walk = (/** @type {number} */ i, /** @type {number} */ depth) => {
+      const under = below.get(i) ?? [];
+      const row = this.row(i, depth, under.length > 0, depth < (many ? 1 : 2));
+      list.append(row.row);
+      for (const child of under) walk(child, depth + 1);
+    };
+    for (const i of roots) walk(i, 0);
+    this.tree.replaceChildren(list);
+    setText(this.count, String(indices.length));
+    this.filter();
+    this.mark();
+  }
+
+  /**
+   * @param {number} i
+   * @param {number} depth
+   * @param {boolean} parent
+   * @param {boolean} open
+   */
+  row(i, depth, parent, open) {
+    const field = this.model.welcome?.fields[i];
+    const row = make("div", "field");
+    row.style.setProperty("--depth", String(depth));
+    row.tabIndex = -1;
+    row.setAttribute("role", "treeitem");
+    row.title = field?.name ?? "";
+    const caret = make("span", "caret", parent ? (open ? "▾" : "▸") : "");
+    const bar = make("span", "field-bar");
+    const value = make("span", "field-value");
+    const name = make("span", "field-name", field?.label ?? "");
+    row.append(bar, caret, name, value);
+    const entry = {
+      row,
+      bar,
+      value,
+      caret,
+      depth,
+      open,
+      text: "",
+      width: 0,
+      key: `${field?.name} ${field?.label}`.toLowerCase(),
+    };
+    this.rows.set(i, entry);
+    caret.addEventListener("click", (event) => {
+      this.unfold(i, !entry.open);
+      event.stopPropagation();
+    });
+    row.addEventListener("click", () => this.choose(i));
+    row.addEventListener("dblclick", () => this.lookAt(i));
+    row.addEventListener("pointerenter", () => this.choices.hoverField(i));
+    return entry;
+  }
+
+  /** @param {number} i */
+  choose(i) {
+    if (this.choices.chosen === i) this.lookAt(i);
+    else this.choices.choose(i);
+  }
+
+  /**
+   * @param {number} i
+   * @param {boolean} open
+   */
+  unfold(i, open) {
+    const entry = this.rows.get(i);
+    if (!entry || !entry.caret.textContent) return;
+    entry.open = open;
+    setText(entry.caret, open ? "▾" : "▸");
+    this.filter();
+  }
+
+  /** Shows the rows that match the search, with all that are above them. */
+  filter() {
+    const fields = this.model.welcome?.fields ?? [];
+    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const touched = this.onlyTouched.checked;
+    /** @type {Set<number>} */
+    const shown = new Set();
+    for (const [i, entry] of this.rows) {
+      if (words.length || touched) {
+        const fits = words.every((word) => entry.key.includes(word));
+        if (!fits || (touched && !this.model.inContact.has(i))) continue;
+        for (let at = /** @type {number | null} */ (i); at !== null; at = fields[at].parent) shown.add(at);
+      } else {
+        let open = true;
+        for (let at = fields[i].parent; at !== null; at = fields[at].parent)
+          open &&= !!this.rows.get(at)?.open;
+        if (open) shown.add(i);
+      }
+    }
+    for (const [i, entry] of this.rows) entry.row.hidden = !shown.has(i);
+  }
+
+  visible() {
+    return [...this.rows].filter(([, entry]) => !entry.row.hidden).map(([i]) => i);
+  }
+
+  /** Shows which field is chosen. */
+  mark() {
+    const { chosen, field } = this.choices;
+    for (const [i, entry] of this.rows) {
+      entry.row.classList.toggle("chosen", i === chosen);
+      entry.row.classList.toggle("followed", i === field && chosen === null);
+      entry.row.tabIndex = i === chosen || (chosen === null && entry.depth === 0) ? 0 : -1;
+    }
+    if (chosen !== null) {
+      const fields = this.model.welcome?.fields ?? [];
+      for (let at = fields[chosen]?.parent ?? null; at !== null; at = fields[at].parent)
+        this.unfold(at, true);
+      this.rows.get(chosen)?.row.scrollIntoView({ block: "nearest" });
+    }
+  }
+
+  /** Totals of the newest frame. */
+  update() {
+    const { model } = this;
+    for (const i of model.inContact.keys()) this.largest = Math.max(this.largest, model.total(i));
+    for (const [i, entry] of this.rows) {
+      const touched = model.inContact.has(i);
+      const total = touched ? model.total(i) : 0;
+      const text = touched ? withUnit(total, "P", model.quantity) : "";
+      if (text !== entry.text) {
+        if (!text !== !entry.text) entry.row.classList.toggle("touched", touched);
+        entry.text = text;
+        setText(entry.value, text);
+      }
+      const width = this.largest > 0 ? Math.round((100 * total) / this.largest) : 0;
+      if (width !== entry.width) {
+        entry.width = width;
+        entry.bar.style.width = `${width}%`;
+      }
+    }
+    if (this.largest > 0) setText(this.caption, `full bar: ${withUnit(this.largest, "P", model.quantity)}`);
+    if (this.onlyTouched.checked) this.filter();
+  }
+
+  /**
+   * The next or previous field, from the one that is chosen.
+   * @param {number} by
+   */
+  step(by) {
+    const list = this.visible();
+    if (!list.length) return;
+    const at = this.choices.chosen === null ? -1 : list.indexOf(this.choices.chosen);
+    const next = at < 0 ? (by > 0 ? 0 : list.length - 1) : (at + by + list.length) % list.length;
+    this.choices.choose(list[next]);
+    if (this.tree.contains(document.activeElement)) this.rows.get(list[next])?.row.focus();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const { chosen } = this.choices;
+    const act = {
+      ArrowDown: () => this.step(1),
+      ArrowUp: () => this.step(-1),
+      ArrowRight: () => chosen !== null && this.unfold(chosen, true),
+      ArrowLeft: () => chosen !== null && this.unfold(chosen, false),
+      Enter: () => chosen !== null && this.lookAt(chosen),
+    }[event.key];
+    if (!act) return;
+    act();
+    event.preventDefault();
+    event.stopPropagation();
+  }
+}

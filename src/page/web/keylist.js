@@ -1,0 +1,86 @@
+/** Which key does what. */
+
+import { MARKS } from "./choices.js";
+import { byId } from "./dom.js";
+
+/**
+ * @param {{camera: import("./camera.js").Camera, choices: import("./choices.js").Choices,
+ *   fields: import("./fields.js").Fields, legend: import("./legend.js").Legend,
+ *   timeline: import("./timeline.js").Timeline, look: (name: import("./camera.js").Preset) => void,
+ *   lookAt: (field: number) => void, lookAtAll: () => void, moved: () => void, explain: () => void,
+ *   help: () => void}} page
+ * @returns {import("./keys.js").Key[]}
+ */
+export function keyList(page) {
+  const { camera, choices, fields, legend, timeline } = page;
+  const move = (/** @type {() => void} */ change) => () => {
+    change();
+    page.moved();
+  };
+  const fold = (/** @type {string} */ id) => () => {
+    const panel = byId(id, HTMLDetailsElement);
+    panel.open = !panel.open;
+  };
+  return [
+    { group: "View", keys: ["1"], does: "from the front", act: () => page.look("front") },
+    { group: "View", keys: ["2"], does: "from the back", act: () => page.look("back") },
+    { group: "View", keys: ["3"], does: "from the left", act: () => page.look("left") },
+    { group: "View", keys: ["4"], does: "from the right", act: () => page.look("right") },
+    { group: "View", keys: ["5"], does: "from the top", act: () => page.look("top") },
+    { group: "View", keys: ["6"], does: "from the bottom", act: () => page.look("bottom") },
+    { group: "View", keys: ["0"], does: "whole body", act: page.lookAtAll },
+    { group: "View", keys: ["ArrowLeft"], does: "orbit left", act: move(() => camera.orbit(-0.12, 0)) },
+    { group: "View", keys: ["ArrowRight"], does: "orbit right", act: move(() => camera.orbit(0.12, 0)) },
+    { group: "View", keys: ["ArrowUp"], does: "orbit up", act: move(() => camera.orbit(0, 0.1)) },
+    { group: "View", keys: ["ArrowDown"], does: "orbit down", act: move(() => camera.orbit(0, -0.1)) },
+    { group: "View", keys: ["Shift+ArrowLeft"], does: "pan left", act: move(() => camera.pan(-40, 0)) },
+    { group: "View", keys: ["Shift+ArrowRight"], does: "pan right", act: move(() => camera.pan(40, 0)) },
+    { group: "View", keys: ["Shift+ArrowUp"], does: "pan up", act: move(() => camera.pan(0, -40)) },
+    { group: "View", keys: ["Shift+ArrowDown"], does: "pan down", act: move(() => camera.pan(0, 40)) },
+    { group: "View", keys: ["+", "="], does: "nearer", act: move(() => camera.zoom(1.2)) },
+    { group: "View", keys: ["-"], does: "farther", act: move(() => camera.zoom(1 / 1.2)) },
+    {
+      group: "Fields",
+      keys: ["f"],
+      does: "look at the field",
+      act: () => choices.field !== null && page.lookAt(choices.field),
+    },
+    { group: "Fields", keys: ["]"], does: "next field", act: () => fields.step(1) },
+    { group: "Fields", keys: ["["], does: "previous field", act: () => fields.step(-1) },
+    { group: "Fields", keys: ["/"], does: "search", act: () => fields.search.focus() },
+    { group: "Fields", keys: ["e"], does: "explain the percept", act: page.explain },
+    { group: "Fields", keys: ["Escape"], does: "follow the touch", act: () => choices.choose(null) },
+    { group: "Picture", keys: ["x"], does: "see through the body", act: () => choices.toggle("xray") },
+    { group: "Picture", keys: ["b"], does: "body on and off", act: () => choices.toggle("body") },
+    { group: "Picture", keys: ["d"], does: "taxels on and off", act: () => choices.toggle("taxels") },
+    { group: "Picture", keys: ["t"], does: "colour rims by field", act: () => choices.toggle("tint") },
+    { group: "Picture", keys: ["n"], does: "labels on and off", act: () => choices.toggle("labels") },
+    {
+      group: "Picture",
+      keys: ["m"],
+      does: "which fields have marks",
+      act: () => {
+        choices.marks = MARKS[(MARKS.indexOf(choices.marks) + 1) % MARKS.length];
+        choices.tell("look");
+      },
+    },
+    { group: "Picture", keys: ["a"], does: "autoscale or fixed scale", act: () => legend.toggle() },
+    { group: "Recording", keys: [" "], does: "play and pause", act: () => timeline.togglePlay() },
+    { group: "Recording", keys: [","], does: "one frame back", act: () => timeline.step(-1) },
+    { group: "Recording", keys: ["."], does: "one frame on", act: () => timeline.step(1) },
+    { group: "Recording", keys: ["PageUp"], does: "one second back", act: () => timeline.jump(-1) },
+    { group: "Recording", keys: ["PageDown"], does: "one second on", act: () => timeline.jump(1) },
+    { group: "Recording", keys: ["Home"], does: "to the start", act: () => timeline.seek(-Infinity) },
+    { group: "Recording", keys: ["End"], does: "to the end", act: () => timeline.seek(Infinity) },
+    { group: "Recording", keys: [">"], does: "faster", act: () => timeline.faster(1) },
+    { group: "Recording", keys: ["<"], does: "slower", act: () => timeline.faster(-1) },
+    { group: "Recording", keys: ["l"], does: "link to this moment", act: () => void timeline.copyLink() },
+    { group: "Panels", keys: ["i"], does: "fields", act: fold("fields-panel") },
+    { group: "Panels", keys: ["v"], does: "percept", act: fold("percept-panel") },
+    { group: "Panels", keys: ["c"], does: "chart", act: fold("chart-panel") },
+    { group: "Panels", keys: ["p"], does: "plots", act: fold("plots-panel") },
+    { group: "Panels", keys: ["g"], does: "events", act: fold("events-panel") },
+    { group: "Panels", keys: ["o"], does: "boards", act: fold("boards-panel") },
+    { group: "Panels", keys: ["?"], does: "this list", act: page.help },
+  ];
+}

@@ -1,0 +1,114 @@
+/** The legend: colours of pressure with units, and how states of taxels look. */
+
+import { make, setText } from "./dom.js";
+import { clock, scaleFor, tickText, ticks } from "./format.js";
+import { HEALTH } from "./wire.js";
+
+export class Legend {
+  /**
+   * @param {HTMLElement} root
+   * @param {import("./model.js").Model} model
+   */
+  constructor(root, model) {
+    this.root = root;
+    this.model = model;
+    this.title = make("div", "legend-title");
+    this.canvas = make("canvas", "legend-bar");
+    this.canvas.width = 256;
+    this.canvas.height = 1;
+    this.ticks = make("div", "legend-ticks");
+    this.source = make("div", "legend-source");
+    this.auto = make("button", "small", "Autoscale");
+    this.auto.title = "Scale the colours to the largest pressure from now on (A)";
+    this.auto.addEventListener("click", () => this.toggle());
+    this.states = make("div", "legend-states");
+    const foot = make("div", "legend-foot");
+    foot.append(this.source, this.auto);
+    root.append(this.title, this.canvas, this.ticks, foot, this.states);
+    this.since = "";
+    this.shown = "";
+    this.counts = "";
+    this.maximum = NaN;
+    model.on("scene scale", () => this.update());
+  }
+
+  toggle() {
+    this.since = clock(new Date());
+    this.model.setAutoscale(this.model.autoscale === null);
+  }
+
+  update() {
+    const { model } = this;
+    const { welcome } = model;
+    if (!welcome) return;
+    const most = model.scaleMax;
+    this.maximum = most;
+    const by = scaleFor("P", most, model.quantity);
+    const what =
+      model.quantity === "N" ? "Force of a taxel" : model.quantity === "Pa" ? "Pressure" : "Raw value";
+    setText(this.title, `${what}, ${by.unit}`);
+    this.paint(welcome.colours);
+    const places = ticks(0, most * by.factor, 4);
+    this.ticks.replaceChildren(
+      ...places.map((place) => {
+        const tick = make("span", "", tickText(place, places));
+        tick.style.left = `${(100 * place) / (most * by.factor)}%`;
+        return tick;
+      }),
+    );
+    const auto = model.autoscale !== null;
+    setText(
+      this.source,
+      auto ? `autoscale since ${this.since}` : `fixed: ${this.sourceText(model.scale.from)}`,
+    );
+    this.root.classList.toggle("auto", auto);
+    setText(this.auto, auto ? "Fixed scale" : "Autoscale");
+  }
+
+  /** @param {string} from */
+  sourceText(from) {
+    switch (from) {
+      case "calibration":
+        return "the calibration’s largest value";
+      case "raw range":
+        return "the sensor’s range";
+      case "recording":
+        return "the recording’s largest value";
+      case "grown":
+        return "it grew with the data";
+      default:
+        return from;
+    }
+  }
+
+  /** @param {number[][]} colours */
+  paint(colours) {
+    const key = colours.join();
+    const context = this.canvas.getContext("2d");
+    if (key === this.shown || !context) return;
+    this.shown = key;
+    const image = context.createImageData(256, 1);
+    colours.forEach(([r, g, b], i) => image.data.set([r, g, b, 255], 4 * i));
+    context.putImageData(image, 0, 0);
+  }
+
+  /** Says how many taxels are in a state that is not good. */
+  updateStates() {
+    const { model } = this;
+    if (model.autoscale !== null && model.scaleMax !== this.maximum) this.update();
+    if (!model.frame) return;
+    const counts = new Array(HEALTH.length).fill(0);
+    for (const state of model.health) counts[state]++;
+    const key = counts.slice(1).join();
+    if (key === this.counts) return;
+    this.counts = key;
+    this.states.replaceChildren(
+      ...HEALTH.flatMap((name, state) => {
+        if (state === 0 || !counts[state]) return [];
+        const line = make("div", "legend-state");
+        line.append(make("i", `state s${state}`), make("span", "", `${counts[state]} ${name}`));
+        return [line];
+      }),
+    );
+  }
+}

@@ -1,0 +1,279 @@
+/** Starts the page and joins its parts. */
+
+import { Boards } from "./boards.js";
+import { Camera, chooseDirection } from "./camera.js";
+import { ChartPanel } from "./chart.js";
+import { Choices, MARKS } from "./choices.js";
+import { atMostEvery, byId, setText } from "./dom.js";
+import { PerceptPanel } from "./explain.js";
+import { Fields } from "./fields.js";
+import { Inspector } from "./inspect.js";
+import { Keys } from "./keys.js";
+import { keyList } from "./keylist.js";
+import { Legend } from "./legend.js";
+import { Log } from "./log.js";
+import { toWorld } from "./math.js";
+import { Model } from "./model.js";
+import { Marks } from "./percepts.js";
+import { Picker } from "./pick.js";
+import { taxelInWorld } from "./places.js";
+import { Plots } from "./plots.js";
+import { Connection, readAddress } from "./socket.js";
+import { Status } from "./status.js";
+import { Timeline } from "./timeline.js";
+import { View } from "./view.js";
+import { say } from "./wire.js";
+
+const { token, moment } = readAddress();
+const model = new Model();
+const choices = new Choices();
+const camera = new Camera();
+const connection = new Connection(model, token);
+const stage = byId("stage", HTMLElement);
+const view = new View(byId("scene", HTMLCanvasElement), model, camera, choices);
+const marks = new Marks(byId("marks", HTMLCanvasElement), model, camera, choices);
+const picker = new Picker(model, camera);
+const legend = new Legend(byId("legend", HTMLElement), model);
+const plots = new Plots(model, connection);
+const timeline = new Timeline(model, connection);
+const percept = new PerceptPanel(model, choices, connection, plots);
+const fields = new Fields(model, choices, lookAt);
+const chart = new ChartPanel(
+  byId("chart", HTMLCanvasElement),
+  byId("chart-note", HTMLElement),
+  model,
+  choices,
+);
+new Boards(model);
+new Log(
+  model,
+  (field) => choices.choose(field),
+  (t) => timeline.seek(t),
+);
+new Status(model, view);
+plots.onSeek = (t) => timeline.seek(t);
+
+/** @param {number} field */
+function pointsOf(field) {
+  const members = model.welcome?.fields[field]?.members ?? [];
+  return members.map((taxel) => taxelInWorld(model, taxel)?.point ?? camera.target);
+}
+
+/** @param {number} field */
+function lookAt(field) {
+  const members = model.welcome?.fields[field]?.members ?? [];
+  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? [0, 0, 0]);
+  const mean = [0, 1, 2].map((k) => normals.reduce((sum, normal) => sum + normal[k], 0) / normals.length);
+  // A field whose taxels look one way is seen from that side; one that goes around the body from where we are.
+  if (Math.hypot(...mean) > 0.6) {
+    camera.yaw = Math.atan2(mean[0], mean[2]) + 0.25;
+    camera.pitch = Math.max(-1.3, Math.min(1.3, Math.asin(mean[1] / Math.hypot(...mean)) + 0.2));
+    camera.update();
+  }
+  camera.frame(pointsOf(field), 0.24);
+  moved();
+}
+
+/** Takes in the whole body. */
+function lookAtAll() {
+  const { mesh, rows } = model;
+  if (!mesh) return;
+  const vertices = mesh.link.length;
+  const step = Math.max(1, Math.floor(vertices / 3000));
+  /** @type {import("./math.js").Vec3[]} */
+  const points = [];
+  for (let i = 0; i < vertices; i += step) points.push(toWorld(rows, mesh.link[i], mesh.position, 1, 3 * i));
+  if (!points.length)
+    for (let i = 0; i < mesh.taxelId.length; i++) points.push(taxelInWorld(model, i)?.point ?? [0, 0, 0]);
+  const [low, high] = [0, 1, 2].reduce(
+    ([lo, hi], k) => [
+      [...lo, points.reduce((m, p) => Math.min(m, p[k]), Infinity)],
+      [...hi, points.reduce((m, p) => Math.max(m, p[k]), -Infinity)],
+    ],
+    /** @type {[number[], number[]]} */ ([[], []]),
+  );
+  camera.radius = Math.max(1e-3, Math.hypot(...high.map((h, k) => h - low[k])) / 2);
+  camera.frame(points, 0.08);
+  moved();
+}
+
+function moved() {
+  view.request();
+}
+
+let framed = "";
+connection.onScene = () => {
+  const { welcome, mesh } = model;
+  if (!welcome || !mesh) return;
+  view.build();
+  connection.send(say.columns(welcome.columns.map((column) => column.name)));
+  plots.begin();
+  const body = `${welcome.body} ${mesh.taxelId.length}`;
+  if (framed !== body) {
+    framed = body;
+    const normals = Array.from(mesh.taxelId, (_, i) => taxelInWorld(model, i)?.normal ?? [0, 0, 1]);
+    chooseDirection(
+      camera,
+      /** @type {import("./math.js").Vec3[]} */ (normals),
+      Array.from(mesh.taxelRadius, (r) => r * r),
+    );
+    lookAtAll();
+    if (moment !== null && welcome.time) {
+      connection.send(say.pause());
+      connection.send(say.seek(moment));
+    }
+  } else if (welcome.time && resume) {
+    connection.send(resume.playing ? say.play() : say.pause());
+    connection.send(say.seek(resume.t));
+    if (resume.speed !== 1) connection.send(say.speed(resume.speed));
+  }
+};
+
+/** Where a recording stood when the connection was lost. @type {{t: number, playing: boolean, speed: number} | null} */
+let resume = null;
+model.on("connection", () => {
+  if (model.connection.state === "lost" && model.frame)
+    resume = { t: model.frame.t, playing: model.status.playing, speed: model.status.speed };
+});
+
+// Panels follow the frames at a pace that people can read, so that time is left for drawing.
+const updatePanels = atMostEvery(100, () => {
+  fields.update();
+  percept.update();
+  legend.updateStates();
+  if (byId("chart-panel", HTMLDetailsElement).open) chart.draw();
+});
+const updatePlots = atMostEvery(80, () => {
+  if (byId("plots-panel", HTMLDetailsElement).open) {
+    plots.draw();
+    setText(byId("plots-range", HTMLElement), plots.caption());
+  }
+  timeline.draw();
+});
+
+model.on("frame", () => {
+  if (model.frame?.pressure) view.taxelsChanged = true;
+  choices.follow(model);
+  view.request();
+  updatePanels();
+  updatePlots();
+});
+model.on("scale", () => {
+  view.taxelsChanged = true;
+  view.request();
+  updatePanels();
+});
+choices.on("look field hover", () => {
+  view.ringsChanged = true;
+  view.request();
+  updatePanels();
+});
+model.on("connection", () => view.request());
+for (const panel of document.querySelectorAll("details"))
+  panel.addEventListener("toggle", () => {
+    updatePanels();
+    updatePlots();
+  });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  updatePanels();
+  plots.draw();
+  timeline.draw();
+});
+
+view.onDraw = () => {
+  const acknowledge = connection.takeToDraw();
+  marks.draw();
+  return acknowledge;
+};
+
+new ResizeObserver(() => {
+  camera.resize(stage.clientWidth, stage.clientHeight);
+  marks.drawn = marks.drawn || "resized";
+  view.request();
+  plots.draw();
+  timeline.draw();
+}).observe(stage);
+camera.resize(stage.clientWidth, stage.clientHeight);
+
+new Inspector(byId("marks", HTMLCanvasElement), {
+  model,
+  camera,
+  choices,
+  connection,
+  picker,
+  marks,
+  onMove: moved,
+  onPercept: (field) => percept.ask(field),
+  lookAt,
+});
+
+/** @param {import("./camera.js").Preset} name */
+function look(name) {
+  camera.preset(name);
+  lookAtAll();
+}
+for (const button of document.querySelectorAll("[data-view]"))
+  button.addEventListener("click", () => {
+    if (!(button instanceof HTMLElement)) return;
+    const name = button.dataset.view ?? "";
+    if (name === "all") lookAtAll();
+    else look(/** @type {import("./camera.js").Preset} */ (name));
+  });
+for (const button of document.querySelectorAll("[data-toggle]")) {
+  if (!(button instanceof HTMLElement)) continue;
+  const name = /** @type {"xray" | "tint" | "labels"} */ (button.dataset.toggle);
+  const show = () => button.setAttribute("aria-pressed", String(choices[name]));
+  button.addEventListener("click", () => choices.toggle(name));
+  choices.on("look", show);
+  show();
+}
+const marksBox = byId("marks-choice", HTMLSelectElement);
+for (const name of MARKS) marksBox.add(new Option(`Marks: ${name}`, name));
+marksBox.addEventListener("change", () => {
+  choices.marks = MARKS[marksBox.selectedIndex];
+  choices.tell("look");
+});
+choices.on("look", () => (marksBox.selectedIndex = MARKS.indexOf(choices.marks)));
+
+const keys = new Keys(
+  keyList({
+    camera,
+    choices,
+    fields,
+    legend,
+    timeline,
+    look,
+    lookAt,
+    lookAtAll,
+    moved,
+    explain: () => percept.ask(),
+    help: () => keys.toggleHelp(),
+  }),
+);
+byId("help-button", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
+byId("help-close", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
+
+connection.open();
+
+// For tests, to read and not to change.
+Object.defineProperty(window, "somatic", {
+  value: Object.freeze({
+    model,
+    camera,
+    /** @param {number} taxel */
+    pixelOfTaxel(taxel) {
+      const at = picker.pixelOf(taxel);
+      const box = stage.getBoundingClientRect();
+      return at ? [box.left + at.x, box.top + at.y] : null;
+    },
+    get framesDrawn() {
+      return view.framesDrawn;
+    },
+    get firstPictureMs() {
+      return view.firstPictureMs;
+    },
+    get renderer() {
+      return view.renderer.name;
+    },
+  }),
+});

@@ -1,0 +1,300 @@
+/** Which outputs are plotted over time, and their values: samples of every frame, or least and most of each pixel. */
+
+import { byId, make, paletteColour, setText } from "./dom.js";
+import { clock, seconds } from "./format.js";
+import { drawPlot } from "./plot.js";
+import { say } from "./wire.js";
+
+/** @typedef {import("./wire.js").Series} Series */
+/** @typedef {{t: Float64Array, v: Float32Array, begin: number, size: number}} Ring */
+
+const SERIES_MAX = 16;
+/** Samples that are kept of a series; a power of two. */
+const SAMPLES_MAX = 1 << 16;
+const WINDOWS_S = [2, 5, 10, 30, 60, 120, 300];
+
+/** @param {Series} s */
+const keyOf = (s) => `${s.field}/${s.column}/${s.component}`;
+
+export class Plots {
+  /**
+   * @param {import("./model.js").Model} model
+   * @param {import("./socket.js").Connection} connection
+   */
+  constructor(model, connection) {
+    this.model = model;
+    this.connection = connection;
+    this.root = byId("plots", HTMLElement);
+    this.note = byId("plots-note", HTMLElement);
+    /** @type {(Series & {colour: number})[]} */
+    this.series = [];
+    /** Series by the number of the `series` message that asked for them. @type {Series[][]} */
+    this.asked = [[]];
+    /** @type {Map<string, Ring>} */
+    this.rings = new Map();
+    this.window = 10;
+    /** What is shown of a recording. */
+    this.from = 0;
+    this.to = 1;
+    /** @type {Map<string, {least: Float32Array, most: Float32Array}>} */
+    this.bands = new Map();
+    this.bandRange = { from: 0, to: 1 };
+    this.historyId = 0;
+    /** @type {Map<number, Series[]>} */
+    this.pending = new Map();
+    this.bins = 300;
+    /** @type {Map<string, {box: HTMLElement, canvas: HTMLCanvasElement, chips: HTMLElement}>} */
+    this.groups = new Map();
+    this.body = "";
+    /** Where the pointer is, as a part of the width. @type {number | null} */
+    this.pointer = null;
+    /** Goes to a moment of a recording. @type {(t: number) => void} */
+    this.onSeek = () => {};
+    model.on("samples", () => this.take());
+    model.on("history", () => this.takeHistory());
+    model.on("timeline", () => this.askHistory());
+  }
+
+  /** After every welcome: asks again, as the server knows nothing of us. */
+  begin() {
+    const { welcome } = this.model;
+    if (!welcome) return;
+    this.asked = [[]];
+    const body = `${welcome.run} ${welcome.body} ${welcome.fields.length}`;
+    if (body !== this.body) {
+      this.body = body;
+      this.rings.clear();
+      this.bands.clear();
+      this.series = [];
+      if (welcome.time) [this.from, this.to] = [welcome.time.start_s, welcome.time.end_s];
+      const { fields } = welcome;
+      const roots = fields.map((_, i) => i).filter((i) => fields[i].parent === null);
+      const below = fields.map((_, i) => i).filter((i) => roots.includes(fields[i].parent ?? -1));
+      const letter = fields[roots[0]]?.letter;
+      for (const f of (below.length ? below : roots).filter((i) => fields[i].letter === letter).slice(0, 5))
+        this.series.push({ field: f, column: "total", component: 0, colour: this.freeColour() });
+    }
+    this.ask();
+  }
+
+  freeColour() {
+    for (let colour = 0; ; colour++) if (!this.series.some((s) => s.colour === colour)) return colour;
+  }
+
+  /**
+   * Adds all components of a column, or takes them away where they are plotted.
+   * @param {number} field
+   * @param {string} column
+   */
+  toggle(field, column) {
+    const components = this.model.welcome?.columns.find((c) => c.name === column)?.components ?? 1;
+    if (this.has(field, column)) {
+      this.series = this.series.filter((s) => s.field !== field || s.column !== column);
+    } else {
+      for (let component = 0; component < components; component++) {
+        if (this.series.length >= SERIES_MAX) {
+          setText(this.note, `At most ${SERIES_MAX} lines: take one away first.`);
+          break;
+        }
+        this.series.push({ field, column, component, colour: this.freeColour() });
+      }
+    }
+    this.ask();
+  }
+
+  /**
+   * @param {number} field
+   * @param {string} column
+   */
+  has(field, column) {
+    return this.series.some((s) => s.field === field && s.column === column);
+  }
+
+  /** @param {Series} one */
+  remove(one) {
+    this.series = this.series.filter((s) => keyOf(s) !== keyOf(one));
+    setText(this.note, "");
+    this.ask();
+  }
+
+  ask() {
+    const list = this.series.map(({ field, column, component }) => ({ field, column, component }));
+    if (this.model.welcome?.mode === "live") {
+      this.asked.push(list);
+      this.connection.send(say.series(list));
+      for (const key of this.rings.keys()) if (!list.some((s) => keyOf(s) === key)) this.rings.delete(key);
+    }
+    this.askHistory();
+    this.build();
+    this.model.tell("series");
+  }
+
+  askHistory() {
+    const { welcome } = this.model;
+    if (!welcome?.time || !this.series.length || !(this.to > this.from)) return;
+    const list = this.series.map(({ field, column, component }) => ({ field, column, component }));
+    const id = ++this.historyId;
+    this.pending.set(id, list);
+    this.connection.send(say.history(id, this.from, this.to, this.bins, list));
+  }
+
+  takeHistory() {
+    const { history } = this.model;
+    const list = history && this.pending.get(history.id);
+    if (!history || !list) return;
+    for (const id of this.pending.keys()) if (id <= history.id) this.pending.delete(id);
+    this.bandRange = { from: history.from, to: history.to };
+    this.bands = new Map(list.map((s, i) => [keyOf(s), { least: history.least[i], most: history.most[i] }]));
+    this.draw();
+  }
+
+  /** Keeps the samples of a live frame. */
+  take() {
+    const { samples } = this.model;
+    if (!samples) return;
+    const list = this.asked[samples.answers || this.asked.length - 1];
+    if (!list || samples.values.length < list.length) return;
+    list.forEach((s, i) => {
+      let ring = this.rings.get(keyOf(s));
+      if (!ring) {
+        ring = { t: new Float64Array(SAMPLES_MAX), v: new Float32Array(SAMPLES_MAX), begin: 0, size: 0 };
+        this.rings.set(keyOf(s), ring);
+      }
+      for (let k = 0; k < samples.t.length; k++) {
+        const at = (ring.begin + ring.size) & (SAMPLES_MAX - 1);
+        ring.t[at] = samples.t[k];
+        ring.v[at] = samples.values[i][k];
+        if (ring.size < SAMPLES_MAX) ring.size++;
+        else ring.begin = (ring.begin + 1) & (SAMPLES_MAX - 1);
+      }
+    });
+  }
+
+  /** One plot for each unit. */
+  build() {
+    const { welcome } = this.model;
+    if (!welcome) return;
+    const unitOf = (/** @type {Series} */ s) => welcome.columns.find((c) => c.name === s.column)?.unit ?? "1";
+    const units = [...new Set(this.series.map(unitOf))];
+    this.groups.clear();
+    this.root.replaceChildren(
+      ...units.map((unit) => {
+        const box = make("div", "plot");
+        const canvas = make("canvas");
+        const chips = make("div", "chips");
+        box.append(canvas, chips);
+        for (const s of this.series.filter((one) => unitOf(one) === unit)) chips.append(this.chip(s));
+        this.groups.set(unit, { box, canvas, chips });
+        this.listen(canvas);
+        return box;
+      }),
+    );
+    if (this.series.length < SERIES_MAX)
+      setText(this.note, this.series.length ? "" : "Press ∿ beside an output of a field to plot it.");
+    this.draw();
+  }
+
+  /** @param {Series & {colour: number}} s */
+  chip(s) {
+    const chip = make("span", "chip");
+    const swatch = make("i");
+    swatch.style.background = paletteColour(s.colour);
+    const field = this.model.welcome?.fields[s.field];
+    const components = this.model.welcome?.columns.find((c) => c.name === s.column)?.components ?? 1;
+    const part =
+      components === 2 ? [" u", " v"][s.component] : components === 3 ? [" x", " y", " z"][s.component] : "";
+    const letter = field?.letter ? ` (${field.letter})` : "";
+    const close = make("button", "", "×");
+    close.title = "Take this line away";
+    close.addEventListener("click", () => this.remove(s));
+    chip.title = field?.name ?? "";
+    chip.append(swatch, make("span", "", `${field?.label ?? ""}${letter} ${s.column}${part}`), close);
+    return chip;
+  }
+
+  /** @param {HTMLCanvasElement} canvas */
+  listen(canvas) {
+    const t = (/** @type {number} */ x) => this.from + (x / canvas.clientWidth) * (this.to - this.from);
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        this.zoom(event.deltaY > 0 ? 1.3 : 1 / 1.3, t(event.offsetX));
+      },
+      { passive: false },
+    );
+    canvas.addEventListener("dblclick", () => this.zoom(Infinity, 0));
+    canvas.addEventListener("click", (event) => {
+      if (this.model.welcome?.time) this.onSeek(t(event.offsetX));
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      this.pointer = event.offsetX / canvas.clientWidth;
+      this.draw();
+    });
+    canvas.addEventListener("pointerleave", () => {
+      this.pointer = null;
+      this.draw();
+    });
+  }
+
+  /**
+   * @param {number} factor of the time that is shown
+   * @param {number} about this time stays where it is
+   */
+  zoom(factor, about) {
+    const time = this.model.welcome?.time;
+    if (!time) {
+      const at = WINDOWS_S.indexOf(this.window) + (factor > 1 ? 1 : -1);
+      this.window = WINDOWS_S[Math.max(0, Math.min(WINDOWS_S.length - 1, at))];
+      this.draw();
+      return;
+    }
+    const span = (this.to - this.from) * factor;
+    if (!(span < time.end_s - time.start_s)) [this.from, this.to] = [time.start_s, time.end_s];
+    else {
+      const part = (about - this.from) / (this.to - this.from);
+      const from = Math.max(time.start_s, Math.min(time.end_s - span, about - part * span));
+      [this.from, this.to] = [from, from + span];
+    }
+    this.askHistory();
+    this.draw();
+  }
+
+  /** The time that is shown, and the moment of the frame. */
+  range() {
+    const now = this.model.frame?.t ?? 0;
+    if (this.model.welcome?.time) return { from: this.from, to: this.to, now };
+    return { from: now - this.window, to: now, now };
+  }
+
+  draw() {
+    const { welcome } = this.model;
+    if (!welcome) return;
+    const range = this.range();
+    for (const [unit, { canvas }] of this.groups) {
+      this.bins = Math.max(50, Math.min(4096, canvas.clientWidth));
+      const lines = this.series
+        .filter((s) => (welcome.columns.find((c) => c.name === s.column)?.unit ?? "1") === unit)
+        .map((s) => ({
+          colour: paletteColour(s.colour),
+          ring: this.rings.get(keyOf(s)),
+          band: this.bands.get(keyOf(s)),
+        }));
+      drawPlot(canvas, lines, {
+        ...range,
+        unit,
+        quantity: this.model.quantity,
+        bandRange: this.bandRange,
+        live: welcome.mode === "live",
+        pointer: this.pointer,
+        until: welcome.time ? this.model.timeline.until : Infinity,
+      });
+    }
+  }
+
+  /** What the head of the panel says. */
+  caption() {
+    if (this.model.welcome?.time) return `${seconds(this.from)} – ${seconds(this.to)}`;
+    return `${this.window} s to ${clock(new Date())}`;
+  }
+}

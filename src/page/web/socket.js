@@ -1,0 +1,159 @@
+/** The connection: says hello, hands messages to the model, comes back after a loss. */
+
+import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "./wire.js";
+
+const TOKEN = "somatic token";
+const RETRY_MIN_MS = 250;
+const RETRY_MAX_MS = 4000;
+/** After so long without a message while frames are due, the page no longer looks live. */
+const SILENT_MS = 2500;
+
+/**
+ * Moves the token from the address to the session's storage, so that it is not seen, kept or shared with a link.
+ * @returns {{token: string, moment: number | null}}
+ */
+export function readAddress() {
+  const fragment = new URLSearchParams(location.hash.slice(1));
+  const token = fragment.get("token");
+  const t = fragment.get("t");
+  const moment = t !== null && Number.isFinite(Number(t)) ? Number(t) : null;
+  if (token) {
+    sessionStorage.setItem(TOKEN, token);
+    const rest = moment === null ? "" : `#t=${t}`;
+    history.replaceState(null, "", location.pathname + location.search + rest);
+  }
+  return { token: sessionStorage.getItem(TOKEN) ?? "", moment };
+}
+
+export class Connection {
+  /**
+   * @param {import("./model.js").Model} model
+   * @param {string} token
+   */
+  constructor(model, token) {
+    this.model = model;
+    this.token = token;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.wait = RETRY_MIN_MS;
+    /** Frames that came since the last drawing. @type {number[]} */
+    this.toDraw = [];
+    /** Called after `welcome` and the mesh. */
+    this.onScene = () => {};
+    this.scene = { taxels: 0, links: 0, components: /** @type {number[]} */ ([]) };
+    this.heard = performance.now();
+    this.saidAfter = /** @type {number | null} */ (null);
+    setInterval(() => this.watch(), 500);
+    document.addEventListener("visibilitychange", () => (this.heard = performance.now()));
+  }
+
+  open() {
+    const socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    this.toDraw = [];
+    socket.onopen = () => {
+      this.saidAfter = this.model.newestEvent;
+      socket.send(say.hello(this.token, this.saidAfter));
+    };
+    socket.onmessage = (message) => {
+      if (this.socket !== socket) return;
+      this.heard = performance.now();
+      try {
+        if (typeof message.data === "string") this.text(JSON.parse(message.data));
+        else this.binary(message.data);
+      } catch (error) {
+        // A message that cannot be read: better no picture than a wrong one.
+        console.error(error);
+        socket.close(4000, "unreadable message");
+      }
+    };
+    socket.onclose = (event) => {
+      if (this.socket !== socket) return;
+      this.socket = null;
+      this.toDraw = [];
+      this.model.setConnection("lost", event.code === 1008 ? this.refusal(event.reason) : event.reason);
+      setTimeout(() => this.open(), this.wait);
+      this.wait = Math.min(RETRY_MAX_MS, this.wait * 1.6);
+    };
+  }
+
+  /** @param {string} reason */
+  refusal(reason) {
+    const advice = "Open the address that somatic printed when it started.";
+    return reason ? `The server refused the page: ${reason}. ${advice}` : advice;
+  }
+
+  /** Greys the page where frames are due and none comes. */
+  watch() {
+    const { model } = this;
+    const due = model.ended === null && (model.welcome?.mode === "live" || model.status.playing);
+    const quiet = performance.now() - this.heard;
+    if (model.connection.state === "open" && due && !document.hidden && quiet > SILENT_MS)
+      model.setConnection("silent", "", new Date(Date.now() - quiet));
+    else if (model.connection.state === "silent" && quiet < SILENT_MS) model.setConnection("open");
+  }
+
+  /** @param {any} message */
+  text(message) {
+    const { model } = this;
+    if (message.type !== "welcome") {
+      model.receive(message);
+      return;
+    }
+    if (model.welcome && model.welcome.run !== message.run && this.saidAfter !== null) {
+      // The server has started anew and counts its events from 1 again.
+      model.forgetEvents();
+      const old = this.socket;
+      this.socket = null;
+      old?.close();
+      this.open();
+      return;
+    }
+    model.begin(message);
+    this.wait = RETRY_MIN_MS;
+  }
+
+  /** @param {ArrayBuffer} buffer */
+  binary(buffer) {
+    const { model } = this;
+    switch (kindOf(buffer)) {
+      case 1: {
+        const mesh = decodeMesh(buffer);
+        this.scene = {
+          taxels: mesh.taxelId.length,
+          links: mesh.restPose.length / 7,
+          components: model.welcome?.columns.map((column) => column.components) ?? [],
+        };
+        model.setMesh(mesh);
+        model.setConnection("open");
+        this.onScene();
+        break;
+      }
+      case 2: {
+        const frame = decodeFrame(buffer, this.scene);
+        this.toDraw.push(frame.seq);
+        if (model.connection.state === "silent") model.setConnection("open");
+        model.apply(frame);
+        break;
+      }
+      case 3:
+        model.setHistory(decodeHistory(buffer));
+        break;
+    }
+  }
+
+  /** The frames that the next drawing shows: what is given back is to be called when they are on the screen. */
+  takeToDraw() {
+    const { socket } = this;
+    const seqs = this.toDraw.splice(0);
+    return () => {
+      if (socket === this.socket) for (const seq of seqs) this.send(say.drawn(seq));
+    };
+  }
+
+  /** @param {string} message */
+  send(message) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(message);
+  }
+}

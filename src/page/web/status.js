@@ -1,0 +1,75 @@
+/** The line of truth: backend, latency, frames skipped, rate; and what is wrong with the connection. */
+
+import { byId, setText } from "./dom.js";
+import { ABSENT, clock } from "./format.js";
+
+export class Status {
+  /**
+   * @param {import("./model.js").Model} model
+   * @param {import("./view.js").View} view
+   */
+  constructor(model, view) {
+    this.model = model;
+    this.view = view;
+    this.banner = byId("banner", HTMLElement);
+    this.last = { drawn: 0, frame: 0, at: performance.now() };
+    model.on("scene", () => this.head());
+    model.on("connection context ended", () => this.connection());
+    setInterval(() => this.update(), 500);
+    if (!view.gl) byId("no-webgl", HTMLElement).hidden = false;
+  }
+
+  head() {
+    const { welcome } = this.model;
+    if (!welcome) return;
+    setText(byId("body-name", HTMLElement), welcome.body);
+    setText(byId("source-name", HTMLElement), welcome.source);
+    setText(byId("mode", HTMLElement), welcome.mode === "live" ? "live" : "recording");
+    document.documentElement.classList.toggle("live", welcome.mode === "live");
+    document.title = `${welcome.body} · somatic`;
+    const backend = byId("backend", HTMLElement);
+    setText(backend, welcome.backend.name);
+    backend.title = `${welcome.backend.device}\n${welcome.backend.why}\nsomatic ${welcome.somatic}`;
+  }
+
+  update() {
+    const { model, view, last } = this;
+    const now = performance.now();
+    const span = (now - last.at) / 1000;
+    const drawn = (view.framesDrawn - last.drawn) / span;
+    this.last = { drawn: view.framesDrawn, frame: 0, at: now };
+    const { frame } = model;
+    const ms = (/** @type {number} */ x) => (Number.isFinite(x) ? x.toFixed(x < 10 ? 1 : 0) : ABSENT);
+    setText(byId("engine-time", HTMLElement), frame ? `${ms(frame.engineMicroseconds)} µs a frame` : ABSENT);
+    setText(
+      byId("latency", HTMLElement),
+      frame && Number.isFinite(frame.p50) ? `${ms(frame.p50)} / ${ms(frame.p99)} ms` : `${ABSENT} ms`,
+    );
+    setText(byId("skipped", HTMLElement), frame ? String(frame.skipped) : ABSENT);
+    setText(byId("rate", HTMLElement), view.gl ? drawn.toFixed(0) : ABSENT);
+    const detail = byId("detail", HTMLElement);
+    detail.hidden = view.detail >= 1 || !view.gl;
+    setText(detail, `body at ${Math.round(100 * view.detail)} % in motion`);
+    byId("rate-chip", HTMLElement).title = `Drawings in the last second, by ${view.renderer.name}`;
+  }
+
+  connection() {
+    const { model, view } = this;
+    const { state, since, reason } = model.connection;
+    const grey = state === "lost" || state === "silent";
+    document.documentElement.classList.toggle("lost", grey);
+    let text = "";
+    if (state === "lost")
+      text = model.welcome
+        ? `Connection lost since ${clock(since)}. Trying again …`
+        : "No connection to somatic yet.";
+    else if (state === "silent") text = `No frames since ${clock(since)}.`;
+    else if (state === "connecting") text = "Connecting …";
+    else if (view.lost) text = "The graphics were lost. Waiting for them to come back.";
+    else if (model.ended !== null) text = `The source has ended: ${model.ended} This is its last frame.`;
+    if (reason) text += ` ${reason}`;
+    setText(this.banner, text);
+    this.banner.hidden = text === "";
+    this.banner.classList.toggle("calm", !grey && !view.lost);
+  }
+}

@@ -1,0 +1,226 @@
+/** The picture in space: when it is drawn, at what detail, and what of it is kept between drawings. */
+
+import { Body } from "./body.js";
+import { openContext, Poses, rendererOf, Target } from "./gl.js";
+import { Taxels } from "./taxels.js";
+import { THEMES } from "./theme.js";
+
+/** The body is drawn finer after so long without motion. */
+const REFINE_AFTER_MS = 220;
+/** Above this time of a drawing in motion the body loses detail; below the second it gains it again. */
+const SLOW_MS = 62;
+const FAST_MS = 26;
+
+export class View {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("./model.js").Model} model
+   * @param {import("./camera.js").Camera} camera
+   * @param {import("./choices.js").Choices} choices
+   */
+  constructor(canvas, model, camera, choices) {
+    this.canvas = canvas;
+    this.model = model;
+    this.camera = camera;
+    this.choices = choices;
+    this.gl = openContext(canvas);
+    this.renderer = this.gl ? rendererOf(this.gl) : { name: "none", software: true };
+    this.lost = false;
+    this.framesDrawn = 0;
+    /** When the first picture with a body was on the screen. @type {number | null} */
+    this.firstPictureMs = null;
+    /** Called before each drawing; what it gives back is called when the drawing is done. @type {() => () => void} */
+    this.onDraw = () => () => {};
+    /** Part of the pixels that the body has while it moves. */
+    this.detail = 1;
+    /** Smoothed time of a drawing, ms. */
+    this.drawMs = 0;
+    this.scheduled = false;
+    this.busy = false;
+    this.again = false;
+    this.taxelsChanged = true;
+    this.ringsChanged = true;
+    this.drawnBody = "";
+    this.refined = false;
+    this.movedAt = 0;
+    /** @type {{body: Body, taxels: Taxels, poses: Poses} | null} */
+    this.parts = null;
+    /** @type {{coarse: Target | null, whole: Target | null}} */
+    this.targets = { coarse: null, whole: null };
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.lost = true;
+      this.busy = false;
+      this.parts = null;
+      this.targets = { coarse: null, whole: null };
+      model.tell("context");
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.lost = false;
+      this.build();
+      model.tell("context");
+    });
+  }
+
+  /** Makes everything that lives in the context from the model. */
+  build() {
+    const { gl, model } = this;
+    if (!gl || this.lost || !model.mesh) return;
+    this.parts = {
+      body: new Body(gl, model.mesh),
+      taxels: new Taxels(gl, model.mesh),
+      poses: new Poses(gl, model.mesh.restPose.length / 7),
+    };
+    this.drawnBody = "";
+    this.taxelsChanged = this.ringsChanged = true;
+    this.request();
+  }
+
+  request() {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      // The drawing before is still under way: one more would only wait behind it.
+      if (this.busy) this.again = true;
+      else this.draw();
+    });
+  }
+
+  draw() {
+    const { gl, camera, model, choices } = this;
+    const finish = this.onDraw();
+    if (!gl || !this.parts || this.lost) {
+      finish();
+      return;
+    }
+    const begun = performance.now();
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const width = Math.max(1, Math.round(camera.width * ratio));
+    const height = Math.max(1, Math.round(camera.height * ratio));
+    const resized = this.canvas.width !== width || this.canvas.height !== height;
+    if (resized) [this.canvas.width, this.canvas.height] = [width, height];
+    const { body, taxels, poses } = this.parts;
+    poses.update(model.rows, model.poseVersion);
+    const theme = THEMES[choices.dark ? "dark" : "light"];
+    const how = { solid: choices.xray ? 0.3 : 1, body: choices.body };
+    const wanted = [
+      camera.version,
+      model.poseVersion,
+      width,
+      height,
+      choices.dark,
+      how.solid,
+      how.body,
+    ].join();
+    let moved = false;
+    if (wanted !== this.drawnBody) {
+      moved = this.drawnBody !== "" && !resized;
+      this.drawnBody = wanted;
+      this.refined = false;
+      this.movedAt = begun;
+      const part = moved ? this.detail : 1;
+      this.shown = this.target("coarse", Math.round(width * part), Math.round(height * part));
+      body.draw(this.shown, camera, poses, theme, how);
+      setTimeout(() => this.request(), REFINE_AFTER_MS + 20);
+    } else if (!this.refined && begun - this.movedAt > REFINE_AFTER_MS) {
+      this.refined = true;
+      this.refine(width, height, theme, how);
+    }
+    const shown = this.shown;
+    if (!shown) return;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    // Chromium clears the screen before the first drawing, and does not take the copy for one.
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    shown.copyTo(null, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    if (this.taxelsChanged) taxels.update(model);
+    if (this.ringsChanged) taxels.updateRings(choices.rings(model));
+    this.taxelsChanged = this.ringsChanged = false;
+    if (choices.taxels) taxels.draw(shown, camera, poses, theme, { through: choices.xray, width, height });
+    this.whenDone(() => {
+      this.framesDrawn++;
+      this.firstPictureMs ??= performance.now();
+      this.adapt(performance.now() - begun, moved);
+      finish();
+    });
+  }
+
+  /**
+   * Draws the body four times as fine and averages: smooth edges at rest also where the processor draws.
+   * @param {number} width
+   * @param {number} height
+   * @param {import("./body.js").Theme} theme
+   * @param {{solid: number, body: boolean}} how
+   */
+  refine(width, height, theme, how) {
+    const { gl, parts } = this;
+    if (!gl || !parts) return;
+    const coarse = this.target("coarse", width, height);
+    const fine = new Target(gl, 2 * width, 2 * height);
+    if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) === gl.FRAMEBUFFER_COMPLETE) {
+      parts.body.draw(coarse, this.camera, parts.poses, theme, how);
+      parts.body.draw(fine, this.camera, parts.poses, theme, how);
+      fine.copyTo(coarse, width, height);
+    }
+    fine.release();
+    this.shown = coarse;
+  }
+
+  /**
+   * A target of a size, made anew where the size differs.
+   * @param {"coarse" | "whole"} name
+   * @param {number} width
+   * @param {number} height
+   */
+  target(name, width, height) {
+    const { gl } = this;
+    if (!gl) throw new Error("There is no WebGL context.");
+    let target = this.targets[name];
+    if (!target || target.width !== width || target.height !== height) {
+      target?.release();
+      target = new Target(gl, width, height);
+      this.targets[name] = target;
+    }
+    return target;
+  }
+
+  /**
+   * Waits until the graphics have done all work so far.
+   * @param {() => void} then
+   */
+  whenDone(then) {
+    const { gl } = this;
+    const fence = gl?.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl?.flush();
+    this.busy = true;
+    const look = () => {
+      if (!this.busy) return;
+      if (gl && fence && !gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
+        setTimeout(look, 1);
+        return;
+      }
+      if (gl && fence) gl.deleteSync(fence);
+      this.busy = false;
+      then();
+      if (this.again) {
+        this.again = false;
+        this.request();
+      }
+    };
+    setTimeout(look, 0);
+  }
+
+  /**
+   * Gives up detail in motion before the page falls behind.
+   * @param {number} ms
+   * @param {boolean} moved
+   */
+  adapt(ms, moved) {
+    this.drawMs += 0.2 * (ms - this.drawMs);
+    if (!moved) return;
+    if (ms > SLOW_MS) this.detail = Math.max(0.4, this.detail * 0.8);
+    else if (ms < FAST_MS) this.detail = Math.min(1, this.detail * 1.1);
+  }
+}
