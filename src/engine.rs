@@ -16,7 +16,7 @@ use self::place::Links;
 use self::post::PostState;
 pub use self::state::EngineState;
 use self::upkeep_state::UpkeepState;
-use crate::backend::agreement::{Agreement, compare};
+use crate::backend::agreement::{Agreement, ComparedColumn, compare, compare_columns};
 use crate::backend::{self, Backend, BackendKind, Picks, Step};
 use crate::body::Body;
 use crate::error::{Error, Result};
@@ -309,6 +309,15 @@ impl Engine {
         let agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
         self.check = Some(check);
         Ok((&self.percepts, agreement))
+    }
+
+    /// The outputs of field `field` in frame `frame` of the last call, beside the reference's; none unless that call was
+    /// [`Engine::process_and_compare`].
+    #[must_use]
+    pub fn compared(&self, frame: usize, field: usize) -> Vec<ComparedColumn> {
+        let Some(check) = &self.check else { return Vec::new() };
+        let bound = &check.bounds[frame * self.plan.fields.len() + field];
+        compare_columns(&check.right.get(frame, field), bound, &self.percepts.get(frame, field))
     }
 
     /// Taxels that are not used at present, by id, and why: those that upkeep has found unfit.

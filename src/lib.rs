@@ -93,7 +93,7 @@ pub mod tradeoff;
 pub mod wire;
 
 pub use backend::BackendKind;
-pub use backend::agreement::{Agreement, Comparison};
+pub use backend::agreement::{Agreement, ComparedColumn, Comparison, Verdict};
 pub use body::Body;
 pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};

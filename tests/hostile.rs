@@ -122,7 +122,9 @@ fn hostile_files_are_refused_in_the_words_expected() {
 #[test]
 fn compressed_files_are_refused_with_a_way_out() {
     let Some(folder) = data("meshes/compressed") else { return };
-    for (file, words) in [("generic-hand_left_draco.glb", "draco_mesh"), ("generic-hand_left_meshopt.glb", "meshopt_compression")] {
+    for (file, words) in
+        [("generic-hand_left_draco.glb", "draco_mesh"), ("generic-hand_left_meshopt.glb", "meshopt_compression")]
+    {
         let line = load(&folder.join(file)).expect_err(file);
         assert!(line.contains(words) && line.contains("gltf-transform"), "{line}");
     }

@@ -150,6 +150,63 @@ pub(crate) fn compare(
     agreement
 }
 
+/// An output of a percept beside the reference's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ComparedColumn {
+    /// The output.
+    pub column: &'static Column,
+    /// What the backend has, its components first.
+    pub value: Option<[f64; 3]>,
+    /// What the reference has.
+    pub reference: Option<[f64; 3]>,
+    /// How far they may be apart; of a centroid each coordinate, the larger of the two bounds.
+    pub bound: Option<f64>,
+    /// What came of comparing them.
+    pub verdict: Verdict,
+}
+
+/// What came of comparing one value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Verdict {
+    /// It is within its bound.
+    Agrees,
+    /// It is not.
+    Differs,
+    /// The reference's own margin to a choice is below the bound of that choice.
+    TooClose,
+    /// It depends on a value of the frame before that was too close to call and is not an output.
+    NotCompared,
+}
+
+/// The outputs that `right` or `got` has, which may differ by `bound`.
+pub(crate) fn compare_columns(right: &Percept, bound: &CellBound, got: &Percept) -> Vec<ComparedColumn> {
+    let mut quantities = BTreeMap::new();
+    Cell { quantities: &mut quantities, failure: None }.compare(right, bound, got);
+    let compared = |column: &'static Column| {
+        let of = quantities.get(column.name).filter(|of| of.values() > 0)?;
+        let limit = match (column.measure, bound.centroid) {
+            (Measure::Place, Limit::Within([u, v])) => Limit::Within(u.max(v)),
+            (Measure::Place, _) => Limit::TooClose,
+            _ => bound.limit(column.output),
+        };
+        Some(ComparedColumn {
+            column,
+            value: got.value(column),
+            reference: right.value(column),
+            bound: if let Limit::Within(bound) = limit { Some(bound) } else { None },
+            verdict: match of {
+                Comparison { too_close: 1.., .. } => Verdict::TooClose,
+                Comparison { not_compared: 1.., .. } => Verdict::NotCompared,
+                _ if of.agreeing == of.compared => Verdict::Agrees,
+                _ => Verdict::Differs,
+            },
+        })
+    };
+    COLUMNS.iter().filter_map(compared).collect()
+}
+
 struct Cell<'a> {
     quantities: &'a mut BTreeMap<String, Comparison>,
     failure: Option<String>,

@@ -8,6 +8,8 @@ mod bench;
 #[cfg(unix)]
 mod board;
 mod bodies;
+#[cfg(feature = "page")]
+mod browser;
 mod calibrate;
 mod completions;
 mod convert;
@@ -39,6 +41,8 @@ mod stdio;
 mod table;
 mod tradeoff;
 mod tune;
+#[cfg(feature = "page")]
+mod view;
 mod words;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -54,6 +58,7 @@ const GREETING: &str = concat!(
     ", a sense of touch for whole robots: touch frames in, percepts out
 
   somatic run         turn touch frames into percepts; alone, on a bundled touch
+  somatic view        show a body or a recording in a browser; alone, a bundled touch
   somatic inspect     show the taxels and fields of a body
   somatic author      put taxels and fields on a mesh
   somatic calibrate   calibrate the sensors from a rest and a press
@@ -70,6 +75,7 @@ Examples:
   somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
+  somatic view touch.mcap --open                see a recording on the body, in a browser
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
   somatic render robot.glb -o robot.png         a picture of them
@@ -98,6 +104,8 @@ pub(crate) struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    #[cfg(feature = "page")]
+    View(Box<view::Arguments>),
     Inspect(inspect::Arguments),
     Author(Box<author::Arguments>),
     #[cfg(feature = "gpu")]
@@ -125,6 +133,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     };
     match command {
         Command::Run(arguments) => run::run(arguments),
+        #[cfg(feature = "page")]
+        Command::View(arguments) => view::view(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Author(arguments) => author::run(arguments),
         #[cfg(feature = "gpu")]

@@ -22,7 +22,40 @@ macro_rules! files {
 }
 
 /// One line a file.
-const FILES: &[PageFile] = files![];
+const FILES: &[PageFile] = files![
+    "boards.js",
+    "body.js",
+    "camera.js",
+    "chart.js",
+    "choices.js",
+    "dom.js",
+    "explain.js",
+    "fields.js",
+    "format.js",
+    "gl.js",
+    "index.html",
+    "inspect.js",
+    "keylist.js",
+    "keys.js",
+    "legend.js",
+    "log.js",
+    "main.js",
+    "math.js",
+    "model.js",
+    "percepts.js",
+    "pick.js",
+    "places.js",
+    "plot.js",
+    "plots.js",
+    "socket.js",
+    "status.js",
+    "style.css",
+    "taxels.js",
+    "theme.js",
+    "timeline.js",
+    "view.js",
+    "wire.js",
+];
 
 /// The page's front door.
 const INDEX: &str = "/index.html";

@@ -178,8 +178,7 @@ fn fields(body: &Body, plan: &Plan) -> Vec<Value> {
             "label": plan.label(index),
             "parent": parent,
             "link": field.anchor,
-            "members": members.iter()
-                .map(|member| plan.body_taxels[plan.channel_of(member.slot as usize)]).collect::<Vec<_>>(),
+            "members": plan.taxels_of(index).collect::<Vec<_>>(),
             "weights": weights,
             "chart": chart(field),
             "no_chart": field.no_chart.as_ref().map(ToString::to_string),

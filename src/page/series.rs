@@ -15,7 +15,8 @@ pub struct Series {
 
 impl Series {
     /// Its value in the batch's frame `frame`; NaN where it is absent.
-    pub(super) fn value(&self, percepts: &Percepts, frame: usize) -> f32 {
+    #[must_use]
+    pub fn value(&self, percepts: &Percepts, frame: usize) -> f32 {
         let value = percepts.value(frame, self.field, self.column);
         value.map_or(f32::NAN, |components| components[self.component] as f32)
     }

@@ -92,7 +92,11 @@ fn what_cannot_be_authored_is_one_line_and_leaves_nothing_behind() {
     one(2, &["author", text_of(&bare), "-o", out], "--taxels");
     one(2, &["author", "humanoid", "--region", "head", "-o", out], "--taxels");
     one(1, &["author", "humanoid", "--taxels", "0", "-o", out], "--taxels: 0 taxels");
-    one(2, &["author", "humanoid", "--spacing", "8", "-o", out], "--spacing: `8` is not a length; write a number and um");
+    one(
+        2,
+        &["author", "humanoid", "--spacing", "8", "-o", out],
+        "--spacing: `8` is not a length; write a number and um",
+    );
     one(1, &["author", "humanoid", "--taxels", "100", "--spacing", "1m", "-o", out], "do not fit");
     one(1, &["author", "humanoid", "--taxels", "9", "--region", "haed", "-o", out], "did you mean `head`?");
     one(2, &["author", "humanoid", "--taxels", "9", "--unit", "inch", "-o", out], "--unit");

@@ -379,9 +379,7 @@ fn pipes_and_devices_are_written_as_they_are() {
     assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
     // Nothing is put beside a device.
     assert!(!Path::new("/dev/stdout.calibration.toml").exists() && !Path::new("/dev/stdout.truth.csv").exists());
-    assert!(
-        refused(folder.path(), 2, &words("simulate sim.toml -o /dev/stdout"), &[]).contains("give --truth a file")
-    );
+    assert!(refused(folder.path(), 2, &words("simulate sim.toml -o /dev/stdout"), &[]).contains("give --truth a file"));
 
     // A named pipe, and what a shell hands over as /dev/fd/63.
     let program = env!("CARGO_BIN_EXE_somatic");

@@ -234,11 +234,7 @@ fn what_makes_no_sense_is_said_before_anything_is_set() {
     assert!(refused(&["--source", "serial:a", "--source", "-", "--press", "3"]).contains("only serial lines"));
     let (_folder, path) = super::file("there.toml", "mine");
     let why = super::fails(1, &["tune", "--source", "serial:a", "--press", "3", "-o", text_of(&path)]);
-    assert!(
-        why.contains("it exists")
-            && why.contains("--force")
-            && std::fs::read_to_string(&path).unwrap() == "mine"
-    );
+    assert!(why.contains("it exists") && why.contains("--force") && std::fs::read_to_string(&path).unwrap() == "mine");
     let why = super::fails(1, &["tune", "--source", "serial:/no/such/port", "--press", "3"]);
     assert!(why.contains("there is no such port"), "{why}");
 }

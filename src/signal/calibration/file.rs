@@ -183,7 +183,10 @@ mod tests {
             why(&format!("{table}curve = \"fingr\"")),
             "line 5: `curve` is `fingr`, which the file does not have: did you mean `finger`?"
         );
-        assert!(why("[taxel.3]\ncurve = \"a\"").contains("line 2: `curve` is `a`, which the file does not have: add a table"));
+        assert!(
+            why("[taxel.3]\ncurve = \"a\"")
+                .contains("line 2: `curve` is `a`, which the file does not have: add a table")
+        );
         assert!(why(&format!("{table}curve = \"finger\"\nsensor = \"fsr\"")).contains("line 5: `curve` and `sensor`"));
         let steep = "[curve.a]\nraw = [0, 0.1]\np = [0, 1]\n[all]\ncurve = \"a\"\ngain = 1e12";
         assert!(why(steep).starts_with("line 6: `gain`"), "{}", why(steep));

@@ -1,0 +1,34 @@
+//! Starts a browser.
+
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use somatic::{Error, Result};
+use tempfile::NamedTempFile;
+
+/// What opens a file with the program that people have chosen for it.
+const OPENER: &str = if cfg!(target_os = "macos") {
+    "open"
+} else if cfg!(windows) {
+    "explorer"
+} else {
+    "xdg-open"
+};
+
+/// Opens `url` in a browser. Command lines are public, and the address holds a token: it is handed over in a file that only
+/// its owner can read, which is to be kept while the browser may read it.
+///
+/// # Errors
+/// There is no program that opens files.
+pub(super) fn open(url: &str) -> Result<NamedTempFile> {
+    let failed = |e: &std::io::Error| Error::failed(format!("cannot start a browser: {e}"));
+    let mut file = tempfile::Builder::new().prefix("somatic-").suffix(".html").tempfile().map_err(|e| failed(&e))?;
+    let page = format!(
+        "<!doctype html><meta charset=utf-8><meta http-equiv=refresh content=\"0;url={url}\"><title>somatic</title>"
+    );
+    file.write_all(page.as_bytes()).and_then(|()| file.flush()).map_err(|e| failed(&e))?;
+    let mut opener = Command::new(OPENER);
+    opener.arg(file.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    opener.spawn().map_err(|e| failed(&e).at(OPENER))?;
+    Ok(file)
+}

@@ -1,0 +1,189 @@
+//! `somatic view`: a body, a recording or a scene in a browser.
+
+mod checkpoints;
+mod explain;
+mod player;
+mod recording;
+mod subject;
+mod timeline;
+
+use std::sync::Arc;
+
+use clap::Args;
+use somatic::page::{Listen, Mode, PageInfo, PageScene, Publisher, Server};
+use somatic::{BackendKind, Body, Engine, Error, Options, Result};
+use tempfile::NamedTempFile;
+
+use self::checkpoints::Checkpoints;
+use self::explain::Explainer;
+use self::player::Player;
+use self::recording::Recording;
+use self::subject::{Subject, subject};
+use super::browser;
+use super::input::Input;
+use super::interrupt::stop_on_signal;
+use super::scene::{RunOptions, grouped};
+use super::stdio::{DONE, LOST, say};
+use super::tradeoff::settled;
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic view --open                             the bundled touch, in the browser
+  somatic view robot.glb                          a body at rest
+  somatic view touch.mcap                         a recording, with the body in it
+  somatic view touch.csv --body robot.glb --calibration robot.toml
+  somatic view robot.scene.toml --outputs centroid,touches
+  somatic view touch.mcap --listen 127.0.0.1:8000
+  ssh -L 7879:127.0.0.1:7879 robot                then open the address here, as a tunnel
+  somatic run --source serial:/dev/ttyUSB0 --sink page      live boards
+
+The page is served to this machine alone. Whoever has the address that is printed, with its
+token, may look and play; nobody can change a file.";
+
+/// Show a body, a recording or a scene in a browser.
+#[derive(Args)]
+#[command(after_help = EXAMPLES, mut_args(shown))]
+pub(super) struct Arguments {
+    /// What to show: a body (.glb, .gltf, hand, mat or humanoid), a recording (.mcap, .csv), or a scene or simulation
+    /// (.toml) [default: the bundled touch].
+    #[arg(value_name = "WHAT")]
+    what: Option<String>,
+
+    #[command(flatten)]
+    asked: RunOptions,
+
+    /// Start the browser.
+    #[arg(long)]
+    open: bool,
+
+    /// Where to listen, HOST:PORT; port 0 is any free one [default: 127.0.0.1:7879, or the next free port].
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: Option<String>,
+
+    /// A name by which another machine may reach the page, beside this machine's own; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    allow_host: Vec<String>,
+}
+
+/// `arg` in its group, unless the page has no use for it.
+fn shown(arg: clap::Arg) -> clap::Arg {
+    let arg = grouped(arg);
+    let is_hidden = arg.get_long().is_some_and(|flag| HIDDEN.contains(&flag));
+    arg.hide(is_hidden)
+}
+
+/// Flags of `run` that a page has no use for.
+const HIDDEN: [&str; 10] =
+    ["sink", "verify", "force", "all-fields", "record", "loop", "batch", "strict", "live-rate", "board-rate"];
+
+/// How a page is served and opened.
+struct Opening<'a> {
+    arguments: &'a Arguments,
+    listen: Listen,
+}
+
+/// A page that is served.
+struct Opened {
+    server: Server,
+    publisher: Publisher,
+    /// The file that a browser was given.
+    _handed_over: Option<NamedTempFile>,
+}
+
+pub(super) fn view(arguments: &Arguments) -> Result<u8> {
+    let listen = Listen::new(arguments.listen.as_deref(), &arguments.allow_host)?;
+    let opening = Opening { arguments, listen };
+    match subject(arguments.what.as_deref(), &arguments.asked)? {
+        Subject::Body(body) => opening.body(&body),
+        Subject::Recording(asked) => opening.recording(&asked),
+    }
+}
+
+impl Opening<'_> {
+    /// Serves `scene` and says where.
+    fn start(&self, scene: PageScene) -> Result<Opened> {
+        let (server, publisher) = Server::start(&self.listen, scene)?;
+        if self.listen.is_open_to_others() {
+            say("other machines can reach this page, and its token travels in clear text; an SSH tunnel is safer");
+        }
+        say(&format!("page at {} (Ctrl-C ends)", server.url()));
+        let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
+            Ok(file) => file,
+            Err(error) => {
+                say(&format!("{error}; open the address yourself"));
+                None
+            }
+        };
+        Ok(Opened { server, publisher, _handed_over: handed_over })
+    }
+
+    /// A body at rest.
+    fn body(&self, body: &Body) -> Result<u8> {
+        let engine = Engine::new(body, Options::default().backend(BackendKind::Cpu))?;
+        let (name, what, why) = engine.backend();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let scene = PageScene::new(
+            body,
+            engine.plan(),
+            &PageInfo {
+                source: "at rest",
+                mode: Mode::Live,
+                backend: [name, &what, why],
+                taxels: &ids,
+                wiring: None,
+                recorded_max: None,
+            },
+        );
+        let stop = stop_on_signal()?;
+        let mut opened = self.start(scene)?;
+        opened.publisher.ended("the body at rest: there are no frames");
+        while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        Ok(DONE)
+    }
+
+    /// A recording, from its first frame on.
+    fn recording(&self, asked: &RunOptions) -> Result<u8> {
+        let input = Input::named(asked)?;
+        if !input.is_recording() {
+            return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
+        }
+        let body = Arc::new(input.body(asked)?);
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let stop = stop_on_signal()?;
+        let Some(recording) = Recording::read(input.open(&ids, asked)?, &stop, asked.quiet)? else { return Ok(DONE) };
+        let recording = Arc::new(recording);
+        let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;
+        let mut engine = Engine::new(&body, settled.options.clone())?;
+        engine.set_channels(&recording.taxels).map_err(|e| e.at("header").at(&input.name))?;
+        let (name, what, why) = engine.backend();
+        let scene = PageScene::new(
+            &body,
+            engine.plan(),
+            &PageInfo {
+                source: &input.name,
+                mode: recording.mode(),
+                backend: [name, &what, settled.why.as_deref().unwrap_or(why)],
+                taxels: &recording.taxels,
+                wiring: None,
+                recorded_max: recording.largest_pressure(&engine),
+            },
+        );
+        // The same backend for all engines, so that they have the same bits.
+        let options = settled.options.backend(name.parse()?);
+        let checkpoints = Arc::new(Checkpoints::new(&mut engine)?);
+        let Opened { mut server, publisher, _handed_over } = self.start(scene)?;
+        let replies = server.replies();
+        let timeline = timeline::start(&body, &options, &recording, &checkpoints, &replies);
+        let explainer = Explainer::start(&body, &options, &recording, &checkpoints, &replies);
+        let player = Player::new(engine, Arc::clone(&recording), checkpoints, publisher, replies, explainer, timeline);
+        let speed = asked.speed.unwrap_or(1.0);
+        let requests = server.requests().ok_or_else(|| Error::failed("the server has no requests"))?;
+        player.speed(speed).loops(input.is_bundled()).run(&requests, &stop)?;
+        for loss in &recording.losses {
+            say(&format!("never processed: {loss}"));
+        }
+        Ok(if recording.losses.is_empty() { DONE } else { LOST })
+    }
+}

@@ -1,0 +1,231 @@
+//! Plays a recording: what viewers ask for, and the frames when they are due.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use somatic::page::{PageInput, Publisher, Replies, Request, ViewerId};
+use somatic::{Engine, Result};
+
+use super::checkpoints::Checkpoints;
+use super::explain::Explainer;
+use super::recording::{CHUNK, Recording};
+use super::timeline::Timeline;
+
+/// The longest wait for a request, so that Ctrl-C is seen.
+const MAX_WAIT: Duration = Duration::from_millis(50);
+
+/// A recording being played.
+pub(super) struct Player {
+    engine: Engine,
+    recording: Arc<Recording>,
+    checkpoints: Arc<Checkpoints>,
+    publisher: Publisher,
+    replies: Replies,
+    explainer: Explainer,
+    timeline: Arc<Timeline>,
+    /// Frames that the engine has processed: the frame shown is the last of them.
+    done: usize,
+    /// The frame that is to be shown, if it takes more than a call.
+    target: Option<usize>,
+    playing: bool,
+    /// Whether it begins again at its end.
+    loops: bool,
+    speed: f64,
+    /// A moment, and the recorded time that is due then, s.
+    due: (Instant, f64),
+}
+
+impl Player {
+    pub(super) fn new(
+        engine: Engine,
+        recording: Arc<Recording>,
+        checkpoints: Arc<Checkpoints>,
+        publisher: Publisher,
+        replies: Replies,
+        explainer: Explainer,
+        timeline: Arc<Timeline>,
+    ) -> Self {
+        let due = (Instant::now(), recording.span_s()[0]);
+        Self {
+            engine,
+            recording,
+            checkpoints,
+            publisher,
+            replies,
+            explainer,
+            timeline,
+            done: 0,
+            target: None,
+            playing: true,
+            loops: false,
+            speed: 1.0,
+            due,
+        }
+    }
+
+    /// At `speed` times the recorded speed.
+    pub(super) fn speed(mut self, speed: f64) -> Self {
+        self.speed = speed;
+        self
+    }
+
+    /// Begins again at its end if `loops`.
+    pub(super) fn loops(mut self, loops: bool) -> Self {
+        self.loops = loops;
+        self
+    }
+
+    /// Plays and answers `requests` until `stop`.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub(super) fn run(mut self, requests: &Receiver<(ViewerId, Request)>, stop: &AtomicBool) -> Result<()> {
+        while !stop.load(Ordering::Relaxed) {
+            match requests.recv_timeout(self.wait()) {
+                Ok((viewer, request)) => {
+                    self.answer(viewer, request);
+                    // A slider sends many: the last one counts.
+                    while let Ok((viewer, request)) = requests.try_recv() {
+                        self.answer(viewer, request);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+            match self.target {
+                Some(index) => self.approach(index)?,
+                None => self.play()?,
+            }
+        }
+        Ok(())
+    }
+
+    /// How long nothing is to be done.
+    fn wait(&self) -> Duration {
+        if self.target.is_some() {
+            return Duration::ZERO;
+        }
+        let next = self.recording.frames.get(self.done).filter(|_| self.playing);
+        next.map_or(MAX_WAIT, |frame| {
+            let (since, due_s) = self.due;
+            let left = Duration::try_from_secs_f64((frame.t_s - due_s) / self.speed).unwrap_or_default();
+            left.saturating_sub(since.elapsed()).min(MAX_WAIT)
+        })
+    }
+
+    fn answer(&mut self, viewer: ViewerId, request: Request) {
+        match request {
+            Request::Joined => {
+                self.replies.text(viewer, self.timeline.message(0));
+                self.replies.text(viewer, self.status());
+                return;
+            }
+            Request::Explain { field } => return self.explainer.explain(viewer, field, self.shown()),
+            Request::History { .. } => return self.explainer.history(viewer, request),
+            Request::Play => {
+                if self.is_at_end() {
+                    self.target = Some(0);
+                }
+                self.playing = true;
+            }
+            Request::Pause => self.playing = false,
+            Request::Seek { t_s } => self.target = Some(self.recording.index_at(t_s)),
+            Request::Step { frames } => {
+                self.playing = false;
+                let last = self.recording.frames.len() - 1;
+                let from = self.target.unwrap_or(self.shown());
+                self.target = Some(from.saturating_add_signed(frames as isize).min(last));
+            }
+            Request::Speed { speed } => self.speed = speed,
+            _ => return,
+        }
+        self.restart_clock();
+        self.replies.all(self.status());
+    }
+
+    /// The frame that is shown.
+    fn shown(&self) -> usize {
+        self.done.saturating_sub(1)
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.done == self.recording.frames.len()
+    }
+
+    /// Recorded time goes on from the frame that is shown.
+    fn restart_clock(&mut self) {
+        self.due = (Instant::now(), self.recording.frames[self.target.unwrap_or(self.shown())].t_s);
+    }
+
+    fn status(&self) -> String {
+        let at_end = self.is_at_end() && self.target.is_none();
+        json!({"type": "status", "playing": self.playing, "speed": self.speed, "at_end": at_end}).to_string()
+    }
+
+    /// Comes nearer to frame `index`, and shows it once it is there.
+    fn approach(&mut self, index: usize) -> Result<()> {
+        let started = Instant::now();
+        let before = self.done;
+        self.done = self.checkpoints.advance(&mut self.engine, &self.recording, before, index)?;
+        if self.done < index {
+            return Ok(());
+        }
+        self.publisher.jump();
+        self.engine.process(&self.recording.frames[index..=index])?;
+        self.done = index + 1;
+        self.target = None;
+        self.publish(1, started);
+        self.restart_clock();
+        self.replies.all(self.status());
+        Ok(())
+    }
+
+    /// Shows what is due.
+    fn play(&mut self) -> Result<()> {
+        if !self.playing {
+            return Ok(());
+        }
+        let (since, due_s) = self.due;
+        let now_s = due_s + since.elapsed().as_secs_f64() * self.speed;
+        let rest = &self.recording.frames[self.done..];
+        let count = rest.iter().take(CHUNK).take_while(|frame| frame.t_s <= now_s).count();
+        if count > 0 {
+            let started = Instant::now();
+            self.engine.process(&rest[..count])?;
+            self.done += count;
+            self.publish(count, started);
+        }
+        if count == CHUNK {
+            // So fast that frames are late: slower, not ever later.
+            self.restart_clock();
+        }
+        if self.is_at_end() {
+            if self.loops {
+                self.target = Some(0);
+            } else {
+                self.playing = false;
+            }
+            self.replies.all(self.status());
+        }
+        Ok(())
+    }
+
+    /// Hands over the last of `count` frames that the engine has processed since `started`.
+    fn publish(&mut self, count: usize, started: Instant) {
+        let frame = &self.recording.frames[self.done - 1];
+        let call_us = started.elapsed().as_secs_f32() * 1e6 / count as f32;
+        self.publisher.read(&PageInput {
+            frame,
+            values_read: None,
+            plan: self.engine.plan(),
+            arrived: Some(started),
+            call_us,
+            number: None,
+        });
+        self.publisher.publish(self.engine.percepts());
+        self.publisher.flush();
+    }
+}

@@ -1,0 +1,65 @@
+//! What `view` shows, by what it is called.
+
+use std::path::Path;
+
+use somatic::source::SimulatedSource;
+use somatic::{Body, Error, Result, bundled};
+
+use super::super::bodies::load_body;
+use super::super::scene::RunOptions;
+
+/// What is shown.
+pub(super) enum Subject {
+    /// A body at rest.
+    Body(Body),
+    /// A recording, with all that is asked of it.
+    Recording(Box<RunOptions>),
+}
+
+/// What `what` names, with the flags `asked`.
+///
+/// # Errors
+/// It is neither a body, a recording, a scene nor a simulation; or flags contradict it.
+pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject> {
+    let Some(what) = what else { return Ok(Subject::Recording(Box::new(asked.with(None)?))) };
+    let ending = Path::new(what).extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+    let as_source = |kind: &str| {
+        if let Some(other) = asked.sources.first() {
+            return Err(Error::usage(format!("`{what}` and --source {other}: give one of them")));
+        }
+        let mut asked = asked.with(None)?;
+        asked.sources = vec![format!("{kind}:{what}")];
+        Ok(Subject::Recording(Box::new(asked)))
+    };
+    match ending.as_deref() {
+        Some("mcap") => as_source("mcap"),
+        Some("csv") => as_source("csv"),
+        Some("toml") if is_simulation(Path::new(what)) => as_source("sim"),
+        Some("toml") => Ok(Subject::Recording(Box::new(asked.with(Some(Path::new(what)))?))),
+        _ if ending.is_none() && bundled::body(what).is_none() && !Path::new(what).exists() => Err(Error::usage(
+            "give a body (.glb, .gltf or a bundled one), a recording (.mcap, .csv), a scene or a simulation (.toml)",
+        )
+        .at(what)),
+        _ => body(what, asked),
+    }
+}
+
+/// The body `what`, at rest, or with a recording where `asked` has one.
+fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
+    if let Some(other) = &asked.body {
+        return Err(Error::usage(format!("`{what}` and --body {other}: give one of them")));
+    }
+    if asked.sources.is_empty() {
+        return Ok(Subject::Body(load_body(what)?));
+    }
+    let mut asked = asked.with(None)?;
+    asked.body = Some(what.to_owned());
+    Ok(Subject::Recording(Box::new(asked)))
+}
+
+/// Whether the file has the keys of a simulation, not those of a scene.
+fn is_simulation(path: &Path) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let keys = text.parse::<toml::Table>().unwrap_or_default();
+    keys.contains_key("duration_s") || SimulatedSource::open(path).is_ok()
+}

@@ -1,0 +1,125 @@
+//! The pass over a recording behind the player: states to enter it anywhere, and where it is touched.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use somatic::page::Replies;
+use somatic::{Body, Engine, Options, Percepts, Result};
+
+use super::super::stdio::say;
+use super::checkpoints::Checkpoints;
+use super::recording::{CHUNK, Recording};
+
+/// Parts of the recording that the page shows.
+const BINS: usize = 600;
+/// Time between two messages.
+const INTERVAL: Duration = Duration::from_millis(100);
+
+/// Where a recording is touched, as far as it has been computed.
+pub(super) struct Timeline {
+    start_s: f64,
+    bin_s: f64,
+    known: Mutex<Known>,
+}
+
+struct Known {
+    until_s: f64,
+    /// By bin, the largest peak; none where nothing is touched.
+    peaks: Vec<Option<f64>>,
+}
+
+impl Timeline {
+    /// Of a recording of which nothing has been computed.
+    pub(super) fn new(recording: &Recording) -> Self {
+        let [start_s, end_s] = recording.span_s();
+        let known = Mutex::new(Known { until_s: start_s, peaks: vec![None; BINS] });
+        Self { start_s, bin_s: (end_s - start_s).max(1e-9) / BINS as f64, known }
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn bin(&self, t_s: f64) -> usize {
+        (((t_s - self.start_s) / self.bin_s) as usize).min(BINS - 1)
+    }
+
+    /// Adds the percepts of a call.
+    fn add(&self, percepts: &Percepts) {
+        let mut known = self.known();
+        for frame in 0..percepts.frames() {
+            let t_s = percepts.t_s(frame);
+            known.until_s = known.until_s.max(t_s);
+            let bin = self.bin(t_s);
+            for percept in percepts.touched(frame) {
+                // Without the output `peak`, that something is touched.
+                let peak = percept.peak.or(percept.total).unwrap_or(1.0);
+                let most = &mut known.peaks[bin];
+                *most = Some(most.map_or(peak, |most| most.max(peak)));
+            }
+        }
+    }
+
+    /// The message that holds what is known from bin `first_bin` on.
+    pub(super) fn message(&self, first_bin: usize) -> String {
+        let known = self.known();
+        json!({
+            "type": "timeline",
+            "computed_until_s": known.until_s,
+            "bins": BINS,
+            "first_bin": first_bin,
+            "peak": known.peaks[first_bin..=self.bin(known.until_s)],
+        })
+        .to_string()
+    }
+}
+
+/// Starts the pass on a thread of its own. It ends with the recording.
+pub(super) fn start(
+    body: &Arc<Body>,
+    options: &Options,
+    recording: &Arc<Recording>,
+    checkpoints: &Arc<Checkpoints>,
+    replies: &Replies,
+) -> Arc<Timeline> {
+    let timeline = Arc::new(Timeline::new(recording));
+    let (body, options, recording) = (Arc::clone(body), options.clone(), Arc::clone(recording));
+    let (checkpoints, replies, filled) = (Arc::clone(checkpoints), replies.clone(), Arc::clone(&timeline));
+    std::thread::spawn(move || {
+        if let Err(error) = pass(&body, options, &recording, &checkpoints, &replies, &filled) {
+            say(&format!("{error}; the recording can be played, but jumps take long"));
+        }
+    });
+    timeline
+}
+
+fn pass(
+    body: &Body,
+    options: Options,
+    recording: &Recording,
+    checkpoints: &Checkpoints,
+    replies: &Replies,
+    timeline: &Timeline,
+) -> Result<()> {
+    let mut engine = Engine::new(body, options)?;
+    engine.set_channels(&recording.taxels)?;
+    let (mut done, mut first_bin) = (0, 0);
+    let mut state_at_s = timeline.start_s;
+    let mut told = Instant::now();
+    for frames in recording.frames.chunks(CHUNK) {
+        timeline.add(engine.process(frames)?);
+        done += frames.len();
+        let now_s = frames[frames.len() - 1].t_s;
+        if now_s - state_at_s >= checkpoints.spacing_s() {
+            state_at_s = now_s;
+            checkpoints.push(engine.state()?);
+        }
+        if told.elapsed() >= INTERVAL || done == recording.frames.len() {
+            told = Instant::now();
+            replies.all(timeline.message(first_bin));
+            first_bin = timeline.bin(now_s);
+        }
+    }
+    Ok(())
+}
