@@ -3,7 +3,8 @@
 use fearless_simd::prelude::*;
 
 use super::lanes::{F, bits_where, of_line, splat, splat_u};
-use super::members::{Cells, Members, Sum, Touch};
+use super::members::{Members, Sum, Touch};
+use super::write::Answers;
 use crate::percept::{Component, Flags, Outputs};
 
 /// What this stage fills.
@@ -46,7 +47,7 @@ pub(super) fn add<S: Simd, A: Sum<S>, P: Members<S>>(
 
 /// Puts the principal axis, where there is one, and the anisotropy into `cells`, with their flags.
 #[inline(always)]
-pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, [a, b, d]: [F<S>; 3], at: usize, cells: &mut Cells) {
+pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, [a, b, d]: [F<S>; 3], at: usize, answers: &mut Answers) {
     let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
     let single = touch.touched & touch.active.simd_le(splat_u(simd, 1));
     let several = touch.touched & touch.active.simd_gt(splat_u(simd, 1));
@@ -61,11 +62,11 @@ pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, [a, b, d]: [F<S>; 3], a
     // Of the two equal forms of the bisector, the one that adds numbers of one sign.
     let right = x.simd_ge(none);
     let angle = of_line(simd, right.select(h + x, y), right.select(y, h - x));
-    cells.put(simd, Component::Axis, found.select(angle, none), at);
-    cells.put(simd, Component::Anisotropy, anisotropy, at);
+    answers.put(simd, Component::Axis, found.select(angle, none), at);
+    answers.put(simd, Component::Anisotropy, anisotropy, at);
     let flags = bits_where(simd, single, Flags::ONE_TAXEL.bits())
         | bits_where(simd, coincident, Flags::COINCIDENT.bits())
         | bits_where(simd, isotropic, Flags::ISOTROPIC.bits());
     let present = bits_where(simd, spread, Outputs::ANISOTROPY.bits()) | bits_where(simd, found, Outputs::AXIS.bits());
-    cells.say(simd, (flags, present), at);
+    answers.add_status(simd, (flags, present), at);
 }

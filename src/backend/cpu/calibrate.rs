@@ -7,8 +7,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, i32x16, u32x16};
 
 use super::super::Rows;
-use super::lanes::{Aligned, F, LANES, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
-use super::read::{OneFrame, Values};
+use super::lanes::{Aligned, F, LANES, Lines, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::read::OneFrame;
 use crate::parallel::{self, Tasks, on_threads};
 use crate::percept::Flags;
 use crate::scene::Plan;
@@ -42,7 +42,7 @@ pub(super) enum Sort {
     Any,
 }
 
-/// All of a plan's taxels, by ascending slot or as a source delivers them.
+/// All of a plan's taxels, by ascending slot.
 #[derive(Clone, Debug)]
 pub(super) struct Tiles {
     pub(super) all: Vec<Tile>,
@@ -53,18 +53,27 @@ pub(super) struct Tiles {
 impl Tiles {
     /// Those of `plan`; what fills up the last tile is unpressed.
     pub(super) fn new(plan: &Plan) -> Self {
-        Self::of(plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect())
+        let all: Vec<Tile> = plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect();
+        Self { sorts: all.iter().map(|tile| tile.sort).collect(), all }
     }
+}
 
-    pub(super) fn of(all: Vec<Tile>) -> Self {
-        let sorts = all.iter().map(|tile| tile.sort).collect();
-        Self { all, sorts }
+/// Calibrated values in rows: pressures, and their statuses where any says anything.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Calibrated {
+    pub(super) pressures: Lines<f32>,
+    pub(super) statuses: Lines<u32>,
+}
+
+impl Calibrated {
+    pub(super) fn new(rows: usize) -> Self {
+        Self { pressures: Lines::new(rows, 0.0), statuses: Lines::new(rows, 0) }
     }
 }
 
 impl Tile {
     /// Of up to sixteen `taxels`.
-    pub(super) fn new(taxels: &[Taxel]) -> Self {
+    fn new(taxels: &[Taxel]) -> Self {
         let sort = if taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure) {
             Sort::Raw
         } else if taxels.iter().all(|taxel| taxel.response == STRAIGHT) {
@@ -72,26 +81,19 @@ impl Tile {
         } else {
             Sort::Any
         };
-        let mut tile = Self {
-            baseline: [0.0; LANES],
-            gain: [0.0; LANES],
-            dead_band: [0.0; LANES],
-            p_max: [f32::MAX; LANES],
-            raw_low: [f32::MIN; LANES],
-            raw_high: [f32::MAX; LANES],
-            response: [0; LANES],
-            sort,
-        };
-        for (lane, taxel) in taxels.iter().enumerate() {
-            tile.baseline[lane] = taxel.baseline;
-            tile.gain[lane] = taxel.gain;
-            tile.dead_band[lane] = taxel.dead_band;
-            tile.p_max[lane] = taxel.p_max;
-            tile.raw_low[lane] = taxel.raw_low;
-            tile.raw_high[lane] = taxel.raw_high;
-            tile.response[lane] = taxel.response;
+        fn row<T: Copy>(taxels: &[Taxel], rest: T, of: impl Fn(&Taxel) -> T) -> Row<T> {
+            std::array::from_fn(|lane| taxels.get(lane).map_or(rest, &of))
         }
-        tile
+        Self {
+            baseline: row(taxels, 0.0, |taxel| taxel.baseline),
+            gain: row(taxels, 0.0, |taxel| taxel.gain),
+            dead_band: row(taxels, 0.0, |taxel| taxel.dead_band),
+            p_max: row(taxels, f32::MAX, |taxel| taxel.p_max),
+            raw_low: row(taxels, f32::MIN, |taxel| taxel.raw_low),
+            raw_high: row(taxels, f32::MAX, |taxel| taxel.raw_high),
+            response: row(taxels, 0, |taxel| taxel.response),
+            sort,
+        }
     }
 }
 
@@ -133,7 +135,7 @@ pub(super) fn tile<S: Simd>(
             store(simd, over.select(pressure, splat(simd, 0.0)), pressures, at);
             store_u(simd, splat_u(simd, 0), statuses, at);
         } else {
-            any |= with_care(simd, plan, tile, first, bits, at, pressures, statuses);
+            any |= any_value(simd, plan, tile, first, bits, at, pressures, statuses);
         }
         at += width::<S>();
     }
@@ -225,31 +227,12 @@ impl<S: Simd> Sizes<S> {
     }
 }
 
-/// A frame's pressures, by slot, and whether any status says anything. Where none does, statuses are of no use, unless the
-/// plan has changes, which look at them in any case.
-pub(super) fn frame(
-    level: Level,
-    plan: &Plan,
-    tiles: &Tiles,
-    raw: (Rows<'_>, usize),
-    pressures: &mut [Row<f32>],
-    statuses: &mut [Row<u32>],
-) -> bool {
-    let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
-    all_tiles(level, plan, tiles, values, pressures, statuses)
-}
-
-/// The same for any `values` of taxels in as many `tiles`, in whatever order these have them.
-pub(super) fn all_tiles(
-    level: Level,
-    plan: &Plan,
-    tiles: &Tiles,
-    values: impl Values,
-    pressures: &mut [Row<f32>],
-    statuses: &mut [Row<u32>],
-) -> bool {
-    let range = 0..tiles.all.len();
-    with_widest!(level, simd => some_tiles(simd, plan, tiles, values, range.clone(), pressures, statuses))
+/// A frame's pressures, by slot, into `values`, and whether any status says anything. Where none does, statuses are of no use,
+/// unless the plan has changes, which look at them in any case.
+pub(super) fn frame(level: Level, plan: &Plan, tiles: &Tiles, raw: (Rows<'_>, usize), values: &mut Calibrated) -> bool {
+    let raw = OneFrame::new(raw.0, raw.1, plan.calibrated());
+    let Calibrated { pressures, statuses } = values;
+    with_widest!(level, simd => some_tiles(simd, plan, tiles, raw, 0..tiles.all.len(), pressures, statuses))
 }
 
 /// The same by all cores. Beside the other, where it is inlined, it makes a small skin's live call longer.
@@ -259,26 +242,25 @@ pub(super) fn shared_frame(
     plan: &Plan,
     tiles: &Tiles,
     raw: (Rows<'_>, usize),
-    pressures: &mut [Row<f32>],
-    statuses: &mut [Row<u32>],
+    values: &mut Calibrated,
 ) -> bool {
     let (count, threads) = (tiles.all.len(), parallel::threads());
     // A few parts a thread, as none knows what else its core does; and no more than a word has bits.
     let part = count.div_ceil((4 * threads).min(u64::BITS as usize)).max(1).next_multiple_of(TOGETHER);
     let faulty = AtomicU64::new(0);
-    let values = OneFrame::new(raw.0, raw.1, plan.calibrated());
-    let parts = pressures[..count].chunks_mut(part).zip(statuses[..count].chunks_mut(part));
+    let raw = OneFrame::new(raw.0, raw.1, plan.calibrated());
+    let parts = values.pressures[..count].chunks_mut(part).zip(values.statuses[..count].chunks_mut(part));
     let parts = Tasks::new(parts.enumerate());
     on_threads(threads, || {
         while let Some((index, (pressures, statuses))) = parts.take() {
             let range = index * part..index * part + pressures.len();
-            if with_widest!(level, simd => some_tiles(simd, plan, tiles, values, range.clone(), pressures, statuses)) {
+            if with_widest!(level, simd => some_tiles(simd, plan, tiles, raw, range.clone(), pressures, statuses)) {
                 faulty.fetch_or(1 << index, Ordering::Relaxed);
             }
         }
     });
     let faulty = faulty.into_inner();
-    for (index, statuses) in statuses[..count].chunks_mut(part).enumerate() {
+    for (index, statuses) in values.statuses[..count].chunks_mut(part).enumerate() {
         if faulty != 0 && faulty & 1 << index == 0 {
             statuses.fill([0; LANES]);
         }
@@ -292,7 +274,7 @@ fn some_tiles<S: Simd>(
     simd: S,
     plan: &Plan,
     tiles: &Tiles,
-    values: impl Values,
+    raw: OneFrame<'_>,
     range: Range<usize>,
     pressures: &mut [Row<f32>],
     statuses: &mut [Row<u32>],
@@ -301,7 +283,7 @@ fn some_tiles<S: Simd>(
     for first in range.clone().step_by(TOGETHER) {
         let group = first..range.end.min(first + TOGETHER);
         let here = first - range.start..group.end - range.start;
-        if plain_tiles(simd, tiles, values, group.clone(), &mut pressures[here.clone()]) {
+        if plain_tiles(simd, tiles, raw, group.clone(), &mut pressures[here.clone()]) {
             if faults || plan.has_changes() {
                 statuses[here].fill([0; LANES]);
             }
@@ -310,7 +292,7 @@ fn some_tiles<S: Simd>(
         let were_plain = !faults;
         for (index, here) in group.zip(here.clone()) {
             let Aligned(bits) = &mut Aligned([0; LANES]);
-            values.read(simd, index, bits);
+            raw.read(simd, index, bits);
             let (pressures, statuses) = (&mut pressures[here], &mut statuses[here]);
             faults |= tile(simd, plan, &tiles.all[index], index * LANES, bits, pressures, statuses);
         }
@@ -329,7 +311,7 @@ fn some_tiles<S: Simd>(
 fn plain_tiles<S: Simd>(
     simd: S,
     tiles: &Tiles,
-    values: impl Values,
+    raw: OneFrame<'_>,
     group: Range<usize>,
     pressures: &mut [Row<f32>],
 ) -> bool {
@@ -339,7 +321,7 @@ fn plain_tiles<S: Simd>(
         if *sort == Sort::Any {
             return false;
         }
-        let bits = values.row(simd, index);
+        let bits = raw.row(simd, index);
         sizes.see(simd, bits);
         if *sort == Sort::Raw {
             unsigned(simd, bits).store_slice(pressures);
@@ -365,10 +347,10 @@ fn fine<S: Simd>(simd: S, bits: U<S>) -> super::lanes::M<S> {
     (size - splat_u(simd, TINY_BITS)).simd_le(splat_u(simd, HUGE_BITS - TINY_BITS)) | size.simd_eq(splat_u(simd, 0))
 }
 
-/// Everything that a value can be.
+/// As [`tile`], for a vector of lanes whose values may be anything.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "the same as `tile`, and where")]
-fn with_care<S: Simd>(
+fn any_value<S: Simd>(
     simd: S,
     plan: &Plan,
     tile: &Tile,
@@ -406,11 +388,11 @@ fn with_care<S: Simd>(
     let over = pressure.simd_gt(of(&tile.dead_band)) & !is_tiny(pressure_size);
     let usable = !(missing | unbelievable);
     let faulty = Flags::FAULTY_INPUT.bits();
-    let said = bits_where(simd, beyond, Flags::OUT_OF_RANGE.bits())
+    let kept = bits_where(simd, beyond, Flags::OUT_OF_RANGE.bits())
         | bits_where(simd, altered, faulty)
         | bits_where(simd, over & pressure.simd_gt(of(&tile.p_max)), Flags::SATURATED.bits());
     let left_out = missing.select(splat_u(simd, Flags::INCOMPLETE.bits() | UNUSABLE), splat_u(simd, faulty | UNUSABLE));
-    let status = usable.select(said, left_out);
+    let status = usable.select(kept, left_out);
     store(simd, (usable & over).select(pressure, none), pressures, at);
     store_u(simd, status, statuses, at);
     status.simd_gt(nothing).any_true()

@@ -4,14 +4,15 @@
 //! statuses come out the same lets no field through: a group of fields all of whose tiles are the same keeps its answers.
 //! What comes out has the same bits as without a gate, unless a scene lets small changes pass unheeded.
 
-use fearless_simd::Level;
+use bytemuck::cast_ref;
 use fearless_simd::prelude::*;
+use fearless_simd::{Level, u32x16};
 
 use super::super::Rows;
 use super::super::raw::TILES_A_BLOCK;
-use super::calibrate::{self, Tile, Tiles};
-use super::lanes::{Aligned, LANES, Lines, Row, load, load_u, width, with_widest};
-use super::read::{OneFrame, Values};
+use super::calibrate::{self, Calibrated, Tile, Tiles};
+use super::lanes::{Aligned, LANES, Lines, Row, with_widest};
+use super::read::OneFrame;
 use crate::scene::{Cadence, Coverage, Knobs, Plan};
 
 /// A plan of fewer values than this is computed before a gate has looked at it.
@@ -110,15 +111,14 @@ impl Gate {
         plan: &Plan,
         tiles: &Tiles,
         raw: (Rows<'_>, usize),
-        pressures: &mut [Row<f32>],
-        statuses: &mut [Row<u32>],
+        values: &mut Calibrated,
     ) -> bool {
         if !self.known {
             self.faulty.fill(false);
             self.faults = 0;
         }
         self.stale.fill(!self.known);
-        with_widest!(level, simd => self.all_tiles(simd, plan, tiles, raw, pressures, statuses));
+        with_widest!(level, simd => self.all_tiles(simd, plan, tiles, raw, values));
         self.known = true;
         self.open =
             if 2 * self.stale.iter().filter(|&&stale| stale).count() > self.stale.len() { self.open + 1 } else { 0 };
@@ -135,8 +135,7 @@ impl Gate {
         plan: &Plan,
         tiles: &Tiles,
         (raw, frame): (Rows<'_>, usize),
-        pressures: &mut [Row<f32>],
-        statuses: &mut [Row<u32>],
+        calibrated: &mut Calibrated,
     ) {
         let mut index = 0;
         while let Some(tile) = tiles.all.get(index) {
@@ -149,7 +148,7 @@ impl Gate {
                 index += TILES_A_BLOCK;
                 continue;
             }
-            self.tile(simd, plan, (raw, frame), (index, tile), pressures, statuses);
+            self.tile(simd, plan, (raw, frame), (index, tile), calibrated);
             index += 1;
         }
     }
@@ -162,8 +161,7 @@ impl Gate {
         plan: &Plan,
         (raw, frame): (Rows<'_>, usize),
         (index, tile): (usize, &Tile),
-        pressures: &mut [Row<f32>],
-        statuses: &mut [Row<u32>],
+        Calibrated { pressures, statuses }: &mut Calibrated,
     ) {
         let Aligned(bits) = &mut Aligned([0; LANES]);
         let (Aligned(p), Aligned(status)) = (&mut Aligned([0.0; LANES]), &mut Aligned([0; LANES]));
@@ -178,8 +176,10 @@ impl Gate {
         *last = *bits;
         let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
         // The pressures that stay are those that answers were made of: what is unheeded does not add up.
-        let unheeded =
-            |old: &Row<f32>| same_pressures(simd, p, old) || self.threshold > 0.0 && near(p, old, self.threshold);
+        // They are no NaN, and no −0: where they are equal their bits are.
+        let unheeded = |old: &Row<f32>| {
+            same(simd, cast_ref(p), cast_ref(old)) || self.threshold > 0.0 && near(p, old, self.threshold)
+        };
         if self.known && unheeded(&pressures[index]) && same(simd, status, &statuses[index]) {
             return;
         }
@@ -195,28 +195,10 @@ impl Gate {
 
 #[inline(always)]
 fn same<S: Simd>(simd: S, a: &Row<u32>, b: &Row<u32>) -> bool {
-    let mut at = 0;
-    let mut same = true;
-    while at < LANES {
-        same &= load_u(simd, a, at).simd_eq(load_u(simd, b, at)).all_true();
-        at += width::<S>();
-    }
-    same
+    u32x16::from_slice(simd, a).simd_eq(u32x16::from_slice(simd, b)).all_true()
 }
 
 /// Whether none of `a` is farther from `b` than `threshold`, and each is pressed in both or in neither.
 fn near(a: &Row<f32>, b: &Row<f32>, threshold: f32) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= threshold && (*a > 0.0) == (*b > 0.0))
-}
-
-/// Pressures are no NaN, and no −0.
-#[inline(always)]
-fn same_pressures<S: Simd>(simd: S, a: &Row<f32>, b: &Row<f32>) -> bool {
-    let mut at = 0;
-    let mut same = true;
-    while at < LANES {
-        same &= load(simd, a, at).simd_eq(load(simd, b, at)).all_true();
-        at += width::<S>();
-    }
-    same
 }

@@ -17,7 +17,7 @@ use crate::stage::angle::ATAN;
 /// what every processor has: sets in between would cost their compilation and gain little.
 macro_rules! with_widest {
     ($level:expr, $simd:ident => $run:expr) => {{
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        #[cfg(target_arch = "x86_64")]
         {
             use fearless_simd::Simd as _;
             let level = $level;
@@ -31,7 +31,7 @@ macro_rules! with_widest {
                 unreachable!("a processor without SSE2 runs nothing that this was compiled to")
             }
         }
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        #[cfg(not(target_arch = "x86_64"))]
         fearless_simd::dispatch!($level, $simd => $run)
     }};
 }
@@ -118,14 +118,6 @@ impl<T: Copy> Lines<T> {
         let memory = vec![value; rows * LANES + spare];
         let first = memory.as_ptr().align_offset(LINE).min(spare);
         Self { memory, first, rows }
-    }
-
-    /// Makes it `rows` rows long; of what is in them only that much is known, that it was there before or is `value`.
-    pub(super) fn make(&mut self, rows: usize, value: T) {
-        if self.first + rows * LANES > self.memory.len() {
-            *self = Self::new(rows, value);
-        }
-        self.rows = rows;
     }
 }
 
@@ -216,7 +208,7 @@ pub(super) fn transpose<'a, S: Simd>(
     row: impl Fn(usize) -> &'a Row<u32>,
     columns: &mut (impl Columns + ?Sized),
 ) {
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    #[cfg(target_arch = "x86_64")]
     {
         // Written out, so that where quarters lie is known where they are loaded, and none takes a detour through memory.
         macro_rules! by_quarters {
@@ -274,21 +266,18 @@ fn by_shuffles<'a, S: Simd>(simd: S, row: impl Fn(usize) -> &'a Row<u32>, column
     }
 }
 
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-mod x86 {
-    #[cfg(target_arch = "x86")]
-    use core::arch::x86::*;
-    #[cfg(target_arch = "x86_64")]
+#[cfg(target_arch = "x86_64")]
+pub(super) mod x86 {
     use core::arch::x86_64::*;
 
     use fearless_simd::prelude::*;
     use fearless_simd::x86::{Avx2, Avx512};
-    use fearless_simd::{u32x4, u32x8, u32x16};
+    use fearless_simd::{u8x16, u32x4, u32x8, u32x16};
 
     fearless_simd::kernel!(
         /// Quarters as one.
         #[inline(always)]
-        pub(super) fn side_by_side_512(
+        pub fn side_by_side_512(
             token: Avx512,
             a: u32x4<Avx512>,
             b: u32x4<Avx512>,
@@ -303,7 +292,7 @@ mod x86 {
     fearless_simd::kernel!(
         /// Within each quarter, rows turned into columns.
         #[inline(always)]
-        pub(super) fn turn_512(
+        pub fn turn_512(
             token: Avx512,
             a: u32x16<Avx512>,
             b: u32x16<Avx512>,
@@ -325,7 +314,7 @@ mod x86 {
     fearless_simd::kernel!(
         /// Quarters as one.
         #[inline(always)]
-        pub(super) fn side_by_side_256(
+        pub fn side_by_side_256(
             token: Avx2,
             a: u32x4<Avx2>,
             b: u32x4<Avx2>,
@@ -342,7 +331,7 @@ mod x86 {
     fearless_simd::kernel!(
         /// Within each quarter, rows turned into columns.
         #[inline(always)]
-        pub(super) fn turn_256(
+        pub fn turn_256(
             token: Avx2,
             a: u32x16<Avx2>,
             b: u32x16<Avx2>,
@@ -363,6 +352,49 @@ mod x86 {
             let low = half([a.into(), b.into(), c.into(), d.into()]);
             let high = half([a_high.into(), b_high.into(), c_high.into(), d_high.into()]);
             [low[0].combine(high[0]), low[1].combine(high[1]), low[2].combine(high[2]), low[3].combine(high[3])]
+        }
+    );
+
+    fearless_simd::kernel!(
+        /// `places` as lanes.
+        #[inline(always)]
+        pub fn in_32(token: Avx512, places: u8x16<Avx512>) -> u32x16<Avx512> {
+            _mm512_cvtepu8_epi32(places.into()).simd_into(token)
+        }
+    );
+
+    fearless_simd::kernel!(
+        /// Those of 32 lanes that `places` says.
+        #[inline(always)]
+        pub fn of_32(
+            token: Avx512,
+            low: u32x16<Avx512>,
+            high: u32x16<Avx512>,
+            places: u32x16<Avx512>,
+        ) -> u32x16<Avx512> {
+            _mm512_permutex2var_epi32(low.into(), places.into(), high.into()).simd_into(token)
+        }
+    );
+
+    fearless_simd::kernel!(
+        /// `places`, which count from `start` places before sixteen lanes, as lanes that count from the first of these.
+        #[inline(always)]
+        pub fn in_sixteen(token: Avx2, places: &[u8; 8], start: u8) -> u32x8<Avx2> {
+            let places = _mm256_cvtepu8_epi32(_mm_set_epi64x(0, i64::from_ne_bytes(*places)));
+            _mm256_sub_epi32(places, _mm256_set1_epi32(start.into())).simd_into(token)
+        }
+    );
+
+    fearless_simd::kernel!(
+        /// Those of sixteen lanes that `places` says.
+        #[inline(always)]
+        pub fn of_sixteen(token: Avx2, low: u32x8<Avx2>, high: u32x8<Avx2>, places: u32x8<Avx2>) -> u32x8<Avx2> {
+            let places = places.into();
+            let [low, high] =
+                [low, high].map(|lanes| _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(lanes.into(), places)));
+            // Eight and more is the bit that becomes the sign.
+            let which = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
+            _mm256_castps_si256(_mm256_blendv_ps(low, high, which)).simd_into(token)
         }
     );
 }
@@ -389,9 +421,9 @@ pub(super) fn store_first<S: Simd>(lanes: u32x16<S>, cells: &mut [u32]) {
 pub(super) fn levels() -> Vec<fearless_simd::Level> {
     use fearless_simd::Level;
     let widest = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    #[cfg(target_arch = "x86_64")]
     let narrower = [widest.as_avx2().map(Level::Avx2), widest.as_sse2().map(Level::Sse2)];
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    #[cfg(not(target_arch = "x86_64"))]
     let narrower: [Option<Level>; 0] = [];
     std::iter::once(widest).chain(narrower.into_iter().flatten()).collect()
 }

@@ -1,17 +1,19 @@
 //! One frame: sixteen fields abreast.
 
+use std::ops::Range;
+
 use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::{RawBatch, Rows, Step};
-use super::calibrate::Tiles;
+use super::calibrate::{Calibrated, Tiles};
 use super::gate::Gate;
-use super::lanes::{F, LANES, Lines, Row, U, load, load_u, with_widest};
-use super::members::{Cells, Kinds, Members, Sample};
-use super::pipeline::{Abreast, Between, Wanted, touch};
+use super::lanes::{LANES, with_widest};
+use super::members::{InFrame, Kinds, MemberRows, OneKind};
+use super::pipeline::{Abreast, Between, Wanted, all_stages};
 use super::recording::the_one_before;
-use super::wide::{self, Table, Values, Wide};
-use super::write::{Columned, Run, Sixteen};
+use super::wide::Wide;
+use super::write::{Answers, FieldLanes, FilledColumns};
 use super::{calibrate, change};
 use crate::parallel::{Tasks, on_threads};
 use crate::percept::CellsMut;
@@ -45,36 +47,45 @@ pub(super) fn is_shared(plan: &Plan, threads: usize) -> bool {
 /// a whole only once it has reached the cache. With their weights and places they are to stay in the nearest one.
 const GATHERED_ROWS: usize = 64;
 
-/// What one thread needs beside.
+/// Members' values side by side, and what one thread needs beside.
 #[derive(Clone, Debug, Default)]
 struct Gathered {
-    pressures: Lines<f32>,
-    statuses: Lines<u32>,
+    values: Calibrated,
     between: Vec<Between>,
-    values: Values,
+}
+
+impl Gathered {
+    /// Makes room for so many rows and sets of cells.
+    fn reserve(&mut self, rows: usize, sets: usize) {
+        if self.values.pressures.len() < rows {
+            self.values = Calibrated::new(rows);
+        }
+        if self.between.len() < sets {
+            self.between.resize(sets, Between::EMPTY);
+        }
+    }
 }
 
 /// The plan laid out for one frame, and the memory for it.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
-    wide: Vec<Table>,
+    wide: Vec<WideField>,
     narrow: Vec<Narrow>,
     /// How many of the narrow are computed together.
     together: usize,
     /// Per wide field, then per group of narrow ones.
-    answers: Vec<Cells>,
-    /// By slot, and a last row of taxels that nothing presses, which is nobody's.
-    pressures: Lines<f32>,
-    statuses: Lines<u32>,
+    answers: Vec<Answers>,
+    /// By slot, and a last row that is nobody's: unpressed and unusable.
+    values: Calibrated,
     /// Those of the frame before, where there are changes.
-    before: (Lines<f32>, Lines<u32>),
+    before: Calibrated,
     gathered: Gathered,
     /// Of the other threads that take part, where a frame is shared.
     others: Vec<Gathered>,
     gate: Option<Gate>,
     /// What is stale where no gate says it: all units.
     everything: Vec<bool>,
-    columned: Columned,
+    columns: FilledColumns,
 }
 
 impl Live {
@@ -90,31 +101,31 @@ impl Live {
         let mut first_row = 0;
         for group in &mut narrow {
             group.first_row = first_row;
-            first_row += group.places.len();
+            first_row += group.rows.count();
         }
-        let most_rows = narrow.iter().map(|group| group.places.len()).max().unwrap_or(0);
+        let most_rows = narrow.iter().map(|group| group.rows.count()).max().unwrap_or(0);
         let together = (GATHERED_ROWS / most_rows.max(1)).max(1);
-        for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(Narrow::is_weighted)) {
-            groups.iter_mut().for_each(Narrow::weigh);
+        for groups in narrow.chunks_mut(together).filter(|groups| groups.iter().any(|group| group.rows.is_weighted())) {
+            groups.iter_mut().for_each(|group| group.rows.weigh());
         }
         let slots_of = |field: usize| plan.members_of(&plan.fields[field]).iter().map(|member| member.slot);
         let gate = Gate::new(plan, wide.len() + narrow.len(), |unit| match unit.checked_sub(wide.len()) {
             None => slots_of(wide[unit]).collect(),
-            Some(group) => narrow[group].fields.iter().flat_map(|&field| slots_of(field)).collect(),
+            Some(group) => narrow[group].lanes.fields().flat_map(slots_of).collect(),
         });
         let threads = crate::parallel::threads();
-        let before = if plan.has_changes() { tiles } else { 0 };
+        let mut values = Calibrated::new(tiles + 1);
+        values.statuses[tiles] = [UNUSABLE; LANES];
         Self {
-            columned: Columned::new(plan),
+            columns: FilledColumns::new(plan),
             gate,
             everything: vec![true; wide.len() + narrow.len()],
-            answers: vec![Cells::EMPTY; wide.len() + narrow.len()],
-            wide: wide.into_iter().map(|field| Table::new(plan, field)).collect(),
+            answers: vec![Answers::EMPTY; wide.len() + narrow.len()],
+            wide: wide.into_iter().map(|field| WideField::new(plan, field, unpressed)).collect(),
             narrow,
             together,
-            pressures: Lines::new(tiles + 1, 0.0),
-            statuses: Lines::new(tiles + 1, 0),
-            before: (Lines::new(before, 0.0), Lines::new(before, 0)),
+            values,
+            before: Calibrated::new(if plan.has_changes() { tiles } else { 0 }),
             gathered: Gathered::default(),
             others: vec![Gathered::default(); if is_shared(plan, threads) { threads - 1 } else { 0 }],
         }
@@ -136,28 +147,23 @@ impl Live {
         moment: &Moment<'_>,
         cells: &mut CellsMut<'_>,
     ) {
-        let Self { pressures, statuses, before: (was, said), gate, .. } = self;
+        let Self { values, before, gate, .. } = self;
         let mut gate = gate.as_mut().and_then(|gate| gate.is_due().then_some(gate));
         let is_shared = !self.others.is_empty();
         let mut faults = match &mut gate {
-            Some(gate) => gate.pass(level, plan, tiles, moment.now, pressures, statuses),
-            None if is_shared => calibrate::shared_frame(level, plan, tiles, moment.now, pressures, statuses),
-            None => calibrate::frame(level, plan, tiles, moment.now, pressures, statuses),
+            Some(gate) => gate.pass(level, plan, tiles, moment.now, values),
+            None if is_shared => calibrate::shared_frame(level, plan, tiles, moment.now, values),
+            None => calibrate::frame(level, plan, tiles, moment.now, values),
         };
         if plan.has_changes() {
-            calibrate::frame(level, plan, tiles, moment.before, was, said);
-            let before = (was.as_flattened(), said.as_flattened());
-            let (pressures, statuses) = (pressures.as_flattened_mut(), statuses.as_flattened_mut());
-            let (pressures, statuses) = (pressures.as_chunks_mut::<1>().0, statuses.as_chunks_mut::<1>().0);
+            calibrate::frame(level, plan, tiles, moment.before, before);
+            let before = (before.pressures.as_flattened(), before.statuses.as_flattened());
+            let (pressures, _) = values.pressures.as_flattened_mut().as_chunks_mut::<1>();
+            let (statuses, _) = values.statuses.as_flattened_mut().as_chunks_mut::<1>();
             faults |= change::frames(plan, std::slice::from_ref(moment.step), before, pressures, statuses);
         }
-        let frame = Frame {
-            level,
-            plan,
-            pressures: self.pressures.as_flattened(),
-            statuses: self.statuses.as_flattened(),
-            faults,
-        };
+        let (pressures, statuses) = (self.values.pressures.as_flattened(), self.values.statuses.as_flattened());
+        let frame = Frame { level, plan, pressures, statuses, faults };
         let stale = gate.as_ref().map_or(&self.everything[..], |gate| gate.stale());
         let (wide, narrow) = self.answers.split_at_mut(self.wide.len());
         let (stale_wide, stale_narrow) = stale.split_at(self.wide.len());
@@ -170,7 +176,7 @@ impl Live {
             frame.shared(fields, (wide, narrow), (stale_wide, stale_narrow), gathered);
         } else {
             let wide = self.wide.iter().zip(wide).zip(stale_wide).filter(|(_, stale)| **stale);
-            wide.for_each(|((table, answer), _)| frame.wide(table, &mut self.gathered, answer));
+            wide.for_each(|((field, answer), _)| frame.wide(field, &mut self.gathered, answer));
             let narrow = self.narrow.chunks(together).zip(narrow.chunks_mut(together));
             for ((groups, answers), stale) in narrow.zip(stale_narrow.chunks(together)) {
                 frame.stale(groups, stale, &mut self.gathered, answers);
@@ -182,18 +188,11 @@ impl Live {
             }
         }
         let (wide, narrow) = self.answers.split_at(self.wide.len());
-        for (of, answer) in self.wide.iter().zip(wide) {
-            self.columned.write_frame(&Run { first: of.field, count: 1 }, answer, cells);
+        for (field, answer) in self.wide.iter().zip(wide) {
+            self.columns.write_frame(&field.lanes, answer, cells);
         }
         for (group, answer) in self.narrow.iter().zip(narrow) {
-            match group.together {
-                Some(first) if group.fields.len() == LANES => self.columned.write_frame(&Sixteen(first), answer, cells),
-                Some(first) => {
-                    let run = Run { first, count: group.fields.len() };
-                    self.columned.write_frame(&run, answer, cells);
-                }
-                None => self.columned.write_frame(&group.fields, answer, cells),
-            }
+            self.columns.write_frame(&group.lanes, answer, cells);
         }
     }
 }
@@ -214,8 +213,8 @@ impl Frame<'_> {
     #[inline(never)]
     fn shared(
         &self,
-        (wide, narrow, together): (&[Table], &[Narrow], usize),
-        (wide_answers, narrow_answers): (&mut [Cells], &mut [Cells]),
+        (wide, narrow, together): (&[WideField], &[Narrow], usize),
+        (wide_answers, narrow_answers): (&mut [Answers], &mut [Answers]),
         (stale_wide, stale_narrow): (&[bool], &[bool]),
         (own, others): (&mut Gathered, &mut [Gathered]),
     ) {
@@ -228,8 +227,8 @@ impl Frame<'_> {
         let gathered = Tasks::new(std::iter::once(own).chain(others));
         on_threads(threads, || {
             let Some(gathered) = gathered.take() else { return };
-            while let Some(((table, answer), _)) = wide.take() {
-                self.wide(table, gathered, answer);
+            while let Some(((field, answer), _)) = wide.take() {
+                self.wide(field, gathered, answer);
             }
             while let Some(((groups, answers), stale)) = narrow.take() {
                 let pieces = groups.chunks(together).zip(answers.chunks_mut(together));
@@ -240,15 +239,29 @@ impl Frame<'_> {
         });
     }
 
-    /// A field alone.
-    fn wide(&self, table: &Table, gathered: &mut Gathered, answer: &mut Cells) {
-        let values = &mut gathered.values;
-        values.gather(table, self.faults, |slot| self.pressures[slot], |slot| self.statuses[slot]);
-        wide::cell(self.level, self.plan, Wide { table, values }, self.faults, answer);
+    /// A field alone, whose answer is the first lane of `answer`.
+    #[inline(never)]
+    fn wide(&self, field: &WideField, gathered: &mut Gathered, answer: &mut Answers) {
+        let count = field.rows.count();
+        gathered.reserve(count, 1);
+        self.gather(&field.rows, &mut gathered.values, 0..count);
+        let Gathered { values, between } = gathered;
+        let members = Wide(InFrame::<true>::new(&field.rows, &values.pressures, &values.statuses));
+        let (wanted, between) = (Wanted::new(self.plan, self.faults), &mut between[..1]);
+        let answer = std::slice::from_mut(answer);
+        with_widest!(self.level, simd => all_stages(simd, |_| (members, &field.kind), 1, wanted, between, answer));
+    }
+
+    /// Brings members' values side by side into `range` of the rows of `values`.
+    fn gather(&self, rows: &MemberRows, values: &mut Calibrated, range: Range<usize>) {
+        rows.gather(self.pressures, &mut values.pressures[range.clone()]);
+        if self.faults {
+            rows.gather(self.statuses, &mut values.statuses[range]);
+        }
     }
 
     /// Those of `groups` that are stale, those side by side together.
-    fn stale(&self, mut groups: &[Narrow], stale: &[bool], gathered: &mut Gathered, mut answers: &mut [Cells]) {
+    fn stale(&self, mut groups: &[Narrow], stale: &[bool], gathered: &mut Gathered, mut answers: &mut [Answers]) {
         for run in stale.chunk_by(|a, b| a == b) {
             let (now, later) = groups.split_at(run.len());
             let (into, rest) = answers.split_at_mut(run.len());
@@ -261,24 +274,15 @@ impl Frame<'_> {
 
     /// Groups together.
     #[inline(never)]
-    fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Cells]) {
-        let rows = groups.iter().map(|group| group.places.len()).sum();
-        if gathered.pressures.len() < rows || gathered.between.len() < groups.len() {
-            gathered.pressures = Lines::new(rows, 0.0);
-            gathered.statuses = Lines::new(rows, 0);
-            gathered.between.resize(groups.len(), Between::EMPTY);
-        }
+    fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Answers]) {
+        gathered.reserve(groups.iter().map(|group| group.rows.count()).sum(), groups.len());
         let mut first = 0;
         for group in groups {
-            let rows = first..first + group.places.len();
-            group.gather(self.pressures, &mut gathered.pressures[rows.clone()]);
-            if self.faults {
-                group.gather(self.statuses, &mut gathered.statuses[rows.clone()]);
-                self.leave_out_what_is_not_there(group, &mut gathered.statuses[rows.clone()]);
-            }
-            first = rows.end;
+            let end = first + group.rows.count();
+            self.gather(&group.rows, &mut gathered.values, first..end);
+            first = end;
         }
-        if groups.iter().any(Narrow::is_weighted) {
+        if groups.iter().any(|group| group.rows.is_weighted()) {
             with_widest!(self.level, simd => self.narrow::<_, true>(simd, groups, gathered, answers));
         } else {
             with_widest!(self.level, simd => self.narrow::<_, false>(simd, groups, gathered, answers));
@@ -291,22 +295,18 @@ impl Frame<'_> {
         simd: S,
         groups: &[Narrow],
         gathered: &mut Gathered,
-        answers: &mut [Cells],
+        answers: &mut [Answers],
     ) {
         let wanted = Wanted::new(self.plan, self.faults);
-        let Gathered { pressures, statuses, between, .. } = gathered;
-        touch(
+        let Gathered { values: Calibrated { pressures, statuses }, between } = gathered;
+        let (pressures, statuses) = (&pressures[..], &statuses[..]);
+        all_stages(
             simd,
             #[inline(always)]
             |index| {
                 let group = &groups[index];
-                let rows = group.first_row - groups[0].first_row..;
-                let members = InFrame::<WEIGHTED> {
-                    group,
-                    weights: group.weights.as_deref().unwrap_or_default(),
-                    pressures: &pressures[rows.clone()],
-                    statuses: &statuses[rows],
-                };
+                let first = group.first_row - groups[0].first_row;
+                let members = InFrame::<WEIGHTED>::new(&group.rows, &pressures[first..], &statuses[first..]);
                 (Abreast(members), &group.kinds)
             },
             LANES,
@@ -315,135 +315,41 @@ impl Frame<'_> {
             answers,
         );
     }
+}
 
-    /// Lanes that have no more members do not keep the others from being all unusable.
-    fn leave_out_what_is_not_there(&self, group: &Narrow, statuses: &mut [Row<u32>]) {
-        for (lane, &field) in group.fields.iter().enumerate() {
-            for row in &mut statuses[self.plan.fields[field].count..group.places.len()] {
-                row[lane] = UNUSABLE;
-            }
-        }
+/// A field of many members, which a frame's lanes share.
+#[derive(Clone, Debug)]
+struct WideField {
+    lanes: FieldLanes,
+    kind: OneKind,
+    rows: MemberRows,
+}
+
+impl WideField {
+    fn new(plan: &Plan, field: usize, unpressed: usize) -> Self {
+        let of = &plan.fields[field];
+        let rows = MemberRows::of_one(plan, of, unpressed);
+        Self { lanes: FieldLanes::new(&[field]), kind: OneKind::new(of), rows }
     }
 }
 
-/// Sixteen narrow fields of about as many members, a lane each.
+/// Sixteen narrow fields of about as many members, a lane each; fewer at the end.
 #[derive(Clone, Debug)]
 struct Narrow {
-    /// Per lane, which field; fewer at the end.
-    fields: Vec<usize>,
-    /// Where they are, if one stands after the other.
-    together: Option<usize>,
+    lanes: FieldLanes,
     kinds: Kinds,
-    /// By member, where it has its value.
-    slots: Lines<u32>,
-    places: Vec<PlaceRow>,
+    rows: MemberRows,
     /// Rows of the groups before it.
     first_row: usize,
-    /// None where all are 1.
-    weights: Option<Lines<f32>>,
-    depths: Lines<f32>,
-    areas: Lines<f32>,
-}
-
-/// Where a member of each field of a group is.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-struct PlaceRow {
-    u: Row<f32>,
-    v: Row<f32>,
 }
 
 impl Narrow {
-    /// The group of `fields`, whose lanes go on with slot `unpressed` where they have no more members.
     fn new(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
-        let rows = fields.iter().map(|&field| plan.fields[field].count).max().unwrap_or(0);
-        let blank = Lines::new(rows, 0.0);
-        let mut group = Self {
-            fields: fields.to_vec(),
-            together: fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected).then_some(fields[0]),
-            kinds: Kinds::EMPTY,
-            slots: Lines::new(rows, unpressed as u32),
-            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+        Self {
+            lanes: FieldLanes::new(fields),
+            kinds: Kinds::new(fields.iter().map(|&field| &plan.fields[field])),
+            rows: MemberRows::of_each(plan, fields, unpressed),
             first_row: 0,
-            weights: (!fields.iter().all(|&field| plan.fields[field].unweighted)).then(|| blank.clone()),
-            depths: blank.clone(),
-            areas: blank,
-        };
-        for (lane, field) in fields.iter().map(|&field| &plan.fields[field]).enumerate() {
-            group.kinds.set(lane, field);
-            for (row, (member, depth)) in plan.members_of(field).iter().zip(&field.depths).enumerate() {
-                group.slots[row][lane] = member.slot;
-                if let Some(weights) = &mut group.weights {
-                    weights[row][lane] = member.weight;
-                }
-                group.places[row].u[lane] = member.u;
-                group.places[row].v[lane] = member.v;
-                group.depths[row][lane] = *depth;
-                group.areas[row][lane] = plan.taxels[member.slot as usize].area;
-            }
         }
-        group
-    }
-
-    /// Brings its members' values side by side.
-    fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
-        for (row, slots) in rows.iter_mut().zip(&self.slots[..]) {
-            for (value, &slot) in row.iter_mut().zip(slots) {
-                *value = values[slot as usize];
-            }
-        }
-    }
-
-    fn is_weighted(&self) -> bool {
-        self.weights.is_some()
-    }
-
-    /// Has weights from now on, of 1 if it had none.
-    fn weigh(&mut self) {
-        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
-    }
-}
-
-/// A group's values in this frame; `WEIGHTED` where weights are not all 1.
-#[derive(Clone, Copy)]
-struct InFrame<'a, const WEIGHTED: bool> {
-    group: &'a Narrow,
-    /// Empty if not `WEIGHTED`.
-    weights: &'a [Row<f32>],
-    pressures: &'a [Row<f32>],
-    statuses: &'a [Row<u32>],
-}
-
-impl<S: Simd, const WEIGHTED: bool> Members<S> for InFrame<'_, WEIGHTED> {
-    #[inline(always)]
-    fn count(self) -> usize {
-        self.group.places.len()
-    }
-
-    #[inline(always)]
-    fn sample(self, simd: S, member: usize, at: usize) -> Sample<S> {
-        let PlaceRow { u, v } = &self.group.places[member];
-        let pressure = load(simd, &self.pressures[member], at);
-        Sample {
-            pressure,
-            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
-            u: load(simd, u, at),
-            v: load(simd, v, at),
-        }
-    }
-
-    #[inline(always)]
-    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.group.depths[member], at)
-    }
-
-    #[inline(always)]
-    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.group.areas[member], at)
-    }
-
-    #[inline(always)]
-    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
-        load_u(simd, &self.statuses[member], at)
     }
 }

@@ -1,12 +1,11 @@
-//! What stages' formulas read and write in lanes: members of fields, sums over them, what fields are like, and cells.
-
-use std::ops::{Index, IndexMut};
+//! What stages' formulas read in lanes: members of fields, sums over them, and what fields are like.
 
 use fearless_simd::prelude::*;
 
-use super::lanes::{F, LANES, M, Row, U, load, load_u, splat, splat_u, store, store_u};
-use crate::percept::{Component, Flags, Outputs};
-use crate::scene::PlanField;
+use super::lanes::{F, LANES, Lines, M, Row, U, load, load_u, splat, splat_u};
+use crate::percept::{Flags, Outputs};
+use crate::scene::{Plan, PlanField};
+use crate::stage::layout::Member;
 
 /// A member's value and place, a lane each.
 pub(super) struct Sample<S: Simd> {
@@ -135,21 +134,27 @@ pub(super) trait Kind<S: Simd> {
     fn any_charted(&self) -> bool;
     /// Whether any has none.
     fn any_uncharted(&self) -> bool;
-    /// Flags that a field always has.
-    fn always(&self, simd: S, at: usize) -> U<S>;
+    /// That of the lanes from `at` on.
+    fn lanes(&self, simd: S, at: usize) -> KindLanes<S>;
+}
+
+/// What fields are like, a lane each.
+#[derive(Clone, Copy)]
+pub(super) struct KindLanes<S: Simd> {
+    /// Those that a field always has.
+    pub(super) flags: U<S>,
     /// The sums it can give.
-    fn sums(&self, simd: S, at: usize) -> U<S>;
+    pub(super) sums: U<S>,
     /// What it can give with its centroid.
-    fn found(&self, simd: S, at: usize) -> U<S>;
-    /// m.
-    fn unit_m(&self, simd: S, at: usize) -> F<S>;
+    pub(super) found: U<S>,
+    pub(super) unit_m: F<S>,
 }
 
 /// Every lane's field is the same.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OneKind {
     charted: bool,
-    always: u32,
+    flags: u32,
     sums: u32,
     found: u32,
     unit_m: f32,
@@ -161,7 +166,7 @@ impl OneKind {
         let in_chart = Outputs::of_stage("centroid") | Outputs::of_stage("position");
         Self {
             charted: field.charted,
-            always: if field.charted { Flags::empty() } else { Flags::NO_CHART }.bits(),
+            flags: if field.charted { Flags::empty() } else { Flags::NO_CHART }.bits(),
             sums: if field.area_known { sums | Outputs::AREA } else { sums }.bits(),
             found: if field.charted { in_chart } else { Outputs::POSITION }.bits(),
             unit_m: field.unit_m,
@@ -170,13 +175,7 @@ impl OneKind {
 
     /// Flags and quantities of a field that nothing presses.
     pub(super) fn untouched(&self) -> (u32, u32) {
-        (self.always | Flags::NO_CONTACT.bits(), self.sums)
-    }
-
-    /// The cells of such a field.
-    pub(super) fn at_rest(&self) -> Cells {
-        let (flags, present) = self.untouched();
-        Cells { flags: [flags; LANES], present: [present; LANES], ..Cells::EMPTY }
+        (self.flags | Flags::NO_CONTACT.bits(), self.sums)
     }
 }
 
@@ -192,23 +191,13 @@ impl<S: Simd> Kind<S> for &OneKind {
     }
 
     #[inline(always)]
-    fn always(&self, simd: S, _: usize) -> U<S> {
-        splat_u(simd, self.always)
-    }
-
-    #[inline(always)]
-    fn sums(&self, simd: S, _: usize) -> U<S> {
-        splat_u(simd, self.sums)
-    }
-
-    #[inline(always)]
-    fn found(&self, simd: S, _: usize) -> U<S> {
-        splat_u(simd, self.found)
-    }
-
-    #[inline(always)]
-    fn unit_m(&self, simd: S, _: usize) -> F<S> {
-        splat(simd, self.unit_m)
+    fn lanes(&self, simd: S, _: usize) -> KindLanes<S> {
+        KindLanes {
+            flags: splat_u(simd, self.flags),
+            sums: splat_u(simd, self.sums),
+            found: splat_u(simd, self.found),
+            unit_m: splat(simd, self.unit_m),
+        }
     }
 }
 
@@ -218,31 +207,27 @@ impl<S: Simd> Kind<S> for &OneKind {
 pub(super) struct Kinds {
     any_charted: bool,
     any_uncharted: bool,
-    always: Row<u32>,
+    flags: Row<u32>,
     sums: Row<u32>,
     found: Row<u32>,
     unit_m: Row<f32>,
 }
 
 impl Kinds {
-    pub(super) const EMPTY: Self = Self {
-        any_charted: false,
-        any_uncharted: false,
-        always: [0; LANES],
-        sums: [0; LANES],
-        found: [0; LANES],
-        unit_m: [1.0; LANES],
-    };
-
-    /// Puts `field` into `lane`.
-    pub(super) fn set(&mut self, lane: usize, field: &PlanField) {
-        let kind = OneKind::new(field);
-        self.any_charted |= kind.charted;
-        self.any_uncharted |= !kind.charted;
-        self.always[lane] = kind.always;
-        self.sums[lane] = kind.sums;
-        self.found[lane] = kind.found;
-        self.unit_m[lane] = kind.unit_m;
+    /// Of up to sixteen `fields`.
+    pub(super) fn new<'a>(fields: impl Iterator<Item = &'a PlanField>) -> Self {
+        let none = [0; LANES];
+        let (any_charted, any_uncharted, unit_m) = (false, false, [1.0; LANES]);
+        let mut kinds = Self { any_charted, any_uncharted, flags: none, sums: none, found: none, unit_m };
+        for (lane, kind) in fields.map(OneKind::new).enumerate() {
+            kinds.any_charted |= kind.charted;
+            kinds.any_uncharted |= !kind.charted;
+            kinds.flags[lane] = kind.flags;
+            kinds.sums[lane] = kind.sums;
+            kinds.found[lane] = kind.found;
+            kinds.unit_m[lane] = kind.unit_m;
+        }
+        kinds
     }
 }
 
@@ -258,27 +243,154 @@ impl<S: Simd> Kind<S> for &Kinds {
     }
 
     #[inline(always)]
-    fn always(&self, simd: S, at: usize) -> U<S> {
-        load_u(simd, &self.always, at)
-    }
-
-    #[inline(always)]
-    fn sums(&self, simd: S, at: usize) -> U<S> {
-        load_u(simd, &self.sums, at)
-    }
-
-    #[inline(always)]
-    fn found(&self, simd: S, at: usize) -> U<S> {
-        load_u(simd, &self.found, at)
-    }
-
-    #[inline(always)]
-    fn unit_m(&self, simd: S, at: usize) -> F<S> {
-        load(simd, &self.unit_m, at)
+    fn lanes(&self, simd: S, at: usize) -> KindLanes<S> {
+        KindLanes {
+            flags: load_u(simd, &self.flags, at),
+            sums: load_u(simd, &self.sums, at),
+            found: load_u(simd, &self.found, at),
+            unit_m: load(simd, &self.unit_m, at),
+        }
     }
 }
 
-/// What the lanes know of their touch so far.
+/// Members of one frame in rows: one of each of sixteen fields, or sixteen of a wide field.
+#[derive(Clone, Debug)]
+pub(super) struct MemberRows {
+    /// Where each has its value. What fills up rows has that of no taxel: unpressed, and unusable, so that it does not keep
+    /// the others from being all unusable.
+    slots: Lines<u32>,
+    places: Vec<PlaceRow>,
+    /// None where all are 1.
+    weights: Option<Lines<f32>>,
+    depths: Lines<f32>,
+    areas: Lines<f32>,
+}
+
+/// Where a row's members are.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct PlaceRow {
+    u: Row<f32>,
+    v: Row<f32>,
+}
+
+impl MemberRows {
+    /// `rows` rows of nobody, whose value is in slot `unpressed`.
+    fn new(rows: usize, unpressed: usize, weighted: bool) -> Self {
+        let blank = Lines::new(rows, 0.0);
+        Self {
+            slots: Lines::new(rows, unpressed as u32),
+            places: vec![PlaceRow { u: [0.0; LANES], v: [0.0; LANES] }; rows],
+            weights: weighted.then(|| blank.clone()),
+            depths: blank.clone(),
+            areas: blank,
+        }
+    }
+
+    /// Those of `fields`, up to sixteen, a lane each.
+    pub(super) fn of_each(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
+        let fields = fields.iter().map(|&field| &plan.fields[field]);
+        let count = fields.clone().map(|field| field.count).max().unwrap_or(0);
+        let mut rows = Self::new(count, unpressed, !fields.clone().all(|field| field.unweighted));
+        for (lane, field) in fields.enumerate() {
+            (0..field.count).for_each(|member| rows.set(plan, field, member, (member, lane)));
+        }
+        rows
+    }
+
+    /// Those of `field`, with their weights.
+    pub(super) fn of_one(plan: &Plan, field: &PlanField, unpressed: usize) -> Self {
+        let mut rows = Self::new(field.count.div_ceil(LANES), unpressed, true);
+        (0..field.count).for_each(|member| rows.set(plan, field, member, (member / LANES, member % LANES)));
+        rows
+    }
+
+    fn set(&mut self, plan: &Plan, field: &PlanField, index: usize, (row, lane): (usize, usize)) {
+        let Member { slot, weight, u, v } = plan.members_of(field)[index];
+        self.slots[row][lane] = slot;
+        if let Some(weights) = &mut self.weights {
+            weights[row][lane] = weight;
+        }
+        self.places[row].u[lane] = u;
+        self.places[row].v[lane] = v;
+        self.depths[row][lane] = field.depths[index];
+        self.areas[row][lane] = plan.taxels[slot as usize].area;
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    pub(super) fn is_weighted(&self) -> bool {
+        self.weights.is_some()
+    }
+
+    /// Has weights from now on, of 1 if it had none.
+    pub(super) fn weigh(&mut self) {
+        self.weights.get_or_insert_with(|| Lines::new(self.places.len(), 1.0));
+    }
+
+    /// Brings its members' values side by side.
+    pub(super) fn gather<T: Copy>(&self, values: &[T], rows: &mut [Row<T>]) {
+        for (row, slots) in rows.iter_mut().zip(&self.slots[..]) {
+            for (value, &slot) in row.iter_mut().zip(slots) {
+                *value = values[slot as usize];
+            }
+        }
+    }
+}
+
+/// Members with their values; `WEIGHTED` where weights are not all 1.
+#[derive(Clone, Copy)]
+pub(super) struct InFrame<'a, const WEIGHTED: bool> {
+    rows: &'a MemberRows,
+    /// Empty if not `WEIGHTED`.
+    weights: &'a [Row<f32>],
+    pressures: &'a [Row<f32>],
+    statuses: &'a [Row<u32>],
+}
+
+impl<'a, const WEIGHTED: bool> InFrame<'a, WEIGHTED> {
+    pub(super) fn new(rows: &'a MemberRows, pressures: &'a [Row<f32>], statuses: &'a [Row<u32>]) -> Self {
+        Self { rows, weights: rows.weights.as_deref().unwrap_or_default(), pressures, statuses }
+    }
+}
+
+impl<S: Simd, const WEIGHTED: bool> Members<S> for InFrame<'_, WEIGHTED> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.rows.count()
+    }
+
+    #[inline(always)]
+    fn sample(self, simd: S, member: usize, at: usize) -> Sample<S> {
+        let PlaceRow { u, v } = &self.rows.places[member];
+        let pressure = load(simd, &self.pressures[member], at);
+        Sample {
+            pressure,
+            pull: if WEIGHTED { load(simd, &self.weights[member], at) * pressure } else { pressure },
+            u: load(simd, u, at),
+            v: load(simd, v, at),
+        }
+    }
+
+    #[inline(always)]
+    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.rows.depths[member], at)
+    }
+
+    #[inline(always)]
+    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
+        load(simd, &self.rows.areas[member], at)
+    }
+
+    #[inline(always)]
+    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
+        load_u(simd, &self.statuses[member], at)
+    }
+}
+
+/// The lanes' touches, as they are known after the centroid.
 #[derive(Clone, Copy)]
 pub(super) struct Touch<S: Simd> {
     /// Number of pressed taxels.
@@ -290,50 +402,4 @@ pub(super) struct Touch<S: Simd> {
     /// In the field's unit.
     pub(super) u: F<S>,
     pub(super) v: F<S>,
-}
-
-/// What the stages found, a row each; lengths in metres.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-pub(super) struct Cells {
-    pub(super) flags: Row<u32>,
-    pub(super) present: Row<u32>,
-    pub(super) active: Row<u32>,
-    parts: [Row<f32>; Component::COUNT],
-}
-
-impl Cells {
-    pub(super) const EMPTY: Self =
-        Self { flags: [0; LANES], present: [0; LANES], active: [0; LANES], parts: [[0.0; LANES]; Component::COUNT] };
-
-    /// Stores lanes of a part.
-    #[inline(always)]
-    pub(super) fn put<S: Simd>(&mut self, simd: S, part: Component, lanes: F<S>, at: usize) {
-        store(simd, lanes, &mut self[part], at);
-    }
-
-    /// Adds flags and outputs that are present.
-    #[inline(always)]
-    pub(super) fn say<S: Simd>(&mut self, simd: S, (flags, present): (U<S>, U<S>), at: usize) {
-        let flags = load_u(simd, &self.flags, at) | flags;
-        store_u(simd, flags, &mut self.flags, at);
-        let present = load_u(simd, &self.present, at) | present;
-        store_u(simd, present, &mut self.present, at);
-    }
-}
-
-impl Index<Component> for Cells {
-    type Output = Row<f32>;
-
-    #[inline(always)]
-    fn index(&self, part: Component) -> &Row<f32> {
-        &self.parts[part as usize]
-    }
-}
-
-impl IndexMut<Component> for Cells {
-    #[inline(always)]
-    fn index_mut(&mut self, part: Component) -> &mut Row<f32> {
-        &mut self.parts[part as usize]
-    }
 }

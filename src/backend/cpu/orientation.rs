@@ -3,7 +3,8 @@
 use fearless_simd::prelude::*;
 
 use super::lanes::{F, U, bits_where, of_line, splat, splat_u};
-use super::members::{Cells, Members, Touch};
+use super::members::{Members, Touch};
+use super::write::Answers;
 use crate::percept::{Component, Flags, Outputs};
 
 /// What this stage fills.
@@ -14,7 +15,7 @@ const NEAR: f32 = 1.0 / 16_384.0;
 
 /// How far the two farthest points lie from the centroid, and from each other.
 #[derive(Clone, Copy)]
-pub(super) struct Apart<S: Simd> {
+pub(super) struct Farthest<S: Simd> {
     /// The three largest squared distances from the centroid; 0 or −1 where there are no more.
     pub(super) r: [F<S>; 3],
     /// From one of the two farthest points to the other: to which does not matter to a line.
@@ -27,7 +28,7 @@ pub(super) struct Apart<S: Simd> {
 /// An unpressed taxel needs no mask: it stands at (0, 0) with r = 0, which is where a pressed one with r = 0 stands too,
 /// so that neither's choice changes the line. How many are pressed says whether there are two or three at all.
 #[inline(always)]
-pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
+pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Farthest<S> {
     if touch.scale.simd_eq(splat(simd, 1.0)).all_true() {
         search::<S, P, false>(simd, members, at, touch)
     } else {
@@ -37,9 +38,9 @@ pub(super) fn farthest<S: Simd, P: Members<S>>(simd: S, members: P, at: usize, t
 
 /// The same; not `SCALED` where every scale is 1, which saves a twentieth of the work.
 #[inline(always)]
-fn search<S: Simd, P: Members<S>, const SCALED: bool>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Apart<S> {
+fn search<S: Simd, P: Members<S>, const SCALED: bool>(simd: S, members: P, at: usize, touch: &Touch<S>) -> Farthest<S> {
     let (unseen, none): (F<S>, F<S>) = (splat(simd, -1.0), splat(simd, 0.0));
-    let mut far: Apart<S> = Apart { r: [unseen; 3], x: none, y: none };
+    let mut far: Farthest<S> = Farthest { r: [unseen; 3], x: none, y: none };
     let (mut far_x, mut far_y): (F<S>, F<S>) = (none, none);
     for member in 0..members.count() {
         // Strictly larger, so that the lower id stays.
@@ -75,16 +76,16 @@ pub(super) fn point<S: Simd, P: Members<S>, const SCALED: bool>(
 
 /// Puts the line through the two farthest points into `cells`, with its flags.
 #[inline(always)]
-pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, apart: &Apart<S>, at: usize, cells: &mut Cells) {
+pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, apart: &Farthest<S>, at: usize, answers: &mut Answers) {
     let (angle, flags, present) = line(simd, touch, apart);
-    cells.put(simd, Component::Orientation, angle, at);
-    cells.say(simd, (flags, present), at);
+    answers.put(simd, Component::Orientation, angle, at);
+    answers.add_status(simd, (flags, present), at);
 }
 
 /// The angle of the line through the two farthest points, where there is one; flags; and what is present. Where no lane has
 /// one, what was found is not looked at.
 #[inline(always)]
-fn line<S: Simd>(simd: S, touch: &Touch<S>, &Apart { r, x, y }: &Apart<S>) -> (F<S>, U<S>, U<S>) {
+fn line<S: Simd>(simd: S, touch: &Touch<S>, &Farthest { r, x, y }: &Farthest<S>) -> (F<S>, U<S>, U<S>) {
     let (none, one, two) = (splat(simd, 0.0), splat_u(simd, 1), splat_u(simd, 2));
     let single = bits_where(simd, touch.touched & touch.active.simd_le(one), Flags::ONE_TAXEL.bits());
     let several = touch.touched & touch.active.simd_gt(one);
@@ -164,7 +165,7 @@ mod tests {
                     u: all(0.0),
                     v: all(0.0),
                 };
-                let apart = Apart { r: [all(first), all(second), all(third)], x: all(x), y: all(y) };
+                let apart = Farthest { r: [all(first), all(second), all(third)], x: all(x), y: all(y) };
                 store_u(simd, line(simd, &touch, &apart).1, &mut flags, 0);
             });
             prop_assert_eq!(Flags::from_bits_retain(flags[0]), with_roots(active, [first, second, third], x, y));

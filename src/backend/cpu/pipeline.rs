@@ -10,8 +10,9 @@ use fearless_simd::prelude::*;
 use super::axis;
 use super::contact::{self, Sums};
 use super::lanes::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
-use super::members::{Cells, Compensated, Kind, Members, OnePass, Sum, Touch};
-use super::orientation::{self, Apart};
+use super::members::{Compensated, Kind, KindLanes, Members, OnePass, Sum, Touch};
+use super::orientation::{self, Farthest};
+use super::write::Answers;
 use crate::percept::{Component, Flags, Outputs};
 use crate::scene::{Plan, Stages};
 use crate::stage::calibrate::UNUSABLE;
@@ -31,7 +32,7 @@ pub(super) trait Sweep<S: Simd>: Copy {
     fn statuses(self, simd: S, at: usize) -> (U<S>, M<S>);
     /// The numerator of the centroid's third coordinate.
     fn depth<A: Sum<S>>(self, simd: S, at: usize) -> F<S>;
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S>;
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S>;
     /// a, b and d of the second moments.
     fn moments<A: Sum<S>>(self, simd: S, at: usize, touch: &Touch<S>) -> [F<S>; 3];
 }
@@ -70,7 +71,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S> {
         orientation::farthest(simd, self.0, at, touch)
     }
 
@@ -116,100 +117,84 @@ impl Between {
         Self { active: [0; LANES], u: [0.0; LANES], v: [0.0; LANES], found: [[0.0; LANES]; 5] };
 }
 
-/// All stages for as many sets of cells as `cells` and `between` have, up to lane `lanes` of each; `lot` says where a
-/// set finds its members, and what its fields are like.
+/// All stages for as many sets of cells as `cells` and `between` have, up to lane `lanes` of each; `set` says where a set
+/// finds its members, and what its fields are like.
 #[inline(always)]
-pub(super) fn touch<S: Simd, P: Sweep<S>, K: Kind<S>>(
+pub(super) fn all_stages<S: Simd, P: Sweep<S>, K: Kind<S>>(
     simd: S,
-    lot: impl Fn(usize) -> (P, K),
+    set: impl Fn(usize) -> (P, K),
     lanes: usize,
     wanted: Wanted,
     between: &mut [Between],
-    cells: &mut [Cells],
+    answers: &mut [Answers],
 ) {
     let Wanted { stages, compensated, .. } = wanted;
-    for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-        let (members, kind) = lot(index);
-        let mut at = 0;
-        while at < lanes {
-            let next = at + width::<S>();
-            if next >= lanes {
-                let sums = match compensated {
-                    true => members.sums::<Compensated<S>>(simd, at, stages.centroid),
-                    false => members.sums::<OnePass<S>>(simd, at, stages.centroid),
-                };
-                find_contact(simd, members, &kind, wanted, at, &sums, between, cells);
-            } else {
-                let [sums, next_sums] = match compensated {
-                    true => members.two_sums::<Compensated<S>>(simd, at, stages.centroid),
-                    false => members.two_sums::<OnePass<S>>(simd, at, stages.centroid),
-                };
-                find_contact(simd, members, &kind, wanted, at, &sums, between, cells);
-                find_contact(simd, members, &kind, wanted, next, &next_sums, between, cells);
+    // Runs a stage on every vector of lanes of all sets.
+    macro_rules! for_each_vector {
+        (|$members:pat_param, $kind:ident, $at:ident, $between:ident, $answers:ident| $stage:expr) => {
+            for (index, ($answers, $between)) in answers.iter_mut().zip(&mut *between).enumerate() {
+                let ($members, $kind) = set(index);
+                let mut $at = 0;
+                while $at < lanes {
+                    $stage;
+                    $at += width::<S>();
+                }
             }
-            at = next + width::<S>();
-        }
+        };
     }
+    for_each_vector!(|members, kind, at, between, answers| {
+        let next = at + width::<S>();
+        if next >= lanes {
+            let sums = match compensated {
+                true => members.sums::<Compensated<S>>(simd, at, stages.centroid),
+                false => members.sums::<OnePass<S>>(simd, at, stages.centroid),
+            };
+            find_contact(simd, members, &kind, wanted, at, &sums, between, answers);
+        } else {
+            let [sums, next_sums] = match compensated {
+                true => members.two_sums::<Compensated<S>>(simd, at, stages.centroid),
+                false => members.two_sums::<OnePass<S>>(simd, at, stages.centroid),
+            };
+            find_contact(simd, members, &kind, wanted, at, &sums, between, answers);
+            find_contact(simd, members, &kind, wanted, next, &next_sums, between, answers);
+            at = next;
+        }
+    });
     if !stages.centroid {
         return;
     }
-    for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-        let (members, kind) = lot(index);
-        let mut at = 0;
-        while at < lanes {
-            find_centroid(simd, members, &kind, compensated, at, between, cells);
-            at += width::<S>();
-        }
-    }
+    for_each_vector!(|members, kind, at, between, answers| {
+        find_centroid(simd, members, &kind, compensated, at, between, answers);
+    });
     if stages.orientation {
-        for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-            let (members, kind) = lot(index);
-            let mut at = 0;
-            while at < lanes {
-                if let Some(touch) = so_far::<S, 2>(simd, &kind, at, between, cells) {
-                    let Apart { r: [r1, r2, r3], x, y } = members.farthest(simd, at, &touch);
-                    keep(simd, [r1, r2, r3, x, y], at, between);
-                }
-                at += width::<S>();
+        for_each_vector!(|members, kind, at, between, answers| {
+            if let Some(touch) = charted_touch::<S, 2>(simd, &kind, at, between, answers) {
+                let Farthest { r: [r1, r2, r3], x, y } = members.farthest(simd, at, &touch);
+                keep(simd, [r1, r2, r3, x, y], at, between);
             }
-        }
-        for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-            let (_, kind) = lot(index);
-            let mut at = 0;
-            while at < lanes {
-                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
-                    let [r1, r2, r3, x, y] = kept(simd, at, between);
-                    orientation::finish(simd, &touch, &Apart { r: [r1, r2, r3], x, y }, at, cells);
-                }
-                at += width::<S>();
+        });
+        for_each_vector!(|_, kind, at, between, answers| {
+            if let Some(touch) = charted_touch::<S, 1>(simd, &kind, at, between, answers) {
+                let [r1, r2, r3, x, y] = kept(simd, at, between);
+                orientation::finish(simd, &touch, &Farthest { r: [r1, r2, r3], x, y }, at, answers);
             }
-        }
+        });
     }
     if stages.axis {
-        for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-            let (members, kind) = lot(index);
-            let mut at = 0;
-            while at < lanes {
-                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
-                    let moments = match compensated {
-                        true => members.moments::<Compensated<S>>(simd, at, &touch),
-                        false => members.moments::<OnePass<S>>(simd, at, &touch),
-                    };
-                    keep(simd, moments, at, between);
-                }
-                at += width::<S>();
+        for_each_vector!(|members, kind, at, between, answers| {
+            if let Some(touch) = charted_touch::<S, 1>(simd, &kind, at, between, answers) {
+                let moments = match compensated {
+                    true => members.moments::<Compensated<S>>(simd, at, &touch),
+                    false => members.moments::<OnePass<S>>(simd, at, &touch),
+                };
+                keep(simd, moments, at, between);
             }
-        }
-        for (index, (cells, between)) in cells.iter_mut().zip(&mut *between).enumerate() {
-            let (_, kind) = lot(index);
-            let mut at = 0;
-            while at < lanes {
-                if let Some(touch) = so_far::<S, 1>(simd, &kind, at, between, cells) {
-                    axis::finish(simd, &touch, kept(simd, at, between), at, cells);
-                }
-                at += width::<S>();
+        });
+        for_each_vector!(|_, kind, at, between, answers| {
+            if let Some(touch) = charted_touch::<S, 1>(simd, &kind, at, between, answers) {
+                axis::finish(simd, &touch, kept(simd, at, between), at, answers);
             }
-        }
+        });
     }
 }
 
@@ -224,40 +209,40 @@ fn find_contact<S: Simd, P: Sweep<S>>(
     at: usize,
     sums: &Sums<S, F<S>>,
     between: &mut Between,
-    cells: &mut Cells,
+    answers: &mut Answers,
 ) {
     let Wanted { outputs, faults, .. } = wanted;
     let none = splat(simd, 0.0);
     let touched = sums.total.simd_gt(none);
-    let mut flags = kind.always(simd, at) | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
-    let mut present = kind.sums(simd, at);
+    let KindLanes { flags, sums: mut present, .. } = kind.lanes(simd, at);
+    let mut flags = flags | bits_where(simd, !touched, Flags::NO_CONTACT.bits());
     if faults {
-        let (said, unusable) = members.statuses(simd, at);
-        flags |= said;
+        let (statuses, unusable) = members.statuses(simd, at);
+        flags |= statuses;
         present = unusable.select(splat_u(simd, 0), present);
     }
-    store_u(simd, flags, &mut cells.flags, at);
-    store_u(simd, present, &mut cells.present, at);
-    cells.put(simd, Component::Total, sums.total, at);
+    store_u(simd, flags, &mut answers.flags, at);
+    store_u(simd, present, &mut answers.present, at);
+    answers.put(simd, Component::Total, sums.total, at);
     store_u(simd, sums.active, &mut between.active, at);
     store(simd, sums.u, &mut between.u, at);
     store(simd, sums.v, &mut between.v, at);
     if outputs.intersects(Outputs::PEAK | Outputs::AREA) {
         let (peak, area) = members.peak_and_area(simd, at);
-        cells.put(simd, Component::Peak, peak, at);
-        cells.put(simd, Component::Area, area, at);
+        answers.put(simd, Component::Peak, peak, at);
+        answers.put(simd, Component::Area, area, at);
     }
     if outputs.contains(Outputs::ACTIVE) {
-        store_u(simd, sums.active, &mut cells.active, at);
+        store_u(simd, sums.active, &mut answers.active, at);
     }
     if !(touched.any_true() && kind.any_charted()) {
         for part in orientation::PARTS.into_iter().chain(axis::PARTS) {
-            cells.put(simd, part, none, at);
+            answers.put(simd, part, none, at);
         }
     }
     if !touched.any_true() {
         for part in [Component::CentroidU, Component::CentroidV, Component::CentroidDepth] {
-            cells.put(simd, part, none, at);
+            answers.put(simd, part, none, at);
         }
     }
 }
@@ -271,24 +256,23 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     compensated: bool,
     at: usize,
     between: &mut Between,
-    cells: &mut Cells,
+    answers: &mut Answers,
 ) {
     let none = splat(simd, 0.0);
-    let total = load(simd, &cells[Component::Total], at);
+    let total = load(simd, &answers[Component::Total], at);
     let touched = total.simd_gt(none);
     if !touched.any_true() {
         return;
     }
-    let found = kind.found(simd, at);
-    let present = load_u(simd, &cells.present, at) | touched.select(found, splat_u(simd, 0));
-    store_u(simd, present, &mut cells.present, at);
+    let KindLanes { found, unit_m, .. } = kind.lanes(simd, at);
+    let present = load_u(simd, &answers.present, at) | touched.select(found, splat_u(simd, 0));
+    store_u(simd, present, &mut answers.present, at);
     let numerators = (load(simd, &between.u, at), load(simd, &between.v, at));
     let (u, v) = contact::quotients(simd, total, numerators, touched);
     store(simd, u, &mut between.u, at);
     store(simd, v, &mut between.v, at);
-    let unit = kind.unit_m(simd, at);
-    cells.put(simd, Component::CentroidU, u * unit, at);
-    cells.put(simd, Component::CentroidV, v * unit, at);
+    answers.put(simd, Component::CentroidU, u * unit_m, at);
+    answers.put(simd, Component::CentroidV, v * unit_m, at);
     let depth = if kind.any_uncharted() {
         let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
         let sum = match compensated {
@@ -296,30 +280,30 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
             false => members.depth::<OnePass<S>>(simd, at),
         };
         let depth = sum / total;
-        (touched & !charted).select(depth, none) * unit
+        (touched & !charted).select(depth, none) * unit_m
     } else {
         none
     };
-    cells.put(simd, Component::CentroidDepth, depth, at);
+    answers.put(simd, Component::CentroidDepth, depth, at);
 }
 
-/// What is known of touches in charts after the centroid, if there are any of `LEAST` taxels and more.
+/// Touches in charts as they are known after the centroid, if there are any of `LEAST` taxels and more.
 #[inline(always)]
-fn so_far<S: Simd, const LEAST: u32>(
+fn charted_touch<S: Simd, const LEAST: u32>(
     simd: S,
     kind: &impl Kind<S>,
     at: usize,
     between: &Between,
-    cells: &Cells,
+    answers: &Answers,
 ) -> Option<Touch<S>> {
-    let total = load(simd, &cells[Component::Total], at);
+    let total = load(simd, &answers[Component::Total], at);
     let touched = total.simd_gt(splat(simd, 0.0));
     let active = load_u(simd, &between.active, at);
     let enough = if LEAST > 1 { touched & active.simd_ge(splat_u(simd, LEAST)) } else { touched };
     if !(enough.any_true() && kind.any_charted()) {
         return None;
     }
-    let charted = (kind.found(simd, at) & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
+    let charted = (kind.lanes(simd, at).found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
     Some(Touch {
         active,
         touched: touched & charted,

@@ -13,19 +13,7 @@ use super::super::Rows;
 use super::super::raw::{ELSEWHERE, Near, Picks, Shuffle};
 use super::lanes::{Aligned, Columns, LANES, Row, store_first, transpose, with_widest};
 
-/// A frame's raw values, tile by tile.
-pub(super) trait Values: Copy {
-    /// The bits of tile `tile`.
-    fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S>;
-
-    /// Reads them.
-    #[inline(always)]
-    fn read<S: Simd>(self, simd: S, tile: usize, bits: &mut Row<u32>) {
-        self.row(simd, tile).store_slice(bits);
-    }
-}
-
-/// Those of a frame in the plan's order.
+/// A frame's raw values in the plan's order, tile by tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OneFrame<'a> {
     raw: Rows<'a>,
@@ -45,12 +33,10 @@ impl<'a> OneFrame<'a> {
         };
         Self { raw, frame, calibrated, picked }
     }
-}
 
-impl Values for OneFrame<'_> {
-    /// From slot 16 · `tile` on.
+    /// The bits from slot 16 · `tile` on.
     #[inline(always)]
-    fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S> {
+    pub(super) fn row<S: Simd>(self, simd: S, tile: usize) -> u32x16<S> {
         if let Some((values, picks)) = self.picked {
             match picks.near[tile] {
                 Near::Straight(from) => return u32x16::from_slice(simd, &values[from as usize..][..LANES]),
@@ -63,6 +49,12 @@ impl Values for OneFrame<'_> {
             }
         }
         u32x16::from_slice(simd, &one_by_one(self.raw, self.frame, tile, self.calibrated))
+    }
+
+    /// Reads them.
+    #[inline(always)]
+    pub(super) fn read<S: Simd>(self, simd: S, tile: usize, bits: &mut Row<u32>) {
+        self.row(simd, tile).store_slice(bits);
     }
 }
 
@@ -158,38 +150,23 @@ fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u3
 }
 
 /// Those of `values` that `shuffle` says, if the machine has instructions that pay; anything for those that lie elsewhere.
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
 fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>> {
-    use fearless_simd::{u8x16, u32x8};
-
     let Aligned(bits) = &mut Aligned([0; LANES]);
-    let values = &values[shuffle.from as usize..];
-    if let Some(avx512) = simd.level().as_avx512() {
-        let both = values.first_chunk::<32>()?;
-        let lanes = |lanes: &[u32]| u32x16::from_slice(avx512, lanes);
-        let places = x86::in_32(avx512, u8x16::from_slice(avx512, &shuffle.places));
-        x86::of_32(avx512, lanes(&both[..16]), lanes(&both[16..]), places).store_slice(bits);
-    } else {
-        let (avx2, starts) = (simd.level().as_avx2()?, shuffle.halves?);
-        let (places, _) = shuffle.places.as_chunks();
-        let half = |index: usize| {
-            let lanes = |lanes: &[u32]| u32x8::from_slice(avx2, lanes);
-            let (low, high) = values[usize::from(starts[index])..][..16].split_at(8);
-            x86::of_sixteen(avx2, lanes(low), lanes(high), x86::in_sixteen(avx2, &places[index], starts[index]))
-        };
-        // Written out: in a loop they take a detour through memory.
-        half(0).combine(half(1)).store_slice(bits);
+    if !pick_from_each(simd, &[values], shuffle, std::slice::from_mut(bits)) {
+        return None;
     }
     // The same lanes under another name: nothing is stored.
     Some(u32x16::from_slice(simd, bits))
 }
 
 /// The same of each of `values`, with what is the same for all made once; whether the machine has the instructions.
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn pick_from_each<S: Simd>(simd: S, values: &[&[u32]], shuffle: &Shuffle, rows: &mut [Row<u32>]) -> bool {
     use fearless_simd::{u8x16, u32x8};
+
+    use super::lanes::x86;
 
     let from = shuffle.from as usize;
     if let Some(avx512) = simd.level().as_avx512() {
@@ -219,71 +196,10 @@ fn pick_from_each<S: Simd>(simd: S, values: &[&[u32]], shuffle: &Shuffle, rows: 
     true
 }
 
-#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-#[inline(always)]
-fn pick<S: Simd>(_: S, _: &[u32], _: &Shuffle) -> Option<u32x16<S>> {
-    None
-}
-
-#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+#[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
 fn pick_from_each<S: Simd>(_: S, _: &[&[u32]], _: &Shuffle, _: &mut [Row<u32>]) -> bool {
     false
-}
-
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-mod x86 {
-    #[cfg(target_arch = "x86")]
-    use core::arch::x86::*;
-    #[cfg(target_arch = "x86_64")]
-    use core::arch::x86_64::*;
-
-    use fearless_simd::prelude::*;
-    use fearless_simd::x86::{Avx2, Avx512};
-    use fearless_simd::{u8x16, u32x8, u32x16};
-
-    fearless_simd::kernel!(
-        /// `places` as lanes.
-        #[inline(always)]
-        pub(super) fn in_32(token: Avx512, places: u8x16<Avx512>) -> u32x16<Avx512> {
-            _mm512_cvtepu8_epi32(places.into()).simd_into(token)
-        }
-    );
-
-    fearless_simd::kernel!(
-        /// Those of 32 lanes that `places` says.
-        #[inline(always)]
-        pub(super) fn of_32(
-            token: Avx512,
-            low: u32x16<Avx512>,
-            high: u32x16<Avx512>,
-            places: u32x16<Avx512>,
-        ) -> u32x16<Avx512> {
-            _mm512_permutex2var_epi32(low.into(), places.into(), high.into()).simd_into(token)
-        }
-    );
-
-    fearless_simd::kernel!(
-        /// `places`, which count from `start` places before sixteen lanes, as lanes that count from the first of these.
-        #[inline(always)]
-        pub(super) fn in_sixteen(token: Avx2, places: &[u8; 8], start: u8) -> u32x8<Avx2> {
-            let places = _mm256_cvtepu8_epi32(_mm_set_epi64x(0, i64::from_ne_bytes(*places)));
-            _mm256_sub_epi32(places, _mm256_set1_epi32(start.into())).simd_into(token)
-        }
-    );
-
-    fearless_simd::kernel!(
-        /// Those of sixteen lanes that `places` says.
-        #[inline(always)]
-        pub(super) fn of_sixteen(token: Avx2, low: u32x8<Avx2>, high: u32x8<Avx2>, places: u32x8<Avx2>) -> u32x8<Avx2> {
-            let places = places.into();
-            let [low, high] =
-                [low, high].map(|lanes| _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(lanes.into(), places)));
-            // Eight and more is the bit that becomes the sign.
-            let which = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(places));
-            _mm256_castps_si256(_mm256_blendv_ps(low, high, which)).simd_into(token)
-        }
-    );
 }
 
 /// Frames that [`side_by_side`] takes at once.

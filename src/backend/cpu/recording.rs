@@ -8,14 +8,14 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::super::{RawBatch, Rows};
-use super::calibrate::Tiles;
-use super::lanes::{Aligned, F, LANES, Lines, Row, U, load, load_u, splat, transpose, with_widest};
-use super::members::{Cells, Members, OneKind, Sample};
-use super::pipeline::{Abreast, Between, Wanted, touch};
+use super::calibrate::{Calibrated, Tiles};
+use super::lanes::{Aligned, F, LANES, Row, U, load, load_u, splat, transpose, with_widest};
+use super::members::{Members, OneKind, Sample};
+use super::pipeline::{Abreast, Between, Wanted, all_stages};
 use super::read::SomeFrames;
-use super::wide::ManyAbreast;
+use super::wide::WideAbreast;
 use super::window::{Rest, Stretch, Window};
-use super::write::{Columned, Place};
+use super::write::{Answers, FilledColumns, Place};
 use super::{calibrate, change};
 use crate::parallel;
 use crate::percept::CellsMut;
@@ -34,7 +34,7 @@ pub(super) struct Recording {
     /// By field.
     briefs: Vec<Brief>,
     rest: Rest,
-    columned: Columned,
+    columns: FilledColumns,
     /// What tasks work in, one for each that runs.
     scratches: Mutex<Vec<Scratch>>,
 }
@@ -57,7 +57,7 @@ impl Recording {
         Self {
             briefs: Brief::all(plan),
             rest: Rest::new(&plan.fields, &seen),
-            columned: Columned::new(plan),
+            columns: FilledColumns::new(plan),
             scratches: Mutex::new(Vec::new()),
             seen,
             window,
@@ -117,19 +117,19 @@ impl Recording {
         let Call { level, plan, tiles, .. } = call;
         let is_first = stretch.fields.start == 0;
         if is_first {
-            (scratch.faults, scratch.in_view.any_rests) = (false, false);
+            (scratch.faults, scratch.in_window.any_rests) = (false, false);
         }
         for range in stretch.reads.iter().filter(|range| !range.is_empty()) {
-            scratch.faults |= scratch.in_view.read(level, plan, tiles, raw, range.clone());
+            scratch.faults |= scratch.in_window.read(level, plan, tiles, raw, range.clone());
         }
         if is_first && plan.has_changes() {
             self.add_changes(call, first, cells.frames(), scratch);
         }
         if is_first && !cells.pressures.is_empty() {
-            scratch.in_view.keep_pressures(plan, cells);
+            scratch.in_window.keep_pressures(plan, cells);
         }
-        let Scratch { in_view, cells: of_fields, between, faults, .. } = scratch;
-        let skin = Skin { plan, pressures: &in_view.pressures, statuses: &in_view.statuses };
+        let Scratch { in_window, answers, between, faults, .. } = scratch;
+        let skin = Skin { plan, pressures: &in_window.values.pressures, statuses: &in_window.values.statuses };
         // The last first, as what is written of it may reach into the first ones of the next frame.
         let last = stretch.start_of_last_sixteen();
         for first_field in std::iter::once(last).chain((stretch.fields.start..last).step_by(LANES)) {
@@ -137,30 +137,31 @@ impl Recording {
             // Of later stretches the next frame's first fields have their answers.
             let place = Place::new(cells, first_field, fields.len(), is_first);
             let mut rests = [false; LANES];
-            let ask = if in_view.any_rests { &mut rests[..fields.len()] } else { &mut [] };
+            let ask = if in_window.any_rests { &mut rests[..fields.len()] } else { &mut [] };
             for (field, rests) in (first_field..).zip(ask) {
-                *rests = self.rest.has_at_rest(field, |tile| in_view.tiles[tile].rests);
+                *rests = self.rest.has_at_rest(field, |tile| in_window.tiles[tile].rests);
             }
             let rests = &rests[..fields.len()];
             if rests.iter().all(|&rests| rests) {
-                self.columned.write_at_rest(fields, place, cells);
+                self.columns.write_at_rest(fields, place, cells);
                 continue;
             }
-            with_widest!(level, simd => answer(simd, plan, self, first_field, rests, &skin, *faults, between, of_fields));
-            with_widest!(level, simd => self.columned.write(simd, of_fields, place, cells));
+            with_widest!(level, simd => answer(simd, plan, self, first_field, rests, &skin, *faults, between, answers));
+            with_widest!(level, simd => self.columns.write(simd, answers, place, cells));
         }
     }
 
     /// Puts changes behind the pressures that they are made of.
     fn add_changes(&self, call: Call<'_>, first: usize, frames: usize, scratch: &mut Scratch) {
         let Call { level, plan, tiles, raw, before } = call;
-        let Scratch { in_view, before: (was, said), faults, .. } = scratch;
-        calibrate::frame(level, plan, tiles, the_one_before(raw.rows, first, before), was, said);
-        let before = (was.as_flattened(), said.as_flattened());
+        let Scratch { in_window, before: last, faults, .. } = scratch;
+        calibrate::frame(level, plan, tiles, the_one_before(raw.rows, first, before), last);
+        let last = (last.pressures.as_flattened(), last.statuses.as_flattened());
         let steps = &raw.steps[first..first + frames];
-        *faults |= change::frames(plan, steps, before, &mut in_view.pressures, &mut in_view.statuses);
-        in_view.tiles.iter_mut().for_each(|tile| tile.rests = false);
-        in_view.any_rests = false;
+        let Calibrated { pressures, statuses } = &mut in_window.values;
+        *faults |= change::frames(plan, steps, last, pressures, statuses);
+        in_window.tiles.iter_mut().for_each(|tile| tile.rests = false);
+        in_window.any_rests = false;
     }
 }
 
@@ -174,12 +175,12 @@ pub(super) fn the_one_before<'a>(rows: Rows<'a>, frame: usize, before: &'a [RawV
 
 /// What a task needs to work in.
 struct Scratch {
-    in_view: InView,
+    in_window: InWindow,
     /// Sixteen fields' answers, a lane a frame.
-    cells: Box<[Cells; LANES]>,
+    answers: Box<[Answers; LANES]>,
     between: Box<[Between; LANES]>,
     /// Pressures and statuses of the frame before, where there are changes.
-    before: (Lines<f32>, Lines<u32>),
+    before: Calibrated,
     /// Whether any value of these frames so far is anything but a plain number.
     faults: bool,
 }
@@ -188,10 +189,10 @@ impl Scratch {
     fn new(plan: &Plan, window: &Window) -> Self {
         let before = if plan.has_changes() { window.slots() / LANES } else { 0 };
         Self {
-            in_view: InView::new(window),
-            cells: Box::new([Cells::EMPTY; LANES]),
+            in_window: InWindow::new(window),
+            answers: Box::new([Answers::EMPTY; LANES]),
             between: Box::new([Between::EMPTY; LANES]),
-            before: (Lines::new(before, 0.0), Lines::new(before, 0)),
+            before: Calibrated::new(before),
             faults: false,
         }
     }
@@ -214,7 +215,7 @@ struct OverFrames<'a, const WEIGHTED: bool> {
     field: usize,
 }
 
-/// What blocks have to know of every field: little, and side by side.
+/// What is to be known of every field: little, and side by side.
 #[derive(Clone, Copy, Debug)]
 struct Brief {
     first: usize,
@@ -284,12 +285,11 @@ impl<S: Simd, const WEIGHTED: bool> Members<S> for OverFrames<'_, WEIGHTED> {
 }
 
 /// Values of up to sixteen frames, as far as the window reaches.
-struct InView {
+struct InWindow {
     /// By slot, a lane a frame.
-    pressures: Lines<f32>,
-    statuses: Lines<u32>,
-    tiles: Vec<TileInView>,
-    /// Whether any tile rests that was read for this block; each block unsets it.
+    values: Calibrated,
+    tiles: Vec<TileState>,
+    /// Whether any tile rests that was read for these frames.
     any_rests: bool,
     /// What a slot's number is cut to for its place here.
     mask: usize,
@@ -297,20 +297,19 @@ struct InView {
 
 /// What is known of sixteen taxels in sixteen frames.
 #[derive(Clone, Copy)]
-struct TileInView {
+struct TileState {
     /// All pressures and statuses are 0.
     rests: bool,
     /// Statuses say something.
     faulty: bool,
 }
 
-impl InView {
+impl InWindow {
     fn new(window: &Window) -> Self {
         let slots = window.slots();
         Self {
-            pressures: Lines::new(slots, 0.0),
-            statuses: Lines::new(slots, 0),
-            tiles: vec![TileInView { rests: true, faulty: false }; slots / LANES],
+            values: Calibrated::new(slots),
+            tiles: vec![TileState { rests: true, faulty: false }; slots / LANES],
             any_rests: false,
             mask: window.mask(),
         }
@@ -319,7 +318,7 @@ impl InView {
     /// Copies all pressures to where percepts keep them.
     fn keep_pressures(&self, plan: &Plan, cells: &mut CellsMut<'_>) {
         let (slots, frames) = (plan.slots(), cells.frames());
-        let tiles = self.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&self.tiles).enumerate();
+        let tiles = self.values.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&self.tiles).enumerate();
         // Those at rest are 0 there already.
         for (tile, (rows, _)) in tiles.filter(|(_, (_, kept))| !kept.rests) {
             for frame in 0..frames {
@@ -343,14 +342,14 @@ fn calibrated<S: Simd>(
     tiles: &Tiles,
     raw: &SomeFrames<'_>,
     range: Range<usize>,
-    in_view: &mut InView,
+    in_window: &mut InWindow,
 ) -> bool {
     let frames = raw.frames();
     let mut any = false;
     let Aligned(pressures) = &mut Aligned([[0.0; LANES]; LANES]);
     let Aligned(statuses) = &mut Aligned([[0; LANES]; LANES]);
     let Aligned(bits) = &mut Aligned([[0; LANES]; LANES]);
-    let InView { pressures: kept_pressures, statuses: kept_statuses, tiles: kept_tiles, any_rests, mask } = in_view;
+    let InWindow { values: kept_values, tiles: kept_tiles, any_rests, mask } = in_window;
     for (index, &sort) in range.clone().zip(&tiles.sorts[range]) {
         let tile = &tiles.all[index];
         let slot = index * LANES;
@@ -369,19 +368,19 @@ fn calibrated<S: Simd>(
         );
         let rests = !is_pressed;
         *any_rests |= rests;
-        let (abreast, kept) = (&mut kept_pressures[place..place + LANES], &mut kept_tiles[place / LANES]);
+        let (abreast, kept) = (&mut kept_values.pressures[place..place + LANES], &mut kept_tiles[place / LANES]);
         if !rests {
             transpose(simd, |frame| cast_ref(&pressures[frame]), cast_slice_mut::<Row<f32>, Row<u32>>(abreast));
         } else if !kept.rests {
             abreast.fill([0.0; LANES]);
         }
-        let abreast = &mut kept_statuses[place..place + LANES];
+        let abreast = &mut kept_values.statuses[place..place + LANES];
         if faults {
             transpose(simd, |frame| &statuses[frame], abreast);
         } else if kept.faulty {
             abreast.fill([0; LANES]);
         }
-        *kept = TileInView { rests, faulty: faults };
+        *kept = TileState { rests, faulty: faults };
         any |= faults;
     }
     any
@@ -399,7 +398,7 @@ fn answer<S: Simd>(
     skin: &Skin<'_>,
     faults: bool,
     between: &mut [Between; LANES],
-    answers: &mut [Cells; LANES],
+    answers: &mut [Answers; LANES],
 ) {
     let wanted = Wanted::new(plan, faults);
     let briefs = &recording.briefs[first..first + rests.len()];
@@ -418,7 +417,7 @@ fn answer<S: Simd>(
                 for (set, brief) in sets.iter_mut().zip(briefs) {
                     *set = (&recording.seen[brief.members()], &brief.kind);
                 }
-                touch(
+                all_stages(
                     simd,
                     #[inline(always)]
                     |index| {
@@ -434,9 +433,9 @@ fn answer<S: Simd>(
         }
         match way {
             _ if rest => {
-                answers.iter_mut().zip(briefs).for_each(|(cells, brief)| *cells = brief.kind.at_rest());
+                answers.iter_mut().zip(briefs).for_each(|(answers, brief)| *answers = Answers::untouched(&brief.kind));
             }
-            Way::Wide => answer!(ManyAbreast, true),
+            Way::Wide => answer!(WideAbreast, true),
             Way::Unweighted => answer!(Abreast, false),
             Way::Weighted => answer!(Abreast, true),
         }

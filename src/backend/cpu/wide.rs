@@ -1,147 +1,22 @@
 //! A field of many members: sixteen of them abreast, so that one large field costs no more a member than small ones.
 //!
 //! Every sum is sixteen sums, one for every sixteenth member, added up in a fixed tree; a choice between equals still goes
-//! to the lower id. [`Wide`] does that for one frame, a sum a lane; [`ManyAbreast`] has sixteen frames abreast, and keeps
+//! to the lower id. [`Wide`] does that for one frame, a sum a lane; [`WideAbreast`] has sixteen frames abreast, and keeps
 //! sixteen sums of each.
 
-use fearless_simd::Level;
 use fearless_simd::prelude::*;
 
 use super::axis;
 use super::contact::{self, Sums};
-use super::lanes::{F, I, LANES, Lines, M, Row, U, load, load_u, splat, splat_u, store, store_u, width, with_widest};
-use super::members::{Cells, Members, OneKind, OnePass, Sample, Sum, Touch};
-use super::orientation::{Apart, point};
-use super::pipeline::{Abreast, Between, Sweep, Wanted, touch};
-use crate::scene::Plan;
+use super::lanes::{F, I, LANES, M, Row, U, splat, splat_u, store, store_u, width};
+use super::members::{Members, OnePass, Sum, Touch};
+use super::orientation::{Farthest, point};
+use super::pipeline::{Abreast, Sweep};
 use crate::stage::calibrate::UNUSABLE;
 
-/// A wide field's members in rows of [`LANES`], the last one filled up with unpressed ones.
-#[derive(Clone, Debug)]
-pub(super) struct Table {
-    pub(super) field: usize,
-    kind: OneKind,
-    slots: Vec<u32>,
-    weights: Lines<f32>,
-    u: Lines<f32>,
-    v: Lines<f32>,
-    depths: Lines<f32>,
-    areas: Lines<f32>,
-}
-
-impl Table {
-    /// Of field `field`.
-    pub(super) fn new(plan: &Plan, field: usize) -> Self {
-        let of = &plan.fields[field];
-        let rows = of.count.div_ceil(LANES);
-        let blank = Lines::new(rows, 0.0);
-        let mut table = Self {
-            field,
-            kind: OneKind::new(of),
-            slots: Vec::with_capacity(of.count),
-            weights: blank.clone(),
-            u: blank.clone(),
-            v: blank.clone(),
-            depths: blank.clone(),
-            areas: blank,
-        };
-        for (index, (member, &depth)) in plan.members_of(of).iter().zip(&of.depths).enumerate() {
-            let (row, lane) = (index / LANES, index % LANES);
-            table.slots.push(member.slot);
-            table.weights[row][lane] = member.weight;
-            table.u[row][lane] = member.u;
-            table.v[row][lane] = member.v;
-            table.depths[row][lane] = depth;
-            table.areas[row][lane] = plan.taxels[member.slot as usize].area;
-        }
-        table
-    }
-}
-
-/// Its values in one frame.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Values {
-    pressures: Lines<f32>,
-    statuses: Lines<u32>,
-}
-
-impl Values {
-    /// Reads the pressures and, where `faults` says so, statuses of `table`'s taxels.
-    pub(super) fn gather(
-        &mut self,
-        table: &Table,
-        faults: bool,
-        pressure: impl Fn(usize) -> f32,
-        status: impl Fn(usize) -> u32,
-    ) {
-        self.pressures.make(table.weights.len(), 0.0);
-        self.statuses.make(table.weights.len(), 0);
-        for (row, slots) in self.pressures.iter_mut().zip(table.slots.chunks(LANES)) {
-            row[slots.len()..].fill(0.0);
-            for (value, &slot) in row.iter_mut().zip(slots) {
-                *value = pressure(slot as usize);
-            }
-        }
-        if faults {
-            for (row, slots) in self.statuses.iter_mut().zip(table.slots.chunks(LANES)) {
-                // What is not there does not keep the others from being all unusable.
-                row[slots.len()..].fill(UNUSABLE);
-                for (value, &slot) in row.iter_mut().zip(slots) {
-                    *value = status(slot as usize);
-                }
-            }
-        }
-    }
-}
-
-/// A wide field in one frame: every lane of an answer is the field's.
+/// A wide field in one frame: all lanes have members of it, and its answer.
 #[derive(Clone, Copy)]
-pub(super) struct Wide<'a> {
-    pub(super) table: &'a Table,
-    pub(super) values: &'a Values,
-}
-
-impl<S: Simd> Members<S> for Wide<'_> {
-    #[inline(always)]
-    fn count(self) -> usize {
-        self.table.weights.len()
-    }
-
-    #[inline(always)]
-    fn sample(self, simd: S, member: usize, at: usize) -> Sample<S> {
-        let pressure = load(simd, &self.values.pressures[member], at);
-        Sample {
-            pressure,
-            pull: load(simd, &self.table.weights[member], at) * pressure,
-            u: load(simd, &self.table.u[member], at),
-            v: load(simd, &self.table.v[member], at),
-        }
-    }
-
-    #[inline(always)]
-    fn depth(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.table.depths[member], at)
-    }
-
-    #[inline(always)]
-    fn area(self, simd: S, member: usize, at: usize) -> F<S> {
-        load(simd, &self.table.areas[member], at)
-    }
-
-    #[inline(always)]
-    fn status(self, simd: S, member: usize, at: usize) -> U<S> {
-        load_u(simd, &self.values.statuses[member], at)
-    }
-}
-
-/// All stages for one cell of a wide field, whose answer is the first lane of `cells`.
-#[inline(never)]
-pub(super) fn cell(level: Level, plan: &Plan, field: Wide<'_>, faults: bool, cells: &mut Cells) {
-    let wanted = Wanted::new(plan, faults);
-    let (mut between, cells) = (Between::EMPTY, std::slice::from_mut(cells));
-    let between = std::slice::from_mut(&mut between);
-    with_widest!(level, simd => touch(simd, |_| (field, &field.table.kind), 1, wanted, between, cells));
-}
+pub(super) struct Wide<P>(pub(super) P);
 
 /// The sum of all lanes, as a tree.
 #[inline(always)]
@@ -183,15 +58,15 @@ fn all_lanes<S: Simd, A: Sum<S>, const K: usize>(simd: S, sums: impl Fn(usize) -
     )
 }
 
-impl<S: Simd> Sweep<S> for Wide<'_> {
+impl<S: Simd, P: Members<S>> Sweep<S> for Wide<P> {
     #[inline(always)]
     fn sums<A: Sum<S>>(self, simd: S, _: usize, centroid: bool) -> Sums<S, F<S>> {
-        let (none, sums) = (splat(simd, 0.0), contact::sums::<S, A, Self, 1>);
+        let (none, sums) = (splat(simd, 0.0), contact::sums::<S, A, P, 1>);
         let [total, active, u, v] = all_lanes(
             simd,
             #[inline(always)]
             |at| {
-                let [Sums { total, active, u, v }] = sums(simd, self, at, centroid);
+                let [Sums { total, active, u, v }] = sums(simd, self.0, at, centroid);
                 let mut count = A::zero(simd);
                 count.add(active.bitcast::<I<S>>().to_float::<F<S>>(), none.simd_ge(none));
                 [total, count, u, v]
@@ -205,7 +80,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
         let mut rows = [[0.0; LANES]; 2];
         let mut at = 0;
         while at < LANES {
-            let (peak, area) = contact::peak_and_area(simd, self, at);
+            let (peak, area) = contact::peak_and_area(simd, self.0, at);
             store(simd, peak, &mut rows[0], at);
             store(simd, area, &mut rows[1], at);
             at += width::<S>();
@@ -219,7 +94,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
         let mut rows = [[0; LANES]; 2];
         let mut at = 0;
         while at < LANES {
-            let (any, all) = contact::statuses(simd, self, at);
+            let (any, all) = contact::statuses(simd, self.0, at);
             store_u(simd, any, &mut rows[0], at);
             store_u(simd, all, &mut rows[1], at);
             at += width::<S>();
@@ -234,13 +109,13 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
         let [depth] = all_lanes(
             simd,
             #[inline(always)]
-            |at| [contact::depth::<S, A, Self>(simd, self, at)],
+            |at| [contact::depth::<S, A, P>(simd, self.0, at)],
         );
         depth
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, _: usize, touch: &Touch<S>) -> Apart<S> {
+    fn farthest(self, simd: S, _: usize, touch: &Touch<S>) -> Farthest<S> {
         let (none, unset) = (splat(simd, 0.0), splat(simd, -1.0));
         let mut third = -1.0_f32;
         let mut candidates = [Candidate::NONE; 2 * LANES];
@@ -249,8 +124,8 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
             let (mut r1, mut r2, mut r3) = (unset, unset, unset);
             let (mut x1, mut y1, mut x2, mut y2) = (none, none, none, none);
             let (mut i1, mut i2) = (splat_u(simd, 0), splat_u(simd, 0));
-            for member in 0..Members::<S>::count(self) {
-                let (r, x, y) = point::<S, Self, true>(simd, self, member, at, touch);
+            for member in 0..self.0.count() {
+                let (r, x, y) = point::<S, P, true>(simd, self.0, member, at, touch);
                 let here = splat_u(simd, member as u32);
                 let (first, second) = (r.simd_gt(r1), r.simd_gt(r2));
                 r3 = r3.max(r2.min(r));
@@ -272,7 +147,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
             at += width::<S>();
         }
         let [first, second] = two_farthest(&candidates, &mut third);
-        Apart {
+        Farthest {
             r: [first.r, second.r, third].map(
                 #[inline(always)]
                 |r| splat(simd, r),
@@ -287,7 +162,7 @@ impl<S: Simd> Sweep<S> for Wide<'_> {
         all_lanes(
             simd,
             #[inline(always)]
-            |at| axis::moments::<S, A, Self>(simd, self, at, touch),
+            |at| axis::moments::<S, A, P>(simd, self.0, at, touch),
         )
     }
 }
@@ -326,7 +201,7 @@ fn two_farthest(candidates: &[Candidate], third: &mut f32) -> [Candidate; 2] {
 
 /// A wide field over sixteen frames: what [`Abreast`] is for others.
 #[derive(Clone, Copy)]
-pub(super) struct ManyAbreast<P>(pub(super) P);
+pub(super) struct WideAbreast<P>(pub(super) P);
 
 /// Members whose values stay in the nearest cache while sixteen sums go over them in turn; a multiple of [`LANES`].
 const MEMBERS_IN_TURN: usize = 256;
@@ -371,7 +246,7 @@ fn in_sixteen<S: Simd, A: Sum<S>, const K: usize>(
     sums[0].map(A::total)
 }
 
-impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
+impl<S: Simd, P: Members<S>> Sweep<S> for WideAbreast<P> {
     #[inline(always)]
     fn sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> Sums<S, F<S>> {
         let (none, one) = (splat(simd, 0.0), splat(simd, 1.0));
@@ -422,7 +297,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for ManyAbreast<P> {
     }
 
     #[inline(always)]
-    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Apart<S> {
+    fn farthest(self, simd: S, at: usize, touch: &Touch<S>) -> Farthest<S> {
         // In the members' order, which is that of the ids.
         Abreast(self.0).farthest(simd, at, touch)
     }

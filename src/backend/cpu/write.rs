@@ -1,23 +1,78 @@
-//! From lanes to the columns of percepts: sixteen fields over sixteen frames, or sixteen fields of one frame.
+//! What the stages found in lanes, and from there to the columns of percepts: sixteen fields over sixteen frames, or sixteen
+//! fields of one frame.
+
+use std::ops::{Index, IndexMut};
 
 use bytemuck::{cast_ref, cast_slice_mut};
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
-use super::lanes::{Columns, LANES, Row, store_first, transpose};
-use super::members::{Cells, OneKind};
+use super::lanes::{Columns, F, LANES, Row, U, load_u, store, store_first, store_u, transpose};
+use super::members::OneKind;
 use crate::percept::{CellsMut, Component, Flags, Outputs};
 use crate::scene::{Plan, PlanField};
 
-/// Which columns the stages up to axis fill for a plan.
+/// What the stages found, a row each; lengths in metres.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Answers {
+    pub(super) flags: Row<u32>,
+    pub(super) present: Row<u32>,
+    pub(super) active: Row<u32>,
+    parts: [Row<f32>; Component::COUNT],
+}
+
+impl Answers {
+    pub(super) const EMPTY: Self =
+        Self { flags: [0; LANES], present: [0; LANES], active: [0; LANES], parts: [[0.0; LANES]; Component::COUNT] };
+
+    /// Those of a field that nothing presses.
+    pub(super) fn untouched(kind: &OneKind) -> Self {
+        let (flags, present) = kind.untouched();
+        Self { flags: [flags; LANES], present: [present; LANES], ..Self::EMPTY }
+    }
+
+    /// Stores lanes of a part.
+    #[inline(always)]
+    pub(super) fn put<S: Simd>(&mut self, simd: S, part: Component, lanes: F<S>, at: usize) {
+        store(simd, lanes, &mut self[part], at);
+    }
+
+    /// Adds flags and outputs that are present.
+    #[inline(always)]
+    pub(super) fn add_status<S: Simd>(&mut self, simd: S, (flags, present): (U<S>, U<S>), at: usize) {
+        let flags = load_u(simd, &self.flags, at) | flags;
+        store_u(simd, flags, &mut self.flags, at);
+        let present = load_u(simd, &self.present, at) | present;
+        store_u(simd, present, &mut self.present, at);
+    }
+}
+
+impl Index<Component> for Answers {
+    type Output = Row<f32>;
+
+    #[inline(always)]
+    fn index(&self, part: Component) -> &Row<f32> {
+        &self.parts[part as usize]
+    }
+}
+
+impl IndexMut<Component> for Answers {
+    #[inline(always)]
+    fn index_mut(&mut self, part: Component) -> &mut Row<f32> {
+        &mut self.parts[part as usize]
+    }
+}
+
+/// The columns that the stages up to axis fill for a plan.
 #[derive(Clone, Debug)]
-pub(super) struct Columned {
+pub(super) struct FilledColumns {
     outputs: Outputs,
     parts: Vec<Component>,
     counts: bool,
 }
 
-impl Columned {
+impl FilledColumns {
     pub(super) fn new(plan: &Plan) -> Self {
         let motion = |part: &Component| part.column().is_some_and(|column| Outputs::MOTION.contains(column.output));
         let kept = |part: &Component| plan.columns.intersects(part.kept_for()) && !motion(part);
@@ -30,7 +85,7 @@ impl Columned {
 
     /// Writes the answers of sixteen fields, a lane a frame, where they belong.
     #[inline(always)]
-    pub(super) fn write<S: Simd>(&self, simd: S, answers: &[Cells; LANES], place: Place, cells: &mut CellsMut<'_>) {
+    pub(super) fn write<S: Simd>(&self, simd: S, answers: &[Answers; LANES], place: Place, cells: &mut CellsMut<'_>) {
         for &part in &self.parts {
             let column = cast_slice_mut(&mut cells[part]);
             transpose(simd, |field| cast_ref(&answers[field][part]), &mut Target { column, place, mask: u32::MAX });
@@ -64,17 +119,17 @@ impl Columned {
         }
     }
 
-    /// Writes the answers of fields of one frame, a lane a field.
-    pub(super) fn write_frame(&self, places: &impl Places, answer: &Cells, cells: &mut CellsMut<'_>) {
+    /// Writes the answers of fields of one frame.
+    pub(super) fn write_frame(&self, lanes: &FieldLanes, answer: &Answers, cells: &mut CellsMut<'_>) {
         for &part in &self.parts {
-            places.put(&answer[part], &mut cells[part]);
+            lanes.put(&answer[part], &mut cells[part]);
         }
         if self.counts {
-            places.put(&answer.active, cells.active);
+            lanes.put(&answer.active, cells.active);
         }
-        places.put(&answer.flags, cast_slice_mut::<Flags, u32>(cells.flags));
+        lanes.put(&answer.flags, cast_slice_mut::<Flags, u32>(cells.flags));
         let present = answer.present.map(|present| present & self.outputs.bits());
-        places.put(&present, cast_slice_mut::<Outputs, u32>(cells.present));
+        lanes.put(&present, cast_slice_mut::<Outputs, u32>(cells.present));
     }
 }
 
@@ -135,36 +190,31 @@ impl Columns for Target<'_> {
     }
 }
 
-/// Where the lanes of one frame belong.
-pub(super) trait Places {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]);
+/// Up to sixteen fields of a frame, a lane each.
+#[derive(Clone, Debug)]
+pub(super) struct FieldLanes {
+    fields: Vec<usize>,
+    /// The first of them, if they stand one after the other.
+    first: Option<usize>,
 }
 
-impl Places for Vec<usize> {
+impl FieldLanes {
+    pub(super) fn new(fields: &[usize]) -> Self {
+        let are_consecutive = fields.iter().zip(fields[0]..).all(|(&field, expected)| field == expected);
+        Self { fields: fields.to_vec(), first: are_consecutive.then_some(fields[0]) }
+    }
+
+    pub(super) fn fields(&self) -> impl Iterator<Item = usize> + '_ {
+        self.fields.iter().copied()
+    }
+
     fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        for (&field, &value) in self.iter().zip(row) {
-            column[field] = value;
+        let count = self.fields.len();
+        match self.first {
+            // So many are copied without a call.
+            Some(first) if count == LANES => column[first..first + LANES].copy_from_slice(row),
+            Some(first) => column[first..first + count].copy_from_slice(&row[..count]),
+            None => self.fields.iter().zip(row).for_each(|(&field, &value)| column[field] = value),
         }
-    }
-}
-
-/// Fields one after the other.
-pub(super) struct Run {
-    pub(super) first: usize,
-    pub(super) count: usize,
-}
-
-impl Places for Run {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        column[self.first..self.first + self.count].copy_from_slice(&row[..self.count]);
-    }
-}
-
-/// Sixteen fields one after the other: so many are copied without a call.
-pub(super) struct Sixteen(pub(super) usize);
-
-impl Places for Sixteen {
-    fn put<T: Copy>(&self, row: &Row<T>, column: &mut [T]) {
-        column[self.0..self.0 + LANES].copy_from_slice(row);
     }
 }
