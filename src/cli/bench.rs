@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use crate::experiments::dump;
 use crate::experiments::shape::Shape;
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use serde_json::json;
 use somatic::output::OutputFolder;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
@@ -16,7 +15,7 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
-use super::scene::{output, outputs_help, outputs_or_usual};
+use super::scene::{one_of, output, outputs_help, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
 
@@ -69,8 +68,7 @@ pub(super) struct Arguments {
     frames: usize,
 
     /// What computes.
-    #[arg(long, default_value = "auto", value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
-        .try_map(|name| name.parse::<BackendKind>()))]
+    #[arg(long, default_value = "auto", value_parser = one_of::<BackendKind>(&["auto", "reference", "cpu", "gpu"]))]
     backend: BackendKind,
 
     /// Only these quantities [default: those of `somatic run`].

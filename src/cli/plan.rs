@@ -28,7 +28,7 @@ taxel pressed. A stage's time is what a plan with it takes more than a plan with
 
 /// Say what a scene computes and what not, why, and what each stage costs.
 #[derive(Args)]
-#[command(after_help = EXAMPLES, mut_args(grouped))]
+#[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
     /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]

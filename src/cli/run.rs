@@ -21,7 +21,7 @@ use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::repeats::Repeats;
-use super::scene::{RunOptions, grouped};
+use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, FAILED, LOST, say};
 use super::tradeoff::{say_kept, settled};
 use super::words;
@@ -59,7 +59,7 @@ of JSON a frame.";
 
 /// Turn touch frames into percepts, live or from a recording.
 #[derive(Args)]
-#[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, mut_args(grouped))]
+#[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
     /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
@@ -69,11 +69,11 @@ pub(super) struct Arguments {
     asked: RunOptions,
 
     /// Stop after this time, such as 10s.
-    #[arg(long = "for", value_name = "TIME")]
+    #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
     lasts: Option<String>,
 
     /// At the end, write how many frames each board sent and lost, and how long percepts took, to this file, as JSON.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = LIVE)]
     summary: Option<PathBuf>,
 }
 

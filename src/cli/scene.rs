@@ -3,12 +3,12 @@
 mod accuracy;
 mod check;
 mod deserialize;
-mod groups;
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Arg, Args};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::parse_toml;
@@ -20,10 +20,35 @@ use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, S
 
 use self::accuracy::Accuracy;
 pub(super) use self::deserialize::output;
-use self::deserialize::{OneOrMany, batch, names_of, outputs, texts, window, word, words};
-pub(super) use self::groups::{first, grouped};
+use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use super::attached;
 use super::ports::LineFlags;
+
+/// Headings of flags that `-h` leaves out.
+const COMPUTED: &str = "What is computed";
+const RECORDINGS: &str = "Recordings";
+pub(super) const LIVE: &str = "Live";
+const ACCURACY: &str = "Accuracy and speed";
+const OUTPUT: &str = "Output";
+
+/// Leaves `arg` out of `-h` if it has a heading.
+pub(super) fn grouped(arg: Arg) -> Arg {
+    let has_heading = arg.get_help_heading().is_some();
+    arg.hide_short_help(has_heading)
+}
+
+/// `arg` among the flags that come first.
+pub(super) fn first(arg: Arg) -> Arg {
+    arg.help_heading(None::<&str>).hide_short_help(false)
+}
+
+/// Reads one of `words`.
+pub(super) fn one_of<T>(words: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = Error> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
+}
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -52,7 +77,7 @@ pub(super) struct RunOptions {
 
     /// Compute only the fields whose names match, such as 'hand/palm*' or '**/thumb'; may be repeated.
     #[arg(long, value_name = "GLOB")]
-    #[serde(deserialize_with = "texts")]
+    #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
@@ -69,9 +94,7 @@ pub(super) struct RunOptions {
 
     /// What computes: reference in double precision, cpu or gpu in single precision, or auto, the faster of cpu and gpu
     /// [default: auto].
-    #[arg(long, hide_possible_values = true,
-        value_parser = PossibleValuesParser::new(["auto", "reference", "cpu", "gpu"])
-        .try_map(|name| name.parse::<BackendKind>()))]
+    #[arg(long, value_parser = one_of::<BackendKind>(&["auto", "reference", "cpu", "gpu"]))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
     pub(super) backend: Option<BackendKind>,
@@ -90,111 +113,110 @@ pub(super) struct RunOptions {
 
     /// Compute the fields from pressures (sustained), from their change per second (change), or once from each [default:
     /// sustained].
-    #[arg(long, hide_possible_values = true, value_name = "LETTER,...", value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(["sustained", "change"]).try_map(|name| name.parse::<Receptor>()))]
+    #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
+        value_parser = one_of::<Receptor>(&["sustained", "change"]))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) letters: Vec<Receptor>,
 
     /// Compute from the raw or linear signal of force-sensing resistors, not the one in the calibration; with both,
     /// every field is computed once from each.
-    #[arg(long, hide_possible_values = true, value_name = "SIGNAL,...", value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(["raw", "linear"]).try_map(|name| name.parse::<FsrSignal>()))]
+    #[arg(long, help_heading = COMPUTED, value_name = "SIGNAL,...", value_delimiter = ',',
+        value_parser = one_of::<FsrSignal>(&["raw", "linear"]))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) signal: Vec<FsrSignal>,
 
     /// Take the first frame's values as the sensors' baselines; nothing may touch the robot then.
-    #[arg(long)]
+    #[arg(long, help_heading = COMPUTED)]
     pub(super) tare: bool,
 
     /// Frame of positions and normals: the world where frames carry poses, or always the field's anchor [default:
     /// world].
-    #[arg(long, hide_possible_values = true, value_name = "FRAME",
-        value_parser = PossibleValuesParser::new(Coordinates::WORDS)
-        .try_map(|name| name.parse::<Coordinates>()))]
+    #[arg(long, help_heading = COMPUTED, value_name = "FRAME",
+        value_parser = one_of::<Coordinates>(Coordinates::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
     pub(super) coordinates: Option<Coordinates>,
 
     /// The longest time between two frames over which motion is measured, in seconds [default: 10].
-    #[arg(long, value_name = "S")]
+    #[arg(long, help_heading = COMPUTED, value_name = "S")]
     #[serde(rename = "max_gap_s")]
     pub(super) max_gap: Option<f64>,
 
     /// How far a centroid must move until the filtered_* outputs count it, and how far it moves at most within one
     /// touch, such as 0.5mm..20mm; either end may be left out [default: 1/16 and 3 times the spacing of the field's
     /// taxels].
-    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true)]
+    #[arg(long, help_heading = COMPUTED, value_name = "LOW..HIGH", allow_hyphen_values = true)]
     #[serde(deserialize_with = "window")]
     pub(super) filter_window: Option<String>,
 
     /// What --filter-window measures: how far the centroid moves (distance), or how much its distance from the chart's
     /// origin changes, as in the paper (radial) [default: distance].
-    #[arg(long, hide_possible_values = true, value_name = "MEASURE",
-        value_parser = PossibleValuesParser::new(["distance", "radial"])
-        .try_map(|name| name.parse::<FilterBy>()))]
+    #[arg(long, help_heading = COMPUTED, value_name = "MEASURE",
+        value_parser = one_of::<FilterBy>(&["distance", "radial"]))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = ["distance", "radial"]))]
     pub(super) filter_by: Option<FilterBy>,
 
     /// Time constant of filtered_direction, in seconds; 0 follows at once [default: 0.1].
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, help_heading = COMPUTED, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
     /// Play a recording from this time after its start, in seconds [default: 0].
-    #[arg(long, value_name = "S")]
+    #[arg(long, help_heading = RECORDINGS, value_name = "S")]
     #[serde(rename = "from_s")]
     pub(super) from: Option<f64>,
 
     /// Play a recording up to this time after its start, in seconds [default: its end].
-    #[arg(long, value_name = "S")]
+    #[arg(long, help_heading = RECORDINGS, value_name = "S")]
     #[serde(rename = "to_s")]
     pub(super) to: Option<f64>,
 
     /// Play a recording N times, or without N until interrupted; its time goes on.
-    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    #[arg(long = "loop", help_heading = RECORDINGS, value_name = "N",
+        num_args = 0..=1, require_equals = true, default_missing_value = "0")]
     #[serde(rename = "loop")]
     pub(super) repeat: Option<u64>,
 
     /// Frames per second of a CSV recording without a column t, in Hz.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, help_heading = RECORDINGS, value_name = "HZ")]
     #[serde(rename = "rate_hz")]
     pub(super) rate: Option<f64>,
 
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
-    #[arg(long, hide_possible_values = true, value_name = "PART,...", value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(["frames", "percepts", "view"]).try_map(|name| name.parse::<RecordPart>()))]
+    #[arg(long, help_heading = RECORDINGS, value_name = "PART,...", value_delimiter = ',',
+        value_parser = one_of::<RecordPart>(&["frames", "percepts", "view"]))]
     #[serde(deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) record: Vec<RecordPart>,
 
     /// How long a taxel that frames leave out keeps its value, in seconds; after that it counts as missing [default: 0;
     /// for boards three of their frames, and at least 0.05].
-    #[arg(long, value_name = "S")]
+    #[arg(long, help_heading = LIVE, value_name = "S")]
     #[serde(rename = "max_age_s")]
     pub(super) max_age: Option<f64>,
 
     /// Fail at the first taxel on standard input that the body does not have [default: leave its values out and exit
     /// with 3].
-    #[arg(long)]
+    #[arg(long, help_heading = LIVE)]
     pub(super) strict: bool,
 
     /// Which taxel is on which channel of which board, a TOML file; docs/wire.md [default: the boards, one per port,
     /// share the taxels in ascending order of their ids].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = LIVE, value_name = "FILE")]
     pub(super) wiring: Option<PathBuf>,
 
     /// Merge the boards' frames at this rate, in Hz; 0 gives one for each frame of any board [default: one for each
     /// frame of the fastest board].
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, help_heading = LIVE, value_name = "HZ")]
     #[serde(rename = "live_rate_hz")]
     pub(super) live_rate: Option<f64>,
 
     /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
     /// are].
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, help_heading = LIVE, value_name = "HZ")]
     #[serde(rename = "board_rate_hz")]
     pub(super) board_rate: Option<f64>,
 
@@ -202,24 +224,19 @@ pub(super) struct RunOptions {
     #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
     pub(super) accuracy: Accuracy,
 
-    /// With --coverage touched: compute fields again only when a pressure changes by more than this, in its unit, or to
-    /// or from 0 [default: 0].
-    #[arg(long, value_name = "P")]
-    pub(super) change_threshold: Option<f64>,
-
     /// Compute at most this many frames in one call: more is faster, fewer is sooner [default: 256 for recordings, 1
     /// live].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[arg(long, help_heading = ACCURACY, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     #[serde(deserialize_with = "batch")]
     #[schemars(range(min = 1, max = 65536))]
     pub(super) batch: Option<u32>,
 
     /// Write fields without contact too.
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub(super) all_fields: bool,
 
     /// Show no table, progress or remarks.
-    #[arg(short, long)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(super) quiet: bool,
 }
 
@@ -281,43 +298,21 @@ impl RunOptions {
     /// As [`RunOptions::load`]; values that make no sense.
     pub(super) fn with(&self, scene: Option<&Path>) -> Result<Self> {
         let file = scene.map(Self::load).transpose()?.unwrap_or_default();
-        fn list<T: Clone>(first: &[T], then: Vec<T>) -> Vec<T> {
-            if first.is_empty() { then } else { first.to_vec() }
+        macro_rules! merged {
+            (values: $($value:ident)*, lists: $($list:ident)*, switches: $($switch:ident)*) => {
+                Self {
+                    $($value: self.$value.clone().or(file.$value),)*
+                    $($list: if self.$list.is_empty() { file.$list } else { self.$list.clone() },)*
+                    $($switch: self.$switch || file.$switch,)*
+                    accuracy: self.accuracy.or(file.accuracy),
+                }
+            };
         }
-        let asked = Self {
-            body: self.body.clone().or(file.body),
-            sources: list(&self.sources, file.sources),
-            sinks: list(&self.sinks, file.sinks),
-            backend: self.backend.or(file.backend),
-            outputs: list(&self.outputs, file.outputs),
-            fields: list(&self.fields, file.fields),
-            all_fields: self.all_fields || file.all_fields,
-            calibration: self.calibration.clone().or(file.calibration),
-            letters: list(&self.letters, file.letters),
-            signal: list(&self.signal, file.signal),
-            tare: self.tare || file.tare,
-            strict: self.strict || file.strict,
-            rate: self.rate.or(file.rate),
-            wiring: self.wiring.clone().or(file.wiring),
-            live_rate: self.live_rate.or(file.live_rate),
-            board_rate: self.board_rate.or(file.board_rate),
-            batch: self.batch.or(file.batch),
-            speed: self.speed.or(file.speed),
-            from: self.from.or(file.from),
-            to: self.to.or(file.to),
-            repeat: self.repeat.or(file.repeat),
-            record: list(&self.record, file.record),
-            force: self.force || file.force,
-            max_age: self.max_age.or(file.max_age),
-            max_gap: self.max_gap.or(file.max_gap),
-            change_threshold: self.change_threshold.or(file.change_threshold),
-            coordinates: self.coordinates.or(file.coordinates),
-            filter_window: self.filter_window.clone().or(file.filter_window),
-            filter_by: self.filter_by.or(file.filter_by),
-            filter_time: self.filter_time.or(file.filter_time),
-            accuracy: self.accuracy.or(file.accuracy),
-            verify: self.verify || file.verify,
-            quiet: self.quiet || file.quiet,
+        let asked = merged! {
+            values: body backend calibration rate wiring live_rate board_rate batch speed from to repeat max_age max_gap
+                coordinates filter_window filter_by filter_time,
+            lists: sources sinks outputs fields letters signal record,
+            switches: all_fields tare strict force verify quiet
         };
         asked.check().map_err(|e| scene.map_or(e.clone(), |path| e.at(path.display())))?;
         Ok(asked)
@@ -330,13 +325,7 @@ impl RunOptions {
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.
     fn check_accuracy(&self) -> Result<(), (&'static str, Error)> {
-        let backend = match self.backend.unwrap_or_default() {
-            BackendKind::Auto => None,
-            BackendKind::Reference => Some("reference"),
-            BackendKind::Cpu => Some("cpu"),
-            BackendKind::Gpu => Some("gpu"),
-        };
-        self.accuracy.check(backend, self.outputs())
+        self.accuracy.check(self.backend.unwrap_or_default(), self.outputs())
     }
 
     /// How boards on serial lines are read.
@@ -387,7 +376,6 @@ impl RunOptions {
             .letters(Letter::all_of(letters, &self.signal))
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
-            .change_threshold(self.change_threshold.unwrap_or(usual.change_threshold))
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         let load = |path: &PathBuf| {
             let calibration = Calibration::load(path, ids)?;

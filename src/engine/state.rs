@@ -73,8 +73,7 @@ impl Engine {
     }
 
     /// Goes on from `state`, of an engine with the same body, scene, calibration and options. On the same backend, percepts are
-    /// the same bits as those of an uninterrupted run, unless the scene lets small changes pass ([`crate::Scene::change_threshold`]);
-    /// on another they agree within its bounds.
+    /// the same bits as those of an uninterrupted run; on another they agree within its bounds.
     ///
     /// # Errors
     /// The state does not fit this engine ([`Error::is_usage`]), or the device was lost.

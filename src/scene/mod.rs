@@ -16,7 +16,6 @@ pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, Orien
 pub use plan::Plan;
 pub(crate) use plan::{PlanField, Stages};
 
-use crate::error::{Error, Result};
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
@@ -39,9 +38,6 @@ pub struct Scene {
     pub filter: MotionFilter,
     /// What is traded for what.
     pub knobs: Knobs,
-    /// By how much a pressure may change, in its unit, until the fields that hold it are computed again, behind the gate of
-    /// [`Coverage::Touched`]; what goes to 0 or comes from it always counts. At 0 percepts are the same to the last bit.
-    pub change_threshold: f64,
     /// In which frame positions and normals are given.
     pub coordinates: Coordinates,
 }
@@ -54,7 +50,6 @@ impl Default for Scene {
             max_age_s: 0.0,
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
-            change_threshold: 0.0,
             coordinates: Coordinates::default(),
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
@@ -69,7 +64,6 @@ setters!(Scene {
     letters: Vec<Letter>,
     filter: MotionFilter,
     knobs: Knobs,
-    change_threshold: f64,
     coordinates: Coordinates,
 });
 
@@ -79,19 +73,5 @@ impl Scene {
     pub fn fields(mut self, globs: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.fields = globs.into_iter().map(Into::into).collect();
         self
-    }
-
-    /// Refuses a threshold that is none, or that no gate heeds.
-    fn check_threshold(&self) -> Result<()> {
-        let threshold = self.change_threshold;
-        if !(threshold.is_finite() && threshold >= 0.0) {
-            return Err(Error::usage(format!(
-                "the change threshold is {threshold}; it must be a pressure of 0 or more"
-            )));
-        }
-        if threshold > 0.0 && self.knobs.coverage != Coverage::Touched {
-            return Err(Error::usage("a change threshold needs coverage touched; ask for that too"));
-        }
-        Ok(())
     }
 }

@@ -52,7 +52,6 @@ pub struct Plan {
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
-    change_threshold: f32,
     /// Up to where changes count as 0, in P per second, as the calibration has it.
     pub(crate) change_dead_band: f64,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
@@ -157,7 +156,6 @@ impl Plan {
         Letter::check(&scene.letters)?;
         let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
         scene.knobs.check(scene.outputs, has_changes)?;
-        scene.check_threshold()?;
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
@@ -185,7 +183,6 @@ impl Plan {
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
-            change_threshold: scene.change_threshold as f32,
             change_dead_band: calibration.change.dead_band,
             calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
             calibration_changes: 0,
@@ -393,11 +390,6 @@ impl Plan {
     #[must_use]
     pub fn knobs(&self) -> Knobs {
         self.knobs
-    }
-
-    /// By how much a pressure may change unheeded.
-    pub(crate) fn change_threshold(&self) -> f32 {
-        self.change_threshold
     }
 
     /// How single precision adds up over a field of `members`, and so how far it may be off.

@@ -98,36 +98,3 @@ fn large(coverage: Coverage) -> Engine {
     let options = Options::default().scene(scene).backend(BackendKind::Cpu);
     Engine::new(&skin.body(), options).unwrap()
 }
-
-#[test]
-fn what_changes_less_than_the_threshold_is_unheeded_and_does_not_add_up() {
-    let body = Flat::new(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]).field("field", None, 0..3).body();
-    let scene = |coverage, change_threshold| {
-        Scene::default()
-            .outputs(Outputs::TOTAL)
-            .knobs(Knobs::default().coverage(coverage))
-            .change_threshold(change_threshold)
-    };
-    let of = |scene: Scene| Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Cpu));
-    let mut engine = of(scene(Coverage::Touched, 2.0)).unwrap();
-    let mut total =
-        |t_s: f64, values: [f64; 3]| engine.process(&[crate::common::frame(t_s, &values)]).unwrap().get(0, 0).total;
-    assert_eq!(total(0.0, [10.0, 20.0, 0.0]), Some(30.0));
-    // Each step is short of the threshold, and so is the way so far: the old answer stands.
-    assert_eq!(total(0.1, [11.0, 20.0, 0.0]), Some(30.0));
-    assert_eq!(total(0.2, [12.0, 19.0, 0.0]), Some(30.0));
-    // The step is short, the way is not.
-    assert_eq!(total(0.3, [13.0, 19.0, 0.0]), Some(32.0));
-    // However little, an onset and a release count.
-    assert_eq!(total(0.4, [13.0, 19.0, 0.5]), Some(32.5));
-    assert_eq!(total(0.5, [13.0, 19.0, 0.0]), Some(32.0));
-    // Negative control: without a threshold every change counts.
-    let mut exact = of(scene(Coverage::Touched, 0.0)).unwrap();
-    for (t_s, value) in [(0.0, 10.0), (0.1, 11.0)] {
-        let percepts = exact.process(&[crate::common::frame(t_s, &[value, 0.0, 0.0])]).unwrap();
-        assert_eq!(percepts.get(0, 0).total, Some(value));
-    }
-    let refused = |scene: Scene| of(scene).err().unwrap().to_string();
-    assert!(refused(scene(Coverage::All, 1.0)).contains("coverage touched"));
-    assert!(refused(scene(Coverage::Touched, -1.0)).contains("a pressure of 0 or more"));
-}

@@ -2,7 +2,7 @@
 //!
 //! Most of a skin is idle. A tile of sixteen values whose bits are the same is not calibrated, and one whose pressures and
 //! statuses come out the same lets no field through: a group of fields all of whose tiles are the same keeps its answers.
-//! What comes out has the same bits as without a gate, unless a scene lets small changes pass unheeded.
+//! What comes out has the same bits as without a gate.
 
 use bytemuck::cast_ref;
 use fearless_simd::prelude::*;
@@ -38,8 +38,6 @@ pub(super) struct Gate {
     known: bool,
     /// Whether it may step aside.
     always: bool,
-    /// By how much a pressure may change unheeded.
-    threshold: f32,
     /// Frames to come without it, and how many it has let through nearly whole.
     pause: u32,
     open: u32,
@@ -82,7 +80,6 @@ impl Gate {
             stale: vec![true; units],
             known: false,
             always: plan.knobs().coverage == Coverage::Touched,
-            threshold: plan.change_threshold(),
             pause: 0,
             open: 0,
         })
@@ -175,12 +172,8 @@ impl Gate {
         }
         *last = *bits;
         let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
-        // The pressures that stay are those that answers were made of: what is unheeded does not add up.
-        // They are no NaN, and no −0: where they are equal their bits are.
-        let unheeded = |old: &Row<f32>| {
-            same(simd, cast_ref(p), cast_ref(old)) || self.threshold > 0.0 && near(p, old, self.threshold)
-        };
-        if self.known && unheeded(&pressures[index]) && same(simd, status, &statuses[index]) {
+        // Pressures are no NaN, and no −0: where they are equal their bits are.
+        if self.known && same(simd, cast_ref(p), cast_ref(&pressures[index])) && same(simd, status, &statuses[index]) {
             return;
         }
         (pressures[index], statuses[index]) = (*p, *status);
@@ -196,9 +189,4 @@ impl Gate {
 #[inline(always)]
 fn same<S: Simd>(simd: S, a: &Row<u32>, b: &Row<u32>) -> bool {
     u32x16::from_slice(simd, a).simd_eq(u32x16::from_slice(simd, b)).all_true()
-}
-
-/// Whether none of `a` is farther from `b` than `threshold`, and each is pressed in both or in neither.
-fn near(a: &Row<f32>, b: &Row<f32>, threshold: f32) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= threshold && (*a > 0.0) == (*b > 0.0))
 }

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
 use somatic::error::place_in;
 use somatic::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Target, angle, length, time};
-use somatic::{Error, Outputs, Result};
+use somatic::{BackendKind, Error, Outputs, Result};
 
 use super::deserialize::word;
+use super::{ACCURACY, one_of};
 
 /// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
 /// by measurement, or the knobs themselves.
@@ -20,7 +20,7 @@ use super::deserialize::word;
 #[serde(default, deny_unknown_fields)]
 pub(in crate::cli) struct Accuracy {
     /// Tolerances by flag; in a file they are two keys.
-    #[arg(long, value_name = "LENGTH,ANGLE", value_parser = Target::within,
+    #[arg(long, help_heading = ACCURACY, value_name = "LENGTH,ANGLE", value_parser = Target::within,
         help = "Measure, and use the fastest knobs that keep 99 % of the centroids and orientations within this, such as \
                 '0.5 mm, 2 deg' or one of these")]
     #[serde(skip)]
@@ -40,52 +40,47 @@ pub(in crate::cli) struct Accuracy {
 
     /// Measure, and use only knobs with which a frame takes at most this in the median, such as 100us; without --within
     /// the most accurate of them.
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, help_heading = ACCURACY, value_name = "TIME", value_parser = time)]
     #[serde(deserialize_with = "seconds")]
     #[schemars(with = "Option<String>")]
     pub(in crate::cli) budget: Option<f64>,
 
     /// How sums are made: in single precision (one-pass), with the rounding errors added back (compensated), or in
     /// double precision on the CPU (double) [default: one-pass; reference: double].
-    #[arg(long, hide_possible_values = true, value_name = "HOW",
-        value_parser = PossibleValuesParser::new(Arithmetic::WORDS)
-        .try_map(|name| name.parse::<Arithmetic>()))]
+    #[arg(long, help_heading = ACCURACY, value_name = "HOW",
+        value_parser = one_of::<Arithmetic>(Arithmetic::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS))]
     pub(in crate::cli) arithmetic: Option<Arithmetic>,
 
     /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest paths over the surface
     /// where that is possible (geodesic) [default: as-authored].
-    #[arg(long, hide_possible_values = true, value_name = "KIND",
-        value_parser = PossibleValuesParser::new(Charts::WORDS)
-        .try_map(|name| name.parse::<Charts>()))]
+    #[arg(long, help_heading = ACCURACY, value_name = "KIND",
+        value_parser = one_of::<Charts>(Charts::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
     pub(in crate::cli) charts: Option<Charts>,
 
     /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), or axis
     /// alone (second-moments) [default: as-asked].
-    #[arg(long, hide_possible_values = true, value_name = "WAY",
-        value_parser = PossibleValuesParser::new(OrientationBy::WORDS)
-        .try_map(|name| name.parse::<OrientationBy>()))]
+    #[arg(long, help_heading = ACCURACY, value_name = "WAY",
+        value_parser = one_of::<OrientationBy>(OrientationBy::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS))]
     pub(in crate::cli) orientation_by: Option<OrientationBy>,
 
     /// Which fields are computed in a live frame on the CPU: all, only those that changed (touched), or the faster of
     /// these (auto); percepts are the same [default: auto].
-    #[arg(long, hide_possible_values = true, value_name = "WHICH",
-        value_parser = PossibleValuesParser::new(Coverage::WORDS)
-        .try_map(|name| name.parse::<Coverage>()))]
+    #[arg(long, help_heading = ACCURACY, value_name = "WHICH",
+        value_parser = one_of::<Coverage>(Coverage::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coverage::WORDS))]
     pub(in crate::cli) coverage: Option<Coverage>,
 
     /// When a field is computed: in every frame (every-frame), or when its values change (on-change), and motion then
     /// from change to change [default: every-frame].
-    #[arg(long, hide_possible_values = true, value_name = "WHEN",
-        value_parser = PossibleValuesParser::new(Cadence::WORDS)
-        .try_map(|name| name.parse::<Cadence>()))]
+    #[arg(long, help_heading = ACCURACY, value_name = "WHEN",
+        value_parser = one_of::<Cadence>(Cadence::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Cadence::WORDS))]
     pub(in crate::cli) cadence: Option<Cadence>,
@@ -160,7 +155,7 @@ impl Accuracy {
     }
 
     /// Refuses what contradicts itself, with the key where it is found out.
-    pub(super) fn check(&self, backend: Option<&str>, outputs: Outputs) -> Result<(), (&'static str, Error)> {
+    pub(super) fn check(&self, backend: BackendKind, outputs: Outputs) -> Result<(), (&'static str, Error)> {
         let target = self.target();
         if let Some(knob) = self.knob().filter(|_| !target.is_empty()) {
             let what = format!("`{knob}` sets a knob that {} chooses; give one or the other", target.words());
@@ -174,12 +169,12 @@ impl Accuracy {
             return Err(("orientation", Error::usage(what)));
         }
         match (backend, self.arithmetic) {
-            (Some("gpu"), Some(Arithmetic::Double)) => {
+            (BackendKind::Gpu, Some(Arithmetic::Double)) => {
                 let what =
                     "`arithmetic` is double, and shaders have no double precision; take backend `cpu`, or compensated";
                 return Err(("arithmetic", Error::usage(what)));
             }
-            (Some("reference"), Some(arithmetic @ (Arithmetic::OnePass | Arithmetic::Compensated))) => {
+            (BackendKind::Reference, Some(arithmetic @ (Arithmetic::OnePass | Arithmetic::Compensated))) => {
                 let what = format!(
                     "`arithmetic` is {arithmetic}, and backend `reference` is always double; take `cpu` or `gpu`"
                 );
@@ -189,7 +184,7 @@ impl Accuracy {
         }
         let only_cpu = |coverage: &Coverage| !matches!(coverage, Coverage::Auto | Coverage::All);
         if let Some(coverage) = self.coverage.filter(only_cpu)
-            && backend.is_some_and(|backend| backend == "gpu" || backend == "reference")
+            && matches!(backend, BackendKind::Gpu | BackendKind::Reference)
         {
             let what = format!("`coverage` is {coverage}, which only backend `cpu` has");
             return Err(("coverage", Error::usage(what)));

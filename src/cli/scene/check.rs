@@ -25,11 +25,6 @@ impl RunOptions {
         if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
         }
-        if self.verify && self.change_threshold.is_some_and(|threshold| threshold > 0.0) {
-            return Err(Error::usage(
-                "--verify holds percepts to bounds that leave no room for a --change-threshold; leave one of them out",
-            ));
-        }
         Ok(())
     }
 

@@ -36,7 +36,7 @@ pub(super) enum OneOrMany {
 /// A value parsed from a string.
 struct Parsed<T>(T);
 
-impl<'de, T: FromStr<Err = Error>> Deserialize<'de> for Parsed<T> {
+impl<'de, T: FromStr<Err: fmt::Display>> Deserialize<'de> for Parsed<T> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         String::deserialize(from)?.parse().map(Self).map_err(D::Error::custom)
     }
@@ -45,7 +45,7 @@ impl<'de, T: FromStr<Err = Error>> Deserialize<'de> for Parsed<T> {
 /// Takes one text, or a list of them.
 struct Texts<T>(PhantomData<T>);
 
-impl<'de, T: FromStr<Err = Error>> Visitor<'de> for Texts<T> {
+impl<'de, T: FromStr<Err: fmt::Display>> Visitor<'de> for Texts<T> {
     type Value = Vec<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -65,43 +65,30 @@ impl<'de, T: FromStr<Err = Error>> Visitor<'de> for Texts<T> {
     }
 }
 
-pub(super) fn words<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
+pub(super) fn words<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
     from.deserialize_any(Texts(PhantomData))
 }
 
-pub(super) fn word<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+pub(super) fn word<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     Parsed::deserialize(from).map(|Parsed(one)| Some(one))
 }
 
 /// A string that parses as a `T`.
 struct Checked<T>(String, PhantomData<T>);
 
-impl<T: FromStr<Err = Error>> FromStr for Checked<T> {
-    type Err = Error;
+impl<T: FromStr> FromStr for Checked<T> {
+    type Err = T::Err;
 
-    fn from_str(text: &str) -> Result<Self> {
+    fn from_str(text: &str) -> Result<Self, T::Err> {
         text.parse::<T>().map(|_| Self(text.to_owned(), PhantomData))
     }
 }
 
-pub(super) fn names_of<'de, T: FromStr<Err = Error>, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+pub(super) fn names_of<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Vec<String>, D::Error> {
     let checked: Vec<Checked<T>> = words(from)?;
     Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
-}
-
-/// Any string.
-struct Text(String);
-
-impl FromStr for Text {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        Ok(Self(text.to_owned()))
-    }
-}
-
-pub(super) fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    Ok(words(from)?.into_iter().map(|Text(text)| text).collect())
 }
 
 /// The one output of a name.
