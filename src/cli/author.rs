@@ -14,7 +14,7 @@ use somatic::{Error, Result, bundled};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::stdio::{DONE, print};
-use super::table::{plain, right, shown};
+use super::table::{plain, shown};
 use super::words::{bullet, count, millimetres};
 
 const EXAMPLES: &str = "\
@@ -179,10 +179,7 @@ fn text(output: &Path, authored: &Authored) -> String {
 }
 
 fn table(places: &[PlaceReport]) -> String {
-    let mut table = plain(["place", "taxels", "least mm", "mean mm", "ids", "links"]);
-    for column in 1..4 {
-        right(&mut table, column);
-    }
+    let mut table = plain(["place", "taxels", "least mm", "mean mm", "ids", "links"], 1..4);
     for place in places {
         let length = |metres: Option<f64>| Cell::new(metres.map_or_else(|| "–".to_owned(), millimetres));
         let run =

@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
-use console::style;
 use serde_json::json;
 use somatic::source::{Lines, Source, SourceSpec};
 use somatic::{Body, Calibration, Error, Result};
@@ -18,7 +17,7 @@ use super::interrupt::stop_on_signal;
 use super::plot::Plot;
 use super::ports::LineFlags;
 use super::stdio::{DONE, LOST, print, say};
-use super::table::{plain, right, shown};
+use super::table::{more, plain, shown};
 use super::words::{bullet, count};
 
 const EXAMPLES: &str = "\
@@ -229,7 +228,7 @@ fn table_of(findings: &Findings) -> String {
         count(findings.sensors.len() as u64, "sensor"),
         if findings.invert { "fall" } else { "rise" }
     );
-    let mut table = plain(["taxel", "at rest", "noise", "dead band", "travel", "full at", "gain"]);
+    let mut table = plain(["taxel", "at rest", "noise", "dead band", "travel", "full at", "gain"], 0..7);
     // Four digits, and no zeros after the point: most sensors count in whole numbers.
     let number =
         |value: f64| format!("{value:.3e}").parse().map_or_else(|_| value.to_string(), |short: f64| short.to_string());
@@ -249,13 +248,8 @@ fn table_of(findings: &Findings) -> String {
     for found in findings.sensors.iter().take(LISTED) {
         table.add_row(row(found));
     }
-    for column in 0..7 {
-        right(&mut table, column);
-    }
     text += &shown(&table);
-    if let Some(more) = findings.sensors.len().checked_sub(LISTED).filter(|&more| more > 0) {
-        text += &format!("{}\n", style(format!(" and {more} more; --json has all")).dim());
-    }
+    text += &more(findings.sensors.len(), LISTED);
     findings.remarks().iter().for_each(|remark| text += &format!("{}\n", bullet(remark)));
     text
 }

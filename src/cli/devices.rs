@@ -79,7 +79,7 @@ impl Devices {
         let cores = available_parallelism().map_or(1, usize::from);
         let mut text = format!("cpu     {}, {}\n\n", self.cpu, count(cores as u64, "core"));
         if !self.gpus.adapters.is_empty() {
-            let mut table = plain(["gpu", "kind", "through", "driver", "backend gpu"]);
+            let mut table = plain(["gpu", "kind", "through", "driver", "backend gpu"], []);
             for ([name, kind, api, driver], unfit) in &self.gpus.adapters {
                 let serves = unfit.as_ref().map_or_else(|| "runs".to_owned(), |why| format!("does not run: {why}"));
                 table.add_row([name, kind, api, driver, &serves]);
@@ -95,7 +95,7 @@ impl Devices {
                 &format!("{}\n", bullet("no serial port; plug a board in, or make a virtual one with `somatic board`"));
             return text;
         }
-        let mut table = plain(["port", "what", "can be opened", "steady name"]);
+        let mut table = plain(["port", "what", "can be opened", "steady name"], []);
         for port in &self.ports {
             let stable_path = port.stable_path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
             table.add_row([&port.name, &port.device, port.problem.as_deref().unwrap_or("yes"), &stable_path]);

@@ -9,7 +9,7 @@ use somatic::{Error, Frame, Result};
 
 use super::bar::Bar;
 use super::stdio::{DONE, LOST, print, say};
-use super::table::{plain, right, shown};
+use super::table::{plain, shown};
 use super::words::{number, span};
 
 const EXAMPLES: &str = "\
@@ -156,12 +156,10 @@ fn text(name: &str, known: &Known) -> String {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
     if !survey.topics.is_empty() {
-        let mut table = plain(["topic", "encoding", "messages", "size"]);
+        let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {
             table.add_row([&topic.name, &topic.encoding, &topic.messages.to_string(), &size_words(topic.bytes)]);
         }
-        right(&mut table, 2);
-        right(&mut table, 3);
         text += "\n";
         text += &shown(&table);
     }

@@ -3,11 +3,17 @@
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
 use console::{Term, style};
 
-/// A table without lines, under `headings`, as wide as the terminal at most.
-pub(super) fn plain<const N: usize>(headings: [&str; N]) -> Table {
+/// A table without lines, under `headings`, as wide as the terminal at most; the columns `numbers` are aligned right.
+pub(super) fn plain<'a>(
+    headings: impl IntoIterator<Item = &'a str>,
+    numbers: impl IntoIterator<Item = usize>,
+) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_header(headings.map(Cell::new));
+    table.set_header(headings.into_iter().map(Cell::new));
+    for column in numbers {
+        table.column_mut(column).into_iter().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    }
     let term = Term::stdout();
     if term.is_term() {
         table.set_width(term.size().1);
@@ -15,10 +21,11 @@ pub(super) fn plain<const N: usize>(headings: [&str; N]) -> Table {
     table
 }
 
-/// Aligns a column of numbers.
-pub(super) fn right(table: &mut Table, column: usize) {
-    if let Some(column) = table.column_mut(column) {
-        column.set_cell_alignment(CellAlignment::Right);
+/// What a table of the first `listed` of `all` rows leaves out.
+pub(super) fn more(all: usize, listed: usize) -> String {
+    match all.checked_sub(listed) {
+        None | Some(0) => String::new(),
+        Some(more) => format!("{}\n", style(format!(" and {more} more; --json has all")).dim()),
     }
 }
 

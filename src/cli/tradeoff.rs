@@ -22,7 +22,7 @@ use super::interrupt::stop_on_signal;
 use super::plot::Plot;
 use super::scene::{RunOptions, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
-use super::table::{plain, right, shown};
+use super::table::{plain, shown};
 use super::words::{count, number};
 
 const EXAMPLES: &str = "\
@@ -45,7 +45,7 @@ const VALUES: usize = 1 << 24;
 
 /// Measure speed against accuracy, knob by knob, on your own body, recording and machine.
 #[derive(Args)]
-#[command(after_help = EXAMPLES, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
+#[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
 pub(super) struct Arguments {
     /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
     #[arg(value_name = "SCENE")]
@@ -182,22 +182,9 @@ fn text(report: &Report, all: bool) -> String {
             listed.len(),
             rows.len()
         );
-        let truth = report.truth;
-        let of_truth = |what| if truth { what } else { "" };
-        let mut table = plain([
-            "µs",
-            "p99",
-            "mm: rms",
-            "p99",
-            "worst",
-            "°: rms",
-            "p99",
-            "worst",
-            of_truth("true mm: p99"),
-            of_truth("°: p99"),
-            "combination",
-        ]);
-        (0..10).for_each(|column| right(&mut table, column));
+        let headings = ["µs", "p99", "mm: rms", "p99", "worst", "°: rms", "p99", "worst"].into_iter();
+        let of_truth = if report.truth { ["true mm: p99", "°: p99"] } else { [""; 2] };
+        let mut table = plain(headings.chain(of_truth).chain(["combination"]), 0..10);
         for row in listed {
             let said = |value: f64, errors: &Errors| if errors.compared > 0 { number(value) } else { "–".to_owned() };
             let of_truth = |errors: &Option<Errors>| errors.map_or(String::new(), |errors| said(errors.p99, &errors));

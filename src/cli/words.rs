@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use console::{Alignment, Term, measure_text_width, pad_str, style, truncate_str};
 use somatic::{Error, Result};
 
 /// `value` with four significant digits, in at most nine characters.
@@ -54,12 +55,12 @@ pub(super) fn seconds(text: &str) -> Result<Duration> {
 
 /// A line of a list for people: a mark, and `text` between words onto as many lines as a terminal needs.
 pub(super) fn bullet(text: &str) -> String {
-    let term = console::Term::stdout();
+    let term = Term::stdout();
     let width = if term.is_term() { usize::from(term.size().1).max(40) } else { usize::MAX };
-    let mut lines = format!("  {} ", console::style("•").yellow());
+    let mut lines = format!("  {} ", style("•").yellow());
     let mut used = 4;
     for (index, word) in text.split(' ').enumerate() {
-        let wide = console::measure_text_width(word);
+        let wide = measure_text_width(word);
         if index > 0 && used + 1 + wide > width {
             lines += "\n    ";
             used = 4;
@@ -75,38 +76,19 @@ pub(super) fn bullet(text: &str) -> String {
 
 /// `text` in exactly `width` columns. What does not fit loses its start, as the end of a name tells most.
 pub(super) fn fitted(text: &str, width: usize, right: bool) -> String {
-    let have = console::measure_text_width(text);
-    if have <= width {
-        let blank = " ".repeat(width - have);
-        return if right { blank + text } else { format!("{text}{blank}") };
+    if width == 0 {
+        return String::new();
     }
-    let mut kept = String::new();
-    let mut used = 1;
-    for letter in text.chars().rev() {
-        used += console::measure_text_width(letter.encode_utf8(&mut [0; 4]));
-        if used > width {
-            break;
-        }
-        kept.insert(0, letter);
+    let (mut shown, mut rest) = (text.to_owned(), text.chars());
+    while measure_text_width(&shown) > width && rest.next().is_some() {
+        shown = format!("…{}", rest.as_str());
     }
-    let short = if width == 0 { String::new() } else { format!("…{kept}") };
-    let blank = width.saturating_sub(console::measure_text_width(&short));
-    short + &" ".repeat(blank)
+    pad_str(&shown, width, if right { Alignment::Right } else { Alignment::Left }, None).into_owned()
 }
 
 /// As much of the start of `text` as `width` columns show.
 pub(super) fn clipped(text: &str, width: usize) -> String {
-    if console::measure_text_width(text) <= width {
-        return text.to_owned();
-    }
-    let mut kept = String::new();
-    for letter in text.chars() {
-        if console::measure_text_width(&kept) + console::measure_text_width(letter.encode_utf8(&mut [0; 4])) >= width {
-            break;
-        }
-        kept.push(letter);
-    }
-    if width == 0 { kept } else { kept + "…" }
+    truncate_str(text, width, if width == 0 { "" } else { "…" }).into_owned()
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, WORLD};
 
 use super::inspection::Inspection;
-use crate::cli::table::{plain, right, shown};
+use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count, millimetres};
 
 /// All there is to say, the oddest last, where it is read.
@@ -89,10 +89,7 @@ fn coverage(body: &Body, coverage: &Coverage) -> Vec<(&'static str, String)> {
 }
 
 fn links(body: &Body, coverage: &Coverage) -> Table {
-    let mut table = plain(["link", "taxels", "cm²", "seen"]);
-    for column in 1..4 {
-        right(&mut table, column);
-    }
+    let mut table = plain(["link", "taxels", "cm²", "seen"], 1..4);
     let parents: Vec<Option<usize>> = body.links.iter().map(|link| link.parent).collect();
     for (link, branch) in branches(&parents) {
         let taxels = body.taxels.iter().filter(|taxel| taxel.link == link).count();
@@ -106,13 +103,9 @@ fn links(body: &Body, coverage: &Coverage) -> Table {
 }
 
 fn tree(body: &Body, fields: &[Field]) -> Table {
-    let mut table = plain(["field", "taxels", "radius mm", "anchor", "distortion", "chart"]);
+    let mut table = plain(["field", "taxels", "radius mm", "anchor", "distortion", "chart"], [1, 2, 4]);
     // Where it is narrow, reasons are wrapped and names are not.
-    let whole = (0..5).map(|_| ColumnConstraint::ContentWidth);
-    table.set_constraints(whole);
-    for column in [1, 2, 4] {
-        right(&mut table, column);
-    }
+    table.set_constraints((0..5).map(|_| ColumnConstraint::ContentWidth));
     let parents: Vec<Option<usize>> = fields.iter().map(|field| field.parent).collect();
     for (index, branch) in branches(&parents) {
         let field = &fields[index];

@@ -41,81 +41,28 @@ struct Column {
     outputs: Outputs,
     /// Columns with larger numbers are dropped first.
     gives_way: u8,
-    text: fn(&Percept, Scale) -> Option<String>,
+    text: Text,
+}
+
+/// What a column shows of a percept.
+type Text = fn(&Percept, Scale) -> Option<String>;
+
+const fn column(heading: &'static str, width: usize, outputs: Outputs, gives_way: u8, text: Text) -> Column {
+    Column { heading, width, outputs, gives_way, text }
 }
 
 const COLUMNS: [Column; 11] = [
-    Column {
-        heading: "total",
-        width: 8,
-        outputs: Outputs::TOTAL,
-        gives_way: 0,
-        text: |p, scale| p.total.map(|total| scale.number(total)),
-    },
-    Column { heading: "", width: BAR_WIDTH, outputs: Outputs::TOTAL, gives_way: 3, text: bar },
-    Column {
-        heading: "peak",
-        width: 8,
-        outputs: Outputs::PEAK,
-        gives_way: 6,
-        text: |p, scale| p.peak.map(|peak| scale.number(peak)),
-    },
-    Column {
-        heading: "active",
-        width: 6,
-        outputs: Outputs::ACTIVE,
-        gives_way: 4,
-        text: |p, _| p.active.map(|active| active.to_string()),
-    },
-    Column {
-        heading: "area mm²",
-        width: 8,
-        outputs: Outputs::AREA,
-        gives_way: 8,
-        text: |p, _| p.area.map(|area| format!("{:.1}", area * 1e6)),
-    },
-    Column {
-        heading: "touches",
-        width: 7,
-        outputs: Outputs::TOUCHES,
-        gives_way: 3,
-        text: |_, beside| Some(beside.touches.to_string()),
-    },
-    Column {
-        heading: "u    v mm",
-        width: 13,
-        outputs: Outputs::CENTROID,
-        gives_way: 1,
-        text: |p, _| p.centroid.map(|c| places(&c)),
-    },
-    Column {
-        heading: "x      y      z mm",
-        width: 20,
-        outputs: Outputs::POSITION,
-        gives_way: 7,
-        text: |p, _| p.position.map(|place| places(&place)),
-    },
-    Column {
-        heading: "angle",
-        width: 6,
-        outputs: Outputs::ORIENTATION,
-        gives_way: 2,
-        text: |p, _| p.orientation.map(line),
-    },
-    Column {
-        heading: "going",
-        width: 7,
-        outputs: Outputs::FILTERED_DIRECTION,
-        gives_way: 3,
-        text: |p, _| p.filtered_direction.map(arrow),
-    },
-    Column {
-        heading: "aniso",
-        width: 5,
-        outputs: Outputs::ANISOTROPY,
-        gives_way: 5,
-        text: |p, _| p.anisotropy.map(|share| format!("{share:.2}")),
-    },
+    column("total", 8, Outputs::TOTAL, 0, |p, scale| p.total.map(|total| scale.number(total))),
+    column("", BAR_WIDTH, Outputs::TOTAL, 3, bar),
+    column("peak", 8, Outputs::PEAK, 6, |p, scale| p.peak.map(|peak| scale.number(peak))),
+    column("active", 6, Outputs::ACTIVE, 4, |p, _| p.active.map(|active| active.to_string())),
+    column("area mm²", 8, Outputs::AREA, 8, |p, _| p.area.map(|area| format!("{:.1}", area * 1e6))),
+    column("touches", 7, Outputs::TOUCHES, 3, |_, beside| Some(beside.touches.to_string())),
+    column("u    v mm", 13, Outputs::CENTROID, 1, |p, _| p.centroid.map(|centroid| places(&centroid))),
+    column("x      y      z mm", 20, Outputs::POSITION, 7, |p, _| p.position.map(|place| places(&place))),
+    column("angle", 6, Outputs::ORIENTATION, 2, |p, _| p.orientation.map(line)),
+    column("going", 7, Outputs::FILTERED_DIRECTION, 3, |p, _| p.filtered_direction.map(arrow)),
+    column("aniso", 5, Outputs::ANISOTROPY, 5, |p, _| p.anisotropy.map(|share| format!("{share:.2}"))),
 ];
 
 /// The columns that fit into a terminal.

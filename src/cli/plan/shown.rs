@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use somatic::Agreement;
 
 use super::bill::{Bill, Stage};
-use crate::cli::table::{plain, right, shown};
+use crate::cli::table::{plain, shown};
 use crate::cli::words::count;
 
 impl Bill {
@@ -34,11 +34,8 @@ impl Bill {
 
     fn table(&self) -> String {
         let headings = ["stage", "over", "memberships", "bytes", "measured µs", "where", "why"];
-        let mut table = plain(headings);
+        let mut table = plain(headings, 1..5);
         table.set_constraints((0..6).map(|_| ColumnConstraint::ContentWidth));
-        for column in 1..5 {
-            right(&mut table, column);
-        }
         for Stage { planned: stage, measured_us } in &self.stages {
             let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
             let place = if stage.on_host { "host" } else { &self.backend.0 };

@@ -47,26 +47,24 @@ pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f6
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
 pub(super) fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize) -> Result<TestFrames> {
     let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
-    let mut take =
-        |source: &mut dyn Source, truth: &mut dyn FnMut() -> Option<Vec<somatic::source::Truth>>| -> Result<()> {
+    /// Adds the next frame of `source`, if there is one.
+    fn next(played: &mut TestFrames, source: &mut dyn Source) -> Result<bool> {
+        if played.frames.is_empty() {
             played.taxels = source.taxels().to_vec();
-            let mut frame = Frame::missing(0.0, played.taxels.len());
-            while played.frames.len() < most && source.next_frame(&mut frame)? {
-                played.frames.push(frame.clone());
-                played.truth.extend(truth());
-            }
-            Ok(())
-        };
+        }
+        let mut frame = Frame::missing(0.0, played.taxels.len());
+        let is_there = source.next_frame(&mut frame)?;
+        played.frames.extend(is_there.then_some(frame));
+        Ok(is_there)
+    }
     if let Some(SourceSpec::Sim(path)) = &input.spec {
         let mut source = SimulatedSource::open(path)?;
-        let mut frame = Frame::missing(0.0, source.taxels().len());
-        played.taxels = source.taxels().to_vec();
-        while played.frames.len() < most && source.next_frame(&mut frame)? {
-            played.frames.push(frame.clone());
+        while played.frames.len() < most && next(&mut played, &mut source)? {
             played.truth.push(source.truth().to_vec());
         }
     } else {
-        take(&mut *input.open(ids, asked)?, &mut || None)?;
+        let mut source = input.open(ids, asked)?;
+        while played.frames.len() < most && next(&mut played, &mut *source)? {}
     }
     if played.frames.is_empty() {
         return Err(Error::failed("there is no frame in it").at(&played.source));

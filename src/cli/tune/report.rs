@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::survey::tuning::{Tuned, Tuning};
-use console::style;
 use serde_json::{Value, json};
 use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
 
 use super::session::TunedChannel;
-use crate::cli::table::{plain, right, shown};
+use crate::cli::table::{more, plain, shown};
 use crate::cli::words::{bullet, count};
 
 /// More sensors than this are summed up.
@@ -24,7 +23,7 @@ pub(super) fn table(tuning: &Tuning, places: &[TunedChannel]) -> String {
         count(tuning.rounds() as u64, "round"),
         if tuning.falls() { "fall" } else { "rise" }
     );
-    let mut table = plain(["taxel", "board", "channel", "tap", "at rest", "firm press", "of the range"]);
+    let mut table = plain(["taxel", "board", "channel", "tap", "at rest", "firm press", "of the range"], 0..7);
     let dash = || "–".to_owned();
     for (at, (sensor, _, [before, after])) in places.iter().zip(tuning.outcomes()).take(LISTED) {
         let number = |raw: f64| format!("{raw:.0}");
@@ -44,11 +43,8 @@ pub(super) fn table(tuning: &Tuning, places: &[TunedChannel]) -> String {
             if before.or(after).is_none() { dash() } else { format!("{} → {} %", percent(before), percent(after)) },
         ]);
     }
-    (0..7).for_each(|column| right(&mut table, column));
     text += &shown(&table);
-    if let Some(more) = places.len().checked_sub(LISTED).filter(|&more| more > 0) {
-        text += &format!("{}\n", style(format!(" and {more} more; --json has all")).dim());
-    }
+    text += &more(places.len(), LISTED);
     remarks(tuning, places).iter().for_each(|remark| text += &bullet(remark));
     text
 }
