@@ -15,11 +15,13 @@ struct Shaded {
     @builtin(position) position: vec4<f32>,
     @location(0) normal: vec3<f32>,
     @location(1) colour: vec3<f32>,
+    // How much of its colour depends on the light.
+    @location(2) @interpolate(flat) shaded: f32,
 }
 
 @vertex
 fn surface(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> Shaded {
-    return Shaded(view.clip_from_world * vec4(position, 1.0), normal, vec3(0.60, 0.585, 0.56));
+    return Shaded(view.clip_from_world * vec4(position, 1.0), normal, vec3(0.60, 0.585, 0.56), 1.0);
 }
 
 // How much light a surface of this normal gives back: from over the left shoulder, some from the right, and a little
@@ -71,11 +73,12 @@ fn slice(
     if dot(n, view.towards.xyz) < 0.02 {
         position = vec4(2.0, 2.0, 2.0, 1.0);
     }
-    return Shaded(position, n, colour.rgb);
+    return Shaded(position, n, colour.rgb, colour.a);
 }
 
 @fragment
 fn slice_colour(shaded: Shaded) -> @location(0) vec4<f32> {
     // Light enough that a colour stays what the legend says.
-    return vec4(shaded.colour * (0.55 + 0.45 * light(normalize(shaded.normal))), 1.0);
+    let shade = 0.45 * shaded.shaded;
+    return vec4(shaded.colour * (1.0 - shade + shade * light(normalize(shaded.normal))), 1.0);
 }

@@ -1,4 +1,6 @@
-//! `somatic render`: a picture of a body and its fields.
+//! `somatic render`: a picture of a body and its fields, or of a touch on it.
+
+mod touched;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -19,11 +21,16 @@ Examples:
   somatic render robot.glb -o robot.png
   somatic render hand -o palm.png --field 'hand/palm*' --view top,bottom
   somatic render humanoid -o chart.png --uv head/skull/patch_14
+  somatic render hand -o hand.png --ids --look-at hand/palm --view bottom
+  somatic render hand -o touch.png --source touch.csv --at 2.9
+  somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
 
-A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
+With a recording, taxels have the colours of their pressures, and each touched field without
+children has its centroid, the line of its orientation, its principal axis as an ellipse and its
+motion of a quarter of a second as an arrow. A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
 side by side differ in colour.";
 
-/// Draw a body from four sides, its taxels coloured by field.
+/// Draw a body, its taxels coloured by field, or by their pressures in a recording.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
@@ -45,6 +52,17 @@ pub(super) struct Arguments {
     /// Draw the chart of this field, laid flat, instead of the body.
     #[arg(long, value_name = "FIELD", conflicts_with = "views")]
     uv: Option<String>,
+
+    /// Fill the picture with this field or link.
+    #[arg(long, value_name = "NAME", conflicts_with = "uv")]
+    look_at: Option<String>,
+
+    /// Label taxels with their ids.
+    #[arg(long, conflicts_with = "uv")]
+    ids: bool,
+
+    #[command(flatten)]
+    touched: touched::Flags,
 
     /// Width in pixels, or WIDTHxHEIGHT where the height is the most it may take.
     #[arg(long, default_value = "1600", value_name = "PIXELS")]
@@ -77,7 +95,8 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
     }
-    let output = FilesRead::default().bodies([&arguments.body]).outputs(arguments.force).add(path)?;
+    let read = FilesRead::default().bodies([&arguments.body]);
+    let output = arguments.touched.files(read).outputs(arguments.force).add(path)?;
     let mut views = Vec::new();
     for name in &arguments.views {
         match name.as_str() {
@@ -89,8 +108,11 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     let set = FieldSet::new(&body)?;
     let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
     let fields = if arguments.fields.is_empty() { Vec::new() } else { named(&arguments.fields)? };
-    let options = Options { size: arguments.size.0, views, fields };
+    let options = Options { size: arguments.size.0, views, fields, look_at: arguments.look_at.clone() };
     let picture = match &arguments.uv {
+        None if arguments.touched.is_given() || arguments.ids => {
+            arguments.touched.draw(&body, &arguments.body, &set.fields, options, arguments.ids)?
+        }
         None => picture::of_body(&body, &set.fields, &options)?,
         Some(name) => {
             let charted = match set.fields.iter().position(|field| field.name == *name) {

@@ -4,10 +4,11 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::PAPER;
+use crate::colours::pressure_colours;
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
 
-const INK: RGBColor = RGBColor(0x2A, 0x2A, 0x2C);
+pub(super) const INK: RGBColor = RGBColor(0x2A, 0x2A, 0x2C);
 const FAINT: RGBColor = RGBColor(0x6A, 0x6A, 0x6E);
 /// Width of a picture up to which labels have the sizes below, pixels; in wider ones they scale with it.
 const BASE_WIDTH: f64 = 1000.0;
@@ -39,12 +40,22 @@ pub(super) struct Labels {
     scale: Option<f64>,
     /// Where an origin with its axes goes.
     axes: Option<[f64; 2]>,
+    /// The upper end of the colours of pressure, and its unit.
+    pressures: Option<(f64, String)>,
 }
 
 impl Labels {
     /// For a picture of `width` pixels.
     pub(super) fn new(title: &str, width: u32) -> Self {
-        Self { title: title.to_owned(), width, key: Vec::new(), captions: Vec::new(), scale: None, axes: None }
+        Self {
+            title: title.to_owned(),
+            width,
+            key: Vec::new(),
+            captions: Vec::new(),
+            scale: None,
+            axes: None,
+            pressures: None,
+        }
     }
 
     /// `pixels` scaled to this picture's width.
@@ -102,6 +113,11 @@ impl Labels {
 
     pub(super) fn bar(&mut self, pixels_a_metre: f64) {
         self.scale = Some(pixels_a_metre);
+    }
+
+    /// Adds the colours of pressure from 0 to `max`.
+    pub(super) fn pressures(&mut self, max: f64, unit: &str) {
+        self.pressures = Some((max, unit.to_owned()));
     }
 
     pub(super) fn axes(&mut self, origin: [f64; 2]) {
@@ -177,6 +193,21 @@ impl Labels {
             }
             area.draw_text(&name, &text(size, INK, HPos::Right), place(left - scaled(8), y)).map_err(cannot)?;
         }
+        if let Some((max, unit)) = &self.pressures {
+            let colours = pressure_colours();
+            let (top, low) = (scaled(14), scaled(12));
+            let ends = [("0".to_owned(), HPos::Right), (format!("{} {unit}", short(*max)), HPos::Left)];
+            let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
+            let left = right - scaled(160);
+            for x in left..right {
+                let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
+                let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
+                area.draw(&Rectangle::new(column, RGBColor(r, g, b).filled())).map_err(cannot)?;
+            }
+            for ((text_of, side), x) in ends.iter().zip([left - scaled(8), right + scaled(8)]) {
+                area.draw_text(text_of, &text(size, INK, *side), place(x, top + scaled(11))).map_err(cannot)?;
+            }
+        }
         if let Some([x, y]) = self.axes {
             let (x, y) = (x.round() as i32, y.round() as i32);
             let [long, beyond, around] = [44, 56, 11].map(|pixels| scaled(pixels) as i32);
@@ -195,6 +226,13 @@ impl Labels {
         }
         area.present().map_err(cannot)
     }
+}
+
+/// A number with three digits, or all of a larger one.
+fn short(number: f64) -> String {
+    let digits = (2.0 - libm::floor(libm::log10(number.abs().max(1e-9)))).clamp(0.0, 9.0) as usize;
+    let text = format!("{number:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// The largest length of 1, 2 or 5 times a power of ten up to `max_m`, m, and its text.

@@ -4,21 +4,23 @@
 mod colour;
 mod labels;
 mod shape;
+mod touch;
 mod view;
 
 use std::path::Path;
 
 use glam::DVec3;
 
+pub use touch::{Moment, TouchPicture};
 pub use view::View;
 
 use self::colour::{PALETTE, PAPER, linear};
 use self::labels::Labels;
 use self::shape::{Dots, RIM};
 use self::view::Arrangement;
-use crate::backend::gpu::raster::{self, Drawing};
+use crate::backend::gpu::raster::{self, Corner, Drawing};
 use crate::body::Body;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, nearest};
 use crate::field::Field;
 use crate::ink;
 
@@ -36,6 +38,8 @@ pub struct Options {
     pub views: Vec<View>,
     /// Indices of the fields to colour; empty for all without children.
     pub fields: Vec<usize>,
+    /// The field or link that fills the picture; all of the body without one.
+    pub look_at: Option<String>,
 }
 
 /// A PNG of `body` and its `fields`, which may be none.
@@ -46,54 +50,108 @@ pub struct Options {
 /// # Errors
 /// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
 pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
-    let [width, height] = checked(options.size)?;
-    let triangles = body.triangles_at_rest();
     let dots = Dots::of(body);
-    let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
-    let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-    if !(low.is_finite() && high.is_finite()) {
-        return Err(Error::failed("it has neither surface nor taxels to draw").at(&body.name));
-    }
-    let middle = (low + high) / 2.0;
     let shown = FieldColours::of(fields, &options.fields, &dots);
-    let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
-
-    let mut labels = Labels::new(&format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel")), width);
-    let below = labels.key(shown.key(fields), [width, height]);
-    let taken = labels.above() + below;
-    if height <= taken + 40 {
-        return Err(Error::usage(format!(
-            "the picture is too low for the body; give a height over {} pixels",
-            taken + 40
-        )));
-    }
-    let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
-    // Include the discs and their rims.
-    let reach = dots.places.iter().zip(&dots.radii).map(|(&p, &r)| (p - middle, RIM * r));
-    let reach = reach.flat_map(|(p, r)| [p - r, p + r]);
-    let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(reach).collect();
-    let arrangement = Arrangement::of(&axes, &points, [width, height - taken], labels.above(), labels.above_view());
-    let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
-
-    let (corners, faces) = shape::surface(&triangles, middle);
-    let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
-    let drawing = Drawing {
-        size: [width, labels.above() + arrangement.height + below],
-        background: linear(PAPER),
-        corners,
-        triangles: faces,
-        slices: dots.slices(&shown.coloured(fields), middle, usual > 2.0),
-        fan: fan(usual),
-        eyes: arrangement.eyes(radius_m),
-    };
+    let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
+    let prepared = Prepared::new(body, fields, options, &title, shown.key(fields))?;
+    let Prepared { size, middle, arrangement, views, .. } = &prepared;
+    let mut drawing = prepared.drawing(linear(PAPER));
+    drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
+    let mut labels = Labels::new(&title, size[0]);
+    labels.key(shown.key(fields), options.size);
     for (view, placed) in views.iter().zip(&arrangement.views) {
         let [left, top, width, _] = placed.part;
         labels.caption(view.name(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
     }
     labels.bar(arrangement.scale);
-    labels.draw(&mut pixels, drawing.size)?;
-    ink::png(&pixels, drawing.size)
+    labels.draw(&mut pixels, *size)?;
+    ink::png(&pixels, *size)
+}
+
+/// A body's surface, discs and views, at their places in a picture.
+struct Prepared {
+    dots: Dots,
+    views: Vec<View>,
+    middle: DVec3,
+    arrangement: Arrangement,
+    size: [u32; 2],
+    /// Around all that is drawn, m.
+    radius_m: f64,
+    corners: Vec<Corner>,
+    faces: Vec<[u32; 3]>,
+}
+
+impl Prepared {
+    /// For a picture with this title and key.
+    fn new(
+        body: &Body,
+        fields: &[Field],
+        options: &Options,
+        title: &str,
+        key: Vec<(Option<[u8; 3]>, String)>,
+    ) -> Result<Self> {
+        let size = checked(options.size)?;
+        let triangles = body.triangles_at_rest();
+        let dots = Dots::of(body);
+        let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
+        let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        if !(low.is_finite() && high.is_finite()) {
+            return Err(Error::failed("it has neither surface nor taxels to draw").at(&body.name));
+        }
+        let middle = (low + high) / 2.0;
+        let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
+        let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
+        // Include the discs and their rims.
+        let reach = |taxel: usize| {
+            let (place, reach) = (dots.places[taxel] - middle, RIM * dots.radii[taxel]);
+            [place - reach, place + reach]
+        };
+        let all = (0..dots.places.len()).flat_map(reach);
+        let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(all).collect();
+        let looked_at = match &options.look_at {
+            None => points.clone(),
+            Some(name) => look_at(body, fields, name)?.into_iter().flat_map(reach).collect(),
+        };
+        let mut labels = Labels::new(title, size[0]);
+        let (arrangement, size) = arranged(&mut labels, key, size, &axes, &looked_at)?;
+        let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
+        let (corners, faces) = shape::surface(&triangles, middle);
+        Ok(Self { dots, views, middle, arrangement, size, radius_m, corners, faces })
+    }
+
+    /// Radius of a usual disc, pixels.
+    fn usual_radius(&self) -> f64 {
+        self.dots.mean_radius() * self.arrangement.scale
+    }
+
+    /// The surface without discs.
+    fn drawing(&self, background: [f64; 3]) -> Drawing {
+        Drawing {
+            size: self.size,
+            background,
+            corners: self.corners.clone(),
+            triangles: self.faces.clone(),
+            slices: Vec::new(),
+            fan: fan(self.usual_radius()),
+            eyes: self.arrangement.eyes(self.radius_m),
+        }
+    }
+}
+
+/// The taxels of the field or the link called `name`.
+fn look_at(body: &Body, fields: &[Field], name: &str) -> Result<Vec<usize>> {
+    if let Some(field) = fields.iter().find(|field| field.name == name) {
+        return Ok(field.members.iter().map(|member| member.taxel).collect());
+    }
+    let link = body.link_index(name);
+    let taxels: Vec<usize> = (0..body.taxels.len()).filter(|&i| Some(body.taxels[i].link) == link).collect();
+    if !taxels.is_empty() {
+        return Ok(taxels);
+    }
+    let names = fields.iter().map(|field| field.name.as_str()).chain(body.links.iter().map(|link| link.name.as_str()));
+    let hint = nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Err(Error::usage(format!("there is no field or link `{name}` with taxels{hint}")).at(&body.name))
 }
 
 /// A PNG of the chart of field `index` of `fields`: members at their (u, v), +u to the right.
@@ -140,25 +198,17 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
         100.0 * chart.distortion
     );
     let mut labels = Labels::new(&title, width);
-    let below = labels.key(shown.key(&within), [width, height]);
     let around = dots
         .places
         .iter()
         .zip(&dots.radii)
         .flat_map(|(&p, &r)| [p - CHART_MARGIN_RADII * r, p + CHART_MARGIN_RADII * r]);
     let points: Vec<DVec3> = around.chain([DVec3::ZERO]).collect();
-    let taken = labels.above() + below;
-    if height <= taken + 40 {
-        return Err(Error::usage(format!(
-            "the picture is too low for the chart; give a height over {} pixels",
-            taken + 40
-        )));
-    }
-    let arrangement =
-        Arrangement::of(&[View::Front.axes()], &points, [width, height - taken], labels.above(), labels.above_view());
-    let usual = dots.radii.iter().sum::<f64>() / dots.radii.len().max(1) as f64 * arrangement.scale;
+    let views = [View::Front.axes()];
+    let (arrangement, size) = arranged(&mut labels, shown.key(&within), [width, height], &views, &points)?;
+    let usual = dots.mean_radius() * arrangement.scale;
     let drawing = Drawing {
-        size: [width, labels.above() + arrangement.height + below],
+        size,
         background: linear(PAPER),
         slices: dots.slices(&shown.coloured(&within), DVec3::ZERO, usual > 2.0),
         fan: fan(usual),
@@ -171,6 +221,24 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     labels.bar(arrangement.scale);
     labels.draw(&mut pixels, drawing.size)?;
     ink::png(&pixels, drawing.size)
+}
+
+/// Views of `points` above a legend of `key` in a picture of at most `size`, and the picture's size.
+fn arranged(
+    labels: &mut Labels,
+    key: Vec<(Option<[u8; 3]>, String)>,
+    [width, height]: [u32; 2],
+    views: &[[DVec3; 3]],
+    points: &[DVec3],
+) -> Result<(Arrangement, [u32; 2])> {
+    let taken = labels.above() + labels.key(key, [width, height]);
+    if height <= taken + 40 {
+        let least = taken + 40;
+        return Err(Error::usage(format!("the picture is too low; give a height over {least} pixels")));
+    }
+    let arrangement = Arrangement::of(views, points, [width, height - taken], labels.above(), labels.above_view());
+    let size = [width, arrangement.height + taken];
+    Ok((arrangement, size))
 }
 
 fn checked(size: [u32; 2]) -> Result<[u32; 2]> {

@@ -74,6 +74,11 @@ impl Dots {
         Self { places, normals, radii, spacing_m }
     }
 
+    /// m.
+    pub(super) fn mean_radius(&self) -> f64 {
+        self.radii.iter().sum::<f64>() / self.radii.len().max(1) as f64
+    }
+
     /// Pairs of `fields` that share taxels or are neighbours, as indices in that list.
     pub(super) fn beside(&self, fields: &[&Field]) -> BTreeSet<(usize, usize)> {
         let mut of_taxel: Vec<Vec<usize>> = vec![Vec::new(); self.places.len()];
@@ -95,6 +100,39 @@ impl Dots {
         pairs
     }
 
+    /// The discs in `colours`, relative to `middle`, unlit: a colour is what the legend says.
+    pub(super) fn flat_slices(&self, colours: &[[u8; 3]], middle: DVec3, rims: bool) -> Vec<Slice> {
+        let mut slices = Vec::with_capacity(2 * colours.len());
+        for (taxel, &colour) in colours.iter().enumerate() {
+            if rims {
+                slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU)));
+            }
+            let slice = self.slice(taxel, middle, (1.0, LIFT + 0.1), colour, (0.0, TAU));
+            slices.push(Slice { colour: [slice.colour[0], slice.colour[1], slice.colour[2], 0.0], ..slice });
+        }
+        slices
+    }
+
+    /// A piece of the disc of a taxel, relative to `middle`: radius and lift in its radii, start and sweep in rad.
+    fn slice(
+        &self,
+        taxel: usize,
+        middle: DVec3,
+        (radius, lift): (f64, f64),
+        colour: [u8; 3],
+        (start, sweep): (f64, f64),
+    ) -> Slice {
+        let [r, g, b] = linear(colour).map(|part| part as f32);
+        Slice {
+            middle: (self.places[taxel] - middle).as_vec3().to_array(),
+            radius: (radius * self.radii[taxel]) as f32,
+            normal: self.normals[taxel].as_vec3().to_array(),
+            lift: lift as f32,
+            colour: [r, g, b, 1.0],
+            span: [start as f32, sweep as f32, 0.0, 0.0],
+        }
+    }
+
     /// The discs, relative to `middle`: each has a slice in the colour of each of its fields.
     pub(super) fn slices(&self, fields: &[(&Field, [u8; 3])], middle: DVec3, rims: bool) -> Vec<Slice> {
         let mut of_taxel: Vec<Vec<[u8; 3]>> = vec![Vec::new(); self.places.len()];
@@ -103,19 +141,8 @@ impl Dots {
         }
         let mut slices = Vec::with_capacity(2 * self.places.len());
         for (taxel, colours) in of_taxel.iter_mut().enumerate() {
-            let slice = |radius: f64, lift: f64, colour: [u8; 3], start: f64, sweep: f64| {
-                let [r, g, b] = linear(colour).map(|part| part as f32);
-                Slice {
-                    middle: (self.places[taxel] - middle).as_vec3().to_array(),
-                    radius: (radius * self.radii[taxel]) as f32,
-                    normal: self.normals[taxel].as_vec3().to_array(),
-                    lift: lift as f32,
-                    colour: [r, g, b, 1.0],
-                    span: [start as f32, sweep as f32, 0.0, 0.0],
-                }
-            };
             if rims {
-                slices.push(slice(RIM, LIFT, colour::RIM, 0.0, TAU));
+                slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU)));
             }
             if colours.is_empty() {
                 colours.push(colour::REST);
@@ -124,7 +151,8 @@ impl Dots {
             let sweep = TAU / colours.len() as f64;
             for (number, &colour) in colours.iter().enumerate() {
                 // Above the rim by more than the depth resolution.
-                slices.push(slice(1.0, LIFT + 0.1, colour, number as f64 * sweep, sweep));
+                let piece = (number as f64 * sweep, sweep);
+                slices.push(self.slice(taxel, middle, (1.0, LIFT + 0.1), colour, piece));
             }
         }
         slices

@@ -67,7 +67,8 @@ impl View {
 
     /// The four sides that show most of the taxels with these normals, or fewer if fewer show any, and then three-quarter.
     /// Without taxels front, back, left and right.
-    pub(super) fn best(normals: &[DVec3]) -> Vec<Self> {
+    #[must_use]
+    pub fn best(normals: &[DVec3]) -> Vec<Self> {
         let seen = |view: Self| -> f64 {
             let towards = view.axes()[2];
             normals.iter().map(|normal| normal.dot(towards).max(0.0)).sum()

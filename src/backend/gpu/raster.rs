@@ -40,7 +40,7 @@ pub(crate) struct Slice {
     pub(crate) normal: [f32; 3],
     /// How far it is moved towards the eye, in radii.
     pub(crate) lift: f32,
-    /// Linear red, green and blue; the fourth is ignored.
+    /// Linear red, green and blue; the fourth is 1 where light falls on it and 0 where its colour is as it is.
     pub(crate) colour: [f32; 4],
     /// Where the piece starts and how far it goes round, rad; the others are ignored.
     pub(crate) span: [f32; 4],
