@@ -48,14 +48,17 @@ void main() {
   vec3 lamp = normalize(toEye + 0.9 * u_up - 0.7 * u_right);
   float wrapped = max(0.0, (dot(normal, lamp) + 0.35) / 1.35);
   float facing = clamp(dot(normal, toEye), 0.0, 1.0);
-  float light = mix(0.42, 0.72, sky) + 0.42 * wrapped * wrapped;
+  float light = mix(0.5, 0.68, sky) + 0.4 * wrapped * wrapped;
   light *= mix(0.62, 1.0, smoothstep(0.0, 0.55, facing));
   vec3 colour = u_albedo * light + u_rim * pow(1.0 - facing, 4.0);
   vec3 behind = background(gl_FragCoord.xy);
   o_colour = vec4(mix(behind, colour, u_solid) + dither(gl_FragCoord.xy), 1.0);
 }`;
 
-/** @typedef {{above: number[], below: number[], albedo: number[], rim: number[], ink: number[]}} Theme */
+/**
+ * @typedef {{above: number[], below: number[], albedo: number[], rim: number[], ink: number[], rest: number[]}} Theme
+ * `rest` is the colour of a taxel that feels nothing, 0 to 255; the others run from 0 to 1.
+ */
 
 export class Body {
   /**

@@ -189,11 +189,11 @@ export function chooseDirection(camera, normals, areas) {
   let best = -Infinity;
   let choice = [0.6, 0.3];
   for (const [yaw, pitch, liking] of [
-    [0.6, 0.25, 1.15],
-    [-0.6, 0.25, 1.1],
+    [0.5, 0.2, 1.3],
+    [-0.5, 0.2, 1.25],
     [0.5, 0.75, 1],
     [0.5, -0.5, 0.9],
-    [Math.PI - 0.6, 0.25, 0.9],
+    [Math.PI - 0.5, 0.2, 0.9],
   ]) {
     const back = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
     let seen = 0;

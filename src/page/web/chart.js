@@ -189,7 +189,8 @@ export class ChartPanel {
     context.beginPath();
     context.arc(at.x, at.y, radius, 0, 2 * Math.PI);
     if (known) {
-      context.fillStyle = `rgb(${colours[colourIndex(p, model.scaleMax)].join(" ")})`;
+      context.fillStyle =
+        p > 0 ? `rgb(${colours[colourIndex(p, model.scaleMax)].join(" ")})` : cssColour("rest");
       context.fill();
     }
     context.lineWidth = taxel === this.choices.hoveredTaxel ? 2.5 : 1;

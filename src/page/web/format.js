@@ -10,11 +10,12 @@ export const ABSENT = "–";
 export function short(x) {
   if (!Number.isFinite(x)) return ABSENT;
   const size = Math.abs(x);
+  if (Number.isInteger(x) && size < 1e6) return String(x);
   if (size >= 1e6 || (size > 0 && size < 1e-3)) return x.toExponential(2).replace("e+", "e");
   if (size >= 100) return x.toFixed(0);
   if (size >= 10) return x.toFixed(1);
   if (size >= 1) return x.toFixed(2);
-  return size === 0 ? "0" : x.toFixed(3);
+  return x.toFixed(3);
 }
 
 /**

@@ -69,20 +69,15 @@ export function makeProgram(gl, vertex, fragment) {
  * A buffer of an attribute.
  * @param {GL} gl
  * @param {number} place
- * @param {Float32Array | Uint32Array | Uint8Array} data
+ * @param {Float32Array | Uint32Array} data
  * @param {number} size components
- * @param {{perInstance?: boolean, changes?: boolean}} [how]
  */
-export function attribute(gl, place, data, size, how = {}) {
-  const buffer = gl.createBuffer();
-  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-  gl.bufferData(gl.ARRAY_BUFFER, data, how.changes ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
+export function attribute(gl, place, data, size) {
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
   gl.enableVertexAttribArray(place);
   if (data instanceof Uint32Array) gl.vertexAttribIPointer(place, size, gl.UNSIGNED_INT, 0, 0);
-  else if (data instanceof Uint8Array) gl.vertexAttribPointer(place, size, gl.UNSIGNED_BYTE, true, 0, 0);
   else gl.vertexAttribPointer(place, size, gl.FLOAT, false, 0, 0);
-  if (how.perInstance) gl.vertexAttribDivisor(place, 1);
-  return buffer;
 }
 
 /**
@@ -109,17 +104,18 @@ export class Target {
    * @param {GL} gl
    * @param {number} width
    * @param {number} height
+   * @param {boolean} deep whether it has depth
    */
-  constructor(gl, width, height) {
+  constructor(gl, width, height, deep) {
     this.gl = gl;
     this.width = width;
     this.height = height;
     this.colour = makeTexture(gl, gl.RGBA8, width, height);
-    this.depth = makeTexture(gl, gl.DEPTH_COMPONENT24, width, height);
+    this.depth = deep ? makeTexture(gl, gl.DEPTH_COMPONENT24, width, height) : null;
     this.framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.colour, 0);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depth, 0);
+    if (deep) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depth, 0);
   }
 
   /** Makes it what is drawn into. */
@@ -129,17 +125,29 @@ export class Target {
   }
 
   /**
-   * Copies the colours to another target, or to the screen.
-   * @param {Target | null} target
-   * @param {number} width of what is copied to
+   * Copies the colours to the screen.
+   * @param {number} width of the screen
    * @param {number} height
    */
-  copyTo(target, width, height) {
+  toScreen(width, height) {
     const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    // Chromium clears the screen before the first drawing, and does not take a copy for one.
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    this.copy(null, width, height);
+  }
+
+  /**
+   * Copies the colours, averaged where the sizes differ.
+   * @param {Target | null} target
+   * @param {number} width
+   * @param {number} height
+   */
+  copy(target, width, height) {
+    const { gl } = this;
+    const filter = width === this.width && height === this.height ? gl.NEAREST : gl.LINEAR;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.framebuffer);
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target ? target.framebuffer : null);
-    const same = width === this.width && height === this.height;
-    const filter = same ? gl.NEAREST : gl.LINEAR;
     gl.blitFramebuffer(0, 0, this.width, this.height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, filter);
   }
 

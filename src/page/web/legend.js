@@ -22,9 +22,14 @@ export class Legend {
     this.auto.title = "Scale the colours to the largest pressure from now on (A)";
     this.auto.addEventListener("click", () => this.toggle());
     this.states = make("div", "legend-states");
+    const head = make("div", "legend-head");
+    head.append(this.title, this.auto);
+    const zero = make("span", "legend-zero");
+    zero.append(make("i"), "0");
+    zero.title = "A taxel that feels nothing";
     const foot = make("div", "legend-foot");
-    foot.append(this.source, this.auto);
-    root.append(this.title, this.canvas, this.ticks, foot, this.states);
+    foot.append(this.source, zero);
+    root.append(head, this.canvas, this.ticks, foot, this.states);
     this.since = "";
     this.shown = "";
     this.counts = "";

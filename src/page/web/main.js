@@ -272,6 +272,10 @@ Object.defineProperty(window, "somatic", {
     get firstPictureMs() {
       return view.firstPictureMs;
     },
+    /** Smoothed time of a drawing, ms. */
+    get drawMs() {
+      return view.drawMs;
+    },
     get renderer() {
       return view.renderer.name;
     },

@@ -92,7 +92,7 @@ export class Marks {
       for (const { at, colour: fill, text } of places) {
         this.ring(context, at, fill, field === choices.field);
         this.places.push({ x: at.x, y: at.y, field });
-        if (choices.labels) this.label(context, at, text, fill, labels);
+        if (choices.labels && facing) this.label(context, at, text, fill, labels);
       }
     }
     context.globalAlpha = 1;

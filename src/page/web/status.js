@@ -49,7 +49,7 @@ export class Status {
     setText(byId("rate", HTMLElement), view.gl ? drawn.toFixed(0) : ABSENT);
     const detail = byId("detail", HTMLElement);
     detail.hidden = view.detail >= 1 || !view.gl;
-    setText(detail, `body at ${Math.round(100 * view.detail)} % in motion`);
+    setText(detail, `drawn at ${Math.round(100 * view.detail)} % in motion`);
     byId("rate-chip", HTMLElement).title = `Drawings in the last second, by ${view.renderer.name}`;
   }
 

@@ -1,22 +1,27 @@
 /**
  * Draws taxels as flat discs of their true size. A disc has one colour, that of its pressure in the server's table, without
- * light, so that a pixel in its middle can be read against the legend. States have marks of their own near the rim.
+ * light, so that a pixel in its middle can be read against the legend. One that feels nothing is a quiet grey. States have marks of their own near the rim.
  */
 
-import { attribute, makeProgram, POSE_GLSL } from "./gl.js";
+import { changedRects } from "./dirty.js";
+import { attribute, makeProgram, makeTexture, POSE_GLSL } from "./gl.js";
 import { HEALTH } from "./wire.js";
+
+/** Taxels in a row of the textures of colours. */
+const ROW = 1024;
 
 const VERTEX = `
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec3 a_normal;
 layout(location = 2) in float a_radius;
 layout(location = 3) in uint a_link;
-layout(location = 4) in vec4 a_fill;
-layout(location = 5) in vec4 a_ring;
+uniform highp sampler2D u_fills;
+uniform highp sampler2D u_rings;
 uniform mat4 u_clipFromWorld;
 uniform vec3 u_eye;
 uniform float u_pixels;
 uniform bool u_bothSides;
+uniform bool u_special;
 ${POSE_GLSL}
 out vec2 v_corner;
 flat out vec4 v_fill;
@@ -24,19 +29,26 @@ flat out vec4 v_ring;
 flat out float v_radius;
 flat out int v_state;
 void main() {
+  int corner = gl_VertexID & 3;
+  int taxel = gl_VertexID >> 2;
+  ivec2 cell = ivec2(taxel % ${ROW}, taxel / ${ROW});
+  vec4 fill = texelFetch(u_fills, cell, 0);
+  vec4 ring = texelFetch(u_rings, cell, 0);
   vec3 place = toWorld(a_link, vec4(a_position, 1.0));
   vec3 normal = toWorld(a_link, vec4(a_normal, 0.0));
   vec3 toEye = u_eye - place;
   float distance = length(toEye);
-  if (!u_bothSides && dot(normal, toEye) < 0.0) {
+  v_state = int(fill.a * 255.0 + 0.5);
+  bool special = v_state != 0 || ring.a > 0.0;
+  if (special != u_special || (!u_bothSides && dot(normal, toEye) < 0.0)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;
   }
   // A disc smaller than a pixel or two would flicker or vanish.
   float radius = max(a_radius, 1.3 * distance / u_pixels);
   v_radius = radius * u_pixels / distance;
-  float grown = 1.0 + (a_ring.a > 0.0 ? 4.5 : 1.0) / v_radius;
-  v_corner = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0) * grown;
+  float grown = 1.0 + (ring.a > 0.0 ? 4.5 : 1.0) / v_radius;
+  v_corner = (vec2(corner & 1, corner >> 1) * 2.0 - 1.0) * grown;
   vec3 one = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0, 1, 0) : vec3(1, 0, 0)));
   vec3 two = cross(normal, one);
   vec3 p = place + (v_corner.x * one + v_corner.y * two) * radius;
@@ -44,26 +56,43 @@ void main() {
   // A curved surface would cut a flat disc: its depth is taken a little nearer.
   vec4 nearer = u_clipFromWorld * vec4(p + toEye / distance * a_radius * 0.7, 1.0);
   gl_Position.z = nearer.z / nearer.w * gl_Position.w;
-  v_fill = a_fill;
-  v_ring = a_ring;
-  v_state = int(a_fill.a * 255.0 + 0.5);
+  v_fill = fill;
+  v_ring = ring;
 }`;
 
-const FRAGMENT = `
+const FRAGMENT_HEAD = `
 in vec2 v_corner;
 flat in vec4 v_fill;
 flat in vec4 v_ring;
 flat in float v_radius;
 flat in int v_state;
 uniform highp sampler2D u_depth;
-uniform vec2 u_depthScale;
 uniform vec3 u_ink;
 uniform vec3 u_paper;
 uniform bool u_through;
 out vec4 o_colour;
+bool isHidden() {
+  return gl_FragCoord.z > texelFetch(u_depth, ivec2(gl_FragCoord.xy), 0).r;
+}`;
+
+/** Of taxels in a good state without a ring: nearly all, so it is short. */
+const PLAIN = `
+${FRAGMENT_HEAD}
 void main() {
-  float there = texelFetch(u_depth, ivec2(gl_FragCoord.xy * u_depthScale), 0).r;
-  bool hidden = gl_FragCoord.z > there;
+  float d = length(v_corner);
+  float pixel = 0.8 / v_radius;
+  float alpha = clamp(0.5 + (1.0 - d) / (2.0 * pixel), 0.0, 1.0);
+  bool hidden = isHidden();
+  if (alpha <= 0.0 || (hidden && !u_through)) discard;
+  float rim = clamp((d - 1.0 + 2.6 * pixel) / pixel, 0.0, 1.0) * clamp((v_radius - 3.0) / 3.0, 0.0, 1.0);
+  o_colour = vec4(v_fill.rgb * (1.0 - 0.3 * rim), hidden ? 0.4 * alpha : alpha);
+}`;
+
+/** Of all others. */
+const SPECIAL = `
+${FRAGMENT_HEAD}
+void main() {
+  bool hidden = isHidden();
   if (hidden && !u_through) discard;
   float d = length(v_corner);
   float pixel = max(1e-4, 0.7 * fwidth(d));
@@ -91,7 +120,7 @@ void main() {
     float dash = step(0.5, fract(atan(v_corner.y, v_corner.x) * 1.2732395));
     colour = mix(colour, u_ink, dash * smoothstep(0.72 - pixel, 0.72 + pixel, d));
   } else {
-    colour = mix(colour, colour * 0.62, rim);
+    colour = mix(colour, colour * 0.7, rim);
   }
   if (v_ring.a > 0.0) {
     float from = 1.0 + 1.0 / v_radius;
@@ -114,13 +143,14 @@ const LEFT_OUT = HEALTH.indexOf("left out");
  * @param {Uint8Array} health
  * @param {number} max pressure at the upper end
  * @param {number[][]} colours
+ * @param {number[]} rest colour of a taxel that feels nothing
  * @param {Uint8Array} out
  */
-export function fillColours(pressure, health, max, colours, out) {
+export function fillColours(pressure, health, max, colours, rest, out) {
   for (let i = 0; i < pressure.length; i++) {
     const p = pressure[i];
     const known = p === p;
-    const [r, g, b] = colours[colourIndex(known ? p : 0, max)];
+    const [r, g, b] = p > 0 ? colours[colourIndex(p, max)] : rest;
     out[4 * i] = r;
     out[4 * i + 1] = g;
     out[4 * i + 2] = b;
@@ -138,6 +168,21 @@ export function colourIndex(p, max) {
   return Math.round(Math.min(1, Math.max(0, p / max)) * 255) || 0;
 }
 
+/**
+ * Each value four times.
+ * @template {Float32Array | Uint32Array} T
+ * @param {T} values
+ * @param {number} size components of a value
+ * @returns {T}
+ */
+function fourTimes(values, size) {
+  const out = /** @type {T} */ (new /** @type {any} */ (values.constructor)(4 * values.length));
+  for (let i = 0; i < values.length / size; i++)
+    for (let c = 0; c < 4; c++)
+      for (let k = 0; k < size; k++) out[(4 * i + c) * size + k] = values[i * size + k];
+  return out;
+}
+
 export class Taxels {
   /**
    * @param {import("./gl.js").GL} gl
@@ -147,29 +192,62 @@ export class Taxels {
     this.gl = gl;
     this.count = mesh.taxelId.length;
     this.hasBody = mesh.corners.length > 0;
-    this.program = makeProgram(gl, VERTEX, FRAGMENT);
-    this.fill = new Uint8Array(4 * this.count);
-    this.ring = new Uint8Array(4 * this.count);
+    this.plain = makeProgram(gl, VERTEX, PLAIN);
+    /** Made when first needed. @type {import("./gl.js").Program | null} */
+    this.special = null;
+    this.hasSpecial = false;
+    this.rows = Math.max(1, Math.ceil(this.count / ROW));
+    this.fill = new Uint8Array(4 * ROW * this.rows);
+    this.before = new Uint8Array(4 * ROW * this.rows);
+    this.ring = new Uint8Array(4 * ROW * this.rows);
+    this.fills = makeTexture(gl, gl.RGBA8, ROW, this.rows);
+    this.rings = makeTexture(gl, gl.RGBA8, ROW, this.rows);
+    // Four corners a taxel, each with all that the taxel has: software draws instances one by one, which is far slower.
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
-    attribute(gl, 0, mesh.taxelPosition, 3, { perInstance: true });
-    attribute(gl, 1, mesh.taxelNormal, 3, { perInstance: true });
-    attribute(gl, 2, mesh.taxelRadius, 1, { perInstance: true });
-    attribute(gl, 3, mesh.taxelLink, 1, { perInstance: true });
-    this.fillBuffer = attribute(gl, 4, this.fill, 4, { perInstance: true, changes: true });
-    this.ringBuffer = attribute(gl, 5, this.ring, 4, { perInstance: true, changes: true });
+    attribute(gl, 0, fourTimes(mesh.taxelPosition, 3), 3);
+    attribute(gl, 1, fourTimes(mesh.taxelNormal, 3), 3);
+    attribute(gl, 2, fourTimes(mesh.taxelRadius, 1), 1);
+    attribute(gl, 3, fourTimes(mesh.taxelLink, 1), 1);
+    const corners = new Uint32Array(6 * this.count);
+    for (let i = 0; i < this.count; i++)
+      [0, 1, 2, 2, 1, 3].forEach((c, k) => (corners[6 * i + k] = 4 * i + c));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
   }
 
   /**
+   * Takes over the pressures of the newest frame.
    * @param {import("./model.js").Model} model
+   * @param {import("./body.js").Theme} theme
+   * @param {(taxel: number) => import("./dirty.js").Rect | null} rectOf where a taxel is in the picture
+   * @param {{width: number, height: number, rects: number}} limits
+   * @returns where the picture changes
    */
-  update(model) {
-    if (!model.welcome || model.pressure.length !== this.count) return;
-    fillColours(model.pressure, model.health, model.scaleMax, model.welcome.colours, this.fill);
+  update(model, theme, rectOf, limits) {
+    if (!model.welcome || model.pressure.length !== this.count) return [];
+    [this.fill, this.before] = [this.before, this.fill];
+    fillColours(model.pressure, model.health, model.scaleMax, model.welcome.colours, theme.rest, this.fill);
+    this.upload(this.fills, this.fill);
+    this.findSpecial();
+    return changedRects(this.before, this.fill, rectOf, limits);
+  }
+
+  /**
+   * @param {WebGLTexture | null} texture
+   * @param {Uint8Array} bytes
+   */
+  upload(texture, bytes) {
     const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.fillBuffer);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.fill);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, this.rows, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  }
+
+  findSpecial() {
+    this.hasSpecial = false;
+    for (let i = 3; i < this.fill.length && !this.hasSpecial; i += 4)
+      this.hasSpecial = this.fill[i] !== 0 || this.ring[i] !== 0;
   }
 
   /**
@@ -179,41 +257,66 @@ export class Taxels {
   updateRings(rings) {
     this.ring.fill(0);
     for (const [taxel, [r, g, b]] of rings) this.ring.set([r, g, b, 255], 4 * taxel);
-    const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.ringBuffer);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.ring);
+    this.upload(this.rings, this.ring);
+    this.findSpecial();
   }
 
   /**
-   * Draws onto the screen, hidden by what the body's picture has nearer.
+   * Draws into the bound picture, hidden by what the body's picture of the same size has nearer.
    * @param {import("./gl.js").Target} body
    * @param {import("./camera.js").Camera} camera
    * @param {import("./gl.js").Poses} poses
    * @param {import("./body.js").Theme} theme
-   * @param {{through: boolean, width: number, height: number}} how
+   * @param {boolean} through whether hidden ones show faintly
    */
-  draw(body, camera, poses, theme, how) {
+  draw(body, camera, poses, theme, through) {
     const { gl } = this;
-    const { program, at } = this.program;
-    gl.useProgram(program);
-    gl.uniformMatrix4fv(at("u_clipFromWorld"), false, camera.clipFromWorld);
-    gl.uniform3fv(at("u_eye"), camera.eye);
-    gl.uniform1f(at("u_pixels"), camera.pixelsPerMetre(1) * (how.height / camera.height));
-    gl.uniform1i(at("u_bothSides"), how.through || !this.hasBody ? 1 : 0);
-    gl.uniform1i(at("u_through"), how.through ? 1 : 0);
-    gl.uniform2f(at("u_depthScale"), body.width / how.width, body.height / how.height);
-    gl.uniform3fv(at("u_ink"), theme.ink);
-    gl.uniform3fv(at("u_paper"), theme.albedo);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, poses.texture);
-    gl.uniform1i(at("u_poses"), 0);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, body.depth);
-    gl.uniform1i(at("u_depth"), 1);
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, this.fills);
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, this.rings);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.bindVertexArray(this.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+    const pixels = camera.pixelsPerMetre(1) * (body.height / camera.height);
+    this.pass(this.plain, false, pixels, camera, theme, through);
+    if (this.hasSpecial) {
+      this.special ??= makeProgram(gl, VERTEX, SPECIAL);
+      this.pass(this.special, true, pixels, camera, theme, through);
+    }
     gl.bindVertexArray(null);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, null);
+    gl.activeTexture(gl.TEXTURE0);
+  }
+
+  /**
+   * @param {import("./gl.js").Program} program
+   * @param {boolean} special
+   * @param {number} pixels that a metre covers at a depth of a metre
+   * @param {import("./camera.js").Camera} camera
+   * @param {import("./body.js").Theme} theme
+   * @param {boolean} through
+   */
+  pass({ program, at }, special, pixels, camera, theme, through) {
+    const { gl } = this;
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(at("u_clipFromWorld"), false, camera.clipFromWorld);
+    gl.uniform3fv(at("u_eye"), camera.eye);
+    gl.uniform1f(at("u_pixels"), pixels);
+    gl.uniform1i(at("u_special"), special ? 1 : 0);
+    gl.uniform1i(at("u_bothSides"), through || !this.hasBody ? 1 : 0);
+    gl.uniform1i(at("u_through"), through ? 1 : 0);
+    gl.uniform3fv(at("u_ink"), theme.ink);
+    gl.uniform3fv(at("u_paper"), theme.albedo);
+    gl.uniform1i(at("u_poses"), 0);
+    gl.uniform1i(at("u_depth"), 1);
+    gl.uniform1i(at("u_fills"), 2);
+    gl.uniform1i(at("u_rings"), 3);
+    gl.drawElements(gl.TRIANGLES, 6 * this.count, gl.UNSIGNED_INT, 0);
   }
 }

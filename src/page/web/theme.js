@@ -5,17 +5,19 @@ const bytes = (/** @type {number[]} */ ...colour) => colour.map((part) => part /
 /** @type {Record<"dark" | "light", import("./body.js").Theme>} */
 export const THEMES = {
   dark: {
-    above: bytes(44, 47, 53),
-    below: bytes(17, 18, 21),
-    albedo: bytes(122, 127, 136),
-    rim: bytes(36, 40, 48),
-    ink: bytes(245, 246, 248),
+    above: bytes(46, 49, 56),
+    below: bytes(18, 19, 22),
+    albedo: bytes(168, 172, 180),
+    rim: bytes(30, 33, 40),
+    ink: bytes(16, 17, 20),
+    rest: [134, 139, 148],
   },
   light: {
-    above: bytes(252, 252, 253),
-    below: bytes(217, 221, 226),
-    albedo: bytes(186, 190, 197),
-    rim: bytes(20, 20, 22),
+    above: bytes(253, 253, 254),
+    below: bytes(214, 218, 224),
+    albedo: bytes(206, 209, 214),
+    rim: bytes(12, 12, 14),
     ink: bytes(24, 26, 30),
+    rest: [176, 181, 189],
   },
 };

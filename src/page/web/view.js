@@ -2,6 +2,7 @@
 
 import { Body } from "./body.js";
 import { openContext, Poses, rendererOf, Target } from "./gl.js";
+import { taxelInWorld } from "./places.js";
 import { Taxels } from "./taxels.js";
 import { THEMES } from "./theme.js";
 
@@ -31,7 +32,7 @@ export class View {
     this.firstPictureMs = null;
     /** Called before each drawing; what it gives back is called when the drawing is done. @type {() => () => void} */
     this.onDraw = () => () => {};
-    /** Part of the pixels that the body has while it moves. */
+    /** Part of the picture's width and height that is drawn while it moves. */
     this.detail = 1;
     /** Smoothed time of a drawing, ms. */
     this.drawMs = 0;
@@ -40,19 +41,19 @@ export class View {
     this.again = false;
     this.taxelsChanged = true;
     this.ringsChanged = true;
-    this.drawnBody = "";
+    this.drawn = { motion: "", look: "" };
     this.refined = false;
     this.movedAt = 0;
     /** @type {{body: Body, taxels: Taxels, poses: Poses} | null} */
     this.parts = null;
-    /** @type {{coarse: Target | null, whole: Target | null}} */
-    this.targets = { coarse: null, whole: null };
+    /** The body alone with its depth, and the body with taxels. @type {{body: Target | null, picture: Target | null}} */
+    this.targets = { body: null, picture: null };
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.lost = true;
       this.busy = false;
       this.parts = null;
-      this.targets = { coarse: null, whole: null };
+      this.targets = { body: null, picture: null };
       model.tell("context");
     });
     canvas.addEventListener("webglcontextrestored", () => {
@@ -71,7 +72,7 @@ export class View {
       taxels: new Taxels(gl, model.mesh),
       poses: new Poses(gl, model.mesh.restPose.length / 7),
     };
-    this.drawnBody = "";
+    this.drawn = { motion: "", look: "" };
     this.taxelsChanged = this.ringsChanged = true;
     this.request();
   }
@@ -88,9 +89,9 @@ export class View {
   }
 
   draw() {
-    const { gl, camera, model, choices } = this;
+    const { gl, camera, model, choices, parts } = this;
     const finish = this.onDraw();
-    if (!gl || !this.parts || this.lost) {
+    if (!gl || !parts || this.lost) {
       finish();
       return;
     }
@@ -100,51 +101,76 @@ export class View {
     const height = Math.max(1, Math.round(camera.height * ratio));
     const resized = this.canvas.width !== width || this.canvas.height !== height;
     if (resized) [this.canvas.width, this.canvas.height] = [width, height];
-    const { body, taxels, poses } = this.parts;
-    poses.update(model.rows, model.poseVersion);
+    parts.poses.update(model.rows, model.poseVersion);
     const theme = THEMES[choices.dark ? "dark" : "light"];
     const how = { solid: choices.xray ? 0.3 : 1, body: choices.body };
-    const wanted = [
-      camera.version,
-      model.poseVersion,
-      width,
-      height,
-      choices.dark,
-      how.solid,
-      how.body,
-    ].join();
-    let moved = false;
-    if (wanted !== this.drawnBody) {
-      moved = this.drawnBody !== "" && !resized;
-      this.drawnBody = wanted;
+    const motion = [camera.version, model.poseVersion, width, height].join();
+    const look = [choices.dark, how.solid, how.body, choices.taxels].join();
+    const moved = this.drawn.motion !== "" && this.drawn.motion !== motion && !resized;
+    let whole = this.drawn.motion !== motion || this.drawn.look !== look || this.ringsChanged;
+    if (this.drawn.look !== look) this.taxelsChanged = true;
+    if (this.drawn.motion !== motion || this.drawn.look !== look) {
+      this.drawn = { motion, look };
       this.refined = false;
       this.movedAt = begun;
       const part = moved ? this.detail : 1;
-      this.shown = this.target("coarse", Math.round(width * part), Math.round(height * part));
-      body.draw(this.shown, camera, poses, theme, how);
+      const target = this.target("body", Math.ceil(width * part), Math.ceil(height * part));
+      parts.body.draw(target, camera, parts.poses, theme, how);
       setTimeout(() => this.request(), REFINE_AFTER_MS + 20);
     } else if (!this.refined && begun - this.movedAt > REFINE_AFTER_MS) {
-      this.refined = true;
+      this.refined = whole = true;
       this.refine(width, height, theme, how);
     }
-    const shown = this.shown;
-    if (!shown) return;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    // Chromium clears the screen before the first drawing, and does not take the copy for one.
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    shown.copyTo(null, width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, width, height);
-    if (this.taxelsChanged) taxels.update(model);
-    if (this.ringsChanged) taxels.updateRings(choices.rings(model));
+    const { body } = this.targets;
+    if (!body) return;
+    const scale = body.width / camera.width;
+    const size = { width: body.width, height: body.height };
+    /** @type {import("./dirty.js").Rect[]} */
+    let rects = [];
+    if (this.taxelsChanged)
+      rects = parts.taxels.update(model, theme, (taxel) => this.rectOf(taxel, scale), {
+        ...size,
+        rects: parts.taxels.count > 3000 ? 2 : 4,
+      });
+    if (this.ringsChanged) parts.taxels.updateRings(choices.rings(model));
     this.taxelsChanged = this.ringsChanged = false;
-    if (choices.taxels) taxels.draw(shown, camera, poses, theme, { through: choices.xray, width, height });
+    if (whole) rects = [{ x0: 0, y0: 0, x1: size.width, y1: size.height }];
+    if (!rects.length && !resized) {
+      // Nothing looks different: what is on the screen shows this frame.
+      finish();
+      return;
+    }
+    const picture = this.target("picture", size.width, size.height);
+    gl.enable(gl.SCISSOR_TEST);
+    for (const { x0, y0, x1, y1 } of rects) {
+      gl.scissor(x0, size.height - y1, x1 - x0, y1 - y0);
+      body.copy(picture, size.width, size.height);
+      picture.bind();
+      if (choices.taxels) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
+    }
+    gl.disable(gl.SCISSOR_TEST);
+    picture.toScreen(width, height);
     this.whenDone(() => {
       this.framesDrawn++;
       this.firstPictureMs ??= performance.now();
       this.adapt(performance.now() - begun, moved);
       finish();
     });
+  }
+
+  /**
+   * The part of the picture that a taxel and its ring cover.
+   * @param {number} taxel
+   * @param {number} scale pixels of the picture in a CSS pixel
+   */
+  rectOf(taxel, scale) {
+    const place = taxelInWorld(this.model, taxel);
+    if (!place) return null;
+    const at = this.camera.project(place.point);
+    if (at.depth <= 0) return null;
+    const reach = place.radius * this.camera.pixelsPerMetre(at.depth) * scale * 1.15 + 7;
+    const [x, y] = [at.x * scale, at.y * scale];
+    return { x0: x - reach, y0: y - reach, x1: x + reach, y1: y + reach };
   }
 
   /**
@@ -157,20 +183,19 @@ export class View {
   refine(width, height, theme, how) {
     const { gl, parts } = this;
     if (!gl || !parts) return;
-    const coarse = this.target("coarse", width, height);
-    const fine = new Target(gl, 2 * width, 2 * height);
+    const body = this.target("body", width, height);
+    parts.body.draw(body, this.camera, parts.poses, theme, how);
+    const fine = new Target(gl, 2 * width, 2 * height, true);
     if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) === gl.FRAMEBUFFER_COMPLETE) {
-      parts.body.draw(coarse, this.camera, parts.poses, theme, how);
       parts.body.draw(fine, this.camera, parts.poses, theme, how);
-      fine.copyTo(coarse, width, height);
+      fine.copy(body, width, height);
     }
     fine.release();
-    this.shown = coarse;
   }
 
   /**
    * A target of a size, made anew where the size differs.
-   * @param {"coarse" | "whole"} name
+   * @param {"body" | "picture"} name
    * @param {number} width
    * @param {number} height
    */
@@ -180,7 +205,7 @@ export class View {
     let target = this.targets[name];
     if (!target || target.width !== width || target.height !== height) {
       target?.release();
-      target = new Target(gl, width, height);
+      target = new Target(gl, width, height, name === "body");
       this.targets[name] = target;
     }
     return target;
