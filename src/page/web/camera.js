@@ -191,8 +191,8 @@ export function chooseDirection(camera, normals, areas) {
   for (const [yaw, pitch, liking] of [
     [0.5, 0.2, 1.3],
     [-0.5, 0.2, 1.25],
-    [0.5, 0.75, 1],
-    [0.5, -0.5, 0.9],
+    [0.45, 0.95, 1],
+    [0.45, -0.95, 0.95],
     [Math.PI - 0.5, 0.2, 0.9],
   ]) {
     const back = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];

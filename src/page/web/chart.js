@@ -6,7 +6,7 @@ import { axisEllipse, motionArrow, orientationLine } from "./places.js";
 import { colourIndex } from "./taxels.js";
 import { HEALTH } from "./wire.js";
 
-const EDGE = { left: 34, right: 10, top: 8, bottom: 26 };
+const EDGE = { left: 34, right: 10, top: 8, bottom: 28 };
 
 export class ChartPanel {
   /**
@@ -169,9 +169,7 @@ export class ChartPanel {
     }
     context.stroke();
     context.textBaseline = "alphabetic";
-    context.fillText("u, mm", inner.right, height - 3);
-    context.textAlign = "left";
-    context.fillText("v, mm", 0, EDGE.top + 2);
+    context.fillText("u → and v ↑ in mm", inner.right, height - 2);
   }
 
   /**

@@ -67,11 +67,12 @@ export class Choices extends Observed {
     const fields = model.welcome?.fields;
     if (!fields || this.chosen !== null) return;
     if (this.followed !== null && model.inContact.has(this.followed)) return;
+    const touched = [...model.inContact.keys()].filter((field) => fields[field]?.letter === this.letter);
+    const whole = touched.filter((field) => this.isWhole(model, field));
     let most = 0;
     let best = this.followed;
-    for (const field of model.inContact.keys())
-      if (this.isWhole(model, field) && fields[field].chart && model.total(field) > most)
-        [most, best] = [model.total(field), field];
+    for (const field of whole.length ? whole : touched)
+      if (model.total(field) > most) [most, best] = [model.total(field), field];
     if (best === null) best = fields.findIndex((field) => field.chart && field.letter === this.letter);
     if (best === this.followed || best < 0) return;
     this.followed = best;

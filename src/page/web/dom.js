@@ -105,14 +105,14 @@ export function cssColour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-/** Colours that tell things apart, also for colour-blind people (Okabe and Ito, then Tol's muted scheme). */
+/** Colours that tell things apart, also for colour-blind people (after Okabe and Ito, then Tol). */
 export const PALETTE = [
   [0x56, 0xb4, 0xe9],
   [0xe6, 0x9f, 0x00],
   [0x00, 0x9e, 0x73],
   [0xcc, 0x79, 0xa7],
   [0xd5, 0x5e, 0x00],
-  [0x00, 0x72, 0xb2],
+  [0x3b, 0x8c, 0xf0],
   [0xf0, 0xe4, 0x42],
   [0x44, 0xaa, 0x99],
   [0xaa, 0x44, 0x99],

@@ -68,12 +68,13 @@ export class PerceptPanel {
     const { field } = choices;
     this.button.disabled = field === null;
     if (!welcome || field === null) {
-      setText(this.title, "Percept");
+      setText(this.title, "");
       return;
     }
     const about = welcome.fields[field];
     setText(this.title, about.label);
     this.title.title = about.name;
+    setText(byId("chart-title", HTMLElement), about.label);
     byId("percept-follow", HTMLElement).hidden = choices.chosen !== null;
     const touched = model.inContact.has(field);
     for (const column of welcome.columns) {
@@ -94,7 +95,9 @@ export class PerceptPanel {
   /** @param {number | null} [field] */
   ask(field = this.choices.field) {
     if (field === null) return;
-    byId("percept-panel", HTMLDetailsElement).open = true;
+    const panel = byId("percept-panel", HTMLDetailsElement);
+    panel.open = true;
+    this.result.scrollIntoView({ block: "nearest" });
     this.result.replaceChildren(make("p", "note", "Computing …"));
     this.connection.send(say.explain(field));
   }

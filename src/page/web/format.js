@@ -106,7 +106,8 @@ export function ticks(least, most, count) {
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = ([1, 2, 5, 10].find((s) => s * power >= raw) ?? 10) * power;
   const places = [];
-  for (let k = Math.ceil(least / step - 1e-9); k * step <= most + step * 1e-9; k++) places.push(k * step);
+  for (let k = Math.ceil(least / step - 1e-9); k * step <= most + step * 1e-9; k++)
+    places.push(k * step || 0);
   return places;
 }
 

@@ -64,7 +64,7 @@ export class Legend {
     const auto = model.autoscale !== null;
     setText(
       this.source,
-      auto ? `autoscale since ${this.since}` : `fixed: ${this.sourceText(model.scale.from)}`,
+      auto ? `autoscale since ${this.since}` : `fixed scale, ${this.sourceText(model.scale.from)}`,
     );
     this.root.classList.toggle("auto", auto);
     setText(this.auto, auto ? "Fixed scale" : "Autoscale");
@@ -74,13 +74,13 @@ export class Legend {
   sourceText(from) {
     switch (from) {
       case "calibration":
-        return "the calibration’s largest value";
+        return "from the calibration";
       case "raw range":
-        return "the sensor’s range";
+        return "the range of raw values";
       case "recording":
-        return "the recording’s largest value";
+        return "the recording’s maximum";
       case "grown":
-        return "it grew with the data";
+        return "grown with the data";
       default:
         return from;
     }

@@ -74,8 +74,9 @@ export class Marks {
       const own = touches.filter((touch) => touch.field === field);
       const colour = own.length ? this.colours.of(own[0]) : paletteColour(field);
       const facing = !plane.normal || dot(plane.normal, subtract(camera.eye, plane.point)) > 0;
-      context.globalAlpha = facing ? 1 : 0.35;
-      this.shapes(context, field, plane, colour);
+      // What lies behind the body is a faint ring only.
+      context.globalAlpha = facing ? 1 : 0.3;
+      if (facing) this.shapes(context, field, plane, colour);
       const places = own.length
         ? own.map((touch) => ({
             at: camera.project(positionInWorld(model, field, touch.position)),
@@ -141,7 +142,7 @@ export class Marks {
     points.forEach(({ x, y }, i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
     context.setLineDash(dash);
     context.strokeStyle = this.halo ?? "";
-    context.lineWidth = width + 2;
+    context.lineWidth = width + 1.6;
     context.stroke();
     context.strokeStyle = colour;
     context.lineWidth = width;
@@ -174,7 +175,7 @@ export class Marks {
    */
   ring(context, at, colour, chosen) {
     for (const [width, style] of /** @type {[number, string][]} */ ([
-      [5, this.halo ?? ""],
+      [4.4, this.halo ?? ""],
       [chosen ? 3 : 2.25, colour],
     ])) {
       context.beginPath();

@@ -162,8 +162,8 @@ function axes(context, width, height, range, how, x) {
     context.fillText(`${tickText(time, times)} s`, px, height - 4);
   }
   context.stroke();
-  context.textAlign = "left";
-  context.fillText(range.unit || "1", 2, EDGE.top - 4);
+  context.textAlign = "right";
+  if (how.pointer === null) context.fillText(range.unit, width - EDGE.right, EDGE.top - 4);
 }
 
 /**

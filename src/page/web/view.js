@@ -245,7 +245,7 @@ export class View {
   adapt(ms, moved) {
     this.drawMs += 0.2 * (ms - this.drawMs);
     if (!moved) return;
-    if (ms > SLOW_MS) this.detail = Math.max(0.4, this.detail * 0.8);
+    if (ms > SLOW_MS) this.detail = Math.max(0.5, this.detail * 0.8);
     else if (ms < FAST_MS) this.detail = Math.min(1, this.detail * 1.1);
   }
 }

@@ -1,0 +1,131 @@
+// Parts of the page that need no browser.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Camera } from "../../src/page/web/camera.js";
+import { addRect, changedRects } from "../../src/page/web/dirty.js";
+import {
+  scaleFor,
+  seconds,
+  short,
+  tickText,
+  ticks,
+  vectorWithUnit,
+  withUnit,
+} from "../../src/page/web/format.js";
+import { poseToRows, toWorld } from "../../src/page/web/math.js";
+import { Model } from "../../src/page/web/model.js";
+import { byPixel } from "../../src/page/web/plot.js";
+import { colourIndex, fillColours } from "../../src/page/web/taxels.js";
+
+const near = (a, b, bound = 1e-6) => assert.ok(Math.abs(a - b) <= bound, `${a} is not near ${b}`);
+
+test("lengths are millimetres and angles degrees", () => {
+  assert.equal(withUnit(0.0123, "m", "Pa"), "12.3 mm");
+  assert.equal(withUnit(Math.PI / 2, "rad", "Pa"), "90.0°");
+  assert.equal(withUnit(1500, "P", "Pa"), "1.50 kPa");
+  assert.equal(withUnit(1500, "P", "count"), "1500 counts");
+  assert.equal(withUnit(null, "P", "N"), "–");
+  assert.equal(withUnit(NaN, "m", "N"), "–");
+  assert.equal(vectorWithUnit([0.001, -0.0025], "m", "N"), "1.00, -2.50 mm");
+  assert.equal(short(0), "0");
+  assert.equal(scaleFor("m²", 1e-4, "N").unit, "mm²");
+  assert.equal(seconds(3661.25), "1:01:01.2");
+});
+
+test("ticks are round and inside", () => {
+  assert.deepEqual(ticks(0, 40, 4), [0, 10, 20, 30, 40]);
+  assert.deepEqual(ticks(0, 1023, 4), [0, 500, 1000]);
+  assert.equal(tickText(0.5, [0, 0.5, 1]), "0.5");
+});
+
+test("the colour of a pressure is round(clamp(p / max) * 255)", () => {
+  assert.equal(colourIndex(0, 10), 0);
+  assert.equal(colourIndex(10, 10), 255);
+  assert.equal(colourIndex(99, 10), 255);
+  assert.equal(colourIndex(-1, 10), 0);
+  assert.equal(colourIndex(5, 10), 128);
+  const colours = Array.from({ length: 256 }, (_, i) => [i, i, i]);
+  const out = new Uint8Array(16);
+  fillColours(new Float32Array([0, 5, NaN, 1e9]), new Uint8Array([0, 0, 0, 4]), 10, colours, [1, 2, 3], out);
+  assert.deepEqual([...out.subarray(0, 4)], [1, 2, 3, 0]);
+  assert.deepEqual([...out.subarray(4, 8)], [128, 128, 128, 0]);
+  assert.equal(out[11], 1, "a taxel without a pressure looks missing");
+  assert.deepEqual([...out.subarray(12)], [255, 255, 255, 4]);
+});
+
+test("changed taxels give few rectangles that hold them", () => {
+  const [before, now] = [new Uint8Array(16), new Uint8Array(16)];
+  now[0] = now[12] = 1;
+  const at = (taxel) => ({ x0: 100 * taxel, y0: 0, x1: 100 * taxel + 10, y1: 10 });
+  assert.deepEqual(changedRects(before, now, at, { width: 1000, height: 5, rects: 4 }), [
+    { x0: 0, y0: 0, x1: 10, y1: 5 },
+    { x0: 300, y0: 0, x1: 310, y1: 5 },
+  ]);
+  const rects = [];
+  for (let i = 0; i < 5; i++) addRect(rects, at(i), 2);
+  assert.equal(rects.length, 2);
+  assert.equal(Math.max(...rects.map((r) => r.x1)), 410);
+});
+
+test("a pose turns and moves a point", () => {
+  const s = Math.SQRT1_2;
+  const rows = new Float32Array(12);
+  poseToRows([1, 2, 3, 0, 0, s, s], 0, rows);
+  const [x, y, z] = toWorld(rows, 0, [1, 0, 0], 1);
+  near(x, 1);
+  near(y, 3);
+  near(z, 3);
+  assert.deepEqual(toWorld(rows, 0xffffffff, [4, 5, 6], 1), [4, 5, 6]);
+});
+
+test("the camera frames all points and projects them inside", () => {
+  const camera = new Camera();
+  camera.resize(900, 600);
+  const points = [];
+  for (let i = 0; i < 8; i++) points.push([i & 1 ? 0.3 : -0.1, i & 2 ? 0.8 : 0, i & 4 ? 0.2 : -0.2]);
+  camera.frame(points, 0.08);
+  const seen = points.map((p) => camera.project(p));
+  for (const { x, y } of seen) assert.ok(x >= 0 && x <= 900 && y >= 0 && y <= 600);
+  assert.ok(
+    Math.max(...seen.map((p) => p.y)) - Math.min(...seen.map((p) => p.y)) > 450,
+    "it fills the picture",
+  );
+  const ray = camera.ray(seen[3].x, seen[3].y);
+  const way = points[3].map((v, k) => v - camera.eye[k]);
+  const size = Math.hypot(...way);
+  ray.forEach((v, k) => near(v, way[k] / size, 1e-5));
+});
+
+test("no peak is lost where many samples share a pixel", () => {
+  const t = new Float64Array(1024);
+  const v = new Float32Array(1024);
+  for (let i = 0; i < 1000; i++) [t[i], v[i]] = [i / 100, i === 555 ? 9 : i === 700 ? NaN : 1];
+  const how = { from: 0, to: 10, live: true, bandRange: { from: 0, to: 1 } };
+  const { least, most } = byPixel({ colour: "", ring: { t, v, begin: 0, size: 1000 } }, how, 50);
+  assert.equal(Math.max(...most), 9);
+  assert.equal(Math.min(...least), 1);
+});
+
+test("an absent column says why", () => {
+  const model = new Model();
+  const column = (name, components) => ({ name, unit: "m", components, help: "" });
+  model.begin({
+    run: "a",
+    fields: [{}],
+    columns: [column("total", 1), column("axis", 1)],
+    flags: ["no_contact", "one_taxel", "tie"],
+    scale: { max: 1, from: "" },
+  });
+  model.apply({
+    percepts: {
+      field: new Uint32Array([0]),
+      flags: new Uint32Array([0b10]),
+      present: new Uint32Array([0b01]),
+      columns: new Map([[0, new Float32Array([3])]]),
+    },
+  });
+  assert.deepEqual([...model.value(0, "total")], [3]);
+  assert.equal(model.value(0, "axis"), null);
+  assert.equal(model.reason(0, "axis"), "one_taxel");
+  assert.equal(model.value(1, "total"), null);
+});
