@@ -62,10 +62,7 @@ export class Legend {
       }),
     );
     const auto = model.autoscale !== null;
-    setText(
-      this.source,
-      auto ? `autoscale since ${this.since}` : `fixed scale, ${this.sourceText(model.scale.from)}`,
-    );
+    setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scale.from));
     this.root.classList.toggle("auto", auto);
     setText(this.auto, auto ? "Fixed scale" : "Autoscale");
   }
@@ -74,13 +71,13 @@ export class Legend {
   sourceText(from) {
     switch (from) {
       case "calibration":
-        return "from the calibration";
+        return "fixed by the calibration";
       case "raw range":
-        return "the range of raw values";
+        return "fixed to the raw range";
       case "recording":
-        return "the recording’s maximum";
+        return "fixed to the recording’s maximum";
       case "grown":
-        return "grown with the data";
+        return "grown with the data so far";
       default:
         return from;
     }

@@ -5,7 +5,7 @@ import { scaleFor, short, tickText, ticks } from "./format.js";
 
 /** @typedef {{colour: string, ring?: import("./plots.js").Ring, band?: {least: Float32Array, most: Float32Array}}} Line */
 /** @typedef {{from: number, to: number, now: number, unit: string, quantity: string, live: boolean, pointer: number | null,
- *   until: number, bandRange: {from: number, to: number}}} How */
+ *   until: number, spacing: number, bandRange: {from: number, to: number}}} How */
 
 const EDGE = { left: 38, right: 6, top: 14, bottom: 17 };
 
@@ -47,7 +47,7 @@ export function byPixel(line, how, pixels) {
       put(Math.floor((t - how.from) * perSecond), line.band.least[i], line.band.most[i]);
     }
     // A recording with fewer frames than pixels leaves bins empty between them.
-    reach = pixels / 60;
+    reach = 1.6 * Math.max(1, perSecond * how.spacing, perSecond * width);
   }
   return { least, most, reach };
 }

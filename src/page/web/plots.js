@@ -42,6 +42,8 @@ export class Plots {
     this.historyId = 0;
     /** @type {Map<number, Series[]>} */
     this.pending = new Map();
+    /** What was asked for has changed since. */
+    this.stale = false;
     this.bins = 300;
     /** @type {Map<string, {box: HTMLElement, canvas: HTMLCanvasElement, chips: HTMLElement}>} */
     this.groups = new Map();
@@ -60,6 +62,7 @@ export class Plots {
     const { welcome } = this.model;
     if (!welcome) return;
     this.asked = [[]];
+    this.pending.clear();
     const body = `${welcome.run} ${welcome.body} ${welcome.fields.length}`;
     if (body !== this.body) {
       this.body = body;
@@ -132,6 +135,12 @@ export class Plots {
   askHistory() {
     const { welcome } = this.model;
     if (!welcome?.time || !this.series.length || !(this.to > this.from)) return;
+    if (this.pending.size) {
+      // One at a time: the answer to this one asks for the next.
+      this.stale = true;
+      return;
+    }
+    this.stale = false;
     const list = this.series.map(({ field, column, component }) => ({ field, column, component }));
     const id = ++this.historyId;
     this.pending.set(id, list);
@@ -142,7 +151,8 @@ export class Plots {
     const { history } = this.model;
     const list = history && this.pending.get(history.id);
     if (!history || !list) return;
-    for (const id of this.pending.keys()) if (id <= history.id) this.pending.delete(id);
+    this.pending.clear();
+    if (this.stale) setTimeout(() => this.askHistory(), 300);
     this.bandRange = { from: history.from, to: history.to };
     this.bands = new Map(list.map((s, i) => [keyOf(s), { least: history.least[i], most: history.most[i] }]));
     this.draw();
@@ -287,6 +297,7 @@ export class Plots {
         bandRange: this.bandRange,
         live: welcome.mode === "live",
         pointer: this.pointer,
+        spacing: welcome.time ? (welcome.time.end_s - welcome.time.start_s) / welcome.time.frames : 0,
         until: welcome.time ? this.model.timeline.until : Infinity,
       });
     }

@@ -107,8 +107,8 @@ void main() {
     float line = smoothstep(1.0 - width - 2.0 * pixel, 1.0 - width, d);
     if (v_state == 3) line = max(line, 1.0 - smoothstep(0.13, 0.13 + 2.0 * pixel, min(abs(v_corner.x - v_corner.y), abs(v_corner.x + v_corner.y))));
     if (v_state == 6) line = max(line, 1.0 - smoothstep(0.12, 0.12 + 2.0 * pixel, abs(v_corner.x)));
-    colour = mix(u_paper, u_ink, line);
-    alpha *= v_state == 6 ? line : max(line, 0.55);
+    colour = u_ink;
+    alpha *= line;
   } else if (v_state == 2) {
     float stripe = step(0.5, fract((v_corner.x + v_corner.y) * 2.2));
     colour = mix(colour, u_paper, stripe * smoothstep(0.38, 0.42, d));

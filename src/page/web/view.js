@@ -10,7 +10,7 @@ import { THEMES } from "./theme.js";
 const REFINE_AFTER_MS = 220;
 /** Above this time of a drawing in motion the body loses detail; below the second it gains it again. */
 const SLOW_MS = 62;
-const FAST_MS = 26;
+const FAST_MS = 40;
 
 export class View {
   /**
@@ -105,7 +105,7 @@ export class View {
     const theme = THEMES[choices.dark ? "dark" : "light"];
     const how = { solid: choices.xray ? 0.3 : 1, body: choices.body };
     const motion = [camera.version, model.poseVersion, width, height].join();
-    const look = [choices.dark, how.solid, how.body, choices.taxels].join();
+    const look = [choices.dark, how.solid, how.body, choices.taxels, model.frame !== null].join();
     const moved = this.drawn.motion !== "" && this.drawn.motion !== motion && !resized;
     let whole = this.drawn.motion !== motion || this.drawn.look !== look || this.ringsChanged;
     if (this.drawn.look !== look) this.taxelsChanged = true;
@@ -146,7 +146,8 @@ export class View {
       gl.scissor(x0, size.height - y1, x1 - x0, y1 - y0);
       body.copy(picture, size.width, size.height);
       picture.bind();
-      if (choices.taxels) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
+      // Before the first frame nothing is known of any taxel.
+      if (choices.taxels && model.frame) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
     }
     gl.disable(gl.SCISSOR_TEST);
     picture.toScreen(width, height);
