@@ -47,7 +47,7 @@ test("the colour of a pressure is round(clamp(p / max) * 255)", () => {
   const colours = Array.from({ length: 256 }, (_, i) => [i, i, i]);
   const out = new Uint8Array(16);
   fillColours(new Float32Array([0, 5, NaN, 1e9]), new Uint8Array([0, 0, 0, 4]), 10, colours, [1, 2, 3], out);
-  assert.deepEqual([...out.subarray(0, 4)], [1, 2, 3, 0]);
+  assert.deepEqual([...out.subarray(0, 4)], [1, 2, 3, 7]);
   assert.deepEqual([...out.subarray(4, 8)], [128, 128, 128, 0]);
   assert.equal(out[11], 1, "a taxel without a pressure looks missing");
   assert.deepEqual([...out.subarray(12)], [255, 255, 255, 4]);

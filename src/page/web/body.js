@@ -45,10 +45,10 @@ void main() {
   if (dot(normal, toEye) < 0.0) normal = -normal;
   // The sky lights what looks up, the floor a little what looks down, a lamp stands left above the eye.
   float sky = 0.5 + 0.5 * normal.y;
-  vec3 lamp = normalize(toEye + 0.9 * u_up - 0.7 * u_right);
+  vec3 lamp = normalize(toEye + 0.7 * u_up - 0.6 * u_right);
   float wrapped = max(0.0, (dot(normal, lamp) + 0.35) / 1.35);
   float facing = clamp(dot(normal, toEye), 0.0, 1.0);
-  float light = mix(0.5, 0.68, sky) + 0.4 * wrapped * wrapped;
+  float light = mix(0.56, 0.68, sky) + 0.36 * wrapped;
   light *= mix(0.62, 1.0, smoothstep(0.0, 0.55, facing));
   vec3 colour = u_albedo * light + u_rim * pow(1.0 - facing, 4.0);
   vec3 behind = background(gl_FragCoord.xy);

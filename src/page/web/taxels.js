@@ -7,6 +7,8 @@ import { changedRects } from "./dirty.js";
 import { attribute, makeProgram, makeTexture, POSE_GLSL } from "./gl.js";
 import { HEALTH } from "./wire.js";
 
+/** In place of a state: a good taxel that feels nothing. */
+const REST = 7;
 /** Taxels in a row of the textures of colours. */
 const ROW = 1024;
 
@@ -39,7 +41,7 @@ void main() {
   vec3 toEye = u_eye - place;
   float distance = length(toEye);
   v_state = int(fill.a * 255.0 + 0.5);
-  bool special = v_state != 0 || ring.a > 0.0;
+  bool special = (v_state != 0 && v_state != ${REST}) || ring.a > 0.0;
   if (special != u_special || (!u_bothSides && dot(normal, toEye) < 0.0)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;
@@ -85,7 +87,9 @@ void main() {
   bool hidden = isHidden();
   if (alpha <= 0.0 || (hidden && !u_through)) discard;
   float rim = clamp((d - 1.0 + 2.6 * pixel) / pixel, 0.0, 1.0) * clamp((v_radius - 3.0) / 3.0, 0.0, 1.0);
-  o_colour = vec4(v_fill.rgb * (1.0 - 0.3 * rim), hidden ? 0.4 * alpha : alpha);
+  // Seen through: what feels nothing gives way to what is behind it.
+  if (u_through) alpha *= v_state == ${REST} ? (hidden ? 0.12 : 0.3) : (hidden ? 0.75 : 1.0);
+  o_colour = vec4(v_fill.rgb * (1.0 - 0.3 * rim), alpha);
 }`;
 
 /** Of all others. */
@@ -156,7 +160,8 @@ export function fillColours(pressure, health, max, colours, rest, out) {
     out[4 * i + 2] = b;
     // Without a pressure a taxel never looks like one at 0, whatever its state.
     const state = health[i];
-    out[4 * i + 3] = known || state === FAULTY || state === LEFT_OUT ? state : MISSING;
+    if (known && state === 0) out[4 * i + 3] = p > 0 ? 0 : REST;
+    else out[4 * i + 3] = known || state === FAULTY || state === LEFT_OUT ? state : MISSING;
   }
 }
 
@@ -247,7 +252,7 @@ export class Taxels {
   findSpecial() {
     this.hasSpecial = false;
     for (let i = 3; i < this.fill.length && !this.hasSpecial; i += 4)
-      this.hasSpecial = this.fill[i] !== 0 || this.ring[i] !== 0;
+      this.hasSpecial = (this.fill[i] !== 0 && this.fill[i] !== REST) || this.ring[i] !== 0;
   }
 
   /**
