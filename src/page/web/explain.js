@@ -97,7 +97,6 @@ export class PerceptPanel {
     if (field === null) return;
     const panel = byId("percept-panel", HTMLDetailsElement);
     panel.open = true;
-    this.result.scrollIntoView({ block: "nearest" });
     this.result.replaceChildren(make("p", "note", "Computing …"));
     this.connection.send(say.explain(field));
   }

@@ -14,19 +14,26 @@ import {
 
 /** @typedef {{x: number, y: number}} Point */
 
+const LABELS_MAX = 6;
+
 /** Keeps the colour of a touch from onset to release. */
 export class IdentityColours {
   constructor() {
     /** @type {Map<string, number>} */
     this.colours = new Map();
-    this.next = 0;
   }
 
   /** @param {import("./wire.js").Touch[]} touches */
   update(touches) {
     const present = new Set(touches.map((touch) => `${touch.field}:${touch.identity}`));
     for (const key of this.colours.keys()) if (!present.has(key)) this.colours.delete(key);
-    for (const key of present) if (!this.colours.has(key)) this.colours.set(key, this.next++);
+    for (const key of present) {
+      if (this.colours.has(key)) continue;
+      const used = new Set(this.colours.values());
+      let free = 0;
+      while (used.has(free)) free++;
+      this.colours.set(key, free);
+    }
   }
 
   /** @param {import("./wire.js").Touch} touch */
@@ -66,7 +73,7 @@ export class Marks {
     this.halo = cssColour("halo");
     const touches = model.touches.filter((touch) => marked.includes(touch.field));
     this.colours.update(touches);
-    /** @type {Point[]} */
+    /** @type {{at: Point, text: string, colour: string, total: number}[]} */
     const labels = [];
     for (const field of marked) {
       const plane = tangentPlane(model, field);
@@ -81,22 +88,30 @@ export class Marks {
         ? own.map((touch) => ({
             at: camera.project(positionInWorld(model, field, touch.position)),
             colour: this.colours.of(touch),
+            total: touch.total,
             text: `#${touch.identity}  ${withUnit(touch.total, "P", model.quantity)}`,
           }))
         : [
             {
               at: camera.project(plane.point),
               colour,
+              total: model.total(field),
               text: withUnit(model.total(field), "P", model.quantity),
             },
           ];
-      for (const { at, colour: fill, text } of places) {
+      for (const { at, colour: fill, text, total } of places) {
         this.ring(context, at, fill, field === choices.field);
         this.places.push({ x: at.x, y: at.y, field });
-        if (choices.labels && facing) this.label(context, at, text, fill, labels);
+        if (choices.labels && facing) labels.push({ at, text, colour: fill, total });
       }
     }
     context.globalAlpha = 1;
+    // The strongest touches only, from the lowest place up, so that labels stand above what they name.
+    labels.sort((a, b) => b.total - a.total).splice(LABELS_MAX);
+    labels.sort((a, b) => b.at.y - a.at.y);
+    /** @type {Point[]} */
+    const taken = [];
+    for (const { at, text, colour } of labels) this.label(context, at, text, colour, taken);
   }
 
   /**
@@ -213,13 +228,23 @@ export class Marks {
    * @param {Point} at
    * @param {string} text
    * @param {string} colour
-   * @param {Point[]} labels those that have been drawn
+   * @param {Point[]} taken places of labels that have been drawn
    */
-  label(context, at, text, colour, labels) {
-    const place = { x: at.x + 20, y: at.y - 22 };
-    while (labels.some((other) => Math.abs(other.x - place.x) < 90 && Math.abs(other.y - place.y) < 20))
-      place.y += 21;
-    labels.push(place);
+  label(context, at, text, colour, taken) {
+    const place = { x: at.x + 22, y: at.y - 24 };
+    while (taken.some((other) => Math.abs(other.x - place.x) < 120 && Math.abs(other.y - place.y) < 21))
+      place.y -= 22;
+    taken.push(place);
+    this.line(
+      context,
+      [
+        { x: at.x + 5, y: at.y - 5 },
+        { x: place.x + 8, y: place.y },
+      ],
+      colour,
+      1,
+      [],
+    );
     context.font = "600 11.5px system-ui, sans-serif";
     const width = context.measureText(text).width + 24;
     context.beginPath();
