@@ -40,6 +40,9 @@ export class Camera {
     this.up = /** @type {Vec3} */ ([0, 1, 0]);
     this.eye = /** @type {Vec3} */ ([0, 0, 1]);
     this.clipFromWorld = new Float32Array(16);
+    /** Planes of depth, m from the eye. */
+    this.near = 0.1;
+    this.far = 10;
     this.update();
   }
 
@@ -51,15 +54,18 @@ export class Camera {
     this.right = /** @type {Vec3} */ ([cy, 0, -sy]);
     this.up = cross(this.back, this.right);
     this.eye = add(this.target, scale(this.back, this.distance));
-    const near = Math.max(this.distance - 2.5 * this.radius, this.distance * 0.02, this.radius * 1e-3);
-    const far = this.distance + 4 * this.radius;
+    this.near = Math.max(this.distance - 2.5 * this.radius, this.distance * 0.02, this.radius * 1e-3);
+    this.far = this.distance + 4 * this.radius;
     const view = new Float32Array(16);
     [this.right, this.up, this.back].forEach((axis, row) => {
       for (let k = 0; k < 3; k++) view[4 * k + row] = axis[k];
       view[12 + row] = -dot(axis, this.eye);
     });
     view[15] = 1;
-    this.clipFromWorld = multiply(perspective(TAN_HALF_Y, this.width / this.height, near, far), view);
+    this.clipFromWorld = multiply(
+      perspective(TAN_HALF_Y, this.width / this.height, this.near, this.far),
+      view,
+    );
     this.version++;
   }
 

@@ -1,7 +1,7 @@
 /** The percept of the field that is shown: all its outputs, and on demand how they came about, beside the reference. */
 
 import { byId, make, setText } from "./dom.js";
-import { ABSENT, seconds, short, vectorWithUnit, withUnit } from "./format.js";
+import { ABSENT, scaleFor, seconds, short, vectorWithUnit, withUnit } from "./format.js";
 import { say } from "./wire.js";
 
 export class PerceptPanel {
@@ -95,9 +95,9 @@ export class PerceptPanel {
   /** @param {number | null} [field] */
   ask(field = this.choices.field) {
     if (field === null) return;
-    const panel = byId("percept-panel", HTMLDetailsElement);
-    panel.open = true;
+    byId("percept-panel", HTMLDetailsElement).open = true;
     this.result.replaceChildren(make("p", "note", "Computing …"));
+    this.button.scrollIntoView({ block: "start" });
     this.connection.send(say.explain(field));
   }
 
@@ -116,22 +116,19 @@ export class PerceptPanel {
       `Frame ${explanation.frame} at ${seconds(explanation.t_s)}, by ${explanation.backend}; the f64 reference starts from the same state.`,
     );
     const values = make("table", "explain-values");
-    values.append(line("th", ["output", explanation.backend, "reference", "bound", ""]));
+    values.append(line("th", ["percept", `${explanation.backend}, reference`, "difference, bound", ""]));
     for (const column of explanation.columns) {
       const unit = welcome.columns.find((c) => c.name === column.name)?.unit ?? "1";
-      if (!column.value && !column.reference) continue;
-      const difference =
-        column.value && column.reference
-          ? Math.hypot(...column.value.map((x, i) => x - (column.reference?.[i] ?? NaN)))
-          : NaN;
+      const { value, reference } = column;
+      if (!value && !reference) continue;
+      const apart = value && reference ? Math.hypot(...value.map((x, i) => x - (reference[i] ?? NaN))) : null;
+      const by = scaleFor(unit, Math.max(...(value ?? reference ?? [0]).map(Math.abs)), quantity);
       const row = line("td", [
-        column.name.replaceAll("_", " "),
-        vectorWithUnit(column.value, unit, quantity),
-        vectorWithUnit(column.reference, unit, quantity),
-        column.bound === null ? ABSENT : withUnit(column.bound, unit, quantity),
+        `${column.name.replaceAll("_", " ")}${by.unit ? `, ${by.unit}` : ""}`,
+        [digits(value, by.factor, 7), digits(reference, by.factor, 7)],
+        [digits(apart, by.factor, 2), digits(column.bound, by.factor, 2)],
         column.verdict,
       ]);
-      if (Number.isFinite(difference)) row.title = `They differ by ${difference.toExponential(2)} (SI).`;
       row.classList.add(`verdict-${column.verdict.replaceAll(" ", "-")}`);
       values.append(row);
     }
@@ -139,7 +136,7 @@ export class PerceptPanel {
     members.append(line("th", ["taxel", "raw", "→", quantity === "N" ? "force" : "pressure"]));
     const sorted = [...explanation.members].sort((a, b) => (b.pressure ?? -1) - (a.pressure ?? -1));
     const pressed = sorted.filter((member) => (member.pressure ?? 0) > 0).length;
-    const shown = sorted.slice(0, Math.max(12, Math.min(pressed, 60)));
+    const shown = sorted.slice(0, Math.max(4, Math.min(pressed, 40)));
     for (const member of shown)
       members.append(
         line("td", [
@@ -150,18 +147,40 @@ export class PerceptPanel {
         ]),
       );
     const rest = sorted.length - shown.length;
-    this.result.replaceChildren(head, values, members);
+    this.result.replaceChildren(head, members);
     if (rest > 0)
-      this.result.append(make("p", "note", `and ${rest} more taxels, not pressed or pressed less`));
+      this.result.append(make("p", "note", `and ${rest} more taxels, pressed less or not at all`));
+    this.result.append(values);
+    this.button.scrollIntoView({ block: "start" });
   }
 }
 
 /**
  * @param {"td" | "th"} cell
- * @param {string[]} texts
+ * @param {(string | string[])[]} texts several of them stand below each other
  */
 function line(cell, texts) {
   const row = make("tr");
-  for (const text of texts) row.append(make(cell, "", text));
+  for (const text of texts) {
+    const box = make(cell);
+    box.append(...(Array.isArray(text) ? text.map((one) => make("div", "", one)) : [text]));
+    row.append(box);
+  }
   return row;
+}
+
+/**
+ * All components with so many significant digits.
+ * @param {number[] | number | null} value
+ * @param {number} factor
+ * @param {number} count
+ */
+function digits(value, factor, count) {
+  if (value === null) return ABSENT;
+  const parts = (Array.isArray(value) ? value : [value]).map((x) => {
+    const y = x * factor;
+    if (Number.isInteger(y) && Math.abs(y) < 1e6) return String(y);
+    return Math.abs(y) < 1e-3 ? y.toExponential(count - 1) : y.toPrecision(count);
+  });
+  return parts.join(", ");
 }

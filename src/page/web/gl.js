@@ -104,18 +104,17 @@ export class Target {
    * @param {GL} gl
    * @param {number} width
    * @param {number} height
-   * @param {boolean} deep whether it has depth
    */
-  constructor(gl, width, height, deep) {
+  constructor(gl, width, height) {
     this.gl = gl;
     this.width = width;
     this.height = height;
     this.colour = makeTexture(gl, gl.RGBA8, width, height);
-    this.depth = deep ? makeTexture(gl, gl.DEPTH_COMPONENT24, width, height) : null;
+    this.depth = makeTexture(gl, gl.DEPTH_COMPONENT24, width, height);
     this.framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.colour, 0);
-    if (deep) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depth, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depth, 0);
   }
 
   /** Makes it what is drawn into. */

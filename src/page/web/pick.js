@@ -1,7 +1,8 @@
 /** What is under the pointer, by rays on the processor. */
 
-import { cross, dot, subtract, toWorld } from "./math.js";
+import { add, cross, dot, scale, subtract, toWorld } from "./math.js";
 import { taxelInWorld } from "./places.js";
+import { CONE } from "./taxels.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 
@@ -71,10 +72,41 @@ export class Picker {
     const place = taxelInWorld(this.model, taxel);
     if (!place) return null;
     const { camera, model } = this;
-    if (model.mesh?.corners.length && dot(place.normal, subtract(camera.eye, place.point)) <= 0) return null;
+    const toEye = subtract(camera.eye, place.point);
+    const facing = dot(place.normal, toEye) / Math.hypot(...toEye);
+    // Nearly from the side a disc is thinner than a pixel.
+    if ((model.mesh?.corners.length ? facing : Math.abs(facing)) < 0.15) return null;
     const at = camera.project(place.point);
     if (at.depth <= 0 || at.x < 0 || at.y < 0 || at.x >= camera.width || at.y >= camera.height) return null;
+    if (this.isCovered(taxel, place.point, place.radius)) return null;
     return this.hides(place.point, 0.7 * place.radius) ? null : at;
+  }
+
+  /**
+   * Whether the disc of another taxel is drawn over the middle of this one.
+   * @param {number} taxel
+   * @param {Vec3} point its middle
+   * @param {number} radius
+   */
+  isCovered(taxel, point, radius) {
+    const { model, camera } = this;
+    const count = model.mesh?.taxelId.length ?? 0;
+    const way = subtract(point, camera.eye);
+    const depth = -dot(way, camera.back);
+    for (let other = 0; other < count; other++) {
+      const place = other === taxel ? null : taxelInWorld(model, other);
+      if (!place) continue;
+      const reach = 4 * (place.radius + radius);
+      const between = subtract(place.point, point);
+      if (dot(between, between) > reach * reach) continue;
+      // Where the line of sight meets the other disc's plane.
+      const s = dot(place.normal, subtract(place.point, camera.eye)) / dot(place.normal, way);
+      const off = subtract(add(camera.eye, scale(way, s)), place.point);
+      const distance = Math.hypot(...off);
+      if (dot(place.normal, way) < 0 && distance < place.radius * 1.05 && s * depth + CONE * distance < depth)
+        return true;
+    }
+    return false;
   }
 
   /**

@@ -7,6 +7,9 @@ import { changedRects } from "./dirty.js";
 import { attribute, makeProgram, makeTexture, POSE_GLSL } from "./gl.js";
 import { HEALTH } from "./wire.js";
 
+/** How steep the cones are that discs are to the depth test. */
+export const CONE = 1.5;
+
 /** In place of a state: a good taxel that feels nothing. */
 const REST = 7;
 /** Taxels in a row of the textures of colours. */
@@ -29,6 +32,7 @@ out vec2 v_corner;
 flat out vec4 v_fill;
 flat out vec4 v_ring;
 flat out float v_radius;
+flat out float v_metres;
 flat out int v_state;
 void main() {
   int corner = gl_VertexID & 3;
@@ -49,6 +53,7 @@ void main() {
   // A disc smaller than a pixel or two would flicker or vanish.
   float radius = max(a_radius, 1.3 * distance / u_pixels);
   v_radius = radius * u_pixels / distance;
+  v_metres = radius;
   float grown = 1.0 + (ring.a > 0.0 ? 4.5 : 1.0) / v_radius;
   v_corner = (vec2(corner & 1, corner >> 1) * 2.0 - 1.0) * grown;
   vec3 one = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0, 1, 0) : vec3(1, 0, 0)));
@@ -67,12 +72,22 @@ in vec2 v_corner;
 flat in vec4 v_fill;
 flat in vec4 v_ring;
 flat in float v_radius;
+flat in float v_metres;
 flat in int v_state;
 uniform highp sampler2D u_depth;
 uniform vec3 u_ink;
 uniform vec3 u_paper;
 uniform bool u_through;
+uniform vec2 u_planes;
 out vec4 o_colour;
+// Discs are cones to the depth test: where two overlap, each pixel shows the one whose middle is nearer, and no
+// disc covers the middle of another.
+float coneDepth(float d) {
+  float away = 1.0 / gl_FragCoord.w + ${CONE.toFixed(1)} * d * v_metres;
+  float near = u_planes.x;
+  float far = u_planes.y;
+  return clamp(far / (far - near) * (1.0 - near / away), 0.0, 1.0);
+}
 bool isHidden() {
   return gl_FragCoord.z > texelFetch(u_depth, ivec2(gl_FragCoord.xy), 0).r;
 }`;
@@ -89,6 +104,7 @@ void main() {
   float rim = clamp((d - 1.0 + 2.6 * pixel) / pixel, 0.0, 1.0) * clamp((v_radius - 3.0) / 3.0, 0.0, 1.0);
   // Seen through: what feels nothing gives way to what is behind it.
   if (u_through) alpha *= v_state == ${REST} ? (hidden ? 0.12 : 0.3) : (hidden ? 0.75 : 1.0);
+  gl_FragDepth = coneDepth(d);
   o_colour = vec4(v_fill.rgb * (1.0 - 0.3 * rim), alpha);
 }`;
 
@@ -134,6 +150,7 @@ void main() {
     alpha = max(alpha, ring);
   }
   if (alpha < 0.004) discard;
+  gl_FragDepth = coneDepth(d > 1.0 ? 0.35 * d : d);
   o_colour = vec4(colour, hidden ? 0.4 * alpha : alpha);
 }`;
 
@@ -286,6 +303,9 @@ export class Taxels {
     gl.bindTexture(gl.TEXTURE_2D, this.rings);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    if (through) gl.disable(gl.DEPTH_TEST);
+    else gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
     gl.bindVertexArray(this.array);
     const pixels = camera.pixelsPerMetre(1) * (body.height / camera.height);
     this.pass(this.plain, false, pixels, camera, theme, through);
@@ -294,6 +314,7 @@ export class Taxels {
       this.pass(this.special, true, pixels, camera, theme, through);
     }
     gl.bindVertexArray(null);
+    gl.disable(gl.DEPTH_TEST);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, null);
     gl.activeTexture(gl.TEXTURE0);
@@ -313,6 +334,7 @@ export class Taxels {
     gl.uniformMatrix4fv(at("u_clipFromWorld"), false, camera.clipFromWorld);
     gl.uniform3fv(at("u_eye"), camera.eye);
     gl.uniform1f(at("u_pixels"), pixels);
+    gl.uniform2f(at("u_planes"), camera.near, camera.far);
     gl.uniform1i(at("u_special"), special ? 1 : 0);
     gl.uniform1i(at("u_bothSides"), through || !this.hasBody ? 1 : 0);
     gl.uniform1i(at("u_through"), through ? 1 : 0);

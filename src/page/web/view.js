@@ -146,6 +146,8 @@ export class View {
       gl.scissor(x0, size.height - y1, x1 - x0, y1 - y0);
       body.copy(picture, size.width, size.height);
       picture.bind();
+      gl.depthMask(true);
+      gl.clear(gl.DEPTH_BUFFER_BIT);
       // Before the first frame nothing is known of any taxel.
       if (choices.taxels && model.frame) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
     }
@@ -186,7 +188,7 @@ export class View {
     if (!gl || !parts) return;
     const body = this.target("body", width, height);
     parts.body.draw(body, this.camera, parts.poses, theme, how);
-    const fine = new Target(gl, 2 * width, 2 * height, true);
+    const fine = new Target(gl, 2 * width, 2 * height);
     if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) === gl.FRAMEBUFFER_COMPLETE) {
       parts.body.draw(fine, this.camera, parts.poses, theme, how);
       fine.copy(body, width, height);
@@ -206,7 +208,7 @@ export class View {
     let target = this.targets[name];
     if (!target || target.width !== width || target.height !== height) {
       target?.release();
-      target = new Target(gl, width, height, name === "body");
+      target = new Target(gl, width, height);
       this.targets[name] = target;
     }
     return target;
