@@ -1,11 +1,13 @@
 //! Messages on serial lines while they are read, and at the end.
 
-use std::collections::VecDeque;
-use std::time::Instant;
+use std::collections::{HashMap, VecDeque};
+use std::time::{Duration, Instant};
 
 use console::style;
 use serde_json::{Value, json};
 use somatic::output::OutputPath;
+use somatic::signal::BoardHealth;
+use somatic::sink::BoardNews;
 use somatic::source::{BoardAccount, BoardState, Lines};
 use somatic::{Error, Result};
 
@@ -18,6 +20,9 @@ use super::words::count;
 const LATEST_MESSAGES: usize = 3;
 /// More boards than this share one row.
 const MAX_BOARD_ROWS: usize = 6;
+
+/// Time between two looks at how boards are doing.
+const HEALTH_PERIOD: Duration = Duration::from_millis(500);
 
 /// A message shown below the table.
 struct Latest {
@@ -36,6 +41,11 @@ pub(super) struct LineReport {
     latest: VecDeque<Latest>,
     summary: Option<OutputPath>,
     quiet: bool,
+    /// What sinks have not been told.
+    news: BoardNews,
+    told_health: Option<Instant>,
+    /// By board, its frames and when there was one more.
+    last_frames: HashMap<u16, (u64, Instant)>,
 }
 
 impl LineReport {
@@ -48,6 +58,36 @@ impl LineReport {
             latest: VecDeque::new(),
             summary,
             quiet,
+            news: BoardNews::default(),
+            told_health: None,
+            last_frames: HashMap::new(),
+        }
+    }
+
+    /// What sinks are to be told now, if anything.
+    pub(super) fn news(&mut self) -> Option<BoardNews> {
+        let now = Instant::now();
+        if self.told_health.is_none_or(|told| now - told >= HEALTH_PERIOD) {
+            self.told_health = Some(now);
+            let accounts = self.lines.accounts();
+            self.news.boards = Some(accounts.iter().map(|account| self.health(account, now)).collect());
+        }
+        let is_news = self.news.boards.is_some() || !self.news.notices.is_empty();
+        is_news.then(|| std::mem::take(&mut self.news))
+    }
+
+    fn health(&mut self, account: &BoardAccount, now: Instant) -> BoardHealth {
+        let (frames, at) = self.last_frames.entry(account.board).or_insert((0, now));
+        if *frames != account.delivered {
+            (*frames, *at) = (account.delivered, now);
+        }
+        BoardHealth {
+            name: format!("board {}", account.board),
+            state: account.state.word().to_owned(),
+            rate_hz: account.rate_hz,
+            frames: account.delivered,
+            lost: account.lost,
+            age_s: (account.delivered > 0).then(|| (now - *at).as_secs_f64()),
         }
     }
 
@@ -60,6 +100,7 @@ impl LineReport {
     pub(super) fn tell(&mut self, at_table: bool) {
         for notice in self.lines.notices() {
             let Some(told) = self.repeats.tell(notice.at_s, &notice.text) else { continue };
+            self.news.notices.push((notice.at_s, notice.text.clone()));
             if !at_table {
                 say(&told);
                 continue;

@@ -41,6 +41,7 @@ mod stdio;
 mod table;
 mod tradeoff;
 mod tune;
+mod unfit;
 #[cfg(feature = "page")]
 mod view;
 mod words;

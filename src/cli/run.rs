@@ -5,7 +5,6 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use somatic::signal::Unfit;
 use somatic::sink::{FieldNames, Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
@@ -20,10 +19,10 @@ use super::interrupt::stop_on_signal;
 use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
-use super::repeats::Repeats;
 use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, FAILED, LOST, say};
 use super::tradeoff::{say_kept, settled};
+use super::unfit::UnfitReport;
 use super::words;
 
 const FIRST_EXAMPLES: &str = "\
@@ -96,7 +95,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
     let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
-    let targets = sinks.iter().map(|sink| sink.target(&mut outputs)).collect::<Result<Vec<SinkTarget>>>()?;
+    let targets =
+        sinks.iter().map(|sink| sink.target(&mut outputs, &asked.allow_hosts)).collect::<Result<Vec<SinkTarget>>>()?;
     let summary = arguments.summary.as_deref().map(|path| outputs.add(path)).transpose()?;
     if sinks.is_empty() {
         outputs.add_standard_output()?;
@@ -116,7 +116,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
-    let speed = asked.speed.or((input.is_bundled() && at_terminal).then_some(1.0));
+    let has_page = sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_)));
+    let is_watched = (input.is_bundled() && at_terminal) || (input.is_recording() && has_page);
+    let speed = asked.speed.or(is_watched.then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
@@ -125,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let mut engine = Engine::new(&body, settled.options)?;
     let verify = asked.verify && has_another_to_compare(&engine, settled.why.as_deref())?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
+    let mut wiring = None;
     let (source, live) = match recorded {
         Some(mut source) => {
             source.report_stale();
@@ -134,6 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             let source = input.open_lines(&ids, &asked)?;
             engine.track_stale();
             engine.wire(source.wiring());
+            wiring = Some(source.wiring().clone());
             let live = LineReport::new(source.lines(), summary, asked.quiet);
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
@@ -155,12 +159,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let stop = stop_on_signal()?;
     let targets = if sinks.is_empty() && !at_terminal { vec![SinkTarget::Stdout] } else { targets };
     let names = field_names(engine.plan());
-    let about = RunInfo { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
-    let view = view.open(&about);
-    // Where standard input is the source, what is typed there are frames.
-    #[cfg(unix)]
-    let keys = if at_terminal && !input.is_stdin() { Keys::listen() } else { None };
     let records = targets.iter().any(|target| matches!(target, SinkTarget::Mcap(_)));
+    let (backend, device, why) = engine.backend();
     let session = Session {
         names,
         all_fields: asked.all_fields,
@@ -168,8 +168,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         body: Some(&body),
         attached: if records { attachments(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
         parts: asked.record.clone(),
+        plan: Some(engine.plan()),
+        source: &input.name,
+        backend: [backend, &device, settled.why.as_deref().unwrap_or(why)],
+        wiring: wiring.as_ref(),
     };
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
+    let about = RunInfo { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
+    let view = view.open(&about);
+    // Where standard input is the source, what is typed there are frames.
+    #[cfg(unix)]
+    let keys = if at_terminal && !input.is_stdin() { Keys::listen() } else { None };
     let feed = match live {
         None => Feed::start(source, ReadMode { most: batch, gather, speed }),
         Some(_) => Feed::start_live(source, batch),
@@ -240,6 +249,14 @@ struct Pump {
     doubts: Option<Doubts>,
 }
 
+/// A call of the engine.
+#[derive(Clone, Copy)]
+struct Call {
+    /// When its last frame arrived, if known.
+    arrived: Option<Instant>,
+    took: Duration,
+}
+
 impl Pump {
     /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source lost.
     fn run(&mut self, mut feed: Feed, is_ended: impl Fn() -> bool, until: Option<Instant>) -> Result<Vec<String>> {
@@ -253,17 +270,19 @@ impl Pump {
                     if told.has_stale && !std::mem::replace(&mut self.heeds_stale, true) {
                         self.engine.track_stale();
                     }
+                    let begin = Instant::now();
                     if let Some(sum) = &mut self.agreement {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);
                     } else {
                         self.engine.process(&frames)?;
                     }
+                    let call = Call { arrived: told.read_at.last().copied(), took: begin.elapsed() };
                     let has_seen_enough = self.doubts.as_mut().is_some_and(|doubts| doubts.see(&frames));
                     if has_seen_enough && !self.view.is_table() {
                         tell_doubts(&self.engine, &mut self.doubts);
                     }
                     self.view.see(self.engine.percepts(), told.progress);
-                    self.pass_on(&frames)?;
+                    self.pass_on(&frames, call)?;
                     if self.sinks.is_empty() && !watched {
                         break;
                     }
@@ -285,6 +304,9 @@ impl Pump {
             if let Some(live) = &mut self.live {
                 live.tell(self.view.is_table());
                 self.view.set_footer(|| live.rows());
+                if let Some(news) = live.news() {
+                    self.each_sink(|sink| sink.write_news(&news))?;
+                }
             }
             self.view.draw();
         }
@@ -292,9 +314,16 @@ impl Pump {
     }
 
     /// Gives `frames`, and what the engine made of them, to every sink.
-    fn pass_on(&mut self, frames: &[Frame]) -> Result<()> {
+    fn pass_on(&mut self, frames: &[Frame], call: Call) -> Result<()> {
         let Self { engine, sinks, flush, failed, .. } = self;
-        let input = InputFrames { frames, pressures: &|frame, to| engine.pressures(frame, to) };
+        let input = InputFrames {
+            frames,
+            pressures: &|frame, to| engine.pressures(frame, to),
+            plan: engine.plan(),
+            values_read: engine.values_read(),
+            arrived: call.arrived,
+            call: call.took,
+        };
         serve(sinks, *flush, failed, |sink| give(sink, &input, engine.percepts(), *flush))
     }
 
@@ -312,7 +341,7 @@ impl Pump {
             losses = live.finish()?;
         }
         self.unfit.tell(&self.engine);
-        self.unfit.repeats.rest().for_each(|told| say(&told));
+        self.unfit.tell_rest();
         tell_doubts(&self.engine, &mut self.doubts);
         for loss in &losses {
             say(&format!("never processed: {loss}"));
@@ -362,32 +391,6 @@ fn give(sink: &mut dyn Sink, input: &InputFrames<'_>, percepts: &Percepts, flush
         }
     }
     if flush { sink.flush() } else { Ok(Flow::Open) }
-}
-
-/// What was told of taxels that are left out.
-#[derive(Default)]
-struct UnfitReport {
-    unfit: Vec<(u32, Unfit)>,
-    repeats: Repeats,
-    /// The time of the last frame, s.
-    at_s: f64,
-}
-
-impl UnfitReport {
-    /// Says which taxels are left out from now on and which are used again, where that differs from what was told.
-    fn tell(&mut self, engine: &Engine) {
-        let now: Vec<(u32, Unfit)> = engine.unfit().collect();
-        let left_out = now.iter().filter(|taxel| !self.unfit.contains(taxel));
-        let left_out = left_out.map(|(id, why)| format!("taxel {id} is {why} and left out"));
-        let again = self.unfit.iter().filter(|(id, _)| !now.iter().any(|(other, _)| other == id));
-        let again = again.map(|(id, _)| format!("taxel {id} is used again"));
-        for text in left_out.chain(again) {
-            if let Some(told) = self.repeats.tell(self.at_s, &text) {
-                say(&told);
-            }
-        }
-        self.unfit = now;
-    }
 }
 
 /// Says, the first time, what is doubtful in the frames so far.

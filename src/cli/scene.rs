@@ -68,8 +68,8 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, mcap:FILE, or - for NDJSON on standard output; may be repeated [default: a table
-    /// at a terminal, else -].
+    /// Where percepts go: ndjson:FILE, mcap:FILE, page[:HOST:PORT] for browsers, or - for NDJSON on standard output; may
+    /// be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -99,13 +99,19 @@ pub(super) struct RunOptions {
     #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
     pub(super) backend: Option<BackendKind>,
 
-    /// Play a recording at this many times its own speed [default: as fast as possible].
+    /// Play a recording at this many times its own speed [default: as fast as possible; 1 with a page].
     #[arg(long, value_name = "X")]
     pub(super) speed: Option<f64>,
 
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
     #[arg(long)]
     pub(super) verify: bool,
+
+    /// Let browsers reach the page by this host name too; without one it is for this machine alone. May be repeated.
+    #[arg(long = "allow-host", value_name = "NAME")]
+    #[serde(rename = "allow_host", deserialize_with = "texts")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) allow_hosts: Vec<String>,
 
     /// Replace output files that exist; a file that is read is never replaced.
     #[arg(long)]
@@ -311,7 +317,7 @@ impl RunOptions {
         let asked = merged! {
             values: body backend calibration rate wiring live_rate board_rate batch speed from to repeat max_age max_gap
                 coordinates filter_window filter_by filter_time,
-            lists: sources sinks outputs fields letters signal record,
+            lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields tare strict force verify quiet
         };
         asked.check().map_err(|e| scene.map_or(e.clone(), |path| e.at(path.display())))?;

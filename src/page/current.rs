@@ -6,7 +6,7 @@ use super::readings::{Reading, Readings};
 use super::scale::Scale;
 use super::scene::PageScene;
 use super::snapshot::Snapshot;
-use crate::percept::{Column, Percept};
+use crate::percept::{Column, Percept, Touch};
 
 /// The newest frame, read when the first viewer wants it.
 #[derive(Debug)]
@@ -18,6 +18,9 @@ pub(super) struct Current {
     /// Of the last frame that was read.
     percepts: Vec<Percept>,
     percept_changes: u64,
+    touches: Vec<(u32, Touch)>,
+    /// 0 where there never was any.
+    touch_changes: u64,
     scale: Scale,
     scale_changes: u64,
     counts: Counts,
@@ -34,6 +37,8 @@ impl Current {
             poses: scene.poses.clone(),
             percepts: Vec::new(),
             percept_changes: 0,
+            touches: Vec::new(),
+            touch_changes: 0,
             scale: scene.scale,
             scale_changes: 0,
             counts: scene.counts.clone(),
@@ -60,6 +65,10 @@ impl Current {
             self.percepts.clone_from(&self.snapshot.percepts);
             self.percept_changes += 1;
         }
+        if self.touches != self.snapshot.touches {
+            self.touches.clone_from(&self.snapshot.touches);
+            self.touch_changes += 1;
+        }
     }
 
     pub(super) fn snapshot(&self) -> &Snapshot {
@@ -76,6 +85,10 @@ impl Current {
 
     pub(super) fn percept_changes(&self) -> u64 {
         self.percept_changes
+    }
+
+    pub(super) fn touch_changes(&self) -> u64 {
+        self.touch_changes
     }
 
     pub(super) fn scale(&self) -> Scale {

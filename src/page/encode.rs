@@ -85,6 +85,8 @@ pub(super) struct FrameHead {
     pub(super) newest_event: u32,
     pub(super) columns: u32,
     pub(super) call_us: f32,
+    /// Number of `series` messages that the values of plots answer.
+    pub(super) answered_series: u32,
 }
 
 impl FrameHead {
@@ -103,7 +105,7 @@ impl FrameHead {
             to.u32(number);
         }
         to.f32(self.call_us);
-        to.u32(0);
+        to.u32(self.answered_series);
         debug_assert_eq!(to.0.len(), Self::BYTES);
         to
     }

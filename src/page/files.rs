@@ -28,6 +28,7 @@ const FILES: &[PageFile] = files![
     "camera.js",
     "chart.js",
     "choices.js",
+    "dirty.js",
     "dom.js",
     "explain.js",
     "fields.js",

@@ -54,7 +54,7 @@ mod tests {
         for millis in 1..=256 {
             latencies.add(Duration::from_millis(millis));
         }
-        assert_eq!(latencies.percentiles_ms(), [129.0, 254.0]);
+        assert_eq!(latencies.percentiles_ms().map(f32::round), [129.0, 254.0]);
         assert_eq!(latencies.millis.len(), WINDOW);
     }
 }

@@ -27,6 +27,8 @@ mod serve;
 mod server;
 mod snapshot;
 mod socket;
+#[cfg(test)]
+mod tests;
 mod text;
 mod token;
 mod viewer;

@@ -1,7 +1,7 @@
 //! The engine's side: hands over frames, percepts and events without ever waiting for a viewer.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 use std::time::Instant;
 
 use super::exchange::{Exchange, Shared, WAITING_ROWS};
@@ -125,9 +125,7 @@ impl Publisher {
             self.trail.push([percepts.t_s(frame); 2], values);
         }
         self.is_new = true;
-        if let Some(shared) = self.exchange.clone().try_lock() {
-            self.hand_over(shared);
-        }
+        self.try_flush();
     }
 
     /// Says that the next frame does not follow the last one, as after a seek: what is touched in it begins no touch.
@@ -146,7 +144,17 @@ impl Publisher {
         self.exchange.wake_for_viewers();
     }
 
-    /// Hands over what could not be handed over yet. For the end of a source and whenever no frame follows soon.
+    /// Hands over what could not be handed over yet, unless it would have to wait again. For whenever no frame follows soon.
+    pub fn try_flush(&mut self) {
+        if self.is_new || !self.events.is_empty() {
+            let exchange = Arc::clone(&self.exchange);
+            if let Some(shared) = exchange.try_lock() {
+                self.hand_over(shared);
+            }
+        }
+    }
+
+    /// The same, and waits for its turn: some microseconds.
     pub fn flush(&mut self) {
         if self.is_new || !self.events.is_empty() {
             let exchange = Arc::clone(&self.exchange);
@@ -161,7 +169,7 @@ impl Publisher {
         self.exchange.wake_for_viewers();
     }
 
-    fn hand_over(&mut self, mut shared: std::sync::MutexGuard<'_, Shared>) {
+    fn hand_over(&mut self, mut shared: MutexGuard<'_, Shared>) {
         self.events.drain(..).for_each(|event| shared.log.push(event));
         if std::mem::take(&mut self.is_new) {
             std::mem::swap(&mut self.snapshot, &mut shared.snapshot);

@@ -32,6 +32,8 @@ pub(super) struct Viewer {
     /// Bits of the columns that frames carry, by the scene's columns.
     columns: u32,
     series: Vec<Series>,
+    /// Number of times that it has said what it plots.
+    series_messages: u32,
     trail: Trail,
     hovered: Option<Hovered>,
     /// Number of the last event that was sent.
@@ -51,7 +53,7 @@ struct Sent {
     pressures: Option<u64>,
     poses: u64,
     percepts: Option<u64>,
-    touches: bool,
+    touches: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +74,7 @@ impl Viewer {
             latencies: Latencies::new(),
             columns: 0,
             series: Vec::new(),
+            series_messages: 0,
             trail: Trail::default(),
             hovered: None,
             seen_event,
@@ -98,6 +101,7 @@ impl Viewer {
     }
 
     pub(super) fn set_series(&mut self, series: Vec<Series>) {
+        self.series_messages = self.series_messages.wrapping_add(1);
         self.trail = Trail::new(series.len(), PLOT_ROWS);
         self.series = series;
     }
@@ -164,12 +168,11 @@ impl Viewer {
         let pressures = self.sent.pressures != Some(current.readings().changes());
         let poses = self.sent.poses != current.poses().changes();
         let percepts = self.sent.percepts != Some(current.percept_changes());
-        let touches = !snapshot.touches.is_empty();
+        let touches = self.sent.touches != current.touch_changes();
         set(section::PRESSURES, pressures);
         set(section::POSES, poses);
         set(section::PERCEPTS, percepts);
-        // Once more where they have ended.
-        set(section::TOUCHES, touches || self.sent.touches);
+        set(section::TOUCHES, touches);
         set(section::SERIES, !self.trail.is_empty());
         let head = FrameHead {
             sections,
@@ -184,6 +187,7 @@ impl Viewer {
             newest_event: u32::try_from(newest_event).unwrap_or(u32::MAX),
             columns: if percepts { self.columns } else { 0 },
             call_us: snapshot.call_us,
+            answered_series: self.series_messages,
         };
         let mut to = head.write();
         if pressures {
@@ -210,7 +214,7 @@ impl Viewer {
             pressures: Some(current.readings().changes()),
             poses: current.poses().changes(),
             percepts: Some(current.percept_changes()),
-            touches,
+            touches: current.touch_changes(),
         };
         self.under_way.push_back((self.seq, is_new.then_some(snapshot.arrived)));
         to.finish()

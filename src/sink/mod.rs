@@ -4,6 +4,8 @@
 
 mod line;
 mod ndjson;
+#[cfg(feature = "page")]
+mod page;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod spec;
@@ -11,16 +13,20 @@ mod spec;
 mod view;
 
 pub use ndjson::NdjsonSink;
+#[cfg(feature = "page")]
+pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
 pub use spec::{SinkSpec, SinkTarget};
 
 use std::str::FromStr;
+use std::time::{Duration, Instant};
 
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::percept::Percepts;
-use crate::signal::Frame;
+use crate::scene::Plan;
+use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
 /// Something that takes percepts.
 pub trait Sink {
@@ -37,6 +43,14 @@ pub trait Sink {
     /// # Errors
     /// They cannot be written; the message names the output.
     fn write(&mut self, percepts: &Percepts) -> Result<Flow>;
+
+    /// Takes what is told of the source's boards. Sinks of percepts ignore it.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    fn write_news(&mut self, _news: &BoardNews) -> Result<Flow> {
+        Ok(Flow::Open)
+    }
 
     /// Writes buffered output: at once, or in a recording within half a second.
     ///
@@ -80,10 +94,27 @@ pub struct InputFrames<'a> {
     pub frames: &'a [Frame],
     /// Replaces a list by the taxel ids and pressures of one of the frames.
     pub pressures: &'a Pressures<'a>,
+    /// The plan that they went through, as it is after the last one.
+    pub plan: &'a Plan,
+    /// The values that the last frame's percepts are made of ([`crate::Engine::values_read`]).
+    pub values_read: Option<&'a [RawValue]>,
+    /// When the last frame arrived, if known.
+    pub arrived: Option<Instant>,
+    /// How long the engine's call took.
+    pub call: Duration,
 }
 
 /// Writes taxel ids and pressures of a frame into a list.
 pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
+
+/// How boards are doing, and messages about them: time (s) and text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoardNews {
+    /// How each board is doing, if it is time to tell.
+    pub boards: Option<Vec<BoardHealth>>,
+    /// Messages since the last news.
+    pub notices: Vec<(f64, String)>,
+}
 
 /// What sinks get before the first frame.
 #[derive(Clone, Debug, Default)]
@@ -100,6 +131,14 @@ pub struct Session<'a> {
     pub attached: Vec<(String, String, Vec<u8>)>,
     /// The parts that recordings hold; empty for all.
     pub parts: Vec<RecordPart>,
+    /// What is run.
+    pub plan: Option<&'a Plan>,
+    /// What people call the source.
+    pub source: &'a str,
+    /// The backend: its name, what it runs on, and why it was chosen.
+    pub backend: [&'a str; 3],
+    /// Which taxel is on which channel of which board.
+    pub wiring: Option<&'a Wiring>,
 }
 
 /// A part of a recording.

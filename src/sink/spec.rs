@@ -7,7 +7,7 @@ use super::{NdjsonSink, Session, Sink};
 use crate::error::{Error, Result, nearest};
 use crate::output::{OutputPath, OutputPaths};
 
-const FORMS: &str = "ndjson:FILE, mcap:FILE, or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, mcap:FILE, page[:HOST:PORT], or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub enum SinkSpec {
     Ndjson(PathBuf),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
+    /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
+    Page(Option<String>),
     /// `-`: NDJSON on standard output.
     Stdout,
 }
@@ -25,8 +27,10 @@ impl FromStr for SinkSpec {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        if text == "-" {
-            return Ok(Self::Stdout);
+        match text {
+            "-" => return Ok(Self::Stdout),
+            "page" => return Ok(Self::Page(None)),
+            _ => {}
         }
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
@@ -34,13 +38,15 @@ impl FromStr for SinkSpec {
             "ndjson" | "mcap" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
             "ndjson" => Ok(Self::Ndjson(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
+            "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
+            "page" => Ok(Self::Page(Some(rest.to_owned()))),
             _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("ndjson")) => {
                 Ok(Self::Ndjson(text.into()))
             }
             _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) => {
                 Ok(Self::Mcap(text.into()))
             }
-            kind => match nearest(kind, ["ndjson", "mcap"]) {
+            kind => match nearest(kind, ["ndjson", "mcap", "page"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -49,12 +55,17 @@ impl FromStr for SinkSpec {
 }
 
 impl SinkSpec {
-    /// Reserves its file or standard output among a command's `outputs`.
+    /// Reserves its file or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
     ///
     /// # Errors
-    /// As [`OutputPaths::add`].
-    pub fn target(&self, outputs: &mut OutputPaths) -> Result<SinkTarget> {
+    /// As [`OutputPaths::add`]; a page cannot be at this address, or for these hosts.
+    #[cfg_attr(not(feature = "page"), expect(unused_variables, reason = "only a page is for hosts"))]
+    pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String]) -> Result<SinkTarget> {
         Ok(match self {
+            #[cfg(feature = "page")]
+            Self::Page(address) => SinkTarget::Page(crate::page::Listen::new(address.as_deref(), allow_hosts)?),
+            #[cfg(not(feature = "page"))]
+            Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
             Self::Stdout => {
@@ -73,6 +84,9 @@ pub enum SinkTarget {
     Ndjson(OutputPath),
     /// A recording in MCAP.
     Mcap(OutputPath),
+    /// A page for browsers.
+    #[cfg(feature = "page")]
+    Page(crate::page::Listen),
     /// NDJSON on standard output.
     Stdout,
 }
@@ -89,6 +103,8 @@ impl SinkTarget {
             Self::Stdout => {
                 Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
             }
+            #[cfg(feature = "page")]
+            Self::Page(listen) => Ok(Box::new(super::PageSink::start(&listen, session)?)),
             #[cfg(feature = "mcap")]
             Self::Mcap(output) => Ok(Box::new(super::RecordingSink::create(output, session)?)),
             #[cfg(not(feature = "mcap"))]
@@ -107,6 +123,8 @@ mod tests {
     fn a_sink_is_named_as_people_write_it() {
         let parsed = |text: &str| text.parse::<SinkSpec>().unwrap();
         assert_eq!(parsed("-"), SinkSpec::Stdout);
+        assert_eq!(parsed("page"), SinkSpec::Page(None));
+        assert_eq!(parsed("page:127.0.0.1:0"), SinkSpec::Page(Some("127.0.0.1:0".into())));
         assert_eq!(parsed("ndjson:a/b"), SinkSpec::Ndjson("a/b".into()));
         assert_eq!(parsed("a.ndjson"), SinkSpec::Ndjson("a.ndjson".into()));
         assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
@@ -116,6 +134,7 @@ mod tests {
             error.to_string()
         };
         assert!(why("json:a").contains("did you mean `ndjson:`"));
+        assert!(why("page:").contains("HOST:PORT") && why("pgae:x").contains("did you mean `page:`"));
         assert!(why("ndjson:").contains("nothing follows"));
         assert!(why("a.csv").contains("ndjson:FILE"));
         assert_eq!(parsed("a.mcap"), SinkSpec::Mcap("a.mcap".into()));

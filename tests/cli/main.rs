@@ -11,6 +11,8 @@ mod fields;
 mod inspect;
 mod live;
 mod outputs;
+#[cfg(all(unix, feature = "page"))]
+mod page;
 mod paper;
 mod plan;
 // The library's own numbers that look like chance.

@@ -14,6 +14,9 @@ impl RunOptions {
                 "--strict is for --source -; in other sources a taxel that the body does not have is always an error",
             ));
         }
+        if !self.allow_hosts.is_empty() && !self.sinks.iter().any(|sink| sink == "page" || sink.starts_with("page:")) {
+            return Err(Error::usage("--allow-host is for a page; add --sink page:HOST:PORT"));
+        }
         if let Some(speed) = self.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
             return Err(Error::usage(format!(
                 "--speed {speed} is not a speed; give a positive number, 1 for as recorded"

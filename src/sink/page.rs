@@ -1,0 +1,93 @@
+//! The sink that shows a run in browsers.
+
+use std::io::{self, Write as _};
+
+use super::{BoardNews, Flow, InputFrames, Session, Sink};
+use crate::error::{Error, Result};
+use crate::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use crate::percept::Percepts;
+
+/// Shows a run on a page.
+#[derive(Debug)]
+pub struct PageSink {
+    // In this order: what is published last is sent before the server ends.
+    publisher: Publisher,
+    server: Server,
+}
+
+impl PageSink {
+    /// Starts a server, and says its address on standard error.
+    ///
+    /// # Errors
+    /// The address is taken; the session says neither body nor plan.
+    pub fn start(listen: &Listen, session: &Session<'_>) -> Result<Self> {
+        let (Some(body), Some(plan)) = (session.body, session.plan) else {
+            return Err(Error::failed("a page shows a body and a plan; the session has none").at("sink `page`"));
+        };
+        let info = PageInfo {
+            source: session.source,
+            mode: Mode::Live,
+            backend: session.backend,
+            taxels: session.taxels,
+            wiring: session.wiring,
+            recorded_max: None,
+        };
+        let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
+        let mut text = format!("page at {}\n", server.url());
+        if listen.is_open_to_others() {
+            text += "somatic: other machines reach this page, and its token travels in clear text; an SSH tunnel to \
+                     127.0.0.1 keeps it private\n";
+        }
+        // A closed standard error is no reason to stop.
+        let _ = io::stderr().write_all(text.as_bytes());
+        Ok(Self { publisher, server })
+    }
+
+    /// Its server.
+    #[must_use]
+    pub fn server(&self) -> &Server {
+        &self.server
+    }
+}
+
+impl Sink for PageSink {
+    fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
+        if let Some(frame) = input.frames.last() {
+            self.publisher.read(&PageInput {
+                frame,
+                values_read: input.values_read,
+                plan: input.plan,
+                arrived: input.arrived,
+                call_us: input.call.as_secs_f32() * 1e6 / input.frames.len() as f32,
+                number: None,
+            });
+        }
+        Ok(Flow::Open)
+    }
+
+    fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
+        self.publisher.publish(percepts);
+        Ok(Flow::Open)
+    }
+
+    fn write_news(&mut self, news: &BoardNews) -> Result<Flow> {
+        for (t_s, text) in &news.notices {
+            self.publisher.event(EventKind::Board, *t_s, None, text.clone());
+        }
+        if let Some(boards) = &news.boards {
+            self.publisher.boards(boards.clone());
+        }
+        self.publisher.flush();
+        Ok(Flow::Open)
+    }
+
+    fn flush(&mut self) -> Result<Flow> {
+        self.publisher.try_flush();
+        Ok(Flow::Open)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        self.publisher.ended("the source has ended");
+        Ok(())
+    }
+}
