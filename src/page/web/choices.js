@@ -40,6 +40,12 @@ export class Choices extends Observed {
     return this.chosen ?? this.followed;
   }
 
+  /** Another body: nothing of it is chosen yet. */
+  forget() {
+    this.chosen = this.followed = this.hoveredField = this.hoveredTaxel = null;
+    this.tell("field");
+  }
+
   /** @param {number | null} field */
   choose(field) {
     this.chosen = field;

@@ -105,10 +105,11 @@ let framed = "";
 connection.onScene = () => {
   const { welcome, mesh } = model;
   if (!welcome || !mesh) return;
+  const body = `${welcome.body} ${welcome.fields.length} ${mesh.taxelId.length}`;
+  if (framed !== body) choices.forget();
   view.build();
   connection.send(say.columns(welcome.columns.map((column) => column.name)));
   plots.begin();
-  const body = `${welcome.body} ${mesh.taxelId.length}`;
   if (framed !== body) {
     framed = body;
     const normals = Array.from(mesh.taxelId, (_, i) => taxelInWorld(model, i)?.normal ?? [0, 0, 1]);

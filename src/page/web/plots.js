@@ -48,6 +48,7 @@ export class Plots {
     /** @type {Map<string, {box: HTMLElement, canvas: HTMLCanvasElement, chips: HTMLElement}>} */
     this.groups = new Map();
     this.body = "";
+    this.run = "";
     /** Where the pointer is, as a part of the width. @type {number | null} */
     this.pointer = null;
     /** Goes to a moment of a recording. @type {(t: number) => void} */
@@ -63,11 +64,15 @@ export class Plots {
     if (!welcome) return;
     this.asked = [[]];
     this.pending.clear();
-    const body = `${welcome.run} ${welcome.body} ${welcome.fields.length}`;
-    if (body !== this.body) {
-      this.body = body;
+    if (welcome.run !== this.run) {
+      this.run = welcome.run;
       this.rings.clear();
       this.bands.clear();
+    }
+    // The same fields again, perhaps from a server that was started anew: the user's plots stay.
+    const body = welcome.fields.map((field) => `${field.letter} ${field.name}`).join("\n");
+    if (body !== this.body) {
+      this.body = body;
       this.series = [];
       if (welcome.time) [this.from, this.to] = [welcome.time.start_s, welcome.time.end_s];
       const { fields } = welcome;

@@ -96,7 +96,7 @@ export class View {
       return;
     }
     const begun = performance.now();
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const ratio = this.renderer.software ? 1 : Math.min(2, window.devicePixelRatio || 1);
     const width = Math.max(1, Math.round(camera.width * ratio));
     const height = Math.max(1, Math.round(camera.height * ratio));
     const resized = this.canvas.width !== width || this.canvas.height !== height;
