@@ -123,17 +123,13 @@ export class Target {
     this.gl.viewport(0, 0, this.width, this.height);
   }
 
-  /**
-   * Copies the colours to the screen.
-   * @param {number} width of the screen
-   * @param {number} height
-   */
-  toScreen(width, height) {
+  /** Copies the colours to the screen, which is as large. */
+  toScreen() {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     // Chromium clears the screen before the first drawing, and does not take a copy for one.
     gl.clear(gl.COLOR_BUFFER_BIT);
-    this.copy(null, width, height);
+    this.copy(null, this.width, this.height);
   }
 
   /**

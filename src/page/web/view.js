@@ -43,6 +43,7 @@ export class View {
     this.ringsChanged = true;
     this.drawn = { motion: "", look: "" };
     this.refined = false;
+    this.size = "";
     this.movedAt = 0;
     /** @type {{body: Body, taxels: Taxels, poses: Poses} | null} */
     this.parts = null;
@@ -99,8 +100,8 @@ export class View {
     const ratio = this.renderer.software ? 1 : Math.min(2, window.devicePixelRatio || 1);
     const width = Math.max(1, Math.round(camera.width * ratio));
     const height = Math.max(1, Math.round(camera.height * ratio));
-    const resized = this.canvas.width !== width || this.canvas.height !== height;
-    if (resized) [this.canvas.width, this.canvas.height] = [width, height];
+    const resized = this.size !== `${width} ${height}`;
+    this.size = `${width} ${height}`;
     parts.poses.update(model.rows, model.poseVersion);
     const theme = THEMES[choices.dark ? "dark" : "light"];
     const how = { solid: choices.xray ? 0.3 : 1, body: choices.body };
@@ -141,6 +142,9 @@ export class View {
       return;
     }
     const picture = this.target("picture", size.width, size.height);
+    // The browser enlarges a coarser picture faster than we could.
+    if (this.canvas.width !== size.width || this.canvas.height !== size.height)
+      [this.canvas.width, this.canvas.height] = [size.width, size.height];
     gl.enable(gl.SCISSOR_TEST);
     for (const { x0, y0, x1, y1 } of rects) {
       gl.scissor(x0, size.height - y1, x1 - x0, y1 - y0);
@@ -152,7 +156,7 @@ export class View {
       if (choices.taxels && model.frame) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
     }
     gl.disable(gl.SCISSOR_TEST);
-    picture.toScreen(width, height);
+    picture.toScreen();
     this.whenDone(() => {
       this.framesDrawn++;
       this.firstPictureMs ??= performance.now();
