@@ -108,8 +108,8 @@ pub(super) struct RunOptions {
     pub(super) verify: bool,
 
     /// Let browsers reach the page by this host name too; without one it is for this machine alone. May be repeated.
-    #[arg(long = "allow-host", value_name = "NAME")]
-    #[serde(rename = "allow_host", deserialize_with = "texts")]
+    #[arg(long = "allow-host", value_name = "NAME", help_heading = OUTPUT)]
+    #[serde(rename = "allow_host", deserialize_with = "words")]
     #[schemars(with = "OneOrMany")]
     pub(super) allow_hosts: Vec<String>,
 

@@ -168,13 +168,12 @@ impl<'a> Answering<'a> {
             let next = end.min(self.done + CHUNK);
             let frames = &self.recording.frames[self.done..next];
             let percepts = self.engine.process(frames)?;
-            for (frame, of) in frames.iter().enumerate().filter(|(_, of)| (from_s..=to_s).contains(&of.t_s)) {
-                let bin = ((of.t_s - from_s) / (to_s - from_s) * bins as f64) as usize;
+            for (frame, _) in frames.iter().enumerate().filter(|(_, of)| (from_s..=to_s).contains(&of.t_s)) {
+                let shown = self.recording.bins(self.done + frame, from_s, (to_s - from_s) / bins as f64, bins);
                 for (series, [least, most]) in series.iter().zip(&mut history.series) {
                     let value = series.value(percepts, frame);
-                    let bin = bin.min(bins - 1);
-                    least[bin] = least[bin].min(value);
-                    most[bin] = most[bin].max(value);
+                    least[shown.clone()].iter_mut().for_each(|least| *least = least.min(value));
+                    most[shown.clone()].iter_mut().for_each(|most| *most = most.max(value));
                 }
             }
             self.done = next;

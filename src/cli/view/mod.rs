@@ -8,6 +8,8 @@ mod subject;
 mod timeline;
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use somatic::page::{Listen, Mode, PageInfo, PageScene, Publisher, Server};
@@ -22,9 +24,10 @@ use self::subject::{Subject, subject};
 use super::browser;
 use super::input::Input;
 use super::interrupt::stop_on_signal;
-use super::scene::{RunOptions, grouped};
+use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, LOST, say};
 use super::tradeoff::settled;
+use super::words;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -56,13 +59,13 @@ pub(super) struct Arguments {
     #[arg(long)]
     open: bool,
 
+    /// Stop after this time, such as 10s.
+    #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
+    lasts: Option<String>,
+
     /// Where to listen, HOST:PORT; port 0 is any free one [default: 127.0.0.1:7879, or the next free port].
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
-
-    /// A name by which another machine may reach the page, beside this machine's own; may be repeated.
-    #[arg(long, value_name = "NAME")]
-    allow_host: Vec<String>,
 }
 
 /// `arg` in its group, unless the page has no use for it.
@@ -80,6 +83,8 @@ const HIDDEN: [&str; 10] =
 struct Opening<'a> {
     arguments: &'a Arguments,
     listen: Listen,
+    /// When to stop, if not when told to.
+    until: Option<Instant>,
 }
 
 /// A page that is served.
@@ -91,8 +96,9 @@ struct Opened {
 }
 
 pub(super) fn view(arguments: &Arguments) -> Result<u8> {
-    let listen = Listen::new(arguments.listen.as_deref(), &arguments.allow_host)?;
-    let opening = Opening { arguments, listen };
+    let listen = Listen::new(arguments.listen.as_deref(), &arguments.asked.allow_hosts)?;
+    let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
+    let opening = Opening { arguments, listen, until: lasts.map(|span| Instant::now() + span) };
     match subject(arguments.what.as_deref(), &arguments.asked)? {
         Subject::Body(body) => opening.body(&body),
         Subject::Recording(asked) => opening.recording(&asked),
@@ -137,8 +143,8 @@ impl Opening<'_> {
         let stop = stop_on_signal()?;
         let mut opened = self.start(scene)?;
         opened.publisher.ended("the body at rest: there are no frames");
-        while !stop.load(std::sync::atomic::Ordering::Relaxed) {
-            std::thread::sleep(std::time::Duration::from_millis(50));
+        while !stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until) {
+            std::thread::sleep(Duration::from_millis(50));
         }
         Ok(DONE)
     }
@@ -180,7 +186,8 @@ impl Opening<'_> {
         let player = Player::new(engine, Arc::clone(&recording), checkpoints, publisher, replies, explainer, timeline);
         let speed = asked.speed.unwrap_or(1.0);
         let requests = server.requests().ok_or_else(|| Error::failed("the server has no requests"))?;
-        player.speed(speed).loops(input.is_bundled()).run(&requests, &stop)?;
+        let is_ended = || stop.load(Ordering::Relaxed) || self.until.is_some_and(|until| Instant::now() >= until);
+        player.speed(speed).loops(input.is_bundled()).run(&requests, is_ended)?;
         for loss in &recording.losses {
             say(&format!("never processed: {loss}"));
         }

@@ -1,7 +1,6 @@
 //! Plays a recording: what viewers ask for, and the frames when they are due.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -78,12 +77,12 @@ impl Player {
         self
     }
 
-    /// Plays and answers `requests` until `stop`.
+    /// Plays and answers `requests` until `is_ended`.
     ///
     /// # Errors
     /// The device was lost.
-    pub(super) fn run(mut self, requests: &Receiver<(ViewerId, Request)>, stop: &AtomicBool) -> Result<()> {
-        while !stop.load(Ordering::Relaxed) {
+    pub(super) fn run(mut self, requests: &Receiver<(ViewerId, Request)>, is_ended: impl Fn() -> bool) -> Result<()> {
+        while !is_ended() {
             match requests.recv_timeout(self.wait()) {
                 Ok((viewer, request)) => {
                     self.answer(viewer, request);

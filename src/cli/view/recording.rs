@@ -1,5 +1,6 @@
 //! A recording in memory, by time.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use somatic::page::Mode;
@@ -12,6 +13,8 @@ use super::super::stdio::say;
 pub(super) const CHUNK: usize = 256;
 /// Values of which a recording is searched for its largest pressure: a second's work.
 const MAX_SEARCHED: usize = 20_000_000;
+/// Time for which a frame is shown in bins after its own at most, s.
+const MAX_HELD_S: f64 = 1.0;
 /// Frames between two looks at whether reading takes long.
 const FRAMES_A_LOOK: usize = 4096;
 
@@ -75,6 +78,16 @@ impl Recording {
         self.latest_s.partition_point(|&latest| latest <= t_s).saturating_sub(1)
     }
 
+    /// Which of `count` bins of `width_s` seconds, the first from `from_s` on, show frame `index`: those up to the next frame,
+    /// unless that comes late.
+    pub(super) fn bins(&self, index: usize, from_s: f64, width_s: f64, count: usize) -> Range<usize> {
+        let bin = |t_s: f64| (((t_s - from_s) / width_s).max(0.0) as usize).min(count - 1);
+        let t_s = self.frames[index].t_s;
+        let next_s = self.frames.get(index + 1).map(|next| next.t_s).filter(|next_s| next_s - t_s < MAX_HELD_S);
+        let first = bin(t_s);
+        first..next_s.map_or(first, bin).max(first + 1)
+    }
+
     /// The largest pressure, unless finding it takes long.
     pub(super) fn largest_pressure(&self, engine: &Engine) -> Option<f64> {
         if self.frames.len() * self.taxels.len() > MAX_SEARCHED {
@@ -86,5 +99,36 @@ impl Recording {
             pressures.iter().map(|&(_, pressure)| pressure).fold(0.0, f64::max)
         });
         Some(largest.fold(0.0, f64::max)).filter(|&largest| largest > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use somatic::source::CsvSource;
+
+    use super::*;
+
+    fn recording(rows: &str) -> Recording {
+        let source = CsvSource::from_reader("a", std::io::Cursor::new(format!("t,4\n{rows}")), None, None).unwrap();
+        Recording::read(Box::new(source), &AtomicBool::new(false), true).unwrap().unwrap()
+    }
+
+    #[test]
+    fn a_frame_is_found_by_time_and_shown_until_the_next() {
+        let recording = recording("0,1\n0.1,2\n0.2,3\n5,4\n4,5\n6,6\n");
+        assert_eq!(
+            [-1.0, 0.0, 0.15, 0.2, 4.9, 5.0, 5.5, 9.0].map(|t_s| recording.index_at(t_s)),
+            [0, 0, 1, 2, 2, 4, 4, 5]
+        );
+        assert_eq!(recording.span_s(), [0.0, 6.0]);
+        let bins = |index| recording.bins(index, 0.0, 0.05, 200);
+        assert_eq!([bins(0), bins(1), bins(2), bins(3)], [0..2, 2..4, 4..5, 100..101]);
+        assert_eq!(recording.bins(5, 0.0, 1.0, 6), 5..6);
+    }
+
+    #[test]
+    fn a_recording_without_frames_is_refused() {
+        let source = CsvSource::from_reader("a", &b"t,4\n"[..], None, None).unwrap();
+        assert!(Recording::read(Box::new(source), &AtomicBool::new(false), true).is_err());
     }
 }

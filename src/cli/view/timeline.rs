@@ -46,16 +46,14 @@ impl Timeline {
     }
 
     /// Adds the percepts of a call.
-    fn add(&self, percepts: &Percepts) {
+    fn add(&self, percepts: &Percepts, recording: &Recording, first: usize) {
         let mut known = self.known();
         for frame in 0..percepts.frames() {
-            let t_s = percepts.t_s(frame);
-            known.until_s = known.until_s.max(t_s);
-            let bin = self.bin(t_s);
-            for percept in percepts.touched(frame) {
-                // Without the output `peak`, that something is touched.
-                let peak = percept.peak.or(percept.total).unwrap_or(1.0);
-                let most = &mut known.peaks[bin];
+            known.until_s = known.until_s.max(percepts.t_s(frame));
+            // Without the output `peak`, that something is touched.
+            let peaks = percepts.touched(frame).map(|percept| percept.peak.or(percept.total).unwrap_or(1.0));
+            let Some(peak) = peaks.reduce(f64::max) else { continue };
+            for most in &mut known.peaks[recording.bins(first + frame, self.start_s, self.bin_s, BINS)] {
                 *most = Some(most.map_or(peak, |most| most.max(peak)));
             }
         }
@@ -108,7 +106,7 @@ fn pass(
     let mut state_at_s = timeline.start_s;
     let mut told = Instant::now();
     for frames in recording.frames.chunks(CHUNK) {
-        timeline.add(engine.process(frames)?);
+        timeline.add(engine.process(frames)?, recording, done);
         done += frames.len();
         let now_s = frames[frames.len() - 1].t_s;
         if now_s - state_at_s >= checkpoints.spacing_s() {

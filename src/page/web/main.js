@@ -12,7 +12,7 @@ import { Keys } from "./keys.js";
 import { keyList } from "./keylist.js";
 import { Legend } from "./legend.js";
 import { Log } from "./log.js";
-import { toWorld } from "./math.js";
+import { dot, toWorld } from "./math.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
 import { Picker } from "./pick.js";
@@ -101,6 +101,32 @@ function moved() {
   view.request();
 }
 
+/** Whether somebody has turned the body: from then on it stays as it is. */
+let turned = false;
+for (const event of ["pointerdown", "wheel"])
+  stage.addEventListener(event, () => (turned = true), { passive: true });
+window.addEventListener("keydown", () => (turned = true));
+
+/** The field whose side was shown last. @type {number | null} */
+let shownSide = null;
+
+/** Turns the body so that the side that is touched is seen, until somebody turns it. */
+function showTouchedSide() {
+  const field = choices.field;
+  if (turned || field === null || field === shownSide || !model.inContact.has(field)) return;
+  shownSide = field;
+  const members = model.welcome?.fields[field]?.members ?? [];
+  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? [0, 0, 0]);
+  const facing = normals.reduce((sum, normal) => sum + dot(normal, camera.back), 0) / normals.length;
+  if (facing > 0.2) return;
+  chooseDirection(
+    camera,
+    normals,
+    members.map((taxel) => (model.mesh?.taxelRadius[taxel] ?? 0) ** 2),
+  );
+  lookAtAll();
+}
+
 let framed = "";
 connection.onScene = () => {
   const { welcome, mesh } = model;
@@ -155,6 +181,7 @@ const updatePlots = atMostEvery(80, () => {
 model.on("frame", () => {
   if (model.frame?.pressure) view.taxelsChanged = true;
   choices.follow(model);
+  showTouchedSide();
   view.request();
   updatePanels();
   updatePlots();
@@ -254,6 +281,10 @@ const keys = new Keys(
 byId("help-button", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
 byId("help-close", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
 
+window.addEventListener("hashchange", () => {
+  const { moment } = readAddress();
+  if (moment !== null) timeline.seek(moment);
+});
 connection.open();
 
 // For tests, to read and not to change.
