@@ -53,6 +53,8 @@ extern crate self as somatic;
 
 #[macro_use]
 mod setters;
+#[macro_use]
+mod words;
 // The skins of `somatic bench`.
 #[cfg(all(test, feature = "cli"))]
 #[allow(dead_code, unreachable_pub, reason = "tests of the library need some of it")]

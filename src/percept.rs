@@ -4,6 +4,28 @@
 //! in one frame, copied out for reading. A quantity is `Some` or it is absent, and then [`Flags`] say why; nothing here
 //! is ever NaN or infinite.
 
+/// Lets a type that has a column for each [`Component`] in `$parts` be indexed by component.
+macro_rules! index_by_component {
+    ($name:ty, $column:ty, $parts:tt $(, $parameter:ident)?) => {
+        impl$(<$parameter>)? std::ops::Index<$crate::percept::Component> for $name {
+            type Output = $column;
+
+            #[inline(always)]
+            fn index(&self, part: $crate::percept::Component) -> &$column {
+                &self.$parts[part as usize]
+            }
+        }
+
+        impl$(<$parameter>)? std::ops::IndexMut<$crate::percept::Component> for $name {
+            #[inline(always)]
+            fn index_mut(&mut self, part: $crate::percept::Component) -> &mut $column {
+                &mut self.$parts[part as usize]
+            }
+        }
+    };
+}
+pub(crate) use index_by_component;
+
 mod batch;
 mod cells;
 mod columns;

@@ -1,10 +1,9 @@
 //! The share of a body's surface that its taxels cover, and the largest holes.
 
 use glam::DVec3;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
-use crate::body::{Body, Taxel, area_vector};
+use super::placed::COINCIDENT_M;
+use crate::body::{Body, PointTree, Taxel, area_vector, point_tree};
 
 /// Number of samples of the surface: limits, and samples per taxel.
 const MIN_SAMPLES: usize = 20_000;
@@ -17,13 +16,9 @@ const NEIGHBOURS: usize = 3;
 /// Maximum number of nearest taxels to search for one that faces the same way.
 const MAX_CANDIDATES: usize = 32;
 
-/// Taxels nearer to each other than this are coincident, m.
-const COINCIDENT_M: f64 = 1e-6;
-
 /// Bare samples nearer to each other than this belong to one hole; in spacings of a square grid of the samples.
 const HOLE_LINK_DISTANCE: f64 = 2.0;
 
-/// Maximum number of reported holes.
 const MAX_HOLES: usize = 3;
 
 /// The coverage of a link.
@@ -121,9 +116,8 @@ pub fn coverage(body: &Body) -> Coverage {
 
 /// The taxels, in the world at rest.
 struct Taxels {
-    tree: RTree<GeomWithData<[f64; 3], usize>>,
+    tree: PointTree,
     normals: Vec<DVec3>,
-    /// m.
     spacings: Vec<f64>,
 }
 
@@ -133,7 +127,7 @@ impl Taxels {
         let place = |taxel: &Taxel| of_world(taxel).transform_point3(taxel.position_in_link);
         let places: Vec<DVec3> = body.taxels.iter().map(place).collect();
         let normals = body.taxels.iter().map(|taxel| of_world(taxel).transform_vector3(taxel.normal_in_link)).collect();
-        let tree = RTree::bulk_load(places.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.to_array(), i)).collect());
+        let tree = point_tree(places.iter().copied());
         let mut taxels = Self { tree, normals, spacings: Vec::new() };
         let spacing = |(&p, &normal): (&DVec3, &DVec3)| {
             let others = taxels.facing(p, normal).map(|(_, distance)| distance);
@@ -163,8 +157,7 @@ fn within(index: u32) -> [f64; 2] {
 /// The largest connected bare parts on partly covered links.
 fn holes(body: &Body, mut bare: Vec<Sample>, seen: &[f64], each: f64) -> Vec<Hole> {
     bare.retain(|sample| seen[sample.link] > 0.0);
-    let tree = bare.iter().zip(0..).map(|(sample, i)| GeomWithData::new(sample.position.to_array(), i)).collect();
-    let tree: RTree<GeomWithData<[f64; 3], usize>> = RTree::bulk_load(tree);
+    let tree = point_tree(bare.iter().map(|sample| sample.position));
     let reach_squared = (HOLE_LINK_DISTANCE * HOLE_LINK_DISTANCE) * each;
     let mut part = vec![usize::MAX; bare.len()];
     let mut parts: Vec<Vec<usize>> = Vec::new();

@@ -19,7 +19,6 @@ const TRIANGLE_ROWS: u32 = 12;
 /// The id of a row without a taxel.
 const NO_TAXEL: i64 = -1;
 
-/// The id of a thermal pad.
 const THERMAL: i64 = -2;
 
 /// Maximum coordinate in metres on a robot of this size.
@@ -28,7 +27,6 @@ const MAX_COORDINATE_M: f64 = 10.0;
 /// Tolerance of a unit normal's length: files have three digits.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Number of neighbours for a missing normal.
 const NORMAL_NEIGHBOURS: usize = 4;
 
 /// A row of the file.
@@ -268,7 +266,6 @@ fn header(lines: &[&str]) -> Result<(String, Vec<i64>)> {
     Ok((part.to_owned(), list.split_whitespace().map(id).collect::<Result<_>>()?))
 }
 
-/// A row's position and normal.
 fn row(line: &str) -> Result<[DVec3; 2]> {
     let wrong = || failed!("`{line}` is no row; six numbers belong there, x y z nx ny nz");
     let words: Vec<&str> = line.split_whitespace().collect();

@@ -7,15 +7,12 @@ use super::placed::{Placed, Progress, SurfacePoint, same_side};
 use super::rest_surface::RestSurface;
 use crate::body::{NONE, SurfaceIndex, Topology, area_vector, next};
 use crate::error::{Error, Result, failed};
-use crate::field::geodesic::{LogMap, SurfacePlace};
-
-/// First distance limit over the straight distance: half a circle, and a margin.
-const FIRST_LIMIT: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
+use crate::field::default_u;
+use crate::field::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
 
 /// How often the limit is doubled before a part of the region counts as unreachable.
 const MAX_DOUBLINGS: u32 = 6;
 
-/// Maximum number of grid points.
 const MAX_GRID_POINTS: f64 = 4e6;
 
 /// A walk longer than the shortest distance by this share is not the shortest path, and is dropped.
@@ -23,9 +20,6 @@ const DETOUR_TOLERANCE: f64 = 1e-6;
 
 /// Minimum barycentric weight of the start, away from its triangle's edges, where directions are ambiguous.
 const EDGE_MARGIN: f64 = 1e-6;
-
-/// cos 10°: +u is not +x within 10° of the normal.
-const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
 
 /// A grid as requested.
 pub(super) struct Lattice {
@@ -37,7 +31,6 @@ pub(super) struct Lattice {
     pub(super) u: Option<DVec3>,
 }
 
-/// A grid laid on a region.
 pub(super) struct LaidGrid {
     /// Row by row, each with the area of a cell of the grid.
     pub(super) placed: Vec<Placed>,
@@ -92,7 +85,6 @@ impl Lattice {
         Ok(LaidGrid { placed: self.without_overlaps(found), reached_share })
     }
 
-    /// The grid's origin.
     fn start(&self, topology: &Topology, sound: &[u32]) -> Result<SurfacePlace> {
         let index = SurfaceIndex::of_triangles(sound.iter().map(|&triangle| topology.corners(triangle)));
         let weighted = |&triangle: &u32| {
@@ -109,7 +101,7 @@ impl Lattice {
     /// The distances to all of the triangles `near`.
     fn map<'t>(&self, topology: &'t Topology, start: SurfacePlace, near: &[u32]) -> Result<LogMap<'t>> {
         let normal = area_vector(topology.corners(start.triangle)).normalize_or_zero();
-        let u = self.u.unwrap_or(if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X });
+        let u = self.u.unwrap_or(default_u(normal));
         let from = start.position(topology);
         let corners = near.iter().flat_map(|&triangle| topology.corners(triangle));
         let mut limit = corners.map(|corner| corner.distance(from)).fold(self.pitch_m, f64::max) * FIRST_LIMIT;

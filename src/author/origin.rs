@@ -7,12 +7,10 @@ use crate::error::Error;
 pub(super) struct Origin(pub(super) String);
 
 impl Origin {
-    /// The error `what` at this place.
     pub(super) fn wrong(&self, what: impl Into<String>) -> Error {
         self.put(Error::failed(what))
     }
 
-    /// `error` with this place.
     pub(super) fn put(&self, error: Error) -> Error {
         if self.0.is_empty() { error } else { error.at(&self.0) }
     }

@@ -4,12 +4,11 @@
 //! as wanted, then remove the one with the most crowded neighbourhood until the wanted number is left.
 
 use glam::DVec3;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, same_side};
 use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
 use super::scatter::Pieces;
+use crate::body::point_tree;
 use crate::error::{Error, Result, failed};
 
 /// Samples per point.
@@ -18,7 +17,6 @@ const OVERSAMPLING: usize = 5;
 /// Samples per disk of the densest packing, for a given spacing.
 const PACKED_OVERSAMPLING: f64 = 9.0;
 
-/// Maximum number of points.
 const MAX_POINTS: f64 = 4e6;
 
 /// The radius, m, of `count` disks in the densest packing of a plane of `area` (m²). No placement of `count` points has a
@@ -183,10 +181,7 @@ fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Sample
         };
         let owner = own.or_else(|| {
             // No kept sample is within reach.
-            let tree = tree.get_or_insert_with(|| {
-                let spots = kept.iter().enumerate().map(|(k, &j)| Spot::new(samples[j].point.position.to_array(), k));
-                RTree::bulk_load(spots.collect())
-            });
+            let tree = tree.get_or_insert_with(|| point_tree(kept.iter().map(|&j| samples[j].point.position)));
             let mut nearest = tree.nearest_neighbor_iter(here.to_array()).map(|spot| spot.data);
             let own = nearest.find(|&k| same_side(sample, &samples[kept[k]]));
             // If no kept sample is on the same side, the nearest one gets the area.
@@ -201,8 +196,7 @@ fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &Sample
 
 /// Per point the distance to its nearest neighbour on its side, m; `None` if there is none.
 pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
-    let spots = points.iter().enumerate().map(|(index, point)| Spot::new(point.position.to_array(), index));
-    let tree = RTree::bulk_load(spots.collect());
+    let tree = point_tree(points.iter().map(|point| point.position));
     let nearest = |(index, point): (usize, &SurfacePoint)| {
         let mut others = tree.nearest_neighbor_iter(point.position.to_array()).map(|spot| spot.data);
         let other = others.find(|&other| other != index && points_on_same_side(&points[other], point))?;
@@ -210,8 +204,6 @@ pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
     };
     points.iter().enumerate().map(nearest).collect()
 }
-
-type Spot = GeomWithData<[f64; 3], usize>;
 
 #[cfg(test)]
 mod tests {

@@ -5,6 +5,9 @@ use glam::DVec3;
 /// cos 90° with a tolerance for rounding: the two faces at a box's edge are neighbours, those of a sharper edge are not.
 const MIN_NORMAL_COSINE: f64 = -1e-9;
 
+/// Taxels nearer to each other than this are coincident, m.
+pub(super) const COINCIDENT_M: f64 = 1e-6;
+
 /// A point on a surface, in the coordinates of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {

@@ -13,14 +13,11 @@ use crate::body::{Body, MAX_TAXEL_ID, Modality, SurfaceIndex};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::geodesic::barycentric;
 
-/// A given place.
 pub(super) struct GivenPoint {
-    /// Its id, if given.
     pub(super) id: Option<u32>,
     position_in_world: DVec3,
     /// Its area, m², if given.
     area_m2: Option<f64>,
-    /// Its name in messages.
     name: String,
 }
 
@@ -73,7 +70,6 @@ fn natural(name: &str) -> Vec<(String, u64)> {
     pieces
 }
 
-/// Columns of a table of places.
 const COLUMNS: [&str; 6] = ["id", "x", "y", "z", "link", "area"];
 
 /// Maximum area of a taxel, m²; larger ones are in another unit.
@@ -153,13 +149,11 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
     Ok(given)
 }
 
-/// The link called `name`.
 fn find_link(body: &Body, name: &str) -> Result<usize> {
     let hint = || suggestion(name, body.links.iter().map(|link| link.name.as_str()));
     body.link_index(name).ok_or_else(|| failed!("the body has no link `{name}`; {}", hint()))
 }
 
-/// Parses an area, m².
 fn area_of(text: &str) -> Result<f64> {
     let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
     area.ok_or_else(|| failed!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))

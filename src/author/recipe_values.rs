@@ -95,7 +95,6 @@ impl Globs {
         &self.text
     }
 
-    /// The globs in a message.
     pub(super) fn listed(&self) -> String {
         self.text.join("`, `")
     }

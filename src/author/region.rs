@@ -21,7 +21,6 @@ pub(super) struct Region {
     pub(super) bounds: Option<[DVec3; 2]>,
     /// Names of regions that it is not in.
     pub(super) except: Vec<String>,
-    /// Its place in the recipe.
     pub(super) at: Origin,
 }
 

@@ -30,7 +30,6 @@ pub(super) struct RestSurface<'a> {
 
 /// A taxel in the coordinates of its mesh, as it is written.
 pub(super) struct MeshTaxel {
-    /// Its part.
     pub(super) part: usize,
     /// The taxel; position, normal and area are in the mesh's coordinates.
     pub(super) taxel: Taxel,
@@ -97,7 +96,6 @@ impl<'a> RestSurface<'a> {
         self.skinning.push(skinning);
     }
 
-    /// The topology of all triangles.
     pub(super) fn topology(&self) -> &Topology {
         self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles))
     }
@@ -112,10 +110,7 @@ impl<'a> RestSurface<'a> {
         area_vector(self.corners(triangle)).length() / 2.0
     }
 
-    /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it.
-    ///
-    /// # Errors
-    /// No part has such an attribute.
+    /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it, an error if no part has it.
     pub(super) fn painted(&self, name: &str) -> Result<Vec<Option<f64>>> {
         let mut values = vec![None; self.positions.len()];
         let mut found = false;

@@ -39,7 +39,6 @@ fn at([a, b, c]: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     a * weights[0] + b * weights[1] + c * weights[2]
 }
 
-/// The corners of each triangle.
 fn corners(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[DVec3; 3]>> {
     let corner = |v: u32| positions.get(v as usize).copied();
     triangles
@@ -127,7 +126,6 @@ impl Pieces {
         Ok(Self { corners, pieces, weight_up_to })
     }
 
-    /// Sum of area times density, m².
     pub(super) fn weight(&self) -> f64 {
         self.weight_up_to.last().copied().unwrap_or(0.0)
     }

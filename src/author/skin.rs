@@ -261,7 +261,6 @@ fn without_area(place: &PlaceSpec, filled: &[Snapped], ids: &[u32]) -> Option<St
     })
 }
 
-/// Used ids, each with its user.
 #[derive(Default)]
 struct UsedIds(BTreeMap<u32, String>);
 

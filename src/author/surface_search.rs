@@ -54,7 +54,6 @@ impl<'a> SurfaceSearch<'a> {
         surface_search
     }
 
-    /// Adds the search indices of skinned surfaces for `link`.
     fn add_link(&mut self, link: usize) {
         for (surface, ways) in &mut self.skinned {
             let Some(way) = world_from_skinned(self.body, surface, link) else { continue };
@@ -73,7 +72,6 @@ impl<'a> SurfaceSearch<'a> {
         std::iter::once(&self.rigid).chain(skinned).filter(|index| !index.is_empty())
     }
 
-    /// Whether there is no surface at all.
     pub(super) fn is_empty(&self) -> bool {
         self.body.surfaces.is_empty()
     }

@@ -8,17 +8,12 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 use super::lattice::{inward, walk};
-use super::placed::{Placed, points_on_same_side};
+use super::placed::{COINCIDENT_M, Placed, points_on_same_side};
 use super::rest_surface::RestSurface;
-use crate::body::{NONE, SurfaceIndex, Topology, area_vector};
+use crate::body::{NONE, PointTree, SurfaceIndex, Topology, area_vector, point_tree};
 use crate::field::geodesic::{LogMap, SurfacePlace};
-
-/// Taxels nearer to each other than this are coincident, m.
-const COINCIDENT_M: f64 = 1e-6;
 
 /// Distance limits along the surface over the straight distances to the sixth nearest and the second nearest taxel.
 const REACH_OF_SIXTH: f64 = 2.0;
@@ -51,15 +46,11 @@ pub(super) fn areas(rest_surface: &RestSurface<'_>, placed: &[Placed]) -> Vec<f6
     sites.of_taxel.iter().map(|&site| cells[site] / f64::from(sites.taxels[site])).collect()
 }
 
-type Spot = GeomWithData<[f64; 3], usize>;
-
-/// The distinct places of taxels.
 struct Sites<'a> {
     topology: &'a Topology,
     places: Vec<SurfacePlace>,
     positions: Vec<DVec3>,
-    tree: RTree<Spot>,
-    /// Per taxel its site.
+    tree: PointTree,
     of_taxel: Vec<usize>,
     /// Per site its number of taxels.
     taxels: Vec<u32>,
@@ -80,12 +71,12 @@ impl<'a> Sites<'a> {
             }
             triangle => triangle,
         };
-        let tree = tree(placed.iter().map(|one| one.point.position));
+        let tree = point_tree(placed.iter().map(|one| one.point.position));
         let mut sites = Self {
             topology,
             places: Vec::new(),
             positions: Vec::new(),
-            tree: RTree::new(),
+            tree: PointTree::new(),
             of_taxel: Vec::new(),
             taxels: Vec::new(),
         };
@@ -107,11 +98,10 @@ impl<'a> Sites<'a> {
             sites.taxels[site] += 1;
             sites.of_taxel.push(site);
         }
-        sites.tree = self::tree(sites.positions.iter().copied());
+        sites.tree = point_tree(sites.positions.iter().copied());
         sites
     }
 
-    /// The area of the cell of `site`, m².
     fn area(&self, site: usize) -> Option<f64> {
         let here = self.positions[site];
         let others = self.tree.nearest_neighbor_iter_with_distance_2(here.to_array());
@@ -160,10 +150,6 @@ impl<'a> Sites<'a> {
         };
         (0..RAYS).map(beyond).sum()
     }
-}
-
-fn tree(positions: impl Iterator<Item = DVec3>) -> RTree<Spot> {
-    RTree::bulk_load(positions.zip(0..).map(|(p, index)| Spot::new(p.to_array(), index)).collect())
 }
 
 /// A neighbouring taxel, or the mirror image of one where the layout ends.

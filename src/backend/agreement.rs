@@ -226,10 +226,7 @@ fn apart_in_space(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 /// By how much the rounding of f64 in poses and far origins adds to a bound on places, on both sides.
 fn far(limit: Limit, place: Option<[f64; 3]>) -> Limit {
-    match (limit, place) {
-        (Limit::Within(bound), Some(place)) => Limit::Within(bound + 4e-15 * DVec3::from_array(place).length()),
-        _ => limit,
-    }
+    limit.map(|bound| bound + place.map_or(0.0, |place| 4e-15 * DVec3::from_array(place).length()))
 }
 
 impl Cell<'_> {
@@ -312,24 +309,17 @@ impl Cell<'_> {
         for index in 0..right.len().max(got.len()) {
             let (right, got) = (right.get(index), got.get(index));
             let same = |a: &(u64, u32), b: &(u64, u32)| if a == b { 0.0 } else { f64::INFINITY };
-            let (who, total, place, position) = match bound.touch {
-                Limit::Within(limit) => (
-                    Limit::Within(0.0),
-                    Limit::Within(limit.total * right.map_or(0.0, |touch| touch.total)),
-                    Limit::Within([limit.place; 2]),
-                    Limit::Within(limit.position),
-                ),
-                Limit::TooClose => (Limit::TooClose, Limit::TooClose, Limit::TooClose, Limit::TooClose),
-                Limit::Unread => (Limit::Unread, Limit::Unread, Limit::Unread, Limit::Unread),
-            };
+            let limit = bound.touch;
             let identity = |touch: &Touch| (touch.id, touch.active);
-            self.quantity(&touches, right.map(identity), got.map(identity), who, same);
+            self.quantity(&touches, right.map(identity), got.map(identity), limit.map(|_| 0.0), same);
             let of = |touch: &Touch| touch.total;
+            let total = limit.map(|limit| limit.total * right.map_or(0.0, of));
             self.quantity(&format!("{touches}.total"), right.map(of), got.map(of), total, distance);
             let of = |touch: &Touch| touch.centroid;
+            let place = limit.map(|limit| [limit.place; 2]);
             self.place(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
             let of = |touch: &Touch| touch.position;
-            let limit = far(position, right.map(of));
+            let limit = far(limit.map(|limit| limit.position), right.map(of));
             self.quantity(&format!("{touches}.position"), right.map(of), got.map(of), limit, apart_in_space);
         }
     }
@@ -359,12 +349,7 @@ impl Cell<'_> {
                 }
             }
         }
-        let limit = match limit {
-            Limit::Within(bounds) => Limit::Within(bounds[axis]),
-            Limit::TooClose => Limit::TooClose,
-            Limit::Unread => Limit::Unread,
-        };
-        self.quantity(name, right, got, limit, |a, b| distance(&a[axis], &b[axis]));
+        self.quantity(name, right, got, limit.map(|bounds| bounds[axis]), |a, b| distance(&a[axis], &b[axis]));
     }
 
     fn quantity<T: fmt::Debug + Copy>(
@@ -410,7 +395,6 @@ impl Cell<'_> {
     }
 }
 
-/// The share of `bound` that `error` takes.
 fn share(error: f64, bound: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / bound }
 }
@@ -420,7 +404,6 @@ fn shown<T: fmt::Debug>(value: &Option<T>) -> String {
     value.as_ref().map_or("absent".to_owned(), |value| format!("{value:?}"))
 }
 
-/// What the one output of `output` is called.
 fn name(output: Outputs) -> String {
     output.names().next().unwrap_or_default()
 }
@@ -428,7 +411,7 @@ fn name(output: Outputs) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::percept::{Component, Components, Host, Precision, Values};
+    use crate::percept::{Component, Components, Precision, Values};
     use crate::stage::touches::TouchBound;
 
     const NAMES: [&str; 1] = ["field"];
@@ -481,64 +464,35 @@ mod tests {
         );
     }
 
+    // That each quantity is held to its bound, and each choice to the reference's, is a test of the engine's comparison.
     #[test]
-    fn every_quantity_beyond_its_bound_fails() {
+    fn what_is_absent_or_no_number_fails() {
         type Change = fn(&mut Percepts, &mut Components<f64>);
-        let changes: [(&str, Change); 24] = [
-            ("total", |_, c| c[Component::Total][0] += 0.011),
-            ("peak", |_, c| c[Component::Peak][0] -= 0.011),
+        let changes: [(&str, Change); 6] = [
             ("area", |_, c| c[Component::Area][0] = f64::NAN),
-            ("centroid", |_, c| c[Component::CentroidU][0] += 0.011),
-            ("centroid", |_, c| c[Component::CentroidV][0] -= 0.011),
-            ("position", |p, _| p.set_host(Host::Position, 0, &[0.0, 0.0, 0.011])),
-            ("normal", |p, _| p.set_host(Host::Normal, 0, &[0.011, 0.0, 0.0])),
-            ("orientation", |_, c| c[Component::Orientation][0] += 0.011),
-            ("axis", |_, c| c[Component::Axis][0] += 1.5),
-            ("anisotropy", |_, c| c[Component::Anisotropy][0] = 0.6),
-            ("displacement", |_, c| (c[Component::DisplacementU][0], c[Component::DisplacementV][0]) = (0.008, 0.008)),
-            ("direction", |_, c| c[Component::Direction][0] = -3.12),
-            ("distance", |_, c| c[Component::Distance][0] = 0.011),
-            ("radial_distance", |_, c| c[Component::RadialDistance][0] = -0.011),
             ("speed", |_, c| c[Component::Speed][0] = f64::INFINITY),
-            ("radial_speed", |_, c| c[Component::RadialSpeed][0] = 0.011),
-            ("filtered_displacement", |p, _| p.set_host(Host::FilteredDisplacement, 0, &[0.008, -0.008])),
-            ("filtered_direction", |p, _| p.set_host(Host::FilteredDirection, 0, &[-0.011])),
-            ("filtered_speed", |p, _| p.set_host(Host::FilteredSpeed, 0, &[0.011])),
             ("filtered_speed", |p, _| p.present[0] -= Outputs::FILTERED_SPEED),
             ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
-            ("active", |p, _| p.active[0] = 2),
-            ("flags", |p, _| p.flags[0] |= Flags::TIE),
             ("axis", |p, _| p.present[0] -= Outputs::AXIS),
+            ("flags", |p, _| p.flags[0] |= Flags::TIE),
         ];
         for (name, change) in changes {
             let agreement = against(bound(), change);
-            assert!(!agreement.holds(), "{name}");
-            assert!(agreement.failures[0].contains(name), "{name}: {}", agreement.failures[0]);
+            assert!(!agreement.holds() && agreement.failures[0].contains(name), "{name}: {agreement}");
         }
     }
 
     #[test]
-    fn a_touch_that_differs_fails() {
+    fn a_touch_that_is_not_there_fails() {
         let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
         let limit =
             CellBound { touch: Limit::Within(TouchBound { total: 1e-6, place: 1e-6, position: 1e-6 }), ..bound() };
         assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
-        let moved = |by: f64| Touch { centroid: Some([0.1, 0.2 + by]), ..touch };
-        assert!(compare(&right, &[limit], &touched(&[moved(0.9e-6)]), &NAMES).holds());
-        let others = [
-            moved(1.1e-6),
-            Touch { id: 2, ..touch },
-            Touch { active: 2, ..touch },
-            Touch { total: 10.1, ..touch },
-            Touch { position: [0.0, 0.0, 1.1e-6], ..touch },
-            Touch { centroid: None, ..touch },
-        ];
-        for other in others {
-            assert!(!compare(&right, &[limit], &touched(&[other]), &NAMES).holds(), "{other:?}");
+        for touches in [vec![], vec![Touch { centroid: None, ..touch }], vec![touch, touch]] {
+            assert!(!compare(&right, &[limit], &touched(&touches), &NAMES).holds(), "{touches:?}");
         }
-        assert!(!compare(&right, &[limit], &touched(&[touch, touch]), &NAMES).holds());
     }
 
     #[test]

@@ -55,7 +55,6 @@ impl CellBound {
         self.limits[output.bits().ilog2() as usize]
     }
 
-    /// Sets them.
     pub(crate) fn set(&mut self, limits: impl IntoIterator<Item = GivenLimit>) {
         limits.into_iter().for_each(|(output, limit)| self.limits[output.bits().ilog2() as usize] = limit);
     }

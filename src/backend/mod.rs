@@ -10,8 +10,6 @@ mod raw;
 pub(crate) mod reference;
 mod state;
 
-use std::str::FromStr;
-
 pub(crate) use self::choose::choose;
 pub use self::choose::processor;
 pub(crate) use self::raw::{Picks, RawBatch, Rows, Step};
@@ -20,18 +18,20 @@ use crate::error::{Error, Result};
 use crate::percept::{Percepts, Precision};
 use crate::scene::{Arithmetic, Plan};
 
-/// Which backend is asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BackendKind {
-    /// The fastest of `cpu` and `gpu` on this plan and machine, by a measurement; `cpu` where the GPU is software on it.
-    #[default]
-    Auto,
-    /// Double precision, as the equations read.
-    Reference,
-    /// Single precision on the CPU's cores.
-    Cpu,
-    /// WGSL compute shaders.
-    Gpu,
+words! {"backend",
+    /// Which backend is asked for.
+    #[derive(Default)]
+    BackendKind {
+        /// The fastest of `cpu` and `gpu` on this plan and machine, by a measurement; `cpu` where the GPU is software on it.
+        #[default]
+        Auto = "auto",
+        /// Double precision, as the equations read.
+        Reference = "reference",
+        /// Single precision on the CPU's cores.
+        Cpu = "cpu",
+        /// WGSL compute shaders.
+        Gpu = "gpu",
+    }
 }
 
 impl BackendKind {
@@ -40,27 +40,8 @@ impl BackendKind {
     pub fn precision(self) -> Precision {
         if self == Self::Reference { Precision::F64 } else { Precision::F32 }
     }
-}
 
-impl FromStr for BackendKind {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "auto" => Ok(Self::Auto),
-            "reference" => Ok(Self::Reference),
-            "cpu" => Ok(Self::Cpu),
-            "gpu" => Ok(Self::Gpu),
-            _ => Err(Error::usage(format!("there is no backend `{name}`; choose auto, reference, cpu or gpu"))),
-        }
-    }
-}
-
-impl BackendKind {
     /// The backend that computes for `self` with `arithmetic`: where it is double, the reference.
-    ///
-    /// # Errors
-    /// The backend has no such arithmetic.
     pub(crate) fn with(self, arithmetic: Option<Arithmetic>) -> Result<Self> {
         match (self, arithmetic) {
             (Self::Gpu, Some(Arithmetic::Double)) => {

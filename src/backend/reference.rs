@@ -43,7 +43,6 @@ impl Reference {
         }
     }
 
-    /// Goes on from `state` in field `index`.
     pub(super) fn restore_field(&mut self, index: usize, state: FieldState) {
         let field = &self.plan.fields[index];
         let moves = state.contact && field.charted && self.plan.stages().motion;

@@ -14,10 +14,8 @@ use crate::error::{Result, failed};
 const EXTENSIONS_WITHOUT_NODES: [&str; 6] =
     ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization", "MSFT_texture_"];
 
-/// The old layout of a file.
 #[derive(Default)]
 struct OldLayout {
-    /// Nodes to remove.
     nodes: BTreeSet<usize>,
     /// Layout nodes that are needed otherwise; only their layout data is removed.
     emptied: Vec<usize>,
@@ -220,10 +218,10 @@ struct Tail {
 impl Tail {
     fn of(edit: &JsonEdit<'_>, old: &OldLayout) -> Self {
         let meshes = edit.list("meshes");
-        let mut kept_meshes = meshes.len();
-        while kept_meshes > 0 && old.meshes.contains(&(kept_meshes - 1)) {
-            kept_meshes -= 1;
-        }
+        let without_end = |length: usize, goes: &dyn Fn(usize) -> bool| {
+            (0..length).rposition(|index| !goes(index)).map_or(0, |last| last + 1)
+        };
+        let kept_meshes = without_end(meshes.len(), &|mesh| old.meshes.contains(&mesh));
         let used_by = |meshes: &[Span]| {
             let mut used = BTreeSet::new();
             for primitive in meshes.iter().flat_map(|mesh| edit.list_in(mesh, "primitives")) {
@@ -244,10 +242,7 @@ impl Tail {
         }
         let accessors = edit.list("accessors");
         let goes = |accessor: usize| freed.contains(&accessor) && !used.contains(&accessor);
-        let mut kept_accessors = accessors.len();
-        while kept_accessors > 0 && goes(kept_accessors - 1) {
-            kept_accessors -= 1;
-        }
+        let kept_accessors = without_end(accessors.len(), &goes);
 
         let views = edit.list("bufferViews");
         let views_of = |accessor: &Span| edit.number_in(accessor, "bufferView");
@@ -258,10 +253,7 @@ impl Tail {
             used.extend(parts.iter().flatten().filter_map(views_of));
         }
         used.extend(edit.list("images").iter().filter_map(views_of));
-        let mut kept_views = views.len();
-        while kept_views > 0 && freed.contains(&(kept_views - 1)) && !used.contains(&(kept_views - 1)) {
-            kept_views -= 1;
-        }
+        let kept_views = without_end(views.len(), &|view| freed.contains(&view) && !used.contains(&view));
         let start = |view: &Span| edit.number_in(view, "byteOffset").unwrap_or(0);
         let first = views[kept_views..].iter().map(start).min();
         let last = views[..kept_views].iter().map(|view| start(view) + edit.number_in(view, "byteLength").unwrap_or(0));

@@ -16,7 +16,6 @@ use crate::error::{Error, Result, failed};
 /// Maximum number of elements of an accessor without data; more mean a damaged file.
 const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
 
-/// The file's JSON and the bytes of its buffers.
 pub(crate) struct Document {
     pub(crate) root: json::Root,
     buffers: Vec<Vec<u8>>,
@@ -51,7 +50,6 @@ impl Document {
         Ok(Self { root, buffers })
     }
 
-    /// The bytes of its buffers.
     pub(crate) fn into_buffers(self) -> Vec<Vec<u8>> {
         self.buffers
     }

@@ -28,7 +28,6 @@ pub struct Glb {
 /// The file to which an addition belongs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BaseFile {
-    /// Lengths of its lists.
     pub(super) counts: BTreeMap<String, usize>,
     /// Bytes of its buffer, a multiple of four.
     pub(super) bytes: usize,
@@ -77,7 +76,6 @@ impl Glb {
         Self { json, bin: Vec::new(), before: BaseFile::default() }
     }
 
-    /// An empty addition to the file `before`.
     pub(super) fn for_base(before: BaseFile) -> Self {
         Self { before, ..Self::new() }
     }
@@ -279,10 +277,7 @@ impl Glb {
     }
 }
 
-/// A `.glb` of the JSON `text`, the buffer `bin` and `rest`, further chunks.
-///
-/// # Errors
-/// It would pass the 4 GiB that a `.glb` can hold.
+/// A `.glb` of the JSON `text`, the buffer `bin` and `rest`, further chunks; an error over the 4 GiB that it can hold.
 pub(super) fn container(text: &str, bin: &[u8], rest: &[u8]) -> Result<Vec<u8>> {
     let (text_end, bin_length) = (20 + text.len().next_multiple_of(4), bin.len().next_multiple_of(4));
     let length = text_end + if bin.is_empty() { 0 } else { 8 + bin_length } + rest.len();

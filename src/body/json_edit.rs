@@ -66,7 +66,6 @@ impl<'a> JsonEdit<'a> {
         members.unwrap_or_default().into_iter().map(|(key, raw)| (key, self.span(raw))).collect()
     }
 
-    /// The member `key` of the object at `span`.
     pub(super) fn member(&self, span: &Span, key: &str) -> Option<Span> {
         self.members(span).into_iter().rev().find(|(known, _)| known == key).map(|(_, span)| span)
     }
@@ -87,7 +86,6 @@ impl<'a> JsonEdit<'a> {
         self.member(span, key).map_or_else(Vec::new, |list| self.elements(&list))
     }
 
-    /// The whole number at `span`.
     pub(super) fn number(&self, span: &Span) -> Option<usize> {
         self.get(span).parse().ok()
     }
@@ -118,7 +116,6 @@ impl<'a> JsonEdit<'a> {
         }
     }
 
-    /// Sets the member `key` of the object at `span`.
     pub(super) fn set(&mut self, span: &Span, key: &str, value: String) {
         match self.member(span, key) {
             Some(old) => self.replace(old, value),
@@ -137,30 +134,19 @@ impl<'a> JsonEdit<'a> {
 
     /// Removes the parts `gone` of `all`, the members (with their keys) or elements of the value at `span`.
     fn cut(&mut self, span: &Span, all: &[Span], gone: impl Fn(usize) -> bool) {
-        // From the end of what stays before to the end of what goes, or at the start to the start of what stays.
-        let mut kept: Option<usize> = None;
-        let mut i = 0;
-        while i < all.len() {
-            if !gone(i) {
-                kept = Some(i);
-                i += 1;
-                continue;
-            }
-            let mut last = i;
-            while last + 1 < all.len() && gone(last + 1) {
-                last += 1;
-            }
-            let (start, end) = match (kept, all.get(last + 1)) {
+        let indices: Vec<usize> = (0..all.len()).collect();
+        for run in indices.chunk_by(|&a, &b| gone(a) == gone(b)).filter(|run| gone(run[0])) {
+            let (first, last) = (run[0], run[run.len() - 1]);
+            // From the end of what stays before to the end of what goes, or at the start to the start of what stays.
+            let (start, end) = match (first.checked_sub(1), all.get(last + 1)) {
                 (Some(before), _) => (all[before].end, all[last].end),
-                (None, Some(after)) => (all[i].start, after.start),
+                (None, Some(after)) => (all[first].start, after.start),
                 (None, None) => (span.start + 1, span.end - 1),
             };
             self.changes.push((start..end, String::new()));
-            i = last + 1;
         }
     }
 
-    /// Removes the elements `gone` of the list at `span`.
     pub(super) fn remove_elements(&mut self, span: &Span, gone: impl Fn(usize) -> bool) {
         let all = self.elements(span);
         self.cut(span, &all, gone);
@@ -190,7 +176,6 @@ impl<'a> JsonEdit<'a> {
         self.cut(span, &all, |i| gone(&keys[i]));
     }
 
-    /// The text with its changes.
     pub(super) fn apply(mut self) -> String {
         self.changes.sort_by_key(|(span, _)| (span.start, span.end));
         let mut out = String::with_capacity(self.text.len());

@@ -61,13 +61,16 @@ pub enum ChartKind {
 }
 
 /// The chart specified in a layout.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ChartSpec {
     /// The kind of chart.
     pub kind: ChartKind,
     /// Origin in the anchor's frame, m.
+    #[serde(rename = "origin", skip_serializing_if = "Option::is_none")]
     pub origin_in_anchor: Option<[f64; 3]>,
     /// Direction of +u in the anchor's frame; its part along the normal is ignored.
+    #[serde(rename = "u", skip_serializing_if = "Option::is_none")]
     pub u_in_anchor: Option<[f64; 3]>,
 }
 
@@ -80,20 +83,10 @@ struct FieldJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     parent: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    chart: Option<ChartJson>,
+    chart: Option<ChartSpec>,
     /// Taxel id → `[weight]` or `[weight, u, v]`.
     #[serde(default)]
     members: BTreeMap<String, Vec<f64>>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ChartJson {
-    kind: ChartKind,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    origin: Option<[f64; 3]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    u: Option<[f64; 3]>,
 }
 
 impl FieldSpec {
@@ -123,13 +116,13 @@ impl FieldSpec {
         }
         let finite = |v: Option<[f64; 3]>| v.is_none_or(|v| v.iter().all(|x| x.is_finite()));
         if let Some(chart) = &json.chart
-            && !(finite(chart.origin) && finite(chart.u))
+            && !(finite(chart.origin_in_anchor) && finite(chart.u_in_anchor))
         {
             return Err(bad("its chart has a number that is not finite".into()));
         }
         if let Some(chart) = &json.chart
             && chart.kind == ChartKind::Geodesic
-            && (chart.origin.is_none() || chart.u.is_none())
+            && (chart.origin_in_anchor.is_none() || chart.u_in_anchor.is_none())
         {
             return Err(bad("a geodesic chart needs its `origin` and `u`; lay it again".into()));
         }
@@ -154,12 +147,7 @@ impl FieldSpec {
                 return Err(bad(format!("member {id} appears twice; give each taxel once")));
             }
         }
-        Ok(Self {
-            name: json.name,
-            parent: json.parent,
-            members,
-            chart: json.chart.map(|c| ChartSpec { kind: c.kind, origin_in_anchor: c.origin, u_in_anchor: c.u }),
-        })
+        Ok(Self { name: json.name, parent: json.parent, members, chart: json.chart })
     }
 
     /// The JSON string that [`FieldSpec::from_json`] reads back.
@@ -168,7 +156,7 @@ impl FieldSpec {
             version: VERSION,
             name: self.name.clone(),
             parent: self.parent.clone(),
-            chart: self.chart.map(|c| ChartJson { kind: c.kind, origin: c.origin_in_anchor, u: c.u_in_anchor }),
+            chart: self.chart,
             members: self
                 .members
                 .iter()

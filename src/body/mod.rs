@@ -31,6 +31,6 @@ pub use original::Original;
 pub use read::TaxelSource;
 pub(crate) use repair::listed;
 pub use surface::{Hit, SurfaceIndex};
-pub(crate) use surface::{Nearest, area_vector};
+pub(crate) use surface::{Nearest, PointTree, area_vector, point_tree};
 pub(crate) use topology::next;
 pub use topology::{Flaws, NONE, Topology};

@@ -203,10 +203,7 @@ impl Body {
 
     /// From the root down to `link`, itself included.
     pub(crate) fn path_from_root(&self, link: usize) -> Vec<usize> {
-        let mut path = vec![link];
-        while let Some(parent) = self.links[path[path.len() - 1]].parent {
-            path.push(parent);
-        }
+        let mut path: Vec<usize> = std::iter::successors(Some(link), |&link| self.links[link].parent).collect();
         path.reverse();
         path
     }

@@ -14,7 +14,6 @@ use crate::error::{Error, Result, failed};
 /// Maximum coordinate, m; sums and products of smaller ones do not overflow.
 pub(super) const MAX_COORDINATE_M: f64 = 1e9;
 
-/// The node tree with all transforms.
 pub(super) struct Nodes<'a> {
     pub(super) raw: &'a [json::Node],
     pub(super) parent: Vec<Option<usize>>,
@@ -102,14 +101,7 @@ impl<'a> Nodes<'a> {
 
     /// The link that `node` is, or its nearest ancestor that is one.
     pub(super) fn link_above(&self, node: usize) -> Option<usize> {
-        let mut at = Some(node);
-        while let Some(node) = at {
-            if self.link[node].is_some() {
-                return self.link[node];
-            }
-            at = self.parent[node];
-        }
-        None
+        std::iter::successors(Some(node), |&node| self.parent[node]).find_map(|node| self.link[node])
     }
 }
 

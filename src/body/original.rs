@@ -15,7 +15,6 @@ use super::model::Body;
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
 
-/// The lists to which a layout adds.
 const LAYOUT_LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
 
 /// Key in the extras of a node that scales a file to metres: the file's unit.
@@ -69,7 +68,6 @@ impl Original {
         Ok(original)
     }
 
-    /// Merges all buffers into one.
     fn merge_buffers(&mut self, buffers: Vec<Vec<u8>>, chunk: Option<&[u8]>) -> Result<()> {
         let mut edit = JsonEdit::new(&self.text);
         let spans = edit.list("buffers");
@@ -114,7 +112,6 @@ impl Original {
         Ok(())
     }
 
-    /// Embeds external images.
     fn embed_images(&mut self, folder: &Path) {
         let mut edit = JsonEdit::new(&self.text);
         let first = edit.list("bufferViews").len();

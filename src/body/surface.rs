@@ -284,3 +284,12 @@ impl SurfaceIndex {
             .map(|(t, (normal, number))| Hit { position: p + direction * t, normal, triangle: number as usize })
     }
 }
+
+/// A search tree of numbered points.
+pub(crate) type PointTree = RTree<GeomWithData<[f64; 3], usize>>;
+
+/// The tree of `points`, numbered from 0.
+pub(crate) fn point_tree(points: impl IntoIterator<Item = DVec3>) -> PointTree {
+    let numbered = points.into_iter().enumerate();
+    RTree::bulk_load(numbered.map(|(index, p)| GeomWithData::new(p.to_array(), index)).collect())
+}

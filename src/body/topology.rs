@@ -97,7 +97,6 @@ impl Topology {
         }
     }
 
-    /// Keeps valid triangles.
     fn take(&mut self, triangles: &[[u32; 3]]) {
         let mut seen: HashSet<[u32; 3]> = HashSet::with_capacity(triangles.len());
         for (index, triangle) in triangles.iter().enumerate() {

@@ -7,9 +7,6 @@ use somatic::recording::{BODY, CALIBRATION, Reader};
 use somatic::{Error, Result, bundled};
 
 /// The body in the recording at `path`: its name, and its bytes as `.glb`.
-///
-/// # Errors
-/// The recording cannot be read.
 pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
     let mut reader = Reader::open(path)?;
     let found = reader.attached().iter().find(|attached| attached.media_type == BODY).cloned();
@@ -17,9 +14,6 @@ pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
 }
 
 /// The text of the calibration in the recording at `path`.
-///
-/// # Errors
-/// The recording cannot be read, or the calibration is not text.
 pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
     let mut reader = Reader::open(path)?;
     let found = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
@@ -29,9 +23,6 @@ pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
 }
 
 /// The body `name`, a file or a bundled one, as a self-contained `.glb`.
-///
-/// # Errors
-/// It cannot be read.
 pub(super) fn body_bytes(name: &str) -> Result<Vec<u8>> {
     let path = Path::new(name);
     if !path.exists()

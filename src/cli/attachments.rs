@@ -9,9 +9,6 @@ use super::attached::{self, body_bytes, file_name};
 use super::scene::RunOptions;
 
 /// The files to attach to a recording of this run: name, media type, bytes.
-///
-/// # Errors
-/// One of them cannot be read.
 pub(super) fn attachments(
     asked: &RunOptions,
     body: &Body,

@@ -68,7 +68,7 @@ pub(super) struct Arguments {
     frames: usize,
 
     /// What computes.
-    #[arg(long, default_value = "auto", value_parser = one_of::<BackendKind>(&["auto", "reference", "cpu", "gpu"]))]
+    #[arg(long, default_value = "auto", value_parser = one_of::<BackendKind>(BackendKind::WORDS))]
     backend: BackendKind,
 
     /// Only these quantities [default: those of `somatic run`].

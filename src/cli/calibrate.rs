@@ -16,7 +16,7 @@ use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::plot::Plot;
 use super::ports::LineFlags;
-use super::stdio::{DONE, LOST, print, say};
+use super::stdio::{print, say, tell_losses};
 use super::table::{more, plain, shown};
 use super::words::{bullet, count};
 
@@ -132,14 +132,11 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         plot.draw(|| findings.svg(), || findings.png())?;
     }
     print(&if arguments.json { json_of(&findings) } else { table_of(&findings) })?;
-    for loss in &lost {
-        say(&format!("never processed: {loss}"));
-    }
+    let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
-    Ok(if lost.is_empty() { DONE } else { LOST })
+    Ok(code)
 }
 
-/// The first of `sources`.
 fn first_of(sources: &[String]) -> Result<SourceSpec> {
     sources.first().ok_or_else(|| Error::usage("give a --source"))?.parse()
 }

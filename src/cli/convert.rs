@@ -13,7 +13,7 @@ use super::attached::{body_bytes, file_name};
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
-use super::stdio::{DONE, LOST, say};
+use super::stdio::{say, tell_losses};
 use super::words::count;
 
 const EXAMPLES: &str = "\
@@ -106,11 +106,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();
         say(&format!("a CSV has no place for what is attached: {} left out", names.join(", ")));
     }
-    let losses = source.losses();
-    for loss in &losses {
-        say(&format!("never processed: {loss}"));
-    }
-    Ok(if losses.is_empty() { DONE } else { LOST })
+    Ok(tell_losses(&source.losses()))
 }
 
 /// Copies all frames; gives how many there were, and how many had poses.

@@ -57,7 +57,7 @@ fn gpus() -> Gpus {
     let adapters = adapters();
     let mut missing: Vec<String> = silent_gpus(&adapters)
         .into_iter()
-        .map(|gpu| format!("no driver answers for the {}: {}", gpu.name, gpu.remedy))
+        .map(|(gpu, remedy)| format!("no driver answers for the {gpu}: {remedy}"))
         .collect();
     if adapters.is_empty() && missing.is_empty() {
         missing.push(

@@ -52,7 +52,6 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    /// Starts to read `source`.
     pub(super) fn start(source: Box<dyn Source + Send>, mode: ReadMode) -> Self {
         Self::with_queue(source, mode, if mode.gather { 4 } else { 1024 }, true)
     }

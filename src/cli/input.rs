@@ -64,9 +64,6 @@ impl Input {
     }
 
     /// The body that `asked` names, or that of the input.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub(super) fn body(&self, asked: &RunOptions) -> Result<Body> {
         match (&asked.body, &self.spec) {
             (Some(body), _) => load_body(body),
@@ -109,15 +106,11 @@ impl Input {
         ))
     }
 
-    /// Opens the serial lines.
     pub(super) fn open_lines(&self, ids: &[u32], asked: &RunOptions) -> Result<SerialSource> {
         asked.line_flags().open(&self.lines, ids, asked.max_age)
     }
 
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
-    ///
-    /// # Errors
-    /// It cannot be opened, or the part does not exist.
     pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
         let cut = Cut {
             from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),

@@ -28,9 +28,6 @@ pub(super) struct LineFlags {
 
 impl LineFlags {
     /// The lines that `sources` name, each with its speed in baud where one is given; none where they are no serial lines.
-    ///
-    /// # Errors
-    /// A usage error: several sources that are not all serial lines, or flags for lines without any.
     pub(super) fn lines(&self, sources: &[String]) -> Result<Vec<(String, Option<u32>)>> {
         let mut lines = Vec::new();
         for source in sources {
@@ -57,18 +54,12 @@ impl LineFlags {
     }
 
     /// The wiring, if one is given.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub(super) fn wiring(&self) -> Result<Option<Wiring>> {
         self.wiring.as_ref().map(Wiring::load).transpose()
     }
 
     /// Opens `lines` for a body whose taxels have `ids`, values being up to `max_age_s` old. What is wrong with the wiring is
     /// told with its file.
-    ///
-    /// # Errors
-    /// As [`SerialSource::open`]; the wiring cannot be read.
     pub(super) fn open(
         &self,
         lines: &[(String, Option<u32>)],
@@ -79,9 +70,6 @@ impl LineFlags {
     }
 
     /// The same with `wiring` in the place of the file's.
-    ///
-    /// # Errors
-    /// As [`SerialSource::open`].
     pub(super) fn open_as(
         &self,
         wiring: Option<Wiring>,
@@ -97,9 +85,6 @@ impl LineFlags {
     }
 
     /// Refuses a calibration whose circuit has another tap than the wiring sets. `ids` are the body's.
-    ///
-    /// # Errors
-    /// That; the wiring cannot be read.
     pub(super) fn check_taps(&self, calibration: Option<&Calibration>, ids: &[u32]) -> Result<()> {
         let (Some(wiring), Some(calibration), Some(path)) = (self.wiring()?, calibration, &self.wiring) else {
             return Ok(());

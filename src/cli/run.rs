@@ -20,7 +20,7 @@ use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::scene::{LIVE, RunOptions, grouped};
-use super::stdio::{DONE, FAILED, LOST, say};
+use super::stdio::{FAILED, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
 use super::words;
@@ -243,7 +243,6 @@ struct Pump {
     failed: bool,
     /// The serial lines, if they are read.
     live: Option<LineReport>,
-    /// Whether the engine heeds what is stale.
     heeds_stale: bool,
     /// What is looked for in the first frames.
     doubts: Option<Doubts>,
@@ -343,20 +342,14 @@ impl Pump {
         self.unfit.tell(&self.engine);
         self.unfit.tell_rest();
         tell_doubts(&self.engine, &mut self.doubts);
-        for loss in &losses {
-            say(&format!("never processed: {loss}"));
-        }
+        let code = tell_losses(&losses);
         if let Some(agreement) = self.agreement {
             say(&format!("backend {} {agreement}", self.engine.backend().0));
             if !agreement.holds() {
                 return Ok(FAILED);
             }
         }
-        Ok(match (self.failed, losses.is_empty()) {
-            (true, _) => FAILED,
-            (_, true) => DONE,
-            (_, false) => LOST,
-        })
+        Ok(if self.failed { FAILED } else { code })
     }
 }
 

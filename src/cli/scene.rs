@@ -94,9 +94,9 @@ pub(super) struct RunOptions {
 
     /// What computes: reference in double precision, cpu or gpu in single precision, or auto, the faster of cpu and gpu
     /// [default: auto].
-    #[arg(long, value_parser = one_of::<BackendKind>(&["auto", "reference", "cpu", "gpu"]))]
+    #[arg(long, value_parser = one_of::<BackendKind>(BackendKind::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = ["auto", "reference", "cpu", "gpu"]))]
+    #[schemars(with = "Option<String>", extend("enum" = BackendKind::WORDS))]
     pub(super) backend: Option<BackendKind>,
 
     /// Play a recording at this many times its own speed [default: as fast as possible; 1 with a page].
@@ -264,9 +264,6 @@ pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
 
 impl RunOptions {
     /// What the scene file at `path` asks for, its paths made relative to where we are.
-    ///
-    /// # Errors
-    /// It cannot be read, or asks for what there is not: one line with its line and column.
     fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
         let mut asked: Self = parse_toml(&text).map_err(|e| e.at(path.display()))?;
@@ -299,9 +296,6 @@ impl RunOptions {
     }
 
     /// What these arguments and the scene file at `scene` ask for together; an argument comes before a key.
-    ///
-    /// # Errors
-    /// As [`RunOptions::load`]; values that make no sense.
     pub(super) fn with(&self, scene: Option<&Path>) -> Result<Self> {
         let file = scene.map(Self::load).transpose()?.unwrap_or_default();
         macro_rules! merged {
@@ -340,9 +334,6 @@ impl RunOptions {
     }
 
     /// The recording whose body and calibration are used, which is so where no body is named.
-    ///
-    /// # Errors
-    /// What is to be read is no source.
     pub(super) fn recording(&self) -> Result<Option<PathBuf>> {
         let spec = self.sources.first().filter(|_| self.body.is_none()).map(|text| text.parse()).transpose()?;
         Ok(if let Some(SourceSpec::Mcap(path)) = spec { Some(path) } else { None })
@@ -350,9 +341,6 @@ impl RunOptions {
 
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation has one,
     /// and a recording may, which is used with its body.
-    ///
-    /// # Errors
-    /// What is to be read cannot be read.
     pub(super) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
         let spec = self.sources.first().map(|text| text.parse()).transpose()?;
         if let Some(SourceSpec::Sim(path)) = spec {
@@ -364,9 +352,6 @@ impl RunOptions {
     }
 
     /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
-    ///
-    /// # Errors
-    /// What is asked for does not go together; the calibration cannot be read.
     pub(super) fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
         let outputs = self.outputs();
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };

@@ -16,6 +16,12 @@ pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "somatic: {line}");
 }
 
+/// Says what of the input was never processed, and gives the exit code.
+pub(super) fn tell_losses(losses: &[String]) -> u8 {
+    losses.iter().for_each(|loss| say(&format!("never processed: {loss}")));
+    if losses.is_empty() { DONE } else { LOST }
+}
+
 /// Writes `text` to standard output. A reader that has gone is a normal end.
 pub(super) fn print(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();

@@ -63,7 +63,6 @@ impl OnChange {
         self.state.before.clear();
     }
 
-    /// Looks at `raw`, whose frames are `frames`.
     pub(super) fn look(&mut self, raw: &RawBatch<'_>, frames: &[Frame]) {
         let ChangeState { before, changed_at_s } = &mut self.state;
         self.cells.clear();
@@ -109,7 +108,7 @@ impl OnChange {
                     let bound = &mut bounds[cell];
                     // One rounding more, where a rate's bound has six.
                     for rate in [Outputs::SPEED, Outputs::RADIAL_SPEED] {
-                        bound.set([(rate, bound.limit(rate).times(times * 7.0 / 6.0))]);
+                        bound.set([(rate, bound.limit(rate).map(|limit| limit * (times * 7.0 / 6.0)))]);
                     }
                 }
             }

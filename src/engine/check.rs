@@ -48,7 +48,6 @@ impl Check {
         Ok(check)
     }
 
-    /// Empties the percepts and bounds for `frames` frames, of which `first_frame` is the first.
     pub(super) fn reset(&mut self, frames: usize, first_frame: u64) {
         self.right.reset(frames);
         self.right.first_frame = first_frame;

@@ -139,7 +139,6 @@ pub(super) fn on_skin(field: &PlanField, place: DVec3) -> (DVec3, DVec3) {
     }
 }
 
-/// The same point and normal in the world.
 pub(super) fn in_world(world_from_anchor: &DAffine3, position: DVec3, normal: DVec3) -> (DVec3, DVec3) {
     (world_from_anchor.transform_point3(position), world_from_anchor.transform_vector3(normal))
 }

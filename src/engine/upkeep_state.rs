@@ -64,7 +64,6 @@ impl UpkeepState {
         }
     }
 
-    /// Flags the fields with a taxel whose drift is unknown, cell by cell.
     pub(super) fn flag_unknown_drift(&self, cells: &mut [Flags]) {
         for frame in cells.chunks_exact_mut(self.unknown.len()) {
             for (flags, &unknown) in frame.iter_mut().zip(&self.unknown) {

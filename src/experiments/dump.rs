@@ -12,7 +12,6 @@ use somatic::percept::{Flags, Outputs, Percept, Percepts, Precision};
 use somatic::signal::Frame;
 
 /// The files that [`write()`] writes for `shape` and `outputs`.
-#[must_use]
 pub fn files(shape: &Shape, outputs: Outputs) -> Vec<String> {
     let fields = |prefix: &str| ["members", "weights", "uv"].map(|name| format!("{prefix}{name}"));
     let mut names = vec!["values".to_owned(), "present".to_owned(), "flags".to_owned()];
@@ -29,9 +28,6 @@ pub fn files(shape: &Shape, outputs: Outputs) -> Vec<String> {
 /// of the wide field, if there is one, as `wide_...`; each output (frames, fields) or (frames, fields, 2 or 3), with the
 /// wide field last; `present` and `flags` (frames, fields), whose bits the JSON names. Where an output's bit is not set
 /// in `present`, it is absent, and its array has 0 there.
-///
-/// # Errors
-/// Touches were asked for, which are no array; or a file cannot be written.
 pub fn write(
     mut folder: OutputFolder,
     shape: &Shape,
@@ -63,9 +59,6 @@ pub fn write(
 }
 
 /// Whether `outputs` can be written.
-///
-/// # Errors
-/// A usage error where not.
 pub fn check(outputs: Outputs) -> Result<()> {
     if outputs.contains(Outputs::TOUCHES) {
         return Err(Error::usage("--dump writes arrays, and touches are none; leave `touches` out of --outputs"));

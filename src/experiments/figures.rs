@@ -55,9 +55,10 @@ fn lines(points: Vec<Point>, colour: Colour, width: f64, name: Option<&'static s
     Layer { mark: Mark::Lines { runs: vec![points], width }, colour, name }
 }
 
-fn time(range: [f64; 2], step: f64) -> Axis {
-    let count = ((range[1] - range[0]) / step).round() as u32;
-    Axis { label: "time (s)", range, ticks: (0..=count).map(|i| range[0] + step * f64::from(i)).collect() }
+/// An axis over `range` with a tick every `step`.
+fn axis(label: &'static str, range: [f64; 2], step: f64) -> Axis {
+    let count = ((range[1] - range[0]) / step) as u32;
+    Axis { label, range, ticks: (0..=count).map(|i| range[0] + step * f64::from(i)).collect() }
 }
 
 /// Fig. 3: taps on one sensor in counts and in both signals.
@@ -66,12 +67,10 @@ fn taps_figure(taps: &Trial) -> Figure {
     let over_time = |value: &dyn Fn(&Moment) -> f64| -> Vec<Point> {
         taps.moments.iter().map(|moment| (moment.t_s, value(moment))).collect()
     };
-    let axis = |label, top: f64, step: f64| Axis {
-        label,
-        range: [0.0, top],
-        ticks: (0..=4).map(|i| step * f64::from(i)).collect(),
+    let panel = |title: &str, y: Axis, layers| {
+        let x = axis("time (s)", [0.0, 8.0], 1.0);
+        Panel { title: title.to_owned(), x, y, layers }
     };
-    let panel = |title: &str, y: Axis, layers| Panel { title: title.to_owned(), x: time([0.0, 8.0], 1.0), y, layers };
     // The linearised signal's scale, so that force and signal would coincide if nothing were lost.
     let per_newton = FsrCircuit::FULL_SIGNAL / FsrCircuit::SATURATION_NEWTON;
     let force = over_time(&|moment| (moment.forces_newton[tapped] * per_newton).min(FsrCircuit::FULL_SIGNAL));
@@ -85,13 +84,13 @@ fn taps_figure(taps: &Trial) -> Figure {
         panels: vec![
             panel(
                 "as converted: less when pressed",
-                axis("counts (0–1023)", 1060.0, 250.0),
+                axis("counts (0–1023)", [0.0, 1060.0], 250.0),
                 vec![lines(counts, [60, 60, 60], 1.5, Some("converter"))],
             ),
-            panel("logarithmic raw", axis("signal (0–1000)", 1060.0, 250.0), vec![signal(0)]),
+            panel("logarithmic raw", axis("signal (0–1000)", [0.0, 1060.0], 250.0), vec![signal(0)]),
             panel(
                 "linearised",
-                axis("signal (0–1000)", 420.0, 100.0),
+                axis("signal (0–1000)", [0.0, 420.0], 100.0),
                 vec![lines(force, GREY, 3.0, Some("force on the sensor, true (1000 = 10 N)")), signal(1)],
             ),
         ],
@@ -197,21 +196,14 @@ fn time_figure(rod: &Trial) -> Figure {
         orientation.push(curve(rod, &angle, PI / 2.0, LINES[signal], 2.0, NAMES[signal]));
     }
     let panel = |title: &str, label, range: [f64; 2], step: f64, layers: Vec<Layer>| {
-        let count = ((range[1] - range[0]) / 45.0).round() as u32;
-        let eighths = (0..=count).map(|i| range[0] + 45.0 * f64::from(i));
-        let grid = eighths.map(|y| Layer {
+        let grid = axis(label, range, 45.0).ticks.into_iter().map(|y| Layer {
             mark: Mark::Dashed { from: (0.0, y), to: (4.0, y) },
             colour: DOTTED,
             name: Some("each 45°"),
         });
-        let count = ((range[1] - range[0]) / step).round() as u32;
-        let ticks = (0..=count).map(|i| range[0] + step * f64::from(i)).collect();
-        Panel {
-            title: title.to_owned(),
-            x: time([0.0, 4.0], 0.5),
-            y: Axis { label, range, ticks },
-            layers: grid.chain(layers).collect(),
-        }
+        let layers = grid.chain(layers).collect();
+        let (x, y) = (axis("time (s)", [0.0, 4.0], 0.5), axis(label, range, step));
+        Panel { title: title.to_owned(), x, y, layers }
     };
     Figure {
         title: "Fig. 7: direction of motion and orientation over time, for the rod of Fig. 6",

@@ -23,9 +23,6 @@ pub const FILES: [&str; 8] =
 
 /// Writes the paper's figures and the table into `folder`, which has [`FILES`], and returns the files. `quick` omits most of
 /// the table. `progress` gets the share that is done.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn write(mut folder: OutputFolder, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Vec<PathBuf>> {
     folder.make()?;
     let body = Body::from_bytes("hand", bundled::HAND)?;

@@ -9,7 +9,6 @@ use somatic::output::OutputPath;
 pub(super) trait Number: Copy {
     /// Its dtype as NumPy writes it.
     const DTYPE: &'static str;
-    /// Its bytes.
     type Bytes: AsRef<[u8]>;
     fn bytes(self) -> Self::Bytes;
 }

@@ -55,9 +55,6 @@ const BYTES_A_FIELD: u128 = 1500;
 
 impl Shape {
     /// Refuses what is no skin: nothing of something, or more members than sensors.
-    ///
-    /// # Errors
-    /// One usage error that names the argument of `somatic bench`.
     pub fn check(&self) -> Result<()> {
         let given = [
             ("--sensors", self.sensors),
@@ -84,19 +81,16 @@ impl Shape {
     }
 
     /// Fields in all.
-    #[must_use]
     pub fn all_fields(&self) -> usize {
         self.fields + usize::from(self.wide > 0)
     }
 
     /// (field, sensor) pairs of a call, over all its frames.
-    #[must_use]
     pub fn memberships(&self) -> u128 {
         (self.fields as u128 * self.members as u128 + self.wide as u128) * self.frames as u128
     }
 
     /// About how much memory the body, an engine for `outputs` and a call's frames and percepts take, bytes.
-    #[must_use]
     pub fn bytes(&self, outputs: Outputs) -> u128 {
         // A cell's flags, what is present and whose frame it is in; and its numbers.
         let cell: u128 = 9 + outputs.iter().map(bytes_a_cell).sum::<u128>();
@@ -106,7 +100,6 @@ impl Shape {
     }
 
     /// The sheet with its fields: `field 0` and on, and `wide`.
-    #[must_use]
     pub fn body(&self) -> Body {
         let mut random = Random::new(self.seed);
         let side_m = PITCH_M * (self.sensors as f64).sqrt();
@@ -175,7 +168,6 @@ impl Shape {
     }
 
     /// A call's frames, every sensor pressed with its own value in (0, 1023], 10 ms apart from t = 0.
-    #[must_use]
     pub fn frames(&self) -> Vec<Frame> {
         // Another sequence than the body's.
         let mut random = Random::new(!self.seed);
@@ -190,9 +182,6 @@ impl Shape {
     }
 
     /// An engine on `body`, which is [`Shape::body`], for calls of so many frames.
-    ///
-    /// # Errors
-    /// The backend cannot run here.
     pub fn engine(&self, body: &Body, backend: BackendKind, outputs: Outputs) -> Result<Engine> {
         // Its frames repeat, and what repeats is not to be left out of a measurement.
         let scene = Scene::default().outputs(outputs).knobs(Knobs::default().coverage(Coverage::All));
@@ -262,15 +251,5 @@ mod tests {
             );
         }
         assert_eq!(percepts.touched(0).count(), SHAPE.all_fields());
-    }
-
-    #[test]
-    fn what_is_no_shape_is_told_by_its_argument() {
-        let why = |shape: Shape| shape.check().unwrap_err().to_string();
-        assert!(SHAPE.check().is_ok());
-        assert!(why(Shape { frames: 0, ..SHAPE }).contains("--frames 0"));
-        assert!(why(Shape { members: 51, ..SHAPE }).contains("--members 51"));
-        assert!(why(Shape { wide: 51, ..SHAPE }).contains("--wide 51"));
-        assert!(why(Shape { sensors: 1 << 25, ..SHAPE }).contains("16777217"));
     }
 }

@@ -131,7 +131,6 @@ impl Series {
         Ok(())
     }
 
-    /// The frames with the percepts of `field` on the body of `source`.
     fn with_percepts(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
         let mut percepts = Vec::with_capacity(2);
         for frames in &self.signals {

@@ -13,9 +13,6 @@ use glam::DVec3;
 
 use crate::body::ChartKind;
 
-/// cos 10°: +u is along the anchor's +z instead of +x if the normal is nearer to +x.
-const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
-
 /// A field's two coordinates and their frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
@@ -114,11 +111,16 @@ impl fmt::Display for NoChart {
     }
 }
 
+/// The default direction of +u: +x, or +z where the normal is within 10° of +x.
+pub(crate) fn default_u(normal: DVec3) -> DVec3 {
+    const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
+    if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X }
+}
+
 /// (u, v, normal) with u along the tangential part of `wanted_u`, or of the default.
 pub(super) fn frame(normal: DVec3, wanted_u: Option<DVec3>) -> [DVec3; 3] {
     let across = |direction: DVec3| (direction - normal * direction.dot(normal)).try_normalize();
-    let default = || if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X };
-    let u = wanted_u.and_then(across).or_else(|| across(default())).unwrap_or(normal.any_orthonormal_vector());
+    let u = wanted_u.and_then(across).or_else(|| across(default_u(normal))).unwrap_or(normal.any_orthonormal_vector());
     [u, normal.cross(u), normal]
 }
 

@@ -1,8 +1,8 @@
 //! The distortion of lengths in a chart.
 
 use glam::{DVec2, DVec3};
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
+
+use crate::body::point_tree;
 
 /// Number of neighbours to measure per member.
 const NEIGHBOURS: usize = 6;
@@ -10,7 +10,6 @@ const NEIGHBOURS: usize = 6;
 /// Number of nearest members to search for them; some may be coincident or face away.
 const MAX_CANDIDATES: usize = 24;
 
-/// Maximum number of measured members.
 const MAX_MEASURED: usize = 4096;
 
 /// How much a chart stretches and shrinks distances.
@@ -34,8 +33,7 @@ impl Distortion {
     /// The distortion of a chart that maps `members` (position, m, and unit normal) to `places`, m.
     #[must_use]
     pub fn of(members: &[(DVec3, DVec3)], places: &[DVec2]) -> Self {
-        let spots = members.iter().enumerate().map(|(i, (position, _))| GeomWithData::new(position.to_array(), i));
-        let tree = RTree::bulk_load(spots.collect());
+        let tree = point_tree(members.iter().map(|(position, _)| *position));
         let mut measured = Self::default();
         let (mut squares, mut pairs) = (0.0, 0_u64);
         for i in (0..members.len()).step_by(members.len().div_ceil(MAX_MEASURED).max(1)) {

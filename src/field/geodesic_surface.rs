@@ -11,7 +11,6 @@ use rstar::primitives::GeomWithData;
 use super::set::{Field, anchor_from_link};
 use crate::body::{Body, SurfaceIndex};
 
-/// Number of members that are blended.
 const BLEND_MEMBERS: usize = 9;
 
 /// Number of neighbours for the fit of a member's linear map.

@@ -65,7 +65,6 @@ impl LinkSurface {
         Some(SurfacePlace::in_triangle(&self.topology, hit.triangle as u32, hit.position))
     }
 
-    /// The place nearest to `p`.
     pub(crate) fn nearest(&self, p: DVec3) -> Option<SurfacePlace> {
         let hit = self.index.nearest(p)?;
         Some(SurfacePlace::in_triangle(&self.topology, hit.triangle as u32, hit.position))

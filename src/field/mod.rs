@@ -14,6 +14,7 @@ mod set;
 mod surface_grid;
 mod unroll;
 
+pub(crate) use chart::default_u;
 pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
 pub(crate) use link_surface::LinkSurface;

@@ -82,7 +82,6 @@ impl FieldSet {
         Self::of(body, &body.fields)
     }
 
-    /// Builds the fields `specs` on `body`.
     pub(super) fn of(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
         let parents = parents(specs);
         let taxels = unions(specs);
@@ -184,7 +183,6 @@ fn normal_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DV
     surface.nearest(origin).and_then(around).or(closest.map(|(_, normal)| *normal)).unwrap_or(DVec3::Z)
 }
 
-/// Per field the index of its parent.
 fn parents(fields: &[FieldSpec]) -> Vec<Option<usize>> {
     let index_of: BTreeMap<&str, usize> = fields.iter().enumerate().map(|(i, f)| (f.name.as_str(), i)).collect();
     fields.iter().map(|f| f.parent.as_deref().and_then(|p| index_of.get(p).copied())).collect()

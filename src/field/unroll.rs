@@ -1,12 +1,12 @@
 //! Computes geodesic charts: the (u, v) of a field's taxels that a layout stores.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
 use super::chart::{NoChart, frame};
 use super::distortion::Distortion;
-use super::geodesic::{LogMap, SurfacePlace};
+use super::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
 use super::link_surface::Surfaces;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector};
 
@@ -15,9 +15,6 @@ const MAX_BEND: f64 = PI / 9.0;
 
 /// Maximum stretch of the distance of neighbours.
 const MAX_STRETCH: f64 = 3.0;
-
-/// First distance limit over the straight distance: half a circle, and a margin.
-const FIRST_LIMIT: f64 = 1.1 * FRAC_PI_2;
 
 /// How often the limit is doubled before a member counts as unreachable.
 const MAX_DOUBLINGS: u32 = 6;
@@ -38,7 +35,6 @@ impl<'a> Unroller<'a> {
         Self { body, surfaces: Surfaces::new(body) }
     }
 
-    /// The surfaces in the links' frames.
     pub(crate) fn surfaces(&mut self) -> &mut Surfaces<'a> {
         &mut self.surfaces
     }
@@ -95,14 +91,12 @@ fn off_edges(place: SurfacePlace) -> SurfacePlace {
     SurfacePlace { barycentric: inward.map(|weight| weight / sum), ..place }
 }
 
-/// Members on a surface.
 struct Patch<'a> {
     topology: &'a Topology,
     /// Per member its position and normal.
     members: Vec<(DVec3, DVec3)>,
     places: Vec<SurfacePlace>,
     ids: Vec<u32>,
-    /// The requested direction of +u.
     u: Option<DVec3>,
 }
 

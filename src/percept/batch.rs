@@ -1,6 +1,5 @@
 //! A batch of percepts, in columns.
 
-use std::ops::{Index, IndexMut};
 use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
@@ -18,19 +17,7 @@ impl<T> Default for Components<T> {
     }
 }
 
-impl<T> Index<Component> for Components<T> {
-    type Output = Vec<T>;
-
-    fn index(&self, part: Component) -> &Vec<T> {
-        &self.0[part as usize]
-    }
-}
-
-impl<T> IndexMut<Component> for Components<T> {
-    fn index_mut(&mut self, part: Component) -> &mut Vec<T> {
-        &mut self.0[part as usize]
-    }
-}
+index_by_component!(Components<T>, Vec<T>, 0, T);
 
 impl<T> Components<T> {
     pub(super) fn each_mut(&mut self) -> [&mut Vec<T>; Component::COUNT] {
@@ -280,7 +267,6 @@ impl Percepts {
         self.touch_ends.push(self.touches.len() as u32);
     }
 
-    /// Changes a cell's first touch.
     #[cfg(test)]
     pub(crate) fn change_first_touch(&mut self, cell: usize, change: impl Fn(&mut Touch)) {
         let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
@@ -297,7 +283,6 @@ impl Percepts {
         (0..self.fields).filter(move |&field| self.in_contact(frame, field)).map(move |field| self.get(frame, field))
     }
 
-    /// Whether field `field` is in contact in the batch's frame `frame`.
     pub(crate) fn in_contact(&self, frame: usize, field: usize) -> bool {
         !self.flags[frame * self.fields + field].contains(Flags::NO_CONTACT)
     }

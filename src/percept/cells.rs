@@ -1,6 +1,6 @@
 //! The columns of a batch, to be written by a backend in single precision.
 
-use std::ops::{Index, IndexMut, Range};
+use std::ops::Range;
 
 use glam::DVec3;
 
@@ -36,20 +36,7 @@ impl Percepts {
     }
 }
 
-/// A part of all cells.
-impl Index<Component> for CellsMut<'_> {
-    type Output = [f32];
-
-    fn index(&self, part: Component) -> &[f32] {
-        self.parts[part as usize]
-    }
-}
-
-impl IndexMut<Component> for CellsMut<'_> {
-    fn index_mut(&mut self, part: Component) -> &mut [f32] {
-        self.parts[part as usize]
-    }
-}
+index_by_component!(CellsMut<'_>, [f32], parts);
 
 impl CellsMut<'_> {
     pub(crate) fn fields(&self) -> usize {
@@ -61,33 +48,18 @@ impl CellsMut<'_> {
     }
 
     /// The first `frames` frames, and the rest.
-    pub(crate) fn split_at(self, frames: usize) -> (Self, Self) {
-        fn split<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
-            column.split_at_mut(cells.min(column.len()))
-        }
-        let cells = frames * self.fields;
-        let (pressures, later_pressures) = split(self.pressures, frames * self.slots);
-        let (flags, later_flags) = split(self.flags, cells);
-        let (present, later_present) = split(self.present, cells);
-        let (active, later_active) = split(self.active, cells);
-        let mut later_parts: [&mut [f32]; Component::COUNT] = Default::default();
-        let mut parts: [&mut [f32]; Component::COUNT] = Default::default();
-        for (part, (first, later)) in self.parts.into_iter().zip(parts.iter_mut().zip(&mut later_parts)) {
-            (*first, *later) = split(part, cells);
-        }
-        let Self { fields, slots, .. } = self;
-        (
-            Self { fields, slots, pressures, flags, present, active, parts },
-            Self {
-                fields,
-                slots,
-                pressures: later_pressures,
-                flags: later_flags,
-                present: later_present,
-                active: later_active,
-                parts: later_parts,
-            },
-        )
+    pub(crate) fn split_at(mut self, frames: usize) -> (Self, Self) {
+        let (fields, slots, cells) = (self.fields, self.slots, frames * self.fields);
+        let first = Self {
+            fields,
+            slots,
+            pressures: take_mut(&mut self.pressures, frames * slots),
+            flags: take_mut(&mut self.flags, cells),
+            present: take_mut(&mut self.present, cells),
+            active: take_mut(&mut self.active, cells),
+            parts: self.parts.each_mut().map(|part| take_mut(part, cells)),
+        };
+        (first, self)
     }
 
     /// The same cells again, for a shorter while.
@@ -111,6 +83,15 @@ impl CellsMut<'_> {
     }
 }
 
+/// Takes the first `count` numbers off `column`; all of one that has fewer.
+fn take<'a, T>(column: &mut &'a [T], count: usize) -> &'a [T] {
+    column.split_off(..count.min(column.len())).unwrap_or_default()
+}
+
+fn take_mut<'a, T>(column: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    column.split_off_mut(..count.min(column.len())).unwrap_or_default()
+}
+
 /// Cells whose centroids are put on the skin, with the columns that this fills; those that nobody asked for are empty.
 pub(crate) struct PlaceCells<'a> {
     pub(crate) flags: &'a [Flags],
@@ -127,7 +108,6 @@ enum Centroids<'a> {
 }
 
 impl Percepts {
-    /// The cells of `frames` frames from frame `first` on.
     pub(crate) fn place_cells(&mut self, first: usize, frames: usize) -> PlaceCells<'_> {
         fn part<T>(column: &mut [T], cells: Range<usize>) -> &mut [T] {
             if column.is_empty() { column } else { &mut column[cells] }
@@ -155,38 +135,19 @@ impl Percepts {
 
 impl PlaceCells<'_> {
     /// The first `cells` cells, and the rest.
-    pub(crate) fn split_at(self, cells: usize) -> (Self, Self) {
-        fn split<T>(columns: [&[T]; 3], cells: usize) -> ([&[T]; 3], [&[T]; 3]) {
-            let at = |column: &[T]| cells.min(column.len());
-            (columns.map(|column| &column[..at(column)]), columns.map(|column| &column[at(column)..]))
-        }
-        fn split_mut<T>(column: &mut [T], cells: usize) -> (&mut [T], &mut [T]) {
-            column.split_at_mut(cells.min(column.len()))
-        }
-        let (flags, later_flags) = self.flags.split_at(cells);
-        let (centroids, later_centroids) = match self.centroids {
-            Centroids::F32(columns) => {
-                let (first, later) = split(columns, cells);
-                (Centroids::F32(first), Centroids::F32(later))
-            }
-            Centroids::F64(columns) => {
-                let (first, later) = split(columns, cells);
-                (Centroids::F64(first), Centroids::F64(later))
-            }
+    pub(crate) fn split_at(mut self, cells: usize) -> (Self, Self) {
+        let centroids = match &mut self.centroids {
+            Centroids::F32(columns) => Centroids::F32(columns.each_mut().map(|column| take(column, cells))),
+            Centroids::F64(columns) => Centroids::F64(columns.each_mut().map(|column| take(column, cells))),
         };
-        let (in_world, later_in_world) = split_mut(self.in_world, cells);
-        let (position, later_position) = split_mut(self.position, cells);
-        let (normal, later_normal) = split_mut(self.normal, cells);
-        (
-            Self { flags, centroids, in_world, position, normal },
-            Self {
-                flags: later_flags,
-                centroids: later_centroids,
-                in_world: later_in_world,
-                position: later_position,
-                normal: later_normal,
-            },
-        )
+        let first = Self {
+            flags: take(&mut self.flags, cells),
+            centroids,
+            in_world: take_mut(&mut self.in_world, cells),
+            position: take_mut(&mut self.position, cells),
+            normal: take_mut(&mut self.normal, cells),
+        };
+        (first, self)
     }
 
     /// A cell's (u, v, depth), m; depth is 0 where it is not kept.

@@ -117,23 +117,14 @@ impl Quantity for u32 {
     }
 }
 
-impl Quantity for [f64; 2] {
-    fn of([u, v, _]: [f64; 3]) -> Self {
-        [u, v]
-    }
-
-    fn components(self) -> [f64; 3] {
-        [self[0], self[1], 0.0]
-    }
-}
-
-impl Quantity for [f64; 3] {
+/// Two or three.
+impl<const N: usize> Quantity for [f64; N] {
     fn of(components: [f64; 3]) -> Self {
-        components
+        std::array::from_fn(|index| components[index])
     }
 
     fn components(self) -> [f64; 3] {
-        self
+        std::array::from_fn(|index| self.get(index).copied().unwrap_or(0.0))
     }
 }
 
@@ -218,6 +209,14 @@ macro_rules! columns {
             /// All of them, in their order.
             pub(crate) const ALL: &'static [Self] = &[$($(Self::$part,)*)* Self::CentroidDepth];
             pub(crate) const COUNT: usize = Self::ALL.len();
+
+            /// The column that it is a component of; none for what is kept beside the outputs.
+            pub(crate) const fn column(self) -> Option<&'static Column> {
+                match self {
+                    $($(Self::$part => Some(&Column::$output),)*)*
+                    Self::CentroidDepth => None,
+                }
+            }
         }
 
         /// An output that the host makes in double precision.
@@ -229,11 +228,16 @@ macro_rules! columns {
         impl Host {
             pub(crate) const ALL: &'static [Self] = &[$($(Self::$host,)?)*];
             pub(crate) const COUNT: usize = Self::ALL.len();
+
+            pub(crate) const fn column(self) -> &'static Column {
+                match self {
+                    $($(Self::$host => &Column::$output,)?)*
+                }
+            }
         }
 
-        /// Every output but [`Outputs::TOUCHES`], which are a table of their own.
-        pub const COLUMNS: &[Column] = &[$(
-            Column {
+        impl Column {
+            $(const $output: Self = Self {
                 output: Outputs::$output,
                 name: stringify!($name),
                 unit: Unit::$unit,
@@ -243,8 +247,11 @@ macro_rules! columns {
                 help: $help,
                 store: store(&[$(Component::$part),*], &[$(Host::$host)?]),
                 shader_override: concat!(stringify!($output), "_AT"),
-            },
-        )*];
+            };)*
+        }
+
+        /// Every output but [`Outputs::TOUCHES`], which are a table of their own.
+        pub const COLUMNS: &[Column] = &[$(Column::$output),*];
     };
 }
 
@@ -359,14 +366,14 @@ impl Column {
 }
 
 impl Component {
-    /// The column that it is a component of; none for what is kept beside the outputs.
-    pub(crate) fn column(self) -> Option<&'static Column> {
-        COLUMNS.iter().find(|column| matches!(column.store, Store::Backend(parts) if parts.contains(&self)))
-    }
-
     /// The outputs that it is made for: its own, and those that later stages make of it.
-    pub(crate) const fn wanted_for(self) -> Outputs {
-        WANTED_FOR[self as usize]
+    pub(crate) fn wanted_for(self) -> Outputs {
+        const PLACE: Outputs = Outputs::of_stage("position");
+        let own = self.column().map_or(Outputs::empty(), |column| column.output);
+        match self {
+            Self::CentroidU | Self::CentroidV | Self::CentroidDepth => own | PLACE,
+            _ => own,
+        }
     }
 
     /// The outputs that it is kept for: also motion, which is made of centroids.
@@ -383,42 +390,3 @@ impl Component {
         self.column().is_none_or(|column| matches!(column.unit, Unit::Metre | Unit::MetrePerSecond))
     }
 }
-
-/// By component.
-const WANTED_FOR: [Outputs; Component::COUNT] = {
-    let (mut wanted, mut i) = ([Outputs::empty(); Component::COUNT], 0);
-    while i < COLUMNS.len() {
-        if let Store::Backend(components) = COLUMNS[i].store {
-            let mut k = 0;
-            while k < components.len() {
-                wanted[components[k] as usize] = COLUMNS[i].output;
-                k += 1;
-            }
-        }
-        i += 1;
-    }
-    let place = Outputs::of_stage("position");
-    wanted[Component::CentroidU as usize] = place.union(Outputs::CENTROID);
-    wanted[Component::CentroidV as usize] = place.union(Outputs::CENTROID);
-    wanted[Component::CentroidDepth as usize] = place;
-    wanted
-};
-
-impl Host {
-    /// Its column.
-    pub(crate) const fn column(self) -> &'static Column {
-        HOST_COLUMNS[self as usize]
-    }
-}
-
-/// By what the host makes.
-const HOST_COLUMNS: [&Column; Host::COUNT] = {
-    let (mut columns, mut i) = ([&COLUMNS[0]; Host::COUNT], 0);
-    while i < COLUMNS.len() {
-        if let Store::Host(host) = COLUMNS[i].store {
-            columns[host as usize] = &COLUMNS[i];
-        }
-        i += 1;
-    }
-    columns
-};

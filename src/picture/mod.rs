@@ -62,7 +62,7 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     labels.key(shown.key(fields), options.size);
     for (view, placed) in views.iter().zip(&arrangement.views) {
         let [left, top, width, _] = placed.part;
-        labels.caption(view.name(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
+        labels.caption(view.word(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
     }
     labels.bar(arrangement.scale);
     labels.draw(&mut pixels, *size)?;
@@ -253,7 +253,6 @@ fn checked(size: [u32; 2]) -> Result<[u32; 2]> {
     Ok(size)
 }
 
-/// The coloured fields.
 struct FieldColours {
     /// Their indices.
     fields: Vec<usize>,

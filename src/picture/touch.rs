@@ -102,7 +102,7 @@ impl<'a> TouchPicture<'a> {
         labels.key(vec![(None, moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s")))], *size);
         for (view, placed) in views.iter().zip(&arrangement.views) {
             let [left, top, width, _] = placed.part;
-            labels.caption(view.name(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
+            labels.caption(view.word(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
         }
         labels.bar(arrangement.scale);
         if let Some(max) = moment.max_pressure {

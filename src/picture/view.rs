@@ -1,55 +1,35 @@
 //! Views of a body, and their arrangement at one scale.
 
-use std::str::FromStr;
-
 use glam::{DVec3, Mat4, Vec3};
 
 use crate::backend::gpu::raster::Eye;
-use crate::error::{Error, Result, nearest};
 
 /// Pixels around each view.
 const MARGIN: f64 = 14.0;
 /// A view is left out if it shows less than this share of the best one.
 const MIN_VISIBLE_SHARE: f64 = 0.02;
 
-/// A view of a body, which stands upright, +y up, and faces +z; its left is +x.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
-    /// From +z.
-    Front,
-    /// From −z.
-    Back,
-    /// From +x.
-    Left,
-    /// From −x.
-    Right,
-    /// From +y, its front below.
-    Top,
-    /// From −y, its front above.
-    Bottom,
-    /// From the front, its left, and above.
-    ThreeQuarter,
+words! {"view",
+    /// A view of a body, which stands upright, +y up, and faces +z; its left is +x.
+    View {
+        /// From +z.
+        Front = "front",
+        /// From −z.
+        Back = "back",
+        /// From +x.
+        Left = "left",
+        /// From −x.
+        Right = "right",
+        /// From +y, its front below.
+        Top = "top",
+        /// From −y, its front above.
+        Bottom = "bottom",
+        /// From the front, its left, and above.
+        ThreeQuarter = "three-quarter",
+    }
 }
 
 impl View {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Front, Self::Back, Self::Left, Self::Right, Self::Top, Self::Bottom, Self::ThreeQuarter];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Front => "front",
-            Self::Back => "back",
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Top => "top",
-            Self::Bottom => "bottom",
-            Self::ThreeQuarter => "three-quarter",
-        }
-    }
-
     /// Unit vectors of its eye: to the right, up, and towards it.
     pub(super) fn axes(self) -> [DVec3; 3] {
         let (towards, up) = match self {
@@ -82,22 +62,7 @@ impl View {
         let best: Vec<Self> =
             sides[..4].iter().filter(|(seen, _)| *seen > MIN_VISIBLE_SHARE * most).map(|&(_, view)| view).collect();
         let room = best.len() < 4;
-        Self::ALL.into_iter().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
-    }
-}
-
-impl FromStr for View {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let names = || Self::ALL.iter().map(|view| view.name());
-        Self::ALL.into_iter().find(|view| view.name() == text).ok_or_else(|| {
-            let hint = nearest(text, names()).map_or_else(
-                || format!("there are {} and all", names().collect::<Vec<_>>().join(", ")),
-                |near| format!("did you mean `{near}`?"),
-            );
-            Error::usage(format!("`{text}` is not a view: {hint}"))
-        })
+        Self::ALL.iter().copied().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
     }
 }
 
@@ -220,10 +185,10 @@ mod tests {
 
     #[test]
     fn an_eye_sees_right_up_and_near_where_they_are() {
-        for view in View::ALL {
+        for &view in View::ALL {
             let [right, up, towards] = view.axes();
             assert!((right.cross(up) - towards).length() < 1e-15, "{view:?}");
-            assert_eq!(view.name().parse::<View>().unwrap(), view);
+            assert_eq!(view.word().parse::<View>().unwrap(), view);
         }
         assert_eq!(View::Front.axes()[0], DVec3::X);
         assert_eq!(View::Left.axes()[0], DVec3::NEG_Z, "from its left it looks to the left");

@@ -1,6 +1,6 @@
 //! What single records say: taxels, attachments, channels.
 
-use super::records::{Parts, Record};
+use super::records::{Parts, Record, op};
 use super::{FRAMES_CHANNEL, TAXEL_IDS, ids_of};
 
 /// A file that lies beside the frames.
@@ -16,7 +16,6 @@ pub struct Attached {
     pub(super) record: u64,
 }
 
-/// A channel of messages.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) topic: String,
@@ -33,21 +32,9 @@ pub(super) struct Preface {
 
 /// What the metadata in `body` tell, if they are a recording's own.
 pub(super) fn preface(body: &[u8]) -> Option<Preface> {
-    let mut parts = Parts(body);
-    if parts.text()? != super::METADATA {
-        return None;
-    }
-    let length = parts.u32()?;
-    let mut pairs = Parts(parts.bytes(length.into())?);
-    let (mut taxels, mut frames) = (None, None);
-    while !pairs.0.is_empty() {
-        match (pairs.text()?, pairs.text()?) {
-            (TAXEL_IDS, ids) => taxels = ids_of(ids),
-            (FRAMES_CHANNEL, id) => frames = id.parse().ok(),
-            _ => {}
-        }
-    }
-    Some(Preface { taxels: taxels?, frames })
+    let Ok(mcap::records::Record::Metadata(own)) = mcap::parse_record(op::METADATA, body) else { return None };
+    let taxels = ids_of(own.metadata.get(TAXEL_IDS).filter(|_| own.name == super::METADATA)?)?;
+    Some(Preface { taxels, frames: own.metadata.get(FRAMES_CHANNEL).and_then(|id| id.parse().ok()) })
 }
 
 /// The attachment whose record begins with `head`.
@@ -70,7 +57,6 @@ pub(super) fn data_of(body: &[u8]) -> Option<&[u8]> {
     (crc32fast::hash(checked) == crc).then_some(data)
 }
 
-/// A channel's id, and the channel.
 pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
     let (id, _schema) = (parts.u16()?, parts.u16()?);
     Some((id, Channel { topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))

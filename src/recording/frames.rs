@@ -4,58 +4,69 @@
 //! what is stale is listed once more.
 
 use glam::{DQuat, DVec3};
+use prost::Message as _;
 
-use super::proto::{Fields, Value, Writer, take_varint};
 use crate::signal::{Frame, Pose, RawValue};
 
-// The fields' numbers, as in the schema.
-pub(super) const T: u32 = 1;
-pub(super) const VALUES: u32 = 2;
-pub(super) const MISSING: u32 = 3;
-pub(super) const PRESENT: u32 = 4;
-pub(super) const POSES: u32 = 5;
-pub(super) const STALE: u32 = 6;
-pub(super) const LINK: u32 = 1;
-pub(super) const POSE: u32 = 2;
+/// `somatic.Frame`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(super) struct FrameMessage {
+    #[prost(double, optional, tag = "1")]
+    t: Option<f64>,
+    /// `repeated float` in the schema, whose bytes these are: they are copied in one piece.
+    #[prost(bytes = "vec", optional, tag = "2")]
+    values: Option<Vec<u8>>,
+    #[prost(uint32, repeated, tag = "3")]
+    missing: Vec<u32>,
+    #[prost(uint32, repeated, tag = "4")]
+    present: Vec<u32>,
+    #[prost(message, repeated, tag = "5")]
+    poses: Vec<LinkPose>,
+    #[prost(uint32, repeated, tag = "6")]
+    stale: Vec<u32>,
+}
+
+/// `somatic.LinkPose`.
+#[derive(Clone, PartialEq, prost::Message)]
+struct LinkPose {
+    #[prost(string, tag = "1")]
+    link: String,
+    /// The translation's x, y, z and the rotation's x, y, z, w.
+    #[prost(double, repeated, tag = "2")]
+    pose: Vec<f64>,
+}
 
 /// Puts `frame` into `to`, in place of what it holds.
 pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
-    to.clear();
-    let mut writer = Writer(to);
-    writer.double(T, frame.t_s);
-    let missing = frame.values.iter().filter(|value| value.is_missing()).count();
-    let indices = |wanted: bool| {
-        (0_u32..).zip(&frame.values).filter(move |(_, value)| value.is_missing() == wanted).map(|(index, _)| index)
+    let indices = |wanted: fn(&RawValue) -> bool| -> Vec<u32> {
+        (0..).zip(&frame.values).filter(|(_, value)| wanted(value)).map(|(index, _)| index).collect()
     };
-    if 2 * missing <= frame.values.len() {
-        // Bits are kept in memory as they are on paper, except on a machine that counts bytes from the other end.
-        if cfg!(target_endian = "little") {
-            writer.bytes(VALUES, bytemuck::cast_slice(&frame.values));
-        } else {
-            let bytes: Vec<u8> = frame.values.iter().flat_map(|value| value.to_bits().to_le_bytes()).collect();
-            writer.bytes(VALUES, &bytes);
-        }
-        if missing > 0 {
-            writer.numbers(MISSING, indices(true));
-        }
+    let missing = indices(|value| value.is_missing());
+    let pose = |(link, Pose { translation: p, rotation: q }): &(String, Pose)| LinkPose {
+        link: link.clone(),
+        pose: vec![p.x, p.y, p.z, q.x, q.y, q.z, q.w],
+    };
+    let mut message = FrameMessage {
+        t: Some(frame.t_s),
+        poses: frame.pose.iter().map(pose).collect(),
+        stale: indices(|value| *value == RawValue::STALE),
+        ..FrameMessage::default()
+    };
+    let bytes = if 2 * missing.len() > frame.values.len() {
+        message.present = indices(|value| !value.is_missing());
+        let present = frame.values.iter().filter(|value| !value.is_missing());
+        present.flat_map(|value| value.to_bits().to_le_bytes()).collect()
     } else {
-        let there = frame.values.iter().filter(|value| !value.is_missing());
-        let bytes: Vec<u8> = there.flat_map(|value| value.to_bits().to_le_bytes()).collect();
-        writer.bytes(VALUES, &bytes);
-        writer.numbers(PRESENT, indices(false));
-    }
-    if frame.values.contains(&RawValue::STALE) {
-        let stale = (0_u32..).zip(&frame.values).filter(|(_, value)| **value == RawValue::STALE);
-        writer.numbers(STALE, stale.map(|(index, _)| index));
-    }
-    for (link, pose) in &frame.pose {
-        writer.message(POSES, |writer| {
-            writer.text(LINK, link);
-            let Pose { translation: p, rotation: q } = pose;
-            let numbers = [p.x, p.y, p.z, q.x, q.y, q.z, q.w];
-            writer.bytes(POSE, &numbers.map(f64::to_le_bytes).concat());
-        });
-    }
+        message.missing = missing;
+        if cfg!(target_endian = "little") {
+            bytemuck::cast_slice(&frame.values).to_vec()
+        } else {
+            frame.values.iter().flat_map(|value| value.to_bits().to_le_bytes()).collect()
+        }
+    };
+    message.values = Some(bytes);
+    to.clear();
+    message.encode(to).expect("a vector has room");
 }
 
 /// The value with these bits; whatever is no number but `MISSING` is faulty.
@@ -64,85 +75,61 @@ fn value_of(bits: [u8; 4]) -> RawValue {
     if single.is_finite() { RawValue::new(single.into()) } else { RawValue::FAULTY }
 }
 
-/// Reads the message in `bytes` into `frame`, which has `width` values, with `stale` for those that are. `None` where it is
-/// no such frame.
-pub(super) fn decode(bytes: &[u8], width: usize, stale: RawValue, frame: &mut Frame) -> Option<()> {
-    frame.pose.clear();
-    let mut t_s = None;
-    let (mut values, mut missing, mut present, mut stale_ones) = (&[][..], &[][..], None, &[][..]);
-    for field in Fields(bytes) {
-        match field? {
-            (T, value) => t_s = Some(value.double()?),
-            (VALUES, Value::Bytes(bytes)) => values = bytes,
-            (MISSING, Value::Bytes(bytes)) => missing = bytes,
-            (PRESENT, Value::Bytes(bytes)) => present = Some(bytes),
-            (STALE, Value::Bytes(bytes)) => stale_ones = bytes,
-            (POSES, Value::Bytes(bytes)) => frame.pose.push(pose(bytes)?),
-            // Of a later version: what it adds takes nothing away.
-            _ => {}
+impl FrameMessage {
+    /// Reads it from `bytes`; `None` where they are no such message, or have no time.
+    pub(super) fn read(bytes: &[u8]) -> Option<Self> {
+        Self::decode(bytes).ok().filter(|message| message.t.is_some_and(f64::is_finite))
+    }
+
+    /// The time of the frame, s.
+    pub(super) fn t_s(&self) -> f64 {
+        self.t.unwrap_or_default()
+    }
+
+    /// Whether any of its values is stale.
+    pub(super) fn has_stale(&self) -> bool {
+        !self.stale.is_empty()
+    }
+
+    /// Whether it poses links.
+    pub(super) fn is_posed(&self) -> bool {
+        !self.poses.is_empty()
+    }
+
+    /// Puts it into `frame`, which has `width` values, with `stale` for those that are. `None` where it is no such frame.
+    pub(super) fn put_into(&self, frame: &mut Frame, width: usize, stale: RawValue) -> Option<()> {
+        frame.t_s = self.t_s();
+        let (words, rest) = self.values.as_deref().unwrap_or_default().as_chunks::<4>();
+        if !rest.is_empty() {
+            return None;
         }
-    }
-    frame.t_s = t_s.filter(|t_s| t_s.is_finite())?;
-    let (words, rest) = values.as_chunks::<4>();
-    if !rest.is_empty() {
-        return None;
-    }
-    frame.values.clear();
-    match present {
-        None if words.len() == width => frame.values.extend(words.iter().map(|&bits| value_of(bits))),
-        None => return None,
-        Some(mut indices) => {
+        frame.values.clear();
+        if self.present.is_empty() && words.len() == width {
+            frame.values.extend(words.iter().map(|&bits| value_of(bits)));
+        } else if self.present.len() == words.len() {
             frame.values.resize(width, RawValue::MISSING);
-            for &bits in words {
-                *frame.values.get_mut(usize::try_from(take_varint(&mut indices)?).ok()?)? = value_of(bits);
+            for (&index, &bits) in self.present.iter().zip(words) {
+                *frame.values.get_mut(index as usize)? = value_of(bits);
+            }
+        } else {
+            return None;
+        }
+        for (indices, value) in [(&self.missing, RawValue::MISSING), (&self.stale, stale)] {
+            for &index in indices {
+                *frame.values.get_mut(index as usize)? = value;
             }
         }
-    }
-    while !missing.is_empty() {
-        *frame.values.get_mut(usize::try_from(take_varint(&mut missing)?).ok()?)? = RawValue::MISSING;
-    }
-    while !stale_ones.is_empty() {
-        *frame.values.get_mut(usize::try_from(take_varint(&mut stale_ones)?).ok()?)? = stale;
-    }
-    Some(())
-}
-
-/// The time of the frame in `bytes`.
-pub(super) fn time_of(bytes: &[u8]) -> Option<f64> {
-    Fields(bytes).flatten().find(|(field, _)| *field == T)?.1.double().filter(|t_s| t_s.is_finite())
-}
-
-/// Whether the frame in `bytes` has values that are stale.
-pub(super) fn has_stale(bytes: &[u8]) -> bool {
-    Fields(bytes).flatten().any(|(field, _)| field == STALE)
-}
-
-/// Whether the frame in `bytes` poses links.
-pub(super) fn is_posed(bytes: &[u8]) -> bool {
-    Fields(bytes).flatten().any(|(field, _)| field == POSES)
-}
-
-fn pose(bytes: &[u8]) -> Option<(String, Pose)> {
-    let (mut link, mut numbers) = (None, None);
-    for field in Fields(bytes) {
-        match field? {
-            (LINK, value) => link = Some(std::str::from_utf8(value.bytes()?).ok()?),
-            (POSE, value) => numbers = Some(value.bytes()?),
-            _ => {}
+        frame.pose.clear();
+        for LinkPose { link, pose } in &self.poses {
+            let [x, y, z, qx, qy, qz, qw] = pose[..] else { return None };
+            if !pose.iter().all(|number| number.is_finite()) {
+                return None;
+            }
+            let pose = Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw) };
+            frame.pose.push((link.clone(), pose));
         }
+        Some(())
     }
-    let mut of = [0.0; 7];
-    let (words, rest) = numbers?.as_chunks::<8>();
-    if words.len() != of.len() || !rest.is_empty() {
-        return None;
-    }
-    for (number, &bits) in of.iter_mut().zip(words) {
-        *number = f64::from_le_bytes(bits);
-    }
-    let [x, y, z, qx, qy, qz, qw] = of;
-    let finite = of.iter().all(|number| number.is_finite());
-    let pose = Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw) };
-    finite.then(|| (link.unwrap_or_default().to_owned(), pose))
 }
 
 #[cfg(test)]
@@ -181,9 +168,9 @@ mod tests {
             let mut bytes = Vec::new();
             encode(&frame, &mut bytes);
             let mut back = Frame::default();
-            prop_assert_eq!(decode(&bytes, frame.values.len(), RawValue::STALE, &mut back), Some(()));
+            let message = FrameMessage::read(&bytes).unwrap();
+            prop_assert_eq!(message.put_into(&mut back, frame.values.len(), RawValue::STALE), Some(()));
             prop_assert_eq!(back.t_s.to_bits(), frame.t_s.to_bits());
-            prop_assert_eq!(time_of(&bytes), Some(frame.t_s));
             prop_assert_eq!(&back, &frame);
             // As numbers 0 and −0 are one; as bits they are not.
             let bits = |frame: &Frame| frame.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -197,8 +184,9 @@ mod tests {
             let at = at.index(bytes.len());
             bytes[at] = to;
             let mut back = Frame::default();
-            if decode(&bytes, frame.values.len(), RawValue::STALE, &mut back).is_some() {
-                prop_assert_eq!(back.values.len(), frame.values.len());
+            let width = frame.values.len();
+            if FrameMessage::read(&bytes).is_some_and(|it| it.put_into(&mut back, width, RawValue::STALE).is_some()) {
+                prop_assert_eq!(back.values.len(), width);
                 prop_assert!(back.t_s.is_finite());
             }
         }
@@ -208,7 +196,7 @@ mod tests {
     fn a_frame_of_another_width_is_none() {
         let mut bytes = Vec::new();
         encode(&Frame { values: vec![RawValue::new(1.0); 3], ..Frame::default() }, &mut bytes);
-        assert_eq!(decode(&bytes, 4, RawValue::STALE, &mut Frame::default()), None);
+        assert_eq!(FrameMessage::read(&bytes).unwrap().put_into(&mut Frame::default(), 4, RawValue::STALE), None);
     }
 
     #[test]
@@ -216,11 +204,12 @@ mod tests {
         let seen = Frame { values: vec![RawValue::new(1.0), RawValue::STALE, RawValue::MISSING], ..Frame::default() };
         let mut bytes = Vec::new();
         encode(&seen, &mut bytes);
-        assert!(has_stale(&bytes));
+        let message = FrameMessage::read(&bytes).unwrap();
+        assert!(message.has_stale());
         let mut back = Frame::default();
-        decode(&bytes, 3, RawValue::MISSING, &mut back).unwrap();
+        message.put_into(&mut back, 3, RawValue::MISSING).unwrap();
         assert_eq!(back.values, [RawValue::new(1.0), RawValue::MISSING, RawValue::MISSING]);
         encode(&back, &mut bytes);
-        assert!(!has_stale(&bytes));
+        assert!(!FrameMessage::read(&bytes).unwrap().has_stale());
     }
 }

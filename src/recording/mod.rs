@@ -53,19 +53,12 @@ pub(crate) fn nanoseconds(t_s: f64) -> u64 {
 
 /// Ids in few characters, in their order: `0-35,64-103`.
 fn words_of(ids: &[u32]) -> String {
-    let mut words = String::new();
-    let mut start = 0;
-    for end in 1..=ids.len() {
-        if end == ids.len() || ids[end - 1].checked_add(1) != Some(ids[end]) {
-            if start > 0 {
-                words.push(',');
-            }
-            let (first, last) = (ids[start], ids[end - 1]);
-            words += &if first == last { first.to_string() } else { format!("{first}-{last}") };
-            start = end;
-        }
-    }
-    words
+    let runs = ids.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let word = |run: &[u32]| match run {
+        [one] => one.to_string(),
+        run => format!("{}-{}", run[0], run[run.len() - 1]),
+    };
+    runs.map(word).collect::<Vec<_>>().join(",")
 }
 
 /// The ids that [`words_of`] wrote; `None` where it did not, or where there are more than a body can have.

@@ -6,11 +6,10 @@ use std::io;
 use std::path::Path;
 
 use super::entries::{Attached, Channel, attached, channel, data_of, preface};
-use super::records::{
-    ATTACHMENT, CHANNEL, CHUNK, DATA_END, FOOTER, MAX_RECORD_BYTES, MESSAGE, METADATA, Next, Parts, Record, Records,
-};
-use super::{FRAMES, frames, nanoseconds, unpack};
-use crate::error::{Error, Result};
+use super::frames::FrameMessage;
+use super::records::{MAX_RECORD_BYTES, Next, Parts, Record, Records, op};
+use super::{FRAMES, nanoseconds, unpack};
+use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
 
 /// Bytes of an attachment's record that hold its name and kind; names are not longer.
@@ -48,7 +47,6 @@ pub struct Reader {
     losses: Vec<String>,
 }
 
-/// What could not be read.
 #[derive(Default)]
 struct Damage {
     places: u64,
@@ -99,7 +97,7 @@ impl Reader {
             losses: Vec::new(),
         };
         // Each channel is told in the first chunk that has it; should that be damaged, others still make sense.
-        let told = reader.records.in_summary(CHANNEL)?;
+        let told = reader.records.in_summary(op::CHANNEL)?;
         reader.channels = told.iter().filter_map(|body| channel(&mut Parts(body))).collect();
         let taxels = reader.read_head()?;
         reader.taxels = taxels.ok_or_else(|| {
@@ -119,7 +117,7 @@ impl Reader {
                 return Ok(taxels);
             };
             match record.kind {
-                METADATA => {
+                op::METADATA => {
                     self.records.body(record, u64::MAX, &mut body)?;
                     if let Some(preface) = preface(&body).filter(|_| taxels.is_none()) {
                         let frames = Channel { topic: FRAMES.to_owned(), encoding: "protobuf".to_owned() };
@@ -127,15 +125,15 @@ impl Reader {
                         taxels = Some(preface.taxels);
                     }
                 }
-                CHANNEL => {
+                op::CHANNEL => {
                     self.records.body(record, MAX_RECORD_BYTES, &mut body)?;
                     self.channels.extend(channel(&mut Parts(&body)));
                 }
-                ATTACHMENT => {
+                op::ATTACHMENT => {
                     self.records.body(record, ATTACHMENT_HEAD, &mut body)?;
                     self.attached.extend(attached(&body, record));
                 }
-                CHUNK | MESSAGE | DATA_END | FOOTER => {
+                op::CHUNK | op::MESSAGE | op::DATA_END | op::FOOTER => {
                     self.records.go_to(start)?;
                     return Ok(taxels);
                 }
@@ -163,15 +161,12 @@ impl Reader {
     pub fn bytes_of(&mut self, attached: &Attached) -> Result<Vec<u8>> {
         let back = self.records.at;
         let mut body = Vec::new();
-        let record = Record { kind: ATTACHMENT, at: attached.at, length: attached.record };
+        let record = Record { kind: op::ATTACHMENT, at: attached.at, length: attached.record };
         let read = self.records.go_to(record.at).and_then(|()| self.records.body(record, u64::MAX, &mut body));
         read.and_then(|()| self.records.go_to(back)).map_err(|e| Error::failed(e.to_string()).at(&self.name))?;
         data_of(&body).map(<[u8]>::to_vec).ok_or_else(|| {
-            Error::failed(format!(
-                "the attached `{}` is damaged; name the file with --body and --calibration",
-                attached.name
-            ))
-            .at(&self.name)
+            failed!("the attached `{}` is damaged; name the file with --body and --calibration", attached.name)
+                .at(&self.name)
         })
     }
 
@@ -226,8 +221,9 @@ impl Reader {
                 }
             }
             let data = &self.chunk[message.data.clone()];
-            if frames::decode(data, self.taxels.len(), self.stale, frame).is_some() {
-                self.seen_stale |= frames::has_stale(data);
+            let read = FrameMessage::read(data);
+            if let Some(message) = read.filter(|it| it.put_into(frame, self.taxels.len(), self.stale).is_some()) {
+                self.seen_stale |= message.has_stale();
                 self.saw(frame.t_s);
                 return Ok(true);
             }
@@ -274,12 +270,12 @@ impl Reader {
             self.left.start = end;
             let mut parts = Parts(body);
             match kind {
-                CHANNEL => {
+                op::CHANNEL => {
                     if let Some((id, channel)) = channel(&mut parts) {
                         self.channels.insert(id, channel);
                     }
                 }
-                MESSAGE => {
+                op::MESSAGE => {
                     let head = (|| Some((parts.u16()?, parts.u32()?, parts.u64()?, parts.u64()?)))();
                     if let Some((channel, _, log_time, _)) = head {
                         return Some(Message { channel, log_time, data: end - parts.0.len()..end });
@@ -320,12 +316,12 @@ impl Reader {
                 }
             };
             match record.kind {
-                CHUNK => {
+                op::CHUNK => {
                     if self.read_chunk(record)? {
                         return Ok(true);
                     }
                 }
-                CHANNEL | MESSAGE => {
+                op::CHANNEL | op::MESSAGE => {
                     // Without a chunk around them, as other programs may write.
                     self.records.go_to(start)?;
                     let whole = Record { at: start, length: record.length + (record.at - start), ..record };
@@ -336,7 +332,7 @@ impl Reader {
                     self.chunk = chunk;
                     return Ok(true);
                 }
-                DATA_END | FOOTER => return Ok(false),
+                op::DATA_END | op::FOOTER => return Ok(false),
                 _ => self.records.skip(record.length)?,
             }
         }

@@ -13,7 +13,7 @@ use super::{
     FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, TAXEL_IDS, TAXELS, TOUCHES, frames, nanoseconds, schemas,
     words_of,
 };
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::output::{GrowingFile, OutputPath};
 use crate::signal::Frame;
 
@@ -195,5 +195,5 @@ fn explained(name: &str, error: McapError) -> Error {
         McapError::Io(e) => e.to_string(),
         other => other.to_string(),
     };
-    Error::failed(format!("cannot write: {what}")).at(name)
+    failed!("cannot write: {what}").at(name)
 }

@@ -3,6 +3,8 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
+pub(super) use mcap::records::op;
+
 /// What begins and ends a file.
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// A record's kind and length.
@@ -12,16 +14,6 @@ const END: u64 = HEAD + 20 + 8;
 
 /// Bytes of a record that says a word or two; a longer one is damaged.
 pub(super) const MAX_RECORD_BYTES: u64 = 1 << 16;
-
-// Kinds of records.
-pub(super) const FOOTER: u8 = 0x02;
-pub(super) const CHANNEL: u8 = 0x04;
-pub(super) const MESSAGE: u8 = 0x05;
-pub(super) const CHUNK: u8 = 0x06;
-const CHUNK_INDEX: u8 = 0x08;
-pub(super) const ATTACHMENT: u8 = 0x09;
-pub(super) const METADATA: u8 = 0x0C;
-pub(super) const DATA_END: u8 = 0x0F;
 
 /// A record whose body is still to be read, or passed over.
 #[derive(Clone, Copy, Debug)]
@@ -125,7 +117,7 @@ impl<R: Read + Seek> Records<R> {
         self.file.read_exact(&mut bytes)?;
         self.go_to(back)?;
         let start = u64::from_le_bytes(bytes[9..17].try_into().expect("eight bytes"));
-        Ok((bytes[0] == FOOTER && bytes[END as usize - 8..] == MAGIC).then_some(start))
+        Ok((bytes[0] == op::FOOTER && bytes[END as usize - 8..] == MAGIC).then_some(start))
     }
 
     /// The bodies of the summary's records of kind `kind`.
@@ -157,7 +149,7 @@ impl<R: Read + Seek> Records<R> {
         let mut found: Option<u64> = None;
         let mut body = Vec::new();
         while let Next::Record(record) = self.next()? {
-            if record.kind == CHUNK_INDEX {
+            if record.kind == op::CHUNK_INDEX {
                 self.body(record, 24, &mut body)?;
                 let chunk = body.get(16..24).map(|bytes| u64::from_le_bytes(bytes.try_into().expect("eight bytes")));
                 if let Some(chunk) = chunk.filter(|&chunk| chunk > at && chunk < start) {

@@ -1,7 +1,6 @@
 //! What the messages are made of, told in the file itself, so that any viewer can read them: Protocol Buffers' own
 //! descriptors, made from the tables below. Those of package `foxglove` are the well-known ones that viewers draw.
 
-use super::frames;
 use super::proto::Writer;
 
 /// A message and its fields, `[repeated] TYPE NAME NUMBER`, TYPE a scalar or another message of the package or, with a
@@ -79,7 +78,7 @@ const ENUMERATIONS: [Enumeration; 3] = [
     ("SceneEntityDeletion", "Type", "MATCHING_ID ALL"),
 ];
 
-/// [`super::frames`] writes and reads these.
+/// The messages of [`super::frames`].
 const SOMATIC: [Message; 2] = [
     (
         "Frame",
@@ -89,17 +88,12 @@ const SOMATIC: [Message; 2] = [
     ("LinkPose", "string link 1; repeated double pose 2"),
 ];
 
-const _: () = assert!(frames::T == 1 && frames::VALUES == 2 && frames::MISSING == 3 && frames::PRESENT == 4);
-const _: () = assert!(frames::POSES == 5 && frames::STALE == 6 && frames::LINK == 1 && frames::POSE == 2);
-
-/// The schema of the frames.
 pub(super) fn somatic() -> Vec<u8> {
     let mut set = Vec::new();
     file(&mut Writer(&mut set), "somatic.proto", "somatic", &[], &SOMATIC, &[]);
     set
 }
 
-/// The schemas of what viewers show.
 pub(super) fn foxglove() -> Vec<u8> {
     let mut set = Vec::new();
     let mut writer = Writer(&mut set);

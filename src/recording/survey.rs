@@ -1,7 +1,10 @@
 //! What is in a recording, without a look at what it says.
 
+use std::collections::BTreeMap;
+
+use super::FRAMES;
+use super::frames::FrameMessage;
 use super::reader::Reader;
-use super::{FRAMES, frames};
 use crate::error::Result;
 
 /// Steps after which it is known how far frames usually lie apart.
@@ -116,19 +119,17 @@ impl Survey {
     /// The file cannot be read, or is compressed.
     pub fn of(reader: &mut Reader, mut progress: impl FnMut(f64)) -> Result<Self> {
         let mut survey = Self::default();
-        let mut counts: Vec<(u16, u64, u64)> = Vec::new();
+        let mut counts: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
         while let Some(message) = reader.next_message()? {
             let data = reader.data(&message);
-            let index = counts.iter().position(|(id, ..)| *id == message.channel).unwrap_or_else(|| {
-                counts.push((message.channel, 0, 0));
-                counts.len() - 1
-            });
-            counts[index].1 += 1;
-            counts[index].2 += data.len() as u64;
+            let (messages, bytes) = counts.entry(message.channel).or_default();
+            *messages += 1;
+            *bytes += data.len() as u64;
             if reader.channels.get(&message.channel).is_some_and(|channel| channel.topic == FRAMES) {
-                let t_s = frames::time_of(data).unwrap_or(message.log_time as f64 / 1e9);
+                let frame = FrameMessage::read(data);
+                let t_s = frame.as_ref().map_or(message.log_time as f64 / 1e9, FrameMessage::t_s);
                 survey.rhythm.see(t_s);
-                survey.posed += u64::from(frames::is_posed(data));
+                survey.posed += u64::from(frame.is_some_and(|frame| frame.is_posed()));
                 reader.saw(t_s);
                 if survey.rhythm.frames.is_multiple_of(64) {
                     progress(reader.progress());
@@ -136,7 +137,7 @@ impl Survey {
             }
         }
         survey.rhythm.finish();
-        for (id, messages, bytes) in counts {
+        for (id, (messages, bytes)) in counts {
             let (name, encoding) = match reader.channels.get(&id) {
                 Some(channel) => (channel.topic.clone(), channel.encoding.clone()),
                 None => (format!("channel {id}"), String::new()),

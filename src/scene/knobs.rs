@@ -1,13 +1,10 @@
 //! The knobs: where a user may trade speed for accuracy, and what each of them can be turned to.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::choose_fields;
 use crate::body::{Body, ChartKind};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::Outputs;
 
@@ -36,63 +33,6 @@ setters!(Knobs {
     coverage: Coverage,
     cadence: Cadence,
 });
-
-/// An enum of words: read from them, shown as them, and all of them in order.
-macro_rules! words {
-    ($what:literal, $(#[$about:meta])* $name:ident { $($(#[$says:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
-        $(#[$about])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        pub enum $name {
-            $($(#[$says])* $variant,)+
-        }
-
-        impl $name {
-            /// All of them.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-            /// What they are called, in the same order.
-            pub const WORDS: &'static [&'static str] = &[$($word),+];
-
-            /// What it is called.
-            #[must_use]
-            pub fn word(self) -> &'static str {
-                match self {
-                    $(Self::$variant => $word,)+
-                }
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = Error;
-
-            fn from_str(word: &str) -> Result<Self> {
-                match word {
-                    $($word => Ok(Self::$variant),)+
-                    _ => Err(unknown($what, word, Self::WORDS)),
-                }
-            }
-        }
-
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(self.word())
-            }
-        }
-
-        impl Serialize for $name {
-            fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.word())
-            }
-        }
-    };
-}
-
-fn unknown(what: &str, word: &str, known: &[&str]) -> Error {
-    let (last, others) = known.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
-    match nearest(word, known.iter().copied()) {
-        Some(near) => Error::usage(format!("there is no {what} `{word}`; did you mean `{near}`?")),
-        None => Error::usage(format!("there is no {what} `{word}`; choose {} or {last}", others.join(", "))),
-    }
-}
 
 words! {"arithmetic",
     /// How sums over a field's taxels are made.
@@ -198,9 +138,6 @@ impl Knobs {
 
 impl Charts {
     /// `fields` of `body`, those that `globs` name in such charts; with it the names of those that cannot have one.
-    ///
-    /// # Errors
-    /// As [`choose_fields`].
     pub(crate) fn applied(self, body: &Body, fields: FieldSet, globs: &[String]) -> Result<Recharted> {
         let kind = match self {
             Self::AsAuthored => return Ok(Recharted { fields, kept: Vec::new() }),
@@ -240,7 +177,7 @@ mod tests {
         let says = |error: Error| error.to_string();
         assert!(says("onepass".parse::<Arithmetic>().unwrap_err()).contains("did you mean `one-pass`?"));
         let wrong = says("quantum".parse::<Coverage>().unwrap_err());
-        assert!(wrong.contains("choose auto, all or touched"), "{wrong}");
+        assert!(wrong.contains("it is one of all, auto, touched"), "{wrong}");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::curve::Curve;
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, Response};
 use super::upkeep::UpkeepKeys;
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 
 /// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 up to the dead band. The constants are those of
 /// the file; the backends `cpu` and `gpu` round each once to single precision.
@@ -67,7 +67,7 @@ pub struct Checks {
 }
 
 /// A robot's calibration, for the taxels of one body.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Calibration {
     /// The file name of its body, if given, with or without folder and extension.
     pub body: Option<String>,
@@ -91,16 +91,7 @@ impl Calibration {
     /// The calibration of a robot without a file: P is the raw value.
     #[must_use]
     pub fn identity(taxels: usize) -> Self {
-        Self {
-            body: None,
-            taxels: vec![TaxelCalibration::default(); taxels],
-            curves: Vec::new(),
-            contact: ContactThresholds::default(),
-            fields: BTreeMap::new(),
-            change: ChangeCalibration::default(),
-            checks: Checks::default(),
-            upkeep: UpkeepKeys::default(),
-        }
+        Self { taxels: vec![TaxelCalibration::default(); taxels], ..Self::default() }
     }
 
     /// Checks that the calibration is for the body `name`.
@@ -110,9 +101,9 @@ impl Calibration {
     pub fn check_body(&self, name: &str) -> Result<()> {
         let stem = |name: &str| Path::new(name).file_stem().map(std::ffi::OsStr::to_owned);
         match &self.body {
-            Some(body) if stem(body) != stem(name) => Err(Error::failed(format!(
+            Some(body) if stem(body) != stem(name) => Err(failed!(
                 "the calibration is for body `{body}`, and this is `{name}`; change its key `body` if they are one"
-            ))),
+            )),
             _ => Ok(()),
         }
     }
@@ -123,7 +114,7 @@ impl Calibration {
         let curve = match taxel.response {
             Response::Linear => return Ok(None),
             Response::Curve(index) => {
-                let missing = || Error::failed(format!("a taxel has curve {index} of {}", self.curves.len()));
+                let missing = || failed!("a taxel has curve {index} of {}", self.curves.len());
                 self.curves.get(index).ok_or_else(missing)?.scaled(taxel.gain)
             }
             Response::Fsr(fsr) => {

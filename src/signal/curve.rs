@@ -2,7 +2,7 @@
 
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, GAIN_RANGE, MAX_MAGNITUDE};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 
 /// A monotone table from raw value to pressure: linear between its knots, constant beyond its ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,14 +13,12 @@ pub struct Curve {
     written: Vec<[f64; 2]>,
 }
 
-/// A column of a curve's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Column {
     Raw,
     P,
 }
 
-/// An error in a curve's table.
 #[derive(Debug)]
 pub(crate) struct CurveError {
     pub(crate) column: Column,
@@ -104,10 +102,7 @@ impl Curve {
         Self { knots: written.iter().map(|knot| knot.map(|x| x as f32)).collect(), written }
     }
 
-    /// The curve for P = |gain| · curve(±x), with the sign of `gain`.
-    ///
-    /// # Errors
-    /// A slope would leave single precision.
+    /// The curve for P = |gain| · curve(±x), with the sign of `gain`; an error if a slope would leave single precision.
     pub(crate) fn scaled(&self, gain: f64) -> Result<Self> {
         let single = gain.abs() as f32;
         let mut knots: Vec<[f32; 2]> = self.knots.iter().map(|&[raw, p]| [raw, p * single]).collect();
@@ -121,10 +116,10 @@ impl Curve {
         let scaled = Self { knots, written };
         match scaled.steep() {
             None => Ok(scaled),
-            Some((_, slope)) => Err(Error::failed(format!(
+            Some((_, slope)) => Err(failed!(
                 "`gain` {} makes the curve change by {slope:e} a raw unit; keep it {GAIN_RANGE_TEXT}",
                 gain.abs()
-            ))),
+            )),
         }
     }
 

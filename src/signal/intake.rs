@@ -4,7 +4,6 @@
 
 use super::{Calibration, Frame, RawValue};
 
-/// The state between frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Intake {
     calibration: Calibration,
@@ -22,7 +21,6 @@ pub(crate) struct Intake {
     stale: Option<Vec<Vec<usize>>>,
 }
 
-/// What is kept from frame to frame.
 #[derive(Clone, Debug)]
 pub(crate) struct IntakeState {
     /// Per taxel, the last value that arrived, and when.
@@ -31,7 +29,6 @@ pub(crate) struct IntakeState {
 }
 
 impl IntakeState {
-    /// The number of taxels it is of.
     pub(crate) fn taxels(&self) -> usize {
         self.last.len()
     }
@@ -58,12 +55,10 @@ impl Intake {
         self.taxel_of_value = taxel_of_value;
     }
 
-    /// Per value of a frame, the taxel it belongs to.
     pub(crate) fn taxel_of_value(&self) -> &[usize] {
         &self.taxel_of_value
     }
 
-    /// The state after the frames so far.
     pub(crate) fn state(&self) -> &IntakeState {
         &self.state
     }
@@ -73,7 +68,6 @@ impl Intake {
         self.state.clone_from(state);
     }
 
-    /// Starts to track stale taxels.
     pub(crate) fn track_stale(&mut self) {
         self.stale = Some(Vec::new());
     }
@@ -83,12 +77,10 @@ impl Intake {
         self.stale.as_deref().unwrap_or_default()
     }
 
-    /// Clears the list of stale taxels.
     pub(crate) fn forget_stale(&mut self) {
         self.stale.iter_mut().for_each(Vec::clear);
     }
 
-    /// Number of values a frame must have.
     pub(crate) fn width(&self) -> usize {
         self.taxel_of_value.len()
     }
@@ -172,7 +164,6 @@ impl Intake {
         f64::from(outside) > share * f64::from(present)
     }
 
-    /// Marks isolated values as faulty.
     fn reject_isolated(&mut self, ratio: f64) {
         for (index, (rise, value)) in self.rise.iter_mut().zip(&self.now).enumerate() {
             let masked = self.calibration.taxels[index].mask;

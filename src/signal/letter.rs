@@ -27,10 +27,7 @@ impl Receptor {
 
 impl fmt::Display for Receptor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Sustained => "sustained",
-            Self::Change => "change",
-        })
+        self.serialize(f)
     }
 }
 

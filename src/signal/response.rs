@@ -63,10 +63,7 @@ impl FsrSignal {
 
 impl fmt::Display for FsrSignal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Raw => "raw",
-            Self::Linear => "linear",
-        })
+        self.serialize(f)
     }
 }
 

@@ -28,12 +28,12 @@ mod press_evidence;
 
 use std::fmt;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use self::common_drift::{CommonDrift, Drift};
 use self::press_evidence::{PressEvidence, TouchSense};
 use super::RawValue;
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 
 /// The drift of a held taxel counts as unknown after this time without an estimate, s.
 const DRIFT_UNKNOWN_AFTER_S: f64 = 60.0;
@@ -63,7 +63,6 @@ pub struct UpkeepKeys {
 }
 
 impl UpkeepKeys {
-    /// Checks that all values are positive.
     pub(crate) fn check(&self) -> Result<()> {
         let keys = [
             ("cadence_s", self.cadence_s),
@@ -75,7 +74,7 @@ impl UpkeepKeys {
             ("dead_s", self.dead_s),
         ];
         match keys.into_iter().find(|(_, value)| value.is_some_and(|value| !(value.is_finite() && value > 0.0))) {
-            Some((key, _)) => Err(Error::failed(format!("[upkeep] `{key}` must be over 0, or left out"))),
+            Some((key, _)) => Err(failed!("[upkeep] `{key}` must be over 0, or left out")),
             None => Ok(()),
         }
     }
@@ -87,7 +86,8 @@ impl UpkeepKeys {
 }
 
 /// The defect for which a taxel is not used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Unfit {
     /// No numbers arrive.
     Dead,
@@ -101,12 +101,7 @@ pub enum Unfit {
 
 impl fmt::Display for Unfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Dead => "dead",
-            Self::Stuck => "stuck",
-            Self::Noisy => "noisy",
-            Self::Saturated => "saturated",
-        })
+        self.serialize(f)
     }
 }
 
@@ -141,7 +136,6 @@ impl Sum {
     }
 }
 
-/// The state of one taxel.
 #[derive(Clone, Copy, Debug)]
 struct TaxelState {
     file: Kept,
@@ -157,7 +151,6 @@ struct TaxelState {
     unchanged_s: f64,
     at_end_s: f64,
     silent_s: f64,
-    /// The mean of the previous epoch.
     before: Option<f64>,
     evidence: PressEvidence,
     /// Error bound of its estimated baseline: the sum of the drift estimates it has followed, raw units.
@@ -207,7 +200,6 @@ impl TaxelState {
         change.is_some_and(|change| self.sense().is_slow(change))
     }
 
-    /// Its defect, if any.
     fn check_health(&self, keys: &UpkeepKeys, held: bool) -> Option<Unfit> {
         let over = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value >= limit);
         let is_off = |last: f64| (last - self.baseline).abs() > self.file.felt;
@@ -243,7 +235,6 @@ impl TaxelState {
         self.baseline += (mean - self.baseline).clamp(-limit, limit);
     }
 
-    /// Error bound of the baseline, raw units.
     fn uncertainty(&self) -> f64 {
         if self.unknown_s > 0.0 { f64::INFINITY } else { self.uncertainty }
     }
@@ -268,7 +259,6 @@ impl TaxelState {
     }
 }
 
-/// The times of an epoch.
 #[derive(Clone, Copy)]
 struct Epoch {
     length_s: f64,
@@ -279,7 +269,6 @@ struct Epoch {
     followed_s: f64,
 }
 
-/// Baselines and health of a plan's taxels.
 #[derive(Clone, Debug)]
 pub(crate) struct Upkeep {
     keys: UpkeepKeys,
@@ -303,7 +292,6 @@ impl Upkeep {
         (!keys.is_off()).then_some(Self { keys, taxels, common, epoch_start_s: None, last_t_s: 0.0, middle_s: None })
     }
 
-    /// The settings.
     pub(crate) fn keys(&self) -> UpkeepKeys {
         self.keys
     }
@@ -318,7 +306,6 @@ impl Upkeep {
         self.epoch_start_s.is_some_and(|start| t_s - start >= self.cadence_s() || t_s < start)
     }
 
-    /// Adds a frame to the epoch.
     pub(crate) fn observe(&mut self, t_s: f64, values: &[RawValue]) {
         let dt_s = if self.epoch_start_s.is_some() { (t_s - self.last_t_s).max(0.0) } else { 0.0 };
         let start_s = *self.epoch_start_s.get_or_insert(t_s);
@@ -384,7 +371,6 @@ impl Upkeep {
         changed
     }
 
-    /// The times of the epoch that ends.
     fn end(&mut self) -> Epoch {
         let start_s = self.epoch_start_s.take().unwrap_or(self.last_t_s);
         let length_s = (self.last_t_s - start_s).max(0.0);
@@ -414,7 +400,6 @@ impl Upkeep {
         taxel.unfit.is_none() && taxel.evidence.is_press(sense)
     }
 
-    /// Per taxel whether its drift is unknown.
     pub(crate) fn unknown(&self) -> impl Iterator<Item = bool> + '_ {
         self.taxels.iter().map(|taxel| taxel.unknown_s >= DRIFT_UNKNOWN_AFTER_S)
     }

@@ -11,7 +11,6 @@ use toml::Spanned;
 use crate::error::{Error, Result};
 use crate::keys::Text;
 
-/// Maximum channels of one board.
 const MAX_CHANNELS: i64 = 256;
 
 /// The boards of a robot and their taxels.

@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 
 use super::line::LineWriter;
 use super::{FieldNames, Flow, Sink};
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 use crate::output::{OutputFile, OutputPath};
 use crate::percept::Percepts;
 
@@ -80,7 +80,7 @@ impl NdjsonSink {
                 self.closed = true;
                 Ok(Flow::Closed)
             }
-            Err(e) => Err(Error::failed(format!("cannot write: {e}")).at(&self.name)),
+            Err(e) => Err(failed!("cannot write: {e}").at(&self.name)),
         }
     }
 }

@@ -32,6 +32,7 @@ impl FromStr for SinkSpec {
             "page" => return Ok(Self::Page(None)),
             _ => {}
         }
+        let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
@@ -40,12 +41,8 @@ impl FromStr for SinkSpec {
             "mcap" => Ok(Self::Mcap(rest.into())),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
-            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("ndjson")) => {
-                Ok(Self::Ndjson(text.into()))
-            }
-            _ if Path::new(text).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) => {
-                Ok(Self::Mcap(text.into()))
-            }
+            _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
+            _ if ending("mcap") => Ok(Self::Mcap(text.into())),
             kind => match nearest(kind, ["ndjson", "mcap", "page"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),

@@ -22,28 +22,18 @@ const DEFAULT_DIAMETER_M: f64 = 0.01;
 /// Length of the arrow of the strongest touch so far, m; the shortest is a fifth of it.
 const MAX_ARROW_M: f64 = 0.06;
 
-/// A periodic task.
-struct Timer {
-    period_s: f64,
-    last_s: Option<f64>,
-}
+/// A periodic task, and the last time that it was done, s.
+#[derive(Default)]
+struct Timer(Option<f64>);
 
 impl Timer {
-    fn new(period_s: f64) -> Self {
-        Self { period_s, last_s: None }
-    }
-
-    fn is_due_after(&mut self, t_s: f64, period_s: f64) -> bool {
+    fn is_due(&mut self, t_s: f64, period_s: f64) -> bool {
         // A tolerance avoids being one frame late; a time that goes back restarts the period.
-        let due = self.last_s.is_none_or(|last_s| t_s < last_s || t_s - last_s >= 0.999 * period_s);
+        let due = self.0.is_none_or(|last_s| t_s < last_s || t_s - last_s >= 0.999 * period_s);
         if due {
-            self.last_s = Some(t_s);
+            self.0 = Some(t_s);
         }
         due
-    }
-
-    fn due(&mut self, t_s: f64) -> bool {
-        self.is_due_after(t_s, self.period_s)
     }
 }
 
@@ -102,7 +92,7 @@ impl ViewWriter {
             max_total: 0.0,
             max_pressure: 0.0,
             shown: false,
-            timers: [Timer::new(TAXELS_PERIOD_S), Timer::new(TOUCHES_PERIOD_S), Timer::new(LINKS_PERIOD_S)],
+            timers: Default::default(),
             message: Vec::new(),
         }
     }
@@ -112,7 +102,8 @@ impl ViewWriter {
         for frame in input.frames {
             let [taxels, _, links] = &mut self.timers;
             let period_s = if frame.pose.is_empty() { LINKS_PERIOD_S } else { TOUCHES_PERIOD_S };
-            let (links_due, taxels_due) = (links.is_due_after(frame.t_s, period_s), taxels.due(frame.t_s));
+            let (links_due, taxels_due) =
+                (links.is_due(frame.t_s, period_s), taxels.is_due(frame.t_s, TAXELS_PERIOD_S));
             if links_due || (taxels_due && !frame.pose.is_empty()) {
                 self.pose(frame);
             }
@@ -165,7 +156,7 @@ impl ViewWriter {
     pub(super) fn write_touches(&mut self, percepts: &Percepts, recorder: &mut Recorder) -> Result<()> {
         for frame in 0..percepts.frames() {
             let t_s = percepts.t_s(frame);
-            if !self.timers[1].due(t_s) {
+            if !self.timers[1].is_due(t_s, TOUCHES_PERIOD_S) {
                 continue;
             }
             self.message.clear();

@@ -11,7 +11,7 @@ use std::path::Path;
 use csv::{ByteRecord, ErrorKind};
 
 use super::Source;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
 
 /// Longest accepted row, so that a file that is no CSV does not fill the memory.
@@ -29,7 +29,6 @@ pub struct CsvSource {
     losses: Vec<String>,
 }
 
-/// Where a frame's time comes from.
 #[derive(Clone, Copy)]
 enum Time {
     /// The first column.
@@ -113,10 +112,7 @@ impl CsvSource {
         for (index, cell) in self.row.iter().enumerate().skip(usize::from(has_time)) {
             let id = header_id(index + 1, cell)?;
             if let Some(first) = columns.insert(id, index + 1) {
-                return Err(Error::failed(format!(
-                    "taxel {id} heads columns {first} and {}; give each taxel one column",
-                    index + 1
-                )));
+                return Err(failed!("taxel {id} heads columns {first} and {}; give each taxel one column", index + 1));
             }
             self.taxels.push(id);
         }
@@ -139,7 +135,7 @@ impl CsvSource {
                     Error::failed("this is a folder; name a file")
                 }
                 ErrorKind::Io(e) => Error::failed(e.to_string()),
-                other => Error::failed(format!("{other:?}")),
+                other => failed!("{other:?}"),
             })?;
             if !(read && self.row.len() == 1 && trimmed(&self.row[0]).is_empty()) {
                 return Ok(read);
@@ -162,7 +158,7 @@ impl CsvSource {
         let taxel = index.checked_sub(self.time.columns()).and_then(|index| self.taxels.get(index));
         let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
         let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
-        Some(Error::failed(format!("`{word}` has a quote; numbers stand without quotes: remove it")).at(place))
+        Some(failed!("`{word}` has a quote; numbers stand without quotes: remove it").at(place))
     }
 
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
@@ -176,11 +172,8 @@ impl CsvSource {
         if found != wanted {
             // Only the last row may be cut short: the recorder was stopped while writing it.
             if self.read_row()? {
-                let ragged = || {
-                    Error::failed(format!(
-                        "{found} values where the header has {wanted} columns; complete or delete the row"
-                    ))
-                };
+                let ragged =
+                    || failed!("{found} values where the header has {wanted} columns; complete or delete the row");
                 return Err(at_line(quote.unwrap_or_else(ragged)));
             }
             let how = if found < wanted { "truncated" } else { "too long" };
@@ -245,7 +238,7 @@ fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
     } else {
         "the header is `t,<taxel id>,<taxel id>,...`, and ids are whole numbers"
     };
-    Err(Error::failed(format!("column {column} is headed `{}`, which is not a taxel id; {remedy}", shortened(&word))))
+    Err(failed!("column {column} is headed `{}`, which is not a taxel id; {remedy}", shortened(&word)))
 }
 
 /// Whether `line` looks like CSV: `t`, numbers and blanks, separated by commas.
@@ -259,10 +252,10 @@ fn parse_time(cell: &[u8]) -> Result<f64> {
     match number(word) {
         Some(t) if t.is_finite() => Ok(t),
         _ if word.is_empty() => Err(Error::failed("t is blank; every row needs its time in seconds")),
-        _ => Err(Error::failed(format!(
+        _ => Err(failed!(
             "t is `{}`; it should be a finite number of seconds",
             shortened(&String::from_utf8_lossy(word))
-        ))),
+        )),
     }
 }
 
@@ -275,10 +268,10 @@ fn parse_value(cell: &[u8]) -> Result<RawValue> {
         return Ok(RawValue::MISSING);
     }
     number(word).map(RawValue::new).ok_or_else(|| {
-        Error::failed(format!(
+        failed!(
             "`{}` is no number; leave a missing value blank, and write `nan` for a faulty one",
             shortened(&String::from_utf8_lossy(word))
-        ))
+        )
     })
 }
 

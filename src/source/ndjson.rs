@@ -14,7 +14,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess
 use super::Source;
 use super::csv::is_csv_row;
 use super::unknown_taxels::UnknownTaxels;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, Pose, RawValue};
 
 /// Longest accepted line, so that invalid input does not fill the memory.
@@ -83,11 +83,8 @@ impl NdjsonSource {
                 return Ok(None);
             }
             if self.line.len() as u64 > MAX_LINE_BYTES {
-                return Err(Error::failed(format!(
-                    "a line of over {} MiB; frames are one line of JSON each",
-                    MAX_LINE_BYTES >> 20
-                ))
-                .at(format!("line {}", self.line_number)));
+                return Err(failed!("a line of over {} MiB; frames are one line of JSON each", MAX_LINE_BYTES >> 20)
+                    .at(format!("line {}", self.line_number)));
             }
             let has_newline = self.line.last() == Some(&b'\n');
             if !self.line.trim_ascii().is_empty() {
@@ -106,8 +103,8 @@ impl NdjsonSource {
             &self.line
         };
         let mut json = serde_json::Deserializer::from_slice(line);
-        let seed = FrameSeed { frame, taxels: &mut self.taxels, line: self.line_number };
-        match seed.deserialize(&mut json).and_then(|()| json.end()) {
+        let parse = Parse(FrameVisitor { frame, taxels: &mut self.taxels, line: self.line_number });
+        match parse.deserialize(&mut json).and_then(|()| json.end()) {
             Ok(()) => Ok(true),
             Err(e) if e.is_eof() && !has_newline => {
                 self.losses.push(format!(
@@ -160,22 +157,25 @@ fn explained(error: &serde_json::Error, line: u64) -> Error {
     Error::failed(what).at(format!("line {line}, column {}", error.column()))
 }
 
+/// Passes whatever is there to a visitor.
+struct Parse<V>(V);
+
+impl<'de, V: Visitor<'de>> DeserializeSeed<'de> for Parse<V> {
+    type Value = V::Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<V::Value, D::Error> {
+        deserializer.deserialize_any(self.0)
+    }
+}
+
 /// Parses a line's object into `frame`.
-struct FrameSeed<'a> {
+struct FrameVisitor<'a> {
     frame: &'a mut Frame,
     taxels: &'a mut Taxels,
     line: u64,
 }
 
-impl<'de> DeserializeSeed<'de> for FrameSeed<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_map(self)
-    }
-}
-
-impl<'de> Visitor<'de> for FrameSeed<'_> {
+impl<'de> Visitor<'de> for FrameVisitor<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -184,18 +184,19 @@ impl<'de> Visitor<'de> for FrameSeed<'_> {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         let (mut has_time, mut has_values, mut has_pose) = (false, false, false);
-        while let Some(key) = map.next_key_seed(KeySeed)? {
+        while let Some(key) = map.next_key_seed(Parse(KeyVisitor))? {
             let seen = match key {
                 Key::Time => {
                     self.frame.t_s = map.next_value()?;
                     &mut has_time
                 }
                 Key::Values => {
-                    map.next_value_seed(ValuesSeed { frame: self.frame, taxels: self.taxels, line: self.line })?;
+                    let values = ValuesVisitor { frame: self.frame, taxels: self.taxels, line: self.line };
+                    map.next_value_seed(Parse(values))?;
                     &mut has_values
                 }
                 Key::Pose => {
-                    map.next_value_seed(PosesSeed { poses: &mut self.frame.pose })?;
+                    map.next_value_seed(Parse(PosesVisitor { poses: &mut self.frame.pose }))?;
                     &mut has_pose
                 }
             };
@@ -227,17 +228,9 @@ impl fmt::Display for Key {
     }
 }
 
-struct KeySeed;
+struct KeyVisitor;
 
-impl<'de> DeserializeSeed<'de> for KeySeed {
-    type Value = Key;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Key, D::Error> {
-        deserializer.deserialize_str(self)
-    }
-}
-
-impl Visitor<'_> for KeySeed {
+impl Visitor<'_> for KeyVisitor {
     type Value = Key;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -254,21 +247,13 @@ impl Visitor<'_> for KeySeed {
     }
 }
 
-struct ValuesSeed<'a> {
+struct ValuesVisitor<'a> {
     frame: &'a mut Frame,
     taxels: &'a mut Taxels,
     line: u64,
 }
 
-impl<'de> DeserializeSeed<'de> for ValuesSeed<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_map(self)
-    }
-}
-
-impl<'de> Visitor<'de> for ValuesSeed<'_> {
+impl<'de> Visitor<'de> for ValuesVisitor<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -276,7 +261,7 @@ impl<'de> Visitor<'de> for ValuesSeed<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        while let Some(id) = map.next_key_seed(IdSeed)? {
+        while let Some(id) = map.next_key_seed(Parse(IdVisitor))? {
             let Some(&index) = self.taxels.index.get(&id) else {
                 self.taxels.unknown.check(id).map_err(A::Error::custom)?;
                 // One that is null is missing, as it would be without the key.
@@ -288,23 +273,15 @@ impl<'de> Visitor<'de> for ValuesSeed<'_> {
             if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
                 return Err(A::Error::custom(format!("taxel {id} appears twice; give each taxel once")));
             }
-            self.frame.values[index] = map.next_value_seed(ValueSeed { id })?;
+            self.frame.values[index] = map.next_value_seed(Parse(ValueVisitor { id }))?;
         }
         Ok(())
     }
 }
 
-struct IdSeed;
+struct IdVisitor;
 
-impl<'de> DeserializeSeed<'de> for IdSeed {
-    type Value = u32;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<u32, D::Error> {
-        deserializer.deserialize_str(self)
-    }
-}
-
-impl Visitor<'_> for IdSeed {
+impl Visitor<'_> for IdVisitor {
     type Value = u32;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -316,19 +293,11 @@ impl Visitor<'_> for IdSeed {
     }
 }
 
-struct ValueSeed {
+struct ValueVisitor {
     id: u32,
 }
 
-impl<'de> DeserializeSeed<'de> for ValueSeed {
-    type Value = RawValue;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<RawValue, D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl Visitor<'_> for ValueSeed {
+impl Visitor<'_> for ValueVisitor {
     type Value = RawValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -363,19 +332,11 @@ impl Visitor<'_> for ValueSeed {
     }
 }
 
-struct PosesSeed<'a> {
+struct PosesVisitor<'a> {
     poses: &'a mut Vec<(String, Pose)>,
 }
 
-impl<'de> DeserializeSeed<'de> for PosesSeed<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for PosesSeed<'_> {
+impl<'de> Visitor<'de> for PosesVisitor<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -388,7 +349,7 @@ impl<'de> Visitor<'de> for PosesSeed<'_> {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         while let Some(link) = map.next_key::<String>()? {
-            let pose = map.next_value_seed(PoseSeed { link: &link })?;
+            let pose = map.next_value_seed(Parse(PoseVisitor { link: &link }))?;
             if self.poses.iter().any(|(known, _)| *known == link) {
                 return Err(A::Error::custom(format!("the pose of `{link}` appears twice; give it once")));
             }
@@ -398,19 +359,11 @@ impl<'de> Visitor<'de> for PosesSeed<'_> {
     }
 }
 
-struct PoseSeed<'a> {
+struct PoseVisitor<'a> {
     link: &'a str,
 }
 
-impl<'de> DeserializeSeed<'de> for PoseSeed<'_> {
-    type Value = Pose;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Pose, D::Error> {
-        deserializer.deserialize_seq(self)
-    }
-}
-
-impl<'de> Visitor<'de> for PoseSeed<'_> {
+impl<'de> Visitor<'de> for PoseVisitor<'_> {
     type Value = Pose;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serialport::{SerialPortInfo, SerialPortType};
 
-use crate::error::{Error, Result};
+use crate::error::{Result, failed};
 
 /// A serial port, and whether it can be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,8 +25,8 @@ pub struct PortSummary {
 /// # Errors
 /// The system cannot list them.
 pub fn serial_ports() -> Result<Vec<PortSummary>> {
-    let mut found = serialport::available_ports()
-        .map_err(|e| Error::failed(format!("the system does not say which serial ports it has: {e}")))?;
+    let mut found =
+        serialport::available_ports().map_err(|e| failed!("the system does not say which serial ports it has: {e}"))?;
     found.sort_by(|a, b| a.port_name.cmp(&b.port_name));
     let stable_path = links(Path::new("/dev/serial/by-id"));
     Ok(found.into_iter().map(|port| summary(port, &stable_path)).collect())

@@ -25,7 +25,6 @@ impl UnknownTaxels {
         if self.refused { Err(what()) } else { Ok(()) }
     }
 
-    /// Counts a skipped value.
     pub(super) fn leave_out(&mut self, id: u32) {
         self.values += 1;
         if self.ids.len() < MAX_IDS && self.ids.insert(id) {

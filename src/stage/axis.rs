@@ -34,7 +34,6 @@ pub(crate) struct Axis {
     pub(crate) anisotropy: Option<f64>,
 }
 
-/// Their bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AxisBound {
     pub(crate) line: LineBound,
@@ -42,7 +41,6 @@ pub(crate) struct AxisBound {
 }
 
 impl Axis {
-    /// The outputs.
     pub(crate) fn outputs(&self) -> [Given; 2] {
         [self.line.given(Outputs::AXIS), (Outputs::ANISOTROPY, self.anisotropy.map(scalar))]
     }
@@ -132,18 +130,10 @@ pub(crate) fn bound(pressed: &[Pressed], sums: Sums, centroid: DVec2, centroid_b
 mod tests {
     use super::*;
     use crate::stage::angle::between_lines;
-    use glam::DVec3;
+    use crate::stage::pressed_at;
 
     fn axis(taxels: &[(f64, f64, f64)]) -> Axis {
-        let pressed: Vec<Pressed> = taxels
-            .iter()
-            .map(|&(u, v, pressure)| Pressed {
-                weight: 1.0,
-                pressure,
-                place: DVec3::new(u, v, 0.0),
-                ..Pressed::default()
-            })
-            .collect();
+        let pressed = pressed_at(taxels);
         reference(&pressed, crate::stage::centroid::reference(&pressed).truncate())
     }
 
@@ -157,13 +147,5 @@ mod tests {
             assert!(between_lines(got.line.angle.unwrap(), right) < 1e-12, "{tenths}");
             assert!((got.anisotropy.unwrap() - (1.0 - 0.04) / 1.04).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn a_square_has_no_axis() {
-        let square = axis(&[(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (1.0, -1.0, 1.0)]);
-        assert_eq!(square.line, Line { angle: None, flags: Flags::ISOTROPIC });
-        assert!(square.anisotropy.unwrap() < 1e-15);
-        assert_eq!(axis(&[(0.3, 0.4, 1.0), (0.3, 0.4, 7.0)]).line.flags, Flags::COINCIDENT);
     }
 }

@@ -41,17 +41,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contact_ends_lower_than_it_begins() {
-        let thresholds = Thresholds { on: 10.0, off: 4.0 };
-        let mut contact = false;
-        let seen = [0.0, 9.0, 10.0, 11.0, 7.0, 5.0, 4.0, 5.0, 0.0].map(|total| {
-            contact = reference(total, thresholds, contact);
-            contact
-        });
-        assert_eq!(seen, [false, false, false, true, true, true, false, false, false]);
-    }
-
-    #[test]
     fn only_the_threshold_that_counts_is_in_doubt() {
         let thresholds = Thresholds { on: 10.0, off: 4.0 };
         let doubts = |total, before| in_doubt(total, 0.2, thresholds, before);

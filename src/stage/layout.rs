@@ -18,7 +18,6 @@ pub(crate) const FEW: usize = 4096;
 /// sixteen frames or fields abreast.
 pub(crate) const MANY: usize = 128;
 
-/// What changes from batch to batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Batch {
@@ -30,7 +29,6 @@ pub(crate) struct Batch {
     pub(crate) calibrated: u32,
     /// Slots after those, which are changes.
     pub(crate) changes: u32,
-    /// Fields.
     pub(crate) fields: u32,
     /// Quads of a block, how many of a field a group of invocations takes: two to this power.
     pub(crate) lanes_log2: u32,

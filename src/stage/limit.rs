@@ -27,12 +27,15 @@ impl Limit {
             (false, true, Some(bound)) => Self::Within(bound),
         }
     }
+}
 
-    /// The same for a value that is multiplied.
-    pub(crate) fn times(self, factor: f64) -> Self {
+impl<T> Limit<T> {
+    /// The same with another bound.
+    pub(crate) fn map<V>(self, bound: impl FnOnce(T) -> V) -> Limit<V> {
         match self {
-            Self::Within(bound) => Self::Within(bound * factor),
-            _ => self,
+            Self::Within(within) => Limit::Within(bound(within)),
+            Self::TooClose => Limit::TooClose,
+            Self::Unread => Limit::Unread,
         }
     }
 }

@@ -110,3 +110,10 @@ impl Pressed {
         self.weight * self.excess + self.weight_rounding * (self.pressure + self.excess)
     }
 }
+
+/// Taxels of weight 1 at (u, v), each with its pressure.
+#[cfg(test)]
+pub(crate) fn pressed_at(taxels: &[(f64, f64, f64)]) -> Vec<Pressed> {
+    let places = taxels.iter().map(|&(u, v, pressure)| (DVec3::new(u, v, 0.0), pressure));
+    places.map(|(place, pressure)| Pressed { weight: 1.0, pressure, place, ..Pressed::default() }).collect()
+}

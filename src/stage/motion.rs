@@ -154,24 +154,9 @@ fn rate_bound(length: f64, bound: f64, dt_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::{FRAC_PI_2, PI};
 
     fn at(u: f64, v: f64) -> Centroid {
         Centroid { place: DVec2::new(u, v), pressed: 1 }
-    }
-
-    #[test]
-    fn eq_3_to_7_as_they_stand() {
-        let still = Still::new(Sums::OnePass, 1, 1.0);
-        let moved = reference(at(3.0, 4.0), at(3.0, -4.0), &still);
-        assert_eq!(moved.displacement, DVec2::new(0.0, 8.0));
-        assert_eq!((moved.direction, moved.distance), (Some(FRAC_PI_2), 8.0));
-        // Around the origin: the paper's distance sees nothing.
-        assert_eq!(moved.radial_distance, 0.0);
-        let inward = reference(at(1.0, 0.0), at(3.0, 0.0), &still);
-        assert_eq!((inward.direction, inward.distance, inward.radial_distance), (Some(PI), 2.0, -2.0));
-        let back = reference(at(1.0, -0.0), at(3.0, 0.0), &still);
-        assert_eq!(back.direction, Some(PI));
     }
 
     #[test]

@@ -43,12 +43,10 @@ pub(crate) struct LineBound {
 }
 
 impl Line {
-    /// The angle as output `output`.
     pub(crate) fn given(&self, output: Outputs) -> Given {
         (output, self.angle.map(scalar))
     }
 
-    /// The outputs.
     pub(crate) fn outputs(&self) -> [Given; 1] {
         [self.given(Outputs::ORIENTATION)]
     }
@@ -134,23 +132,10 @@ pub(crate) fn bound(pressed: &[Pressed], centroid: DVec2, centroid_bound: DVec2)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::centroid;
-    use glam::DVec3;
-
-    fn pressed(taxels: &[(f64, f64, f64)]) -> Vec<Pressed> {
-        taxels
-            .iter()
-            .map(|&(u, v, pressure)| Pressed {
-                weight: 1.0,
-                pressure,
-                place: DVec3::new(u, v, 0.0),
-                ..Pressed::default()
-            })
-            .collect()
-    }
+    use crate::stage::{centroid, pressed_at};
 
     fn line(taxels: &[(f64, f64, f64)]) -> Line {
-        let pressed = pressed(taxels);
+        let pressed = pressed_at(taxels);
         reference(&pressed, centroid::reference(&pressed).truncate())
     }
 
@@ -165,22 +150,17 @@ mod tests {
     }
 
     #[test]
-    fn doubt_and_absence_have_their_flags() {
-        assert_eq!(line(&[(1.0, 0.0, 3.0)]), Line { angle: None, flags: Flags::ONE_TAXEL });
-        assert_eq!(line(&[(1.0, 0.0, 3.0), (1.0, 0.0, 9.0)]), Line { angle: None, flags: Flags::COINCIDENT });
-        let square = line(&[(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (1.0, -1.0, 1.0)]);
-        assert_eq!(square, Line { angle: Some(0.0), flags: Flags::TIE });
-        // Two equal points on one side of the centroid: the line through them, though it misses the centroid.
+    fn two_points_on_one_side_have_a_line_that_misses_the_centroid() {
         let one_side = line(&[(2.0, 1.0, 3.0), (2.0, -1.0, 3.0), (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)]);
         assert!((one_side.angle.unwrap() - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
     }
 
     #[test]
     fn a_choice_with_no_margin_is_not_compared() {
-        let tie = pressed(&[(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]);
+        let tie = pressed_at(&[(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]);
         let loose = DVec2::splat(1e-7);
         assert_eq!(bound(&tie, DVec2::ZERO, loose).angle, None);
-        let clear = pressed(&[(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (0.0, 0.3, 1.0), (0.0, -0.3, 1.0)]);
+        let clear = pressed_at(&[(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (0.0, 0.3, 1.0), (0.0, -0.3, 1.0)]);
         let clear = bound(&clear, DVec2::ZERO, loose);
         assert!(clear.angle.unwrap() < 2e-6 && clear.in_doubt.is_empty());
     }

@@ -11,17 +11,11 @@ const LOST: Colour = [200, 40, 40];
 
 impl Findings {
     /// The figure as SVG, text being text.
-    ///
-    /// # Errors
-    /// It cannot be drawn.
     pub fn svg(&self) -> Result<String> {
         self.figure().svg()
     }
 
     /// The figure as PNG.
-    ///
-    /// # Errors
-    /// It cannot be drawn.
     pub fn png(&self) -> Result<Vec<u8>> {
         self.figure().png()
     }

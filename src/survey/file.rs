@@ -65,7 +65,6 @@ fn number(value: f64) -> String {
     value.to_string()
 }
 
-/// A TOML string.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

@@ -44,7 +44,6 @@ pub struct Survey {
     whole_numbers: bool,
 }
 
-/// What was seen of a sensor while it was pressed.
 #[derive(Clone, Copy, Debug)]
 struct Pressed {
     last: [f32; 2],
@@ -84,7 +83,6 @@ pub struct Wishes {
 /// One sensor, as it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// The taxel's id.
     pub id: u32,
     /// Its raw value at rest; `None` where it delivered nothing.
     pub baseline: Option<f64>,
@@ -114,7 +112,6 @@ pub struct Findings {
 }
 
 impl Survey {
-    /// A survey of the sensors `ids`.
     #[must_use]
     pub fn new(ids: &[u32]) -> Self {
         Self {
@@ -295,7 +292,6 @@ fn movement_of(kept: &[f32], baseline: f64) -> f64 {
     noise_of(kept.windows(3).map(|three| middle(three[0], three[1], three[2]).into()), baseline)
 }
 
-/// The middle one of three values.
 fn middle(a: f32, b: f32, c: f32) -> f32 {
     a.max(b).min(a.min(b).max(c))
 }

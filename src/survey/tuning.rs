@@ -22,7 +22,6 @@ const MIN_GAIN: f64 = 0.06;
 const POOR_SHARE: f64 = 0.5;
 /// Minimum travel of a press, as a share of the expected travel.
 const MIN_EXPECTED_SHARE: f64 = 0.25;
-/// Maximum number of rounds.
 pub const MAX_ROUNDS: usize = 5;
 
 /// What a sensor read at one tap.
@@ -149,7 +148,6 @@ impl Tuned {
 /// A sensor while it is tuned.
 #[derive(Clone, Debug)]
 pub struct Sensor {
-    /// The taxel's id.
     pub id: u32,
     /// The highest reading of its converter.
     pub most: f64,
@@ -290,7 +288,6 @@ impl Tuning {
         Ok(taps)
     }
 
-    /// The rounds that have ended.
     #[must_use]
     pub fn rounds(&self) -> usize {
         self.rounds
@@ -302,7 +299,6 @@ impl Tuning {
         self.falls
     }
 
-    /// The sensors, in order.
     #[must_use]
     pub fn sensors(&self) -> &[Sensor] {
         &self.sensors

@@ -70,7 +70,6 @@ impl ChartGeometry {
         Ok(Self { plan, kept })
     }
 
-    /// The field of the first letter.
     fn field(&self, field: usize) -> &PlanField {
         &self.plan.fields[field]
     }
@@ -111,7 +110,6 @@ impl ChartGeometry {
     }
 }
 
-/// The errors of one combination.
 #[derive(Default)]
 pub(super) struct ErrorSamples {
     /// mm, and degrees.

@@ -63,7 +63,6 @@ struct Trial {
 struct Calls {
     calls: Vec<Vec<Frame>>,
     times_s: Vec<Vec<f64>>,
-    /// Time of a pass, s.
     period_s: f64,
 }
 
@@ -109,12 +108,8 @@ pub fn measure(
         source: played.source.clone(),
         frames: played.frames.len(),
         asked_by: asked_by(&options.scene).word().to_owned(),
-        touched: 0,
-        ties: 0,
-        truth: false,
         kept_charts: geometries.values().flat_map(|geometry| geometry.kept.clone()).collect(),
-        left_out: Vec::new(),
-        rows: Vec::new(),
+        ..Report::default()
     };
     let authored = &geometries[Charts::AsAuthored.word()];
     let another = |charts: Charts| charts == options.scene.knobs.charts || !geometries[charts.word()].is_like(authored);
@@ -330,18 +325,11 @@ impl Trial {
     }
 
     fn row(mut self, truth: bool) -> Measurement {
-        let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
-            self.combination.words().map(str::to_owned);
         self.times_us.sort_by(f64::total_cmp);
         let errors = &mut self.errors;
         Measurement {
             way: self.way,
-            backend,
-            arithmetic,
-            charts,
-            orientation_by,
-            coverage,
-            cadence,
+            words: self.combination.words(),
             p50_us: rank(&self.times_us, 0.5),
             p99_us: rank(&self.times_us, 0.99),
             centroid_mm: Errors::of(&mut errors.centroid),
@@ -398,10 +386,10 @@ mod tests {
         assert_eq!(report.rows.len(), expected);
         for row in &report.rows {
             assert!(row.p50_us > 0.0 && row.p99_us >= row.p50_us, "{row:?}");
-            let authored = row.charts == "as-authored";
+            let authored = row.words.charts == "as-authored";
             assert!(!authored || row.centroid_mm.worst < 1e-4, "{row:?}");
             // Negative control: double precision in the layout's charts is the reference, and single precision is not.
-            assert_eq!(authored && row.arithmetic == "double", row.centroid_mm.worst == 0.0, "{row:?}");
+            assert_eq!(authored && row.words.arithmetic == "double", row.centroid_mm.worst == 0.0, "{row:?}");
             assert!(row.centroid_mm.compared > 0);
         }
         assert!(report.rows.iter().any(|row| row.front) && report.rows.iter().any(|row| !row.front));

@@ -62,15 +62,15 @@ pub struct Combination {
 
 impl fmt::Display for Combination {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [backend, arithmetic, charts, orientation, coverage, cadence] = self.words();
-        write!(f, "{backend}, {arithmetic}, {charts}, {orientation}, {coverage}, {cadence}")
+        let Words { backend, arithmetic, charts, orientation_by, coverage, cadence } = self.words();
+        write!(f, "{backend}, {arithmetic}, {charts}, {orientation_by}, {coverage}, {cadence}")
     }
 }
 
 impl Combination {
-    /// Backend, arithmetic, charts, method of orientation, coverage and cadence.
+    /// Its backend and knobs in words.
     #[must_use]
-    pub fn words(&self) -> [&'static str; 6] {
+    pub fn words(&self) -> Words {
         let Knobs { arithmetic, charts, orientation_by, coverage, cadence } = self.knobs;
         let backend = match self.backend {
             BackendKind::Gpu => "gpu",
@@ -78,8 +78,14 @@ impl Combination {
             BackendKind::Cpu | BackendKind::Auto => "cpu",
         };
         let usual = if self.backend == BackendKind::Reference { Arithmetic::Double } else { Arithmetic::OnePass };
-        let arithmetic = arithmetic.unwrap_or(usual).word();
-        [backend, arithmetic, charts.word(), orientation_by.word(), coverage.word(), cadence.word()]
+        Words {
+            backend: backend.to_owned(),
+            arithmetic: arithmetic.unwrap_or(usual).word().to_owned(),
+            charts: charts.word().to_owned(),
+            orientation_by: orientation_by.word().to_owned(),
+            coverage: coverage.word().to_owned(),
+            cadence: cadence.word().to_owned(),
+        }
     }
 
     /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed.
@@ -141,12 +147,10 @@ impl Combination {
     }
 }
 
-/// Time and errors of a combination.
+/// A [`Combination`] in words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Measurement {
-    /// How frames were passed.
-    pub way: CallMode,
-    /// The backend, as in [`Combination::words`].
+pub struct Words {
+    /// `cpu`, `gpu` or `reference`.
     pub backend: String,
     /// See [`Arithmetic`].
     pub arithmetic: String,
@@ -158,6 +162,16 @@ pub struct Measurement {
     pub coverage: String,
     /// See [`Cadence`].
     pub cadence: String,
+}
+
+/// Time and errors of a combination.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measurement {
+    /// How frames were passed.
+    pub way: CallMode,
+    /// The combination.
+    #[serde(flatten)]
+    pub words: Words,
     /// Median time of a frame, µs.
     pub p50_us: f64,
     /// The 99th percentile, µs.
@@ -180,16 +194,15 @@ impl Measurement {
     /// # Errors
     /// Its words are of another version.
     pub fn combination(&self) -> crate::Result<Combination> {
-        Ok(Combination {
-            backend: self.backend.parse()?,
-            knobs: Knobs {
-                arithmetic: (self.backend != "reference").then(|| self.arithmetic.parse()).transpose()?,
-                charts: self.charts.parse()?,
-                orientation_by: self.orientation_by.parse()?,
-                coverage: self.coverage.parse()?,
-                cadence: self.cadence.parse()?,
-            },
-        })
+        let Words { backend, arithmetic, charts, orientation_by, coverage, cadence } = &self.words;
+        let knobs = Knobs {
+            arithmetic: (backend != "reference").then(|| arithmetic.parse()).transpose()?,
+            charts: charts.parse()?,
+            orientation_by: orientation_by.parse()?,
+            coverage: coverage.parse()?,
+            cadence: cadence.parse()?,
+        };
+        Ok(Combination { backend: backend.parse()?, knobs })
     }
 
     /// Its errors against the truth, or else the reference: centroid, mm, and orientation, degrees.
@@ -203,7 +216,7 @@ impl Measurement {
 }
 
 /// What was measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the body.
     pub body: String,
@@ -235,7 +248,7 @@ impl Report {
             let no_worse = b[0].p99 <= a[0].p99 && b[1].p99 <= a[1].p99 && by.p50_us <= row.p50_us;
             let better = b[0].p99 < a[0].p99 || b[1].p99 < a[1].p99 || by.p50_us < row.p50_us;
             // Without a truth, orientations of different methods cannot be compared.
-            let alike = self.truth || row.orientation_by == by.orientation_by;
+            let alike = self.truth || row.words.orientation_by == by.words.orientation_by;
             row.way == by.way && alike && no_worse && better
         };
         let fronts: Vec<bool> = self.rows.iter().map(|row| !self.rows.iter().any(|other| beaten(row, other))).collect();
@@ -259,15 +272,9 @@ mod tests {
         let errors = |p99: f64| Errors { compared: 10, rms: p99 / 2.0, p99, worst: p99 * 2.0 };
         let knobs = Knobs { arithmetic: (backend != "reference").then_some(Arithmetic::OnePass), ..Knobs::default() };
         let combination = Combination { backend: backend.parse().unwrap(), knobs };
-        let [backend, arithmetic, charts, orientation_by, coverage, cadence] = combination.words().map(str::to_owned);
         Measurement {
             way: CallMode::Live,
-            backend,
-            arithmetic,
-            charts,
-            orientation_by,
-            coverage,
-            cadence,
+            words: combination.words(),
             p50_us,
             p99_us: 2.0 * p50_us,
             centroid_mm: errors(centroid),
@@ -285,11 +292,8 @@ mod tests {
             frames: 10,
             asked_by: "as-asked".into(),
             touched: 10,
-            ties: 0,
-            truth: false,
-            kept_charts: Vec::new(),
-            left_out: Vec::new(),
             rows,
+            ..Report::default()
         };
         report.find_front();
         report
@@ -336,17 +340,7 @@ mod tests {
     fn a_row_says_its_combination_again() {
         for way in CallMode::ALL {
             for combination in Combination::all(&Scene::default(), way, &[BackendKind::Cpu, BackendKind::Gpu]) {
-                let [backend, arithmetic, charts, orientation_by, coverage, cadence] =
-                    combination.words().map(str::to_owned);
-                let row = Measurement {
-                    backend,
-                    arithmetic,
-                    charts,
-                    orientation_by,
-                    coverage,
-                    cadence,
-                    ..row("cpu", 1.0, 0.0, 0.0)
-                };
+                let row = Measurement { words: combination.words(), ..row("cpu", 1.0, 0.0, 0.0) };
                 assert_eq!(row.combination().unwrap().words(), combination.words());
             }
         }

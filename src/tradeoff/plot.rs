@@ -44,7 +44,6 @@ pub fn plot_png(report: &Report) -> Result<Vec<u8>> {
     ink::png(&pixels, [width, height])
 }
 
-/// A panel for a way and a quantity.
 struct Panel<'a> {
     way: CallMode,
     what: &'static str,
@@ -112,7 +111,7 @@ fn draw_legend<B: DrawingBackend>(report: &Report, area: &DrawingArea<B, Shift>)
 }
 
 fn colour(row: &Measurement) -> (&'static str, RGBColor) {
-    let index = match (row.backend.as_str(), row.arithmetic.as_str()) {
+    let index = match (row.words.backend.as_str(), row.words.arithmetic.as_str()) {
         ("reference", _) => 2,
         ("gpu", "compensated") => 4,
         ("gpu", _) => 3,

@@ -21,10 +21,8 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// What a measurement depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Key {
-    /// Version of the file.
     version: u32,
     program: String,
     machine: String,

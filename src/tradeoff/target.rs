@@ -142,7 +142,7 @@ impl Target {
     #[must_use]
     pub fn pick<'a>(&self, report: &'a Report, way: CallMode) -> Option<Pick<'a>> {
         let mut rows = report.of(way);
-        rows.retain(|row| report.truth || row.orientation_by == report.asked_by);
+        rows.retain(|row| report.truth || row.words.orientation_by == report.asked_by);
         let granted = |row: &&&Measurement| self.misses(row).iter().all(|times| *times <= 1.0);
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
         let true_to = |row: &Measurement| {

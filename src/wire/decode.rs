@@ -138,9 +138,12 @@ impl<'a> Values<'a> {
 
     /// Channels, in order, with their values.
     pub fn iter(&self) -> impl Iterator<Item = (u16, u16)> + use<'a> {
-        let (count, bits, packed) = (self.len(), usize::from(self.bits.count()), self.packed);
-        let mut channels = ChannelsOf { channels: self.channels, next: 0 };
-        (0..count).map(move |index| (channels.step(), value(packed, index * bits, bits)))
+        let (width, channels, packed) = (usize::from(self.bits.count()), self.channels, self.packed);
+        let is_set =
+            |set: &[u8], channel: u16| set.get(usize::from(channel / 8)).is_some_and(|b| b >> (channel % 8) & 1 == 1);
+        let has_value = move |&channel: &u16| channels.is_none_or(|set| is_set(set, channel));
+        let sent = (0..self.len()).zip((0..=u16::MAX).filter(has_value));
+        sent.map(move |(index, channel)| (channel, value(packed, index * width, width)))
     }
 }
 
@@ -150,24 +153,6 @@ fn value(packed: &[u8], start: usize, bits: usize) -> u16 {
     let bytes = [0, 1, 2].map(|more| packed.get(first + more).copied().unwrap_or(0));
     let three = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], 0]);
     ((three >> (start % 8)) & ((1 << bits) - 1)) as u16
-}
-
-struct ChannelsOf<'a> {
-    channels: Option<&'a [u8]>,
-    next: u16,
-}
-
-impl ChannelsOf<'_> {
-    fn step(&mut self) -> u16 {
-        if let Some(set) = self.channels {
-            let at = |channel: u16| set.get(usize::from(channel / 8)).map(|byte| byte >> (channel % 8) & 1);
-            while at(self.next) == Some(0) {
-                self.next += 1;
-            }
-        }
-        self.next += 1;
-        self.next - 1
-    }
 }
 
 /// What has come so far.
@@ -198,8 +183,6 @@ impl Default for Decoder {
         Self::new()
     }
 }
-
-static CHECKSUM_TABLE: crc::Crc<u32> = CHECKSUM;
 
 impl Decoder {
     /// A decoder that may start in the middle of a packet.
@@ -290,14 +273,13 @@ impl Decoder {
     }
 }
 
-/// The packet in `coded`, without its order.
 fn parse(coded: &mut [u8]) -> Result<Event<'_>, Corruption> {
     let length = cobs::decode_in_place(coded).map_err(|_| Corruption::Code)?;
     if length < COMMAND_HEAD_BYTES + CHECKSUM_BYTES {
         return Err(Corruption::Short);
     }
     let (packet, checksum) = coded[..length].split_at(length - CHECKSUM_BYTES);
-    if CHECKSUM_TABLE.checksum(packet).to_le_bytes() != checksum {
+    if CHECKSUM.checksum(packet).to_le_bytes() != checksum {
         return Err(Corruption::Checksum);
     }
     if packet[0] != VERSION {

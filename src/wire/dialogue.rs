@@ -82,11 +82,6 @@ impl Dialogue {
         Self { board, retry, waiting: VecDeque::new(), pending: None, request: first, tickets: 0, bytes }
     }
 
-    /// Sets the board that is addressed.
-    pub fn set_board(&mut self, board: u16) {
-        self.board = board;
-    }
-
     /// Queues `command`. Returns its ticket, or `None` if the queue is full.
     pub fn ask(&mut self, command: Command) -> Option<u64> {
         if self.waiting.len() >= Self::MAX_WAITING {

@@ -85,9 +85,6 @@ pub fn command(to: &mut [u8], board: u16, request: u8, command: Command) -> Opti
     })
 }
 
-/// The checksum's table, once in memory.
-static CHECKSUM_TABLE: crc::Crc<u32> = CHECKSUM;
-
 /// A packet being written, COBS-encoded and checksummed on the fly.
 struct Packet<'a> {
     cobs: CobsEncoder<'a>,
@@ -99,7 +96,7 @@ struct Packet<'a> {
 fn packet(to: &mut [u8], fill: impl FnOnce(&mut Packet<'_>) -> Option<()>) -> Option<usize> {
     let (first, to) = to.split_first_mut()?;
     *first = 0;
-    let mut packet = Packet { cobs: CobsEncoder::new(&mut *to), digest: CHECKSUM_TABLE.digest() };
+    let mut packet = Packet { cobs: CobsEncoder::new(&mut *to), digest: CHECKSUM.digest() };
     fill(&mut packet)?;
     let Packet { mut cobs, digest } = packet;
     cobs.push(&digest.finalize().to_le_bytes()).ok()?;

@@ -24,7 +24,7 @@ pub const ANY_BOARD: u16 = 0xFFFF;
 pub const NO_LAYOUT: u32 = 0;
 
 /// CRC-32 as Ethernet, zlib and PNG have it: polynomial 0x04C11DB7, bits reflected, starting from and ended with all ones.
-pub(super) const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+pub(super) static CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// The kinds of packets, a packet's second byte.
 pub(super) mod kind {

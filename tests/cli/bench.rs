@@ -194,8 +194,13 @@ fn what_cannot_be_measured_is_one_line() {
     }
     refused(&["--outputs", "centriod"], "did you mean `centroid`?");
     refused(&["--backend", "gpo"], "gpu");
-    let error = fails(2, &["bench", "--sensors", "5", "--members", "6"]);
-    assert!(error.contains("--members 6") && error.lines().count() == 1, "{error}");
+    for (more, word) in [
+        (["--sensors", "5", "--members", "6"], "--members 6"),
+        (["--sensors", "33554432", "--members", "6"], "16777217"),
+    ] {
+        let error = fails(2, &[&["bench"], &more[..]].concat());
+        assert!(error.contains(word) && error.lines().count() == 1, "{error}");
+    }
     let file = tempfile::NamedTempFile::new().unwrap();
     let error = fails(1, &with(&["--backend", "cpu", "--dump", text_of(file.path())]));
     assert!(error.contains(text_of(file.path())) && error.lines().count() == 1, "{error}");

@@ -43,7 +43,7 @@ fn what_a_scene_gets_wrong_is_one_line_with_line_and_column() {
     for (text, place, what) in [
         ("\n  sorce = \"-\"", "line 2, column 3", "did you mean `source`"),
         ("outputs = [\"total\", \"centriod\"]", "line 1, column 11", "did you mean `centroid`"),
-        ("backend = \"cuda\"", "line 1, column 11", "choose auto, reference, cpu or gpu"),
+        ("backend = \"cuda\"", "line 1, column 11", "it is one of auto, cpu, gpu, reference"),
         ("batch = 0", "line 1, column 9", "between 1 and 65536"),
         ("source = \"seril:a\"", "line 1, column 10", "did you mean `serial:`"),
         ("sink = 3", "line 1, column 8", "a text, or a list of texts"),

@@ -75,6 +75,11 @@ fn slow_motion_counts_in_the_end_with_all_its_way_and_time() {
         // What was not asked for is not there.
         assert!(run.iter().all(|p| p.centroid.is_none() && p.position.is_none() && p.direction.is_none()));
     }
+    // Jitter never counts, however long it lasts.
+    let jitter: Vec<Frame> = (0..50).map(|i| at(0.1 * f64::from(i), 0.04 * f64::from(i % 3), 0.0)).collect();
+    for run in on_every_backend(filter(0.1, 0.5, 0.0), &jitter) {
+        assert!(run[1..].iter().all(|p| p.flags == Flags::HELD && p.filtered_direction.is_none()));
+    }
 }
 
 #[test]
@@ -96,6 +101,10 @@ fn the_papers_measure_sees_nothing_around_the_origin() {
     let radial = filter(0.1, 1.5, 0.0).by(FilterBy::Radial);
     for run in on_every_backend(radial, &frames) {
         assert!(run[1..].iter().all(|p| p.flags == Flags::HELD && p.filtered_direction.is_none()));
+    }
+    // Towards the origin counts as much as away from it; to the other side, as far out, does not.
+    for run in on_every_backend(radial, &[at(0.0, 0.8, 0.0), at(0.1, 0.4, 0.0), at(0.2, -0.4, 0.0)]) {
+        assert!(near(run[1].filtered_direction, PI) && run[2].flags == Flags::HELD, "{run:?}");
     }
 }
 

@@ -16,6 +16,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("keys", vec!["error"]),
         ("length", vec![]),
         ("setters", vec![]),
+        ("words", vec!["error"]),
         ("parallel", vec![]),
         ("signal", vec!["error", "keys"]),
         ("body", vec!["error", "output"]),
@@ -172,6 +173,7 @@ fn each_heavy_dependency_has_one_door() {
         ("mcap", "recording"),
         ("crc32fast", "recording"),
         ("lz4_flex", "recording"),
+        ("prost", "recording"),
         ("ruzstd", "recording"),
         ("serialport", "source"),
     ];

@@ -119,7 +119,7 @@ fn a_clock_that_jumps_gives_no_motion() {
 
 #[test]
 fn contact_with_thresholds_begins_high_and_ends_low() {
-    let totals = [5.0, 9.0, 12.0, 9.0, 5.0, 4.0, 9.0, 11.0];
+    let totals = [5.0, 10.0, 12.0, 9.0, 5.0, 4.0, 9.0, 11.0];
     let frames: Vec<Frame> = (0..8).map(|i| press(i as f64 * 0.1, &[(i, totals[i])])).collect();
     for run in on_every_backend("[contact]\non = 10\noff = 4", &frames) {
         let contact: Vec<bool> = run.iter().map(|p| p.contact).collect();

@@ -5,17 +5,14 @@ use crate::field::NoChart;
 /// A chart with more distortion is split, if requested, or reported.
 pub(super) const POOR_DISTORTION: f64 = 0.25;
 
-/// How to split a field.
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
 
-/// Problems with charts.
 #[derive(Default)]
 pub(super) struct ChartNotes {
     /// Fields that were split, into how many parts and why.
     pub(super) split: Vec<(String, usize, String)>,
     /// Fields without a chart, why, and whether others are below them.
     pub(super) bare: Vec<(String, NoChart, bool)>,
-    /// Fields with distorted charts, and their distortion.
     pub(super) poor: Vec<(String, f64)>,
 }
 

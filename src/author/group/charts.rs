@@ -21,7 +21,6 @@ const MIN_SECTOR_TAXELS: usize = 3;
 /// Numbers of sectors around a limb to try before it is cut across.
 const SECTOR_COUNTS: std::ops::RangeInclusive<usize> = 2..=4;
 
-/// Maximum number of parts of a split.
 const MAX_PARTS: usize = 64;
 
 /// Rounds of Lloyd's iteration for the patches of a split.
@@ -30,7 +29,6 @@ const SPLIT_ROUNDS: usize = 4;
 /// Maximum number of parts of a split that is only proposed in an error.
 const MAX_PROPOSED_PARTS: usize = 12;
 
-/// A field with its chart.
 type Fitted = std::result::Result<FieldSpec, NoChart>;
 
 impl Grouper<'_> {

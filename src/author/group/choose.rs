@@ -87,7 +87,6 @@ impl Grouper<'_> {
         Ok(())
     }
 
-    /// The place of `taxel` on the surface.
     fn taxel_place(&mut self, taxel: usize) -> Option<TaxelPlace> {
         let (body, unroller) = (self.body, &mut self.unroller);
         *self.taxel_places.entry(taxel).or_insert_with(|| {

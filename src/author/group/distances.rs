@@ -10,16 +10,13 @@ use std::rc::Rc;
 use glam::{DVec2, DVec3};
 
 use crate::field::LinkSurface;
-use crate::field::geodesic::{LogMap, SurfacePlace};
+use crate::field::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
 
 /// Taxels without a surface are neighbours up to this many median distances to the nearest.
 const NEIGHBOUR_DISTANCE: f64 = 2.0;
 
 /// Maximum number of taxels on the same triangle that a taxel is connected to in a net.
 const MAX_JOINED_ON_TRIANGLE: usize = 8;
-
-/// First distance limit over the straight distance to the farthest taxel: half a circle, and a margin.
-const FIRST_LIMIT: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
 
 /// How often the limit is doubled before it is dropped.
 const MAX_DOUBLINGS: u32 = 4;
@@ -53,12 +50,10 @@ impl LinkDistances {
         Self { taxels, points, surface, places, too_long_m: None, net: None }
     }
 
-    /// Number of taxels.
     pub(super) fn len(&self) -> usize {
         self.taxels.len()
     }
 
-    /// Whether distances are those of a net.
     pub(super) fn is_approximate(&self) -> bool {
         self.net.is_some()
     }

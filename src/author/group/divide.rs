@@ -11,13 +11,11 @@ use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
 use crate::error::{Result, failed};
 use crate::field::unions;
 
-/// Maximum rounds of Lloyd's iteration.
 const MAX_ROUNDS: usize = 12;
 
 /// Children: name and indices of taxels in the body.
 type Children = Vec<(String, Vec<usize>)>;
 
-/// The middle of a disc.
 enum Seed {
     Taxel(usize),
     /// In the world at rest, m.
@@ -73,7 +71,6 @@ impl Grouper<'_> {
         Ok(Vec::new())
     }
 
-    /// The rule's name in notes.
     fn rule_name(&self, rule: &FieldRule) -> String {
         rule.name.as_ref().map_or("a rule without name".to_owned(), |name| format!("rule `{name}`"))
     }
@@ -209,7 +206,6 @@ impl Grouper<'_> {
         }
     }
 
-    /// The seeds of a rule.
     fn seeds(&self, seeds: &Seeds, chosen: &[usize]) -> Result<Vec<Seed>> {
         let body = self.body;
         match seeds {

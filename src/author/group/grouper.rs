@@ -52,7 +52,6 @@ pub(super) struct FieldDraft {
     pub(super) u: Option<[f64; 3]>,
     /// Whether it exists only as a level of a longer name.
     pub(super) is_level: bool,
-    /// Index of the rule that made it.
     pub(super) rule: usize,
 }
 
@@ -69,7 +68,6 @@ pub struct Grouper<'a> {
     pub(super) notes: Vec<String>,
     /// Fields with distorted charts, and their distortion.
     pub(super) poor: Vec<(String, f64)>,
-    /// Rules applied so far.
     applied: usize,
 }
 

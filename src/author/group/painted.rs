@@ -2,39 +2,31 @@
 
 use crate::body::{Body, Details, Paint};
 
-/// Materials and painted attributes of a body's surfaces. Surfaces and triangles are numbered as in [`Body::surfaces`].
+/// Materials and painted attributes of a body's surfaces, none by default. Surfaces and triangles are numbered as in
+/// [`Body::surfaces`].
 pub trait Painted {
     /// The names of all materials.
-    fn materials(&self) -> Vec<String>;
-
-    /// The material of `triangle`.
-    fn material(&self, surface: usize, triangle: usize) -> Option<&str>;
-
-    /// The names of all painted attributes with one number per vertex, as in a recipe.
-    fn attributes(&self) -> Vec<String>;
-
-    /// Attribute `name` at `barycentric` of `triangle`; `None` if the surface does not have it.
-    fn attribute(&self, name: &str, surface: usize, triangle: usize, barycentric: [f64; 3]) -> Option<f64>;
-}
-
-/// A body without materials and attributes.
-impl Painted for () {
     fn materials(&self) -> Vec<String> {
         Vec::new()
     }
 
-    fn material(&self, _: usize, _: usize) -> Option<&str> {
+    /// The material of a triangle.
+    fn material(&self, _surface: usize, _triangle: usize) -> Option<&str> {
         None
     }
 
+    /// The names of all painted attributes with one number per vertex, as in a recipe.
     fn attributes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    fn attribute(&self, _: &str, _: usize, _: usize, _: [f64; 3]) -> Option<f64> {
+    /// An attribute at a place of a triangle; `None` if the surface does not have it.
+    fn attribute(&self, _name: &str, _surface: usize, _triangle: usize, _barycentric: [f64; 3]) -> Option<f64> {
         None
     }
 }
+
+impl Painted for () {}
 
 /// Materials and painted attributes from the body's file.
 pub(in crate::author) struct FilePaint<'a> {

@@ -3,19 +3,15 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
+use super::super::placed::COINCIDENT_M;
 use super::super::surface_search::SurfaceSearch;
 use super::finding::{Finding, FindingKind};
-use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed};
+use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed, point_tree};
 use crate::field::{Field, Unroller};
 
 /// Minimum number of taxels of a field for orientation and axis.
 const MIN_FIELD_TAXELS: usize = 3;
-
-/// Taxels nearer to each other than this are coincident, m.
-const COINCIDENT_M: f64 = 1e-6;
 
 /// A taxel is isolated if its nearest neighbour is over this many times the median distance away.
 const ISOLATED_RATIO: f64 = 5.0;
@@ -98,7 +94,7 @@ fn crowding(body: &Body) -> Vec<Finding> {
         .iter()
         .map(|taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link))
         .collect();
-    let tree = RTree::bulk_load(places.iter().enumerate().map(|(i, p)| GeomWithData::new(p.to_array(), i)).collect());
+    let tree = point_tree(places.iter().copied());
     let mut coincident: BTreeMap<u32, u32> = BTreeMap::new();
     let mut gaps: Vec<(f64, usize)> = Vec::new();
     for (index, place) in places.iter().enumerate() {
@@ -146,11 +142,9 @@ fn crowding(body: &Body) -> Vec<Finding> {
 
 /// Distance and angle of a taxel to the surface below it.
 pub(in super::super) struct SurfaceFit {
-    /// Distance from the surface, m.
     pub(in super::super) off_m: f64,
     /// Angle of its normal with the nearest triangle normal there, rad.
     pub(in super::super) tilt_rad: f64,
-    /// The surface's normal, in the taxel's link.
     pub(in super::super) normal_in_link: DVec3,
 }
 

@@ -2,8 +2,11 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 /// The kind of a problem.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum FindingKind {
     /// The body has no taxels.
@@ -29,45 +32,13 @@ pub enum FindingKind {
 }
 
 impl FindingKind {
-    /// The name for programs.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoTaxels => "no_taxels",
-            Self::NoFields => "no_fields",
-            Self::SmallField => "small_field",
-            Self::UnusedTaxel => "unused_taxel",
-            Self::CoincidentTaxels => "coincident_taxels",
-            Self::OffSurface => "off_surface",
-            Self::InwardNormal => "inward_normal",
-            Self::StaleNormal => "stale_normal",
-            Self::IsolatedTaxel => "isolated_taxel",
-            Self::StaleChart => "stale_chart",
-        }
-    }
-
     /// The unit of [`Finding::worst`].
     #[must_use]
     pub fn unit(self) -> Option<&'static str> {
         match self {
             Self::OffSurface | Self::IsolatedTaxel | Self::StaleChart => Some("m"),
             Self::InwardNormal | Self::StaleNormal => Some("rad"),
-            Self::NoTaxels | Self::NoFields | Self::SmallField | Self::UnusedTaxel | Self::CoincidentTaxels => None,
-        }
-    }
-
-    /// What to do about it.
-    fn remedy(self) -> &'static str {
-        match self {
-            Self::NoTaxels => "add some with `somatic author`",
-            Self::NoFields => "add some with `somatic author`",
-            Self::SmallField => "give it more taxels, or do not request its orientation",
-            Self::UnusedTaxel => "put it into a field",
-            Self::CoincidentTaxels => "move or remove one",
-            Self::OffSurface => "move it to the surface",
-            Self::InwardNormal => "flip it, or the triangles below it",
-            Self::StaleNormal | Self::StaleChart => "recompute it with `somatic author BODY -o OUT`",
-            Self::IsolatedTaxel => "check its place",
+            _ => None,
         }
     }
 }
@@ -92,11 +63,18 @@ impl Finding {
     /// What to do about it.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
-        self.kind.remedy()
+        match self.kind {
+            FindingKind::NoTaxels | FindingKind::NoFields => "add some with `somatic author`",
+            FindingKind::SmallField => "give it more taxels, or do not request its orientation",
+            FindingKind::UnusedTaxel => "put it into a field",
+            FindingKind::CoincidentTaxels => "move or remove one",
+            FindingKind::OffSurface => "move it to the surface",
+            FindingKind::InwardNormal => "flip it, or the triangles below it",
+            FindingKind::StaleNormal | FindingKind::StaleChart => "recompute it with `somatic author BODY -o OUT`",
+            FindingKind::IsolatedTaxel => "check its place",
+        }
     }
-}
 
-impl Finding {
     pub(super) fn of_taxels(kind: FindingKind, taxels: Vec<u32>, what: String) -> Self {
         Self { kind, taxels, fields: Vec::new(), worst: None, place: None, what }
     }

@@ -106,7 +106,6 @@ impl RecipeText<'_> {
     }
 }
 
-/// The place of a key that is given.
 fn span<T>(key: Option<&Spanned<T>>) -> Option<Range<usize>> {
     key.map(Spanned::span)
 }

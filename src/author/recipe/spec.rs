@@ -41,7 +41,7 @@ use crate::length;
 /// ```
 ///
 /// `docs/authoring.md` describes all keys.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Recipe {
     /// The unit of the mesh file's numbers, and its metres.
     pub(in crate::author) unit: Option<(String, f64)>,
@@ -70,7 +70,6 @@ pub(in crate::author) struct PlaceSpec {
     pub(in crate::author) at: Origin,
 }
 
-/// How taxels are placed.
 #[derive(Clone, Debug)]
 pub(in crate::author) enum Placement {
     /// `count` as blue noise, with a minimum spacing if given.
@@ -115,15 +114,7 @@ impl Recipe {
     /// A recipe without taxels: the body's own are grouped.
     #[must_use]
     pub fn none() -> Self {
-        Self {
-            unit: None,
-            bare: Vec::new(),
-            keeps_existing: false,
-            regions: BTreeMap::new(),
-            places: Vec::new(),
-            fields: Vec::new(),
-            seed: 0,
-        }
+        Self::default()
     }
 
     /// A number of taxels as blue noise (`taxels`), a spacing (such as `8 mm`), or both, on the nodes, meshes or links whose
@@ -191,10 +182,8 @@ impl Recipe {
     }
 }
 
-/// Default name of a place on the whole surface.
 pub(super) const SKIN: &str = "skin";
 
-/// Maximum number of taxels of a place.
 pub(super) const MAX_COUNT: usize = 4_000_000;
 
 /// The metres of `unit`.

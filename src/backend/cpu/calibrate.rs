@@ -7,7 +7,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, f32x16, i32x16, u32x16};
 
 use super::super::Rows;
-use super::lanes::{Aligned, F, LANES, Lines, Row, U, bits_where, splat, splat_u, store, store_u, width, with_widest};
+use super::lanes::{
+    Aligned, F, LANES, Lines, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width, with_widest,
+};
 use super::read::OneFrame;
 use crate::parallel::{self, Tasks, on_threads};
 use crate::percept::Flags;
@@ -112,9 +114,8 @@ pub(super) fn tile<S: Simd>(
     let mut any = false;
     let mut at = 0;
     while at < LANES {
-        let lanes = at..at + width::<S>();
-        let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
-        let bits = U::<S>::from_slice(simd, &raw[lanes.clone()]);
+        let of = |row: &Row<f32>| load(simd, row, at);
+        let bits = load_u(simd, raw, at);
         if tile.sort == Sort::Raw && fine(simd, bits).all_true() {
             let (value, none) = (bits.bitcast::<F<S>>(), splat(simd, 0.0));
             // Not the larger of the two, which might be −0.
@@ -342,7 +343,7 @@ fn plain_tiles<S: Simd>(
 
 /// Where a number is 0 or neither tiny nor unbelievable.
 #[inline(always)]
-fn fine<S: Simd>(simd: S, bits: U<S>) -> super::lanes::M<S> {
+fn fine<S: Simd>(simd: S, bits: U<S>) -> M<S> {
     let size = bits & SIZE_BITS;
     (size - splat_u(simd, TINY_BITS)).simd_le(splat_u(simd, HUGE_BITS - TINY_BITS)) | size.simd_eq(splat_u(simd, 0))
 }
@@ -360,9 +361,8 @@ fn any_value<S: Simd>(
     pressures: &mut Row<f32>,
     statuses: &mut Row<u32>,
 ) -> bool {
-    let lanes = at..at + width::<S>();
-    let of = |row: &Row<f32>| F::<S>::from_slice(simd, &row[lanes.clone()]);
-    let response = U::<S>::from_slice(simd, &tile.response[lanes.clone()]);
+    let of = |row: &Row<f32>| load(simd, row, at);
+    let response = load_u(simd, &tile.response, at);
     let (none, nothing) = (splat(simd, 0.0), splat_u(simd, 0));
     let is_tiny = |size: U<S>| size.simd_gt(nothing) & size.simd_lt(splat_u(simd, TINY_BITS));
     let is_huge = |size: U<S>| size.simd_gt(splat_u(simd, HUGE_BITS));

@@ -130,11 +130,8 @@ impl<S: Simd> Sum<S> for Compensated<S> {
 
 /// What the lanes' fields are like.
 pub(super) trait Kind<S: Simd> {
-    /// Whether any has a chart.
     fn any_charted(&self) -> bool;
-    /// Whether any has none.
     fn any_uncharted(&self) -> bool;
-    /// That of the lanes from `at` on.
     fn lanes(&self, simd: S, at: usize) -> KindLanes<S>;
 }
 

@@ -9,7 +9,9 @@ use fearless_simd::prelude::*;
 use glam::DVec2;
 
 use super::super::Step;
-use super::lanes::{F, I, LANES, Row, U, bits_where, of_direction, splat, splat_u, store, width, with_widest};
+use super::lanes::{
+    F, I, LANES, Row, bits_where, load, load_u, of_direction, splat, splat_u, store, store_u, width, with_widest,
+};
 use crate::parallel;
 use crate::percept::{CellsMut, Component, Flags, Outputs};
 use crate::scene::Plan;
@@ -90,7 +92,6 @@ impl Before {
             .map(|((&flags, &pressed), place)| (flags & NOWHERE.bits() == 0).then_some(Centroid { place, pressed }))
     }
 
-    /// Takes over frame `frame` of `cells`.
     fn copy(&mut self, cells: &CellsMut<'_>, frame: usize) {
         let row = frame * self.flags.len()..(frame + 1) * self.flags.len();
         self.flags.copy_from_slice(cast_slice(&cells.flags[row.clone()]));
@@ -227,11 +228,9 @@ fn sixteen_fields<S: Simd>(
     let none = splat(simd, 0.0);
     let mut at = 0;
     while at < LANES {
-        let load = |row: &Row<f32>| F::<S>::from_slice(simd, &row[at..at + width::<S>()]);
-        let is_away = |row: &Row<u32>| {
-            let flags = U::<S>::from_slice(simd, &row[at..at + width::<S>()]);
-            (flags & nobody).simd_gt(splat_u(simd, 0))
-        };
+        let load = |row: &Row<f32>| load(simd, row, at);
+        let count = |row: &Row<u32>| load_u(simd, row, at);
+        let is_away = |row: &Row<u32>| (count(row) & nobody).simd_gt(splat_u(simd, 0));
         let (touched, had_previous) = (!is_away(&now), !is_away(&before));
         let no_previous = touched & !had_previous;
         let bad_step = if step.flags.is_empty() { no_previous & !no_previous } else { touched & had_previous };
@@ -241,7 +240,6 @@ fn sixteen_fields<S: Simd>(
         let (du, dv) = (u - u0, v - v0);
         let distance = (du * du + dv * dv).sqrt();
         let radial = (u * u + v * v).sqrt() - (u0 * u0 + v0 * v0).sqrt();
-        let count = |row: &Row<u32>| U::<S>::from_slice(simd, &row[at..at + width::<S>()]);
         let pressed = (count(&pressed) + count(&pressed_before)).bitcast::<I<S>>().to_float::<F<S>>();
         let still = (load(&rounding) + load(&per_taxel) * pressed).max(load(&least));
         let is_still = moved & distance.simd_le(still);
@@ -268,11 +266,11 @@ fn sixteen_fields<S: Simd>(
         let flags = bits_where(simd, no_previous, Flags::NO_PREVIOUS.bits())
             | bits_where(simd, bad_step, step.flags.bits())
             | bits_where(simd, is_still, Flags::STILL.bits());
-        flags.store_slice(&mut found.flags[at..at + width::<S>()]);
+        store_u(simd, flags, &mut found.flags, at);
         let motion = (Outputs::MOTION - Outputs::DIRECTION) & outputs;
         let present =
             bits_where(simd, moved, motion.bits()) | bits_where(simd, directed, (Outputs::DIRECTION & outputs).bits());
-        present.store_slice(&mut found.present[at..at + width::<S>()]);
+        store_u(simd, present, &mut found.present, at);
         at += width::<S>();
     }
     let range = first..first + count;

@@ -51,7 +51,6 @@ impl<'a> OneFrame<'a> {
         u32x16::from_slice(simd, &one_by_one(self.raw, self.frame, tile, self.calibrated))
     }
 
-    /// Reads them.
     #[inline(always)]
     pub(super) fn read<S: Simd>(self, simd: S, tile: usize, bits: &mut Row<u32>) {
         self.row(simd, tile).store_slice(bits);
@@ -77,7 +76,6 @@ pub(super) struct SomeFrames<'a> {
 }
 
 impl<'a> SomeFrames<'a> {
-    /// As many frames of `raw`, from `first` on.
     pub(super) fn new(raw: Rows<'a>, first: usize, frames: usize) -> Self {
         let mut values: [&[u32]; LANES] = [&[]; LANES];
         for (frame, values) in (first..first + frames).zip(&mut values) {

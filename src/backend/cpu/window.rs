@@ -112,17 +112,10 @@ impl Rest {
         let (mut starts, mut tiles) = (vec![0], Vec::new());
         for field in fields {
             let members = &seen[field.first..field.first + field.count];
-            let first = tiles.len();
-            tiles.extend(members.iter().map(|member| member.slot / LANES as u32));
-            tiles[first..].sort_unstable();
-            let mut kept = first;
-            for index in first..tiles.len() {
-                if index == first || tiles[index] != tiles[kept - 1] {
-                    tiles[kept] = tiles[index];
-                    kept += 1;
-                }
-            }
-            tiles.truncate(kept);
+            let mut own: Vec<u32> = members.iter().map(|member| member.slot / LANES as u32).collect();
+            own.sort_unstable();
+            own.dedup();
+            tiles.extend(own);
             starts.push(tiles.len() as u32);
         }
         tiles.shrink_to_fit();

@@ -1,15 +1,13 @@
 //! What the stages found in lanes, and from there to the columns of percepts: sixteen fields over sixteen frames, or sixteen
 //! fields of one frame.
 
-use std::ops::{Index, IndexMut};
-
 use bytemuck::{cast_ref, cast_slice_mut};
 use fearless_simd::prelude::*;
 use fearless_simd::u32x16;
 
 use super::lanes::{Columns, F, LANES, Row, U, load_u, store, store_first, store_u, transpose};
 use super::members::OneKind;
-use crate::percept::{CellsMut, Component, Flags, Outputs};
+use crate::percept::{CellsMut, Component, Flags, Outputs, index_by_component};
 use crate::scene::{Plan, PlanField};
 
 /// What the stages found, a row each; lengths in metres.
@@ -32,13 +30,11 @@ impl Answers {
         Self { flags: [flags; LANES], present: [present; LANES], ..Self::EMPTY }
     }
 
-    /// Stores lanes of a part.
     #[inline(always)]
     pub(super) fn put<S: Simd>(&mut self, simd: S, part: Component, lanes: F<S>, at: usize) {
         store(simd, lanes, &mut self[part], at);
     }
 
-    /// Adds flags and outputs that are present.
     #[inline(always)]
     pub(super) fn add_status<S: Simd>(&mut self, simd: S, (flags, present): (U<S>, U<S>), at: usize) {
         let flags = load_u(simd, &self.flags, at) | flags;
@@ -48,21 +44,7 @@ impl Answers {
     }
 }
 
-impl Index<Component> for Answers {
-    type Output = Row<f32>;
-
-    #[inline(always)]
-    fn index(&self, part: Component) -> &Row<f32> {
-        &self.parts[part as usize]
-    }
-}
-
-impl IndexMut<Component> for Answers {
-    #[inline(always)]
-    fn index_mut(&mut self, part: Component) -> &mut Row<f32> {
-        &mut self.parts[part as usize]
-    }
-}
+index_by_component!(Answers, Row<f32>, parts);
 
 /// The columns that the stages up to axis fill for a plan.
 #[derive(Clone, Debug)]
@@ -157,16 +139,6 @@ impl Place {
         Self { fields, first, count, frames, whole: whole.min(frames) }
     }
 
-    /// Writes the row of `frame`, if there is such a frame.
-    #[inline(always)]
-    fn put<S: Simd>(self, frame: usize, row: u32x16<S>, column: &mut [u32]) {
-        if frame < self.whole {
-            row.store_slice(&mut column[frame * self.fields + self.first..][..LANES]);
-        } else if frame < self.frames {
-            store_first(row, self.of_frame(column, frame));
-        }
-    }
-
     /// The cells of one of the frames.
     #[inline(always)]
     fn of_frame<T>(self, column: &mut [T], frame: usize) -> &mut [T] {
@@ -185,8 +157,13 @@ struct Target<'a> {
 impl Columns for Target<'_> {
     #[inline(always)]
     fn put<S: Simd>(&mut self, _: S, frame: usize, lanes: u32x16<S>) {
-        let lanes = if self.mask == u32::MAX { lanes } else { lanes & self.mask };
-        self.place.put(frame, lanes, self.column);
+        let Self { column, place, mask } = self;
+        let lanes = if *mask == u32::MAX { lanes } else { lanes & *mask };
+        if frame < place.whole {
+            lanes.store_slice(&mut column[frame * place.fields + place.first..][..LANES]);
+        } else if frame < place.frames {
+            store_first(lanes, place.of_frame(column, frame));
+        }
     }
 }
 

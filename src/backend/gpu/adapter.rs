@@ -26,6 +26,25 @@ impl Device {
         ))
     }
 
+    /// A buffer with room for `size` bytes; one that the host writes into is mapped.
+    pub(super) fn buffer(&self, name: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size: size.max(16).next_multiple_of(16),
+            usage,
+            mapped_at_creation: usage.contains(wgpu::BufferUsages::MAP_WRITE),
+        })
+    }
+
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    pub(super) fn shader(&self, name: &str, wgsl: String) -> wgpu::ShaderModule {
+        let source = wgpu::ShaderSource::Wgsl(wgsl.into());
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
+    }
+
     /// Whether a processor stands in for a GPU.
     pub(crate) fn is_processor(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu

@@ -4,24 +4,16 @@ use std::path::Path;
 
 use super::AdapterSummary;
 
-/// A GPU without a Vulkan driver.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SilentGpu {
-    /// Its maker and its place on the bus.
-    pub name: String,
-    /// How to make it answer.
-    pub remedy: String,
-}
-
-/// The GPUs on the PCI bus whose maker none of `answering` has. Empty where the system does not tell (it does on Linux).
+/// The GPUs on the PCI bus whose maker none of `answering` has: maker and place of each, and how to make it answer. Empty where
+/// the system does not tell (it does on Linux).
 #[must_use]
-pub fn silent_gpus(answering: &[AdapterSummary]) -> Vec<SilentGpu> {
+pub fn silent_gpus(answering: &[AdapterSummary]) -> Vec<(String, &'static str)> {
     on_bus(Path::new("/sys/bus/pci/devices"), answering)
 }
 
-fn on_bus(devices: &Path, answering: &[AdapterSummary]) -> Vec<SilentGpu> {
+fn on_bus(devices: &Path, answering: &[AdapterSummary]) -> Vec<(String, &'static str)> {
     let Ok(entries) = std::fs::read_dir(devices) else { return Vec::new() };
-    let mut silent: Vec<SilentGpu> = entries
+    let mut silent: Vec<(String, &str)> = entries
         .flatten()
         .filter_map(|entry| {
             let number = |file: &str| {
@@ -35,10 +27,10 @@ fn on_bus(devices: &Path, answering: &[AdapterSummary]) -> Vec<SilentGpu> {
             }
             let (maker, remedy) = remedy(vendor)?;
             let place = entry.file_name();
-            Some(SilentGpu { name: format!("{maker} GPU at {}", place.to_string_lossy()), remedy: remedy.to_owned() })
+            Some((format!("{maker} GPU at {}", place.to_string_lossy()), remedy))
         })
         .collect();
-    silent.sort_by(|a, b| a.name.cmp(&b.name));
+    silent.sort();
     silent
 }
 
@@ -85,7 +77,7 @@ mod tests {
             unfit: None,
         };
         let silent = |answering: &[AdapterSummary]| {
-            on_bus(bus.path(), answering).into_iter().map(|gpu| gpu.name).collect::<Vec<_>>()
+            on_bus(bus.path(), answering).into_iter().map(|(gpu, _)| gpu).collect::<Vec<_>>()
         };
         assert_eq!(silent(&[]), ["Intel GPU at 0000:00:02.0", "NVIDIA GPU at 0000:01:00.0"]);
         assert_eq!(silent(&[intel]), ["NVIDIA GPU at 0000:01:00.0"]);

@@ -116,21 +116,18 @@ pub(super) const NOTHING: Constants<'static> = &[];
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::plan_of;
     use super::*;
     use crate::body::Body;
     use crate::bundled;
-    use crate::field::FieldSet;
     use crate::scene::Scene;
-    use crate::signal::Calibration;
 
     #[test]
     fn what_is_read_back_is_what_a_plan_says() {
         let body = Body::from_bytes("hand.glb", bundled::HAND).unwrap();
-        let fields = FieldSet::new(&body).unwrap();
-        let calibration = Calibration::identity(body.taxels.len());
         let wanted = Outputs::all().iter().chain([Outputs::USUAL, Outputs::CENTROID | Outputs::SPEED]);
         for outputs in wanted.filter(|outputs| !outputs.contains(Outputs::TOUCHES)) {
-            let plan = Plan::new(&body, &fields, &Scene { outputs, ..Scene::default() }, &calibration).unwrap();
+            let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
             let cells = plan.fields.len() * size_of::<u32>();
             assert_eq!(plan.bytes_down(), Columns::new(&plan).read().len() * cells, "{outputs:?}");
         }

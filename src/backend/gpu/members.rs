@@ -13,7 +13,6 @@ pub(super) enum MemberTable {
 }
 
 impl MemberTable {
-    /// `members` on `device`.
     pub(super) fn new(device: &Device, members: &[layout::Member]) -> Self {
         if members.len() > layout::FEW {
             return Self::Many(table(device, "members", members));

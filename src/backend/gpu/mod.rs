@@ -29,7 +29,7 @@ mod skips;
 mod tests;
 
 pub use adapter::{AdapterSummary, adapters};
-pub use bus::{SilentGpu, silent_gpus};
+pub use bus::silent_gpus;
 use bytemuck::cast_slice;
 use glam::DVec2;
 pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
@@ -67,7 +67,7 @@ pub(crate) struct Gpu {
     taxels: wgpu::Buffer,
     stages: Vec<Stage>,
     /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
-    careful: (usize, Vec<Stage>),
+    fallback: (usize, Vec<Stage>),
     packer: Packer,
     columns: Columns,
     results: wgpu::Buffer,
@@ -81,17 +81,11 @@ pub(crate) struct Gpu {
 
 impl Gpu {
     /// The backend for `plan` on the process's device, for calls of about `batch` frames.
-    ///
-    /// # Errors
-    /// No adapter, a plan whose tables are beyond what every WebGPU device can bind, or a device without memory for it.
     pub(crate) fn new(plan: &Plan, batch: usize) -> Result<Self> {
         Self::on(adapter::shared()?, plan, batch)
     }
 
     /// The same on a device that is not the CPU itself.
-    ///
-    /// # Errors
-    /// As [`Gpu::new`]; the only adapter is software.
     pub(crate) fn on_hardware(plan: &Plan, batch: usize) -> Result<Self> {
         Self::on(adapter::hardware()?, plan, batch)
     }
@@ -108,20 +102,12 @@ impl Gpu {
         let shares = Shares::new(plan, of_part, most);
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
         let frames = capacity as u64;
-        let buffer = |name: &str, size: u64, usage: wgpu::BufferUsages| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(name),
-                size: size.max(16).next_multiple_of(16),
-                usage,
-                mapped_at_creation: false,
-            })
-        };
         let working = |name: &str, size: u64| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            buffer(name, size, usage)
+            device.buffer(name, size, usage)
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let batch = buffer("batch", HEADER, uniform);
+        let batch = device.buffer("batch", HEADER, uniform);
         let steps = working("steps", frames * STEP);
         let row = layout::padded_channels(plan.channels()) as u64 * 4;
         let plain = is_plain(plan);
@@ -154,21 +140,21 @@ impl Gpu {
             Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
         };
         let mut stages = if direct { Vec::new() } else { vec![calibrated(plain)] };
-        // What a plan runs with once it has more to say than that raw values are pressures.
-        let mut careful: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
+        // For a plan that ceases to be plain.
+        let mut fallback: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
         // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
         let before = plan.has_changes().then(|| working("raw before", row));
         if let Some(before) = &before {
-            let one = buffer("one frame", HEADER, uniform);
+            let one = device.buffer("one frame", HEADER, uniform);
             device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1)));
             let calibrated = plan.calibrated() as u64;
             let pressed = working("pressures before", calibrated * 16);
-            let heard = working("statuses before", calibrated * 4);
-            let buffers = [&one, &taxels, before, &pressed, &heard, &curves, &knots];
-            for stages in [&mut stages, &mut careful].into_iter().filter(|stages| !stages.is_empty()) {
+            let statuses_before = working("statuses before", calibrated * 4);
+            let buffers = [&one, &taxels, before, &pressed, &statuses_before, &curves, &knots];
+            for stages in [&mut stages, &mut fallback].into_iter().filter(|stages| !stages.is_empty()) {
                 stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
             }
-            let buffers = [&batch, &taxels, &steps, &pressed, &heard, &pressures, &statuses];
+            let buffers = [&batch, &taxels, &steps, &pressed, &statuses_before, &pressures, &statuses];
             stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
         }
         let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
@@ -182,12 +168,12 @@ impl Gpu {
         };
         let replaced = match direct {
             true => {
-                careful.extend(over_fields(false));
-                careful.len() - 1
+                fallback.extend(over_fields(false));
+                fallback.len() - 1
             }
-            false => careful.len(),
+            false => fallback.len(),
         };
-        let careful = (replaced, careful);
+        let fallback = (replaced, fallback);
         stages.extend(over_fields(direct));
         if wanted.hysteresis {
             let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| f.thresholds.rounded()).collect();
@@ -224,7 +210,7 @@ impl Gpu {
             before,
             taxels,
             stages,
-            careful,
+            fallback,
             packer: Packer::new(form, plan.channels(), capacity),
             columns,
             results,
@@ -244,7 +230,7 @@ impl Gpu {
         upload.unmap();
         let frames = raw.frames as u64;
         let steps = frames * STEP;
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.device.encoder();
         // Each copy waits for the one before: none that changes nothing.
         if self.told != Some(header) {
             encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
@@ -257,12 +243,7 @@ impl Gpu {
         {
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
             let mut pass = encoder.begin_compute_pass(&descriptor);
-            for stage in &self.stages {
-                let [wide, tall, deep] = stage.over.groups(&header);
-                pass.set_pipeline(&stage.pipeline);
-                pass.set_bind_group(0, &stage.bound, &[]);
-                pass.dispatch_workgroups(wide, tall, deep);
-            }
+            self.stages.iter().for_each(|stage| stage.dispatch(&mut pass, stage.over.groups(&header)));
         }
         if let Some(before) = &self.before {
             let row = layout::padded_channels(self.plan.channels()) as u64 * 4;
@@ -342,8 +323,8 @@ impl Backend for Gpu {
         self.plan.recalibrate(plan);
         self.device.queue.write_buffer(&self.taxels, 0, cast_slice(&self.plan.taxels));
         if !is_plain(&self.plan) {
-            let (replaced, careful) = std::mem::take(&mut self.careful);
-            self.stages.splice(..replaced, careful);
+            let (replaced, fallback) = std::mem::take(&mut self.fallback);
+            self.stages.splice(..replaced, fallback);
             self.packer.form = Form::Rows;
         }
     }
@@ -377,13 +358,8 @@ impl Gpu {
 
 /// The contents of `buffer`, waiting for all work before.
 fn readback<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer) -> Result<Vec<T>> {
-    let copy = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("state"),
-        size: buffer.size(),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let copy = device.buffer("state", buffer.size(), wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+    let mut encoder = device.encoder();
     encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
     encoder.map_buffer_on_submit(&copy, wgpu::MapMode::Read, .., |_| {});
     let submission = device.queue.submit([encoder.finish()]);

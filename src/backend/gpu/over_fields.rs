@@ -71,12 +71,8 @@ impl OverFields {
             wide: (table(device, "wide fields", &share.wide), share.wide.len() as u32),
             parts: (table(device, "parts", &share.parts), share.parts.len() as u32),
         };
-        let by_parts = device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("by parts"),
-            size: (shares.parts * layout::padded_quads(capacity) * BY_PART).max(BY_PART) as u64,
-            usage: wgpu::BufferUsages::STORAGE,
-            mapped_at_creation: false,
-        });
+        let by_parts = (shares.parts * layout::padded_quads(capacity) * BY_PART).max(BY_PART) as u64;
+        let by_parts = device.buffer("by parts", by_parts, wgpu::BufferUsages::STORAGE);
         let stages = plan.stages();
         Self {
             shares: shares.shares.iter().map(tables).collect(),

@@ -25,7 +25,6 @@ pub(super) enum Form {
 }
 
 impl Form {
-    /// Bytes of `frames` frames of `channels` values.
     pub(super) fn bytes(self, channels: usize, frames: usize) -> usize {
         match self {
             Self::Rows | Self::One => frames * layout::padded_channels(channels) * 4,

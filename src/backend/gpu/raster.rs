@@ -82,10 +82,6 @@ struct View {
 }
 
 /// The pixels of `drawing`, three bytes each, row by row from the top left.
-///
-/// # Errors
-/// No adapter, a picture with a side of 0 or over [`LONGEST_SIDE`], more than a device can hold, or one that stopped
-/// answering.
 pub(crate) fn draw(drawing: &Drawing) -> Result<Vec<u8>> {
     let [width, height] = drawing.size;
     if !(1..=LONGEST_SIDE).contains(&width) || !(1..=LONGEST_SIDE).contains(&height) {
@@ -104,13 +100,9 @@ pub(crate) fn draw(drawing: &Drawing) -> Result<Vec<u8>> {
     let samples = texture(&device, drawing.size, FORMAT, SAMPLES);
     let depths = texture(&device, drawing.size, DEPTH, SAMPLES);
     let padded = (4 * width).next_multiple_of(ROW);
-    let readback = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("picture"),
-        size: u64::from(padded) * u64::from(height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+    let readback = device.buffer("picture", u64::from(padded) * u64::from(height), usage);
+    let mut encoder = device.encoder();
     draw_into(&device, &mut encoder, drawing, &samples, &depths, &picture);
     encoder.copy_texture_to_buffer(
         picture.as_image_copy(),
@@ -222,10 +214,7 @@ enum Of {
 }
 
 fn pipeline(device: &Device, of: Of) -> wgpu::RenderPipeline {
-    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("body"),
-        source: wgpu::ShaderSource::Wgsl(SOURCE.into()),
-    });
+    let module = device.shader("body", SOURCE.to_owned());
     let attributes: &[wgpu::VertexAttribute] = match of {
         Of::Surface => &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
         Of::Slices { .. } => &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4],

@@ -52,61 +52,54 @@ pub struct DeviceTime {
 pub fn bandwidth() -> Result<Bandwidth> {
     let device = adapter::shared()?;
     let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-    let buffer = |label| {
-        let descriptor = wgpu::BufferDescriptor { label: Some(label), size: MUCH, usage, mapped_at_creation: false };
-        device.device.create_buffer(&descriptor)
-    };
-    let (one, other) = (buffer("one"), buffer("other"));
+    let [one, other] = ["one", "other"].map(|name| device.buffer(name, MUCH, usage));
     let mut set = Set::new(&device, MUCH, MUCH);
-    let nothing = median(ROUNDS, || copy(&device, &mut set, None))?;
+    let (upload, readback) = (set.upload.clone(), set.readback.clone());
+    let mut seconds = |between: Option<(&wgpu::Buffer, &wgpu::Buffer)>, bytes_back: u64| {
+        let copy = |encoder: &mut wgpu::CommandEncoder| {
+            between.into_iter().for_each(|(from, to)| encoder.copy_buffer_to_buffer(from, 0, to, 0, MUCH));
+        };
+        median(|| timed(&device, &mut set, bytes_back, copy, |_| ()))
+    };
+    let nothing = seconds(None, 16)?;
     let rate = |seconds: f64| MUCH as f64 / (seconds - nothing).max(1e-9);
-    let on_device = rate(median(ROUNDS, || copy(&device, &mut set, Some((&one, &other))))?);
-    let upload = set.upload.clone();
-    let up = median(ROUNDS, || {
-        let start = Instant::now();
-        {
-            let mapped = upload.get_mapped_range_mut(..).map_err(|e| device.lost(&e))?;
-            drop(mapped);
-        }
-        upload.unmap();
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&upload, 0, &one, 0, MUCH);
-        set.submit(&device, encoder.finish(), (0, 0), 16);
-        set.collect(&device, |_, _| ())?;
-        Ok(start.elapsed().as_secs_f64())
-    })?;
-    let readback = set.readback.clone();
-    let down = median(ROUNDS, || {
-        let start = Instant::now();
-        set.upload.unmap();
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&one, 0, &readback, 0, MUCH);
-        set.submit(&device, encoder.finish(), (0, 0), MUCH);
-        set.collect(&device, |_, _| ())?;
-        Ok(start.elapsed().as_secs_f64())
-    })?;
-    Ok(Bandwidth { on_device, up: rate(up), down: rate(down) })
+    Ok(Bandwidth {
+        on_device: rate(seconds(Some((&one, &other)), 16)?),
+        up: rate(seconds(Some((&upload, &one)), 16)?),
+        down: rate(seconds(Some((&one, &readback)), MUCH)?),
+    })
 }
 
-/// A submission that copies from one buffer to another, or does nothing; how long until the host knows.
-fn copy(device: &Device, set: &mut Set, between: Option<(&wgpu::Buffer, &wgpu::Buffer)>) -> Result<f64> {
+/// Submits what `record` encodes with `set`, and lets `take` read the `bytes` that come back; how long until then, s.
+fn timed(
+    device: &Device,
+    set: &mut Set,
+    bytes: u64,
+    record: impl FnOnce(&mut wgpu::CommandEncoder),
+    take: impl FnOnce(&[u8]),
+) -> Result<f64> {
     let start = Instant::now();
     set.upload.unmap();
-    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    if let Some((from, to)) = between {
-        encoder.copy_buffer_to_buffer(from, 0, to, 0, MUCH);
-    }
-    set.submit(device, encoder.finish(), (0, 0), 16);
-    set.collect(device, |_, _| ())?;
+    let mut encoder = device.encoder();
+    record(&mut encoder);
+    set.submit(device, encoder.finish(), (0, 0), bytes);
+    set.collect(device, |_, bytes| take(bytes))?;
     Ok(start.elapsed().as_secs_f64())
 }
 
-fn median(rounds: usize, mut measure: impl FnMut() -> Result<f64>) -> Result<f64> {
+/// Writes `bytes` into the upload buffer of `set`.
+fn fill(device: &Device, set: &Set, bytes: &[u8]) -> Result<()> {
+    let mapped = set.upload.get_mapped_range_mut(..bytes.len() as u64);
+    mapped.map_err(|e| device.lost(&e))?.slice(..).copy_from_slice(bytes);
+    Ok(())
+}
+
+fn median(mut measure: impl FnMut() -> Result<f64>) -> Result<f64> {
     // The first pays for memory that was never touched.
     measure()?;
-    let mut seconds = (0..rounds).map(|_| measure()).collect::<Result<Vec<f64>>>()?;
+    let mut seconds = (0..ROUNDS).map(|_| measure()).collect::<Result<Vec<f64>>>()?;
     seconds.sort_by(f64::total_cmp);
-    Ok(seconds[rounds / 2])
+    Ok(seconds[ROUNDS / 2])
 }
 
 /// Measures the programs of `plan`, as many of `frames` as one submission takes, on whatever the buffers hold.
@@ -122,45 +115,33 @@ pub fn device_time(plan: &Plan, frames: usize) -> Result<DeviceTime> {
     let clock = Clock::new(&gpu.device);
     let up = gpu.packer.bytes(frames);
     let mut set = gpu.ring.swap_remove(0);
-    {
-        // Every taxel pressed.
-        let values: Vec<f32> = (0..up / 4).map(|i| (i % 977 + 1) as f32).collect();
-        let mapped = set.upload.get_mapped_range_mut(..(values.len() * 4) as u64);
-        mapped.map_err(|e| gpu.device.lost(&e))?.slice(..).copy_from_slice(bytemuck::cast_slice(&values));
-    }
+    // Every taxel pressed.
+    let values: Vec<f32> = (0..up / 4).map(|i| (i % 977 + 1) as f32).collect();
+    fill(&gpu.device, &set, bytemuck::cast_slice(&values))?;
     let mut run = |over: &dyn Fn(Over) -> [u32; 3], clock: Option<&Clock>| {
-        let start = Instant::now();
-        set.upload.unmap();
-        let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
+        let readback = set.readback.clone();
+        let record = |encoder: &mut wgpu::CommandEncoder| {
             let timestamp_writes = clock.map(Clock::writes);
             let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes };
             let mut pass = encoder.begin_compute_pass(&descriptor);
-            for stage in &gpu.stages {
-                let [wide, tall, deep] = over(stage.over);
-                pass.set_pipeline(&stage.pipeline);
-                pass.set_bind_group(0, &stage.bound, &[]);
-                pass.dispatch_workgroups(wide, tall, deep);
-            }
-        }
-        if let Some(clock) = clock {
-            clock.resolve(&mut encoder, &set.readback);
-        }
-        set.submit(&gpu.device, encoder.finish(), (0, 0), 16);
+            gpu.stages.iter().for_each(|stage| stage.dispatch(&mut pass, over(stage.over)));
+            drop(pass);
+            clock.into_iter().for_each(|clock| clock.resolve(encoder, &readback));
+        };
         let mut ticks = [0_u64; 2];
-        set.collect(&gpu.device, |_, bytes| bytemuck::bytes_of_mut(&mut ticks).copy_from_slice(&bytes[..16]))?;
-        let device_s = clock.map(|clock| ticks[1].wrapping_sub(ticks[0]) as f64 * clock.tick_s);
-        Ok(device_s.unwrap_or(start.elapsed().as_secs_f64()))
+        let take = |bytes: &[u8]| bytemuck::bytes_of_mut(&mut ticks).copy_from_slice(&bytes[..16]);
+        let host_s = timed(&gpu.device, &mut set, 16, record, take)?;
+        Ok(clock.map_or(host_s, |clock| ticks[1].wrapping_sub(ticks[0]) as f64 * clock.tick_s))
     };
     let cells = (frames * plan.fields.len()) as u64;
     let (bytes_up, bytes_down) = (up as u64, cells * 4 * gpu.columns.read().len() as u64);
     let nothing = |_: Over| [0, 0, 0];
     let everything = |over: Over| over.groups(&batch);
     let programs_s = match &clock {
-        Some(clock) => median(ROUNDS, || run(&everything, Some(clock)))?,
+        Some(clock) => median(|| run(&everything, Some(clock)))?,
         None => {
-            let still = median(ROUNDS, || run(&nothing, None))?;
-            (median(ROUNDS, || run(&everything, None))? - still).max(0.0)
+            let still = median(|| run(&nothing, None))?;
+            (median(|| run(&everything, None))? - still).max(0.0)
         }
     };
     // Raw values, pressures and statuses there and back where there are any, what is known of members, and the results.
@@ -191,10 +172,7 @@ impl EmptyCall {
         let gpu = Gpu::on(adapter::shared()?, plan, frames)?;
         let frames = frames.min(gpu.capacity);
         let batch = header(plan, frames as u32);
-        let module = gpu.device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("empty"),
-            source: wgpu::ShaderSource::Wgsl(format!("@compute @workgroup_size({GROUP}) fn main() {{}}").into()),
-        });
+        let module = gpu.device.shader("empty", format!("@compute @workgroup_size({GROUP}) fn main() {{}}"));
         let pipeline = gpu.device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("empty"),
             layout: None,
@@ -214,27 +192,20 @@ impl EmptyCall {
     /// # Errors
     /// The device was lost.
     pub fn run(&mut self) -> Result<()> {
-        let Gpu { device, ring, .. } = &mut self.gpu;
-        let mut set = ring.swap_remove(0);
-        {
-            let mapped = set.upload.get_mapped_range_mut(..self.values.len() as u64);
-            mapped.map_err(|e| device.lost(&e))?.slice(..).copy_from_slice(&self.values);
-        }
-        set.upload.unmap();
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let bytes = self.values.len() as u64;
-        encoder.copy_buffer_to_buffer(&set.upload, 0, &self.gpu.raw, 0, bytes);
-        {
+        let Gpu { device, ring, raw, results, .. } = &mut self.gpu;
+        let set = &mut ring[0];
+        fill(device, set, &self.values)?;
+        let (upload, readback) = (set.upload.clone(), set.readback.clone());
+        let record = |encoder: &mut wgpu::CommandEncoder| {
+            encoder.copy_buffer_to_buffer(&upload, 0, raw, 0, self.values.len() as u64);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
             let [wide, tall, deep] = self.groups;
             pass.dispatch_workgroups(wide, tall, deep);
-        }
-        encoder.copy_buffer_to_buffer(&self.gpu.results, 0, &set.readback, 0, self.bytes_down);
-        set.submit(&self.gpu.device, encoder.finish(), (0, 0), self.bytes_down.max(16));
-        let done = set.collect(&self.gpu.device, |_, _| ());
-        self.gpu.ring.insert(0, set);
-        done
+            drop(pass);
+            encoder.copy_buffer_to_buffer(results, 0, &readback, 0, self.bytes_down);
+        };
+        timed(device, set, self.bytes_down.max(16), record, |_| ()).map(|_| ())
     }
 }
 
@@ -254,12 +225,7 @@ impl Clock {
                 ty: wgpu::QueryType::Timestamp,
                 count: 2,
             }),
-            ticks: device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("ticks"),
-                size: 256,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            }),
+            ticks: device.buffer("ticks", 256, wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
             tick_s: f64::from(device.queue.get_timestamp_period()) * 1e-9,
         })
     }

@@ -31,18 +31,10 @@ pub(super) struct Pending {
 
 impl Set {
     pub(super) fn new(device: &Device, up: u64, back: u64) -> Self {
-        let buffer = |name: &str, size: u64, usage, mapped| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(name),
-                size: size.max(16).next_multiple_of(16),
-                usage,
-                mapped_at_creation: mapped,
-            })
-        };
         let (told, outcome) = channel();
         Self {
-            upload: buffer("upload", up, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, true),
-            readback: buffer("readback", back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, false),
+            upload: device.buffer("upload", up, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC),
+            readback: device.buffer("readback", back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
             told,
             outcome,
             pending: None,

@@ -86,14 +86,13 @@ impl Shares {
 #[cfg(test)]
 mod tests {
     use super::super::skips::skip;
-    use super::super::tests::{percepts_of, percepts_of_odd_values};
+    use super::super::tests::{percepts_of, percepts_of_odd_values, plan_of};
     use super::super::{Gpu, adapter};
     use super::*;
-    use crate::field::FieldSet;
     use crate::percept::{Flags, Outputs};
     use crate::scene::{Arithmetic, Knobs, Scene};
     use crate::shape::Shape;
-    use crate::signal::{Calibration, RawValue};
+    use crate::signal::RawValue;
 
     /// The device; where there is none, that is a skip.
     fn device() -> Option<adapter::Device> {
@@ -104,8 +103,7 @@ mod tests {
     fn every_member_has_one_place_in_a_share_that_has_room() {
         let shape = Shape { sensors: 9000, fields: 150, members: 30, wide: 8500, local: true, frames: 1, seed: 1 };
         let body = shape.body();
-        let calibration = Calibration::identity(body.taxels.len());
-        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &Scene::default(), &calibration).unwrap();
+        let plan = plan_of(&body, &Scene::default());
         let cuts = [WIDE, 2 * WIDE, 3 * WIDE]
             .into_iter()
             .flat_map(|of_part| [0, 5000, 9000, 1 << 20].map(|most| (of_part, most)));
@@ -145,11 +143,10 @@ mod tests {
         let Some(device) = device() else { return };
         let shape = Shape { sensors: 34_000, fields: 300, members: 40, wide: 33_000, local: true, frames: 9, seed: 3 };
         let body = shape.body();
-        let calibration = Calibration::identity(body.taxels.len());
         for arithmetic in [Arithmetic::OnePass, Arithmetic::Compensated] {
             let knobs = Knobs { arithmetic: Some(arithmetic), ..Knobs::default() };
             let scene = Scene { outputs: Outputs::USUAL | Outputs::AXIS, knobs, ..Scene::default() };
-            let mut plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+            let mut plan = plan_of(&body, &scene);
             // Some without a chart, whose third coordinate counts.
             let mut fields = plan.fields.to_vec();
             for field in fields.iter_mut().rev().step_by(3) {
@@ -173,9 +170,8 @@ mod tests {
         let Some(device) = device() else { return };
         let shape = Shape { sensors: 30_000, fields: 1, members: 1, wide: 30_000, local: true, frames: 5, seed: 3 };
         let body = shape.body();
-        let calibration = Calibration::identity(body.taxels.len());
         let scene = Scene { outputs: Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE, ..Scene::default() };
-        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let plan = plan_of(&body, &scene);
         // Whole numbers, whose sums are exact in whatever order.
         let value = |i: usize| RawValue::new((i * i % 509) as f64);
         let values: Vec<RawValue> = (0..shape.frames * shape.sensors).map(value).collect();
@@ -200,9 +196,8 @@ mod tests {
         let sensors = SIDE * SIDE;
         let shape = Shape { sensors, fields: 1, members: 1, wide: sensors, local: true, frames: SIDE / 2, seed: 3 };
         let body = shape.body();
-        let calibration = Calibration::identity(body.taxels.len());
         let scene = Scene { outputs: Outputs::ORIENTATION, ..Scene::default() };
-        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let plan = plan_of(&body, &scene);
         // In each frame the four corners of a rectangle round the middle, which are as far from it as each other.
         let mut values = vec![RawValue::new(0.0); shape.frames * sensors];
         for row in 0..shape.frames {

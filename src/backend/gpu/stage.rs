@@ -98,6 +98,13 @@ impl Stage {
         Self::with(self.pipeline.clone(), self.name, device, over, &numbered(buffers))
     }
 
+    /// Adds it to `pass`, over so many groups.
+    pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, [wide, tall, deep]: [u32; 3]) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bound, &[]);
+        pass.dispatch_workgroups(wide, tall, deep);
+    }
+
     fn with(
         pipeline: wgpu::ComputePipeline,
         name: &'static str,
@@ -130,10 +137,7 @@ pub(super) fn pipeline(
     entry: &str,
     constants: Constants<'_>,
 ) -> wgpu::ComputePipeline {
-    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(shader.name),
-        source: wgpu::ShaderSource::Wgsl(shader.wgsl().into()),
-    });
+    let module = device.shader(shader.name, shader.wgsl());
     device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(shader.name),
         layout: None,
@@ -161,12 +165,7 @@ pub(super) fn table_as<T: Pod>(
     least: u64,
 ) -> wgpu::Buffer {
     let bytes: &[u8] = cast_slice(rows);
-    let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(name),
-        size: (bytes.len() as u64).max(least).next_multiple_of(16),
-        usage: usage | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+    let buffer = device.buffer(name, (bytes.len() as u64).max(least), usage | wgpu::BufferUsages::COPY_DST);
     device.queue.write_buffer(&buffer, 0, bytes);
     buffer
 }

@@ -196,20 +196,13 @@ fn a_batch_is_cut_into_blocks_that_hold_it() {
 /// A backend for the hand on a device that computes nothing.
 fn on_noop() -> Gpu {
     let body = Body::from_bytes("hand", include_bytes!("../../../bodies/hand.glb")).unwrap();
-    let calibration = Calibration::identity(body.taxels.len());
-    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &Scene::default(), &calibration).unwrap();
+    let plan = plan_of(&body, &Scene::default());
     Gpu::on(adapter::open(wgpu::Backends::NOOP).unwrap(), &plan, 4).unwrap()
 }
 
-fn run(gpu: &mut Gpu) -> crate::error::Result<()> {
-    let plan = gpu.plan.clone();
-    let values = vec![RawValue::new(1.0); plan.channels()];
-    let steps = [Step { dt_s: 0.01, flags: Flags::empty() }];
-    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
-        .with_columns(plan.columns, plan.kept_pressures());
-    percepts.reset(1);
-    let rows = Rows::Packed { values: &values, channels: plan.channels() };
-    gpu.run(&RawBatch { first: 0, frames: 1, rows, steps: &steps }, &mut percepts)
+fn run(gpu: &mut Gpu) -> crate::error::Result<Percepts> {
+    let values = vec![RawValue::new(1.0); gpu.plan.channels()];
+    run_on(gpu, &values)
 }
 
 #[test]
@@ -228,7 +221,7 @@ fn a_device_that_is_lost_is_an_error_in_one_line_and_stays_one() {
 fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
     let mut gpu = on_noop();
     // A copy beyond a buffer's end, which no call of the backend's own makes.
-    let mut encoder = gpu.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = gpu.device.encoder();
     encoder.copy_buffer_to_buffer(&gpu.raw, 0, &gpu.steps, 0, 1 << 30);
     gpu.device.queue.submit([encoder.finish()]);
     let error = run(&mut gpu).unwrap_err().to_string();
@@ -250,33 +243,39 @@ pub(super) fn percepts_of_odd_values(gpu: &mut Gpu, frames: usize) -> Percepts {
 
 /// Percepts of frames of `values`, one after the other.
 pub(super) fn percepts_of(gpu: &mut Gpu, values: &[RawValue]) -> Percepts {
-    let plan = gpu.plan.clone();
-    let frames = values.len() / plan.channels();
+    run_on(gpu, values).unwrap()
+}
+
+fn run_on(gpu: &mut Gpu, values: &[RawValue]) -> crate::error::Result<Percepts> {
+    let (channels, frames) = (gpu.plan.channels(), values.len() / gpu.plan.channels());
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
-    let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
-        .with_columns(plan.columns, plan.kept_pressures());
+    let mut percepts = Percepts::new(gpu.plan.outputs, gpu.plan.fields.len(), Precision::F32)
+        .with_columns(gpu.plan.columns, gpu.plan.kept_pressures());
     percepts.reset(frames);
-    let rows = Rows::Packed { values, channels: plan.channels() };
-    gpu.run(&RawBatch { first: 0, frames, rows, steps: &steps }, &mut percepts).unwrap();
-    percepts
+    let rows = Rows::Packed { values, channels };
+    gpu.run(&RawBatch { first: 0, frames, rows, steps: &steps }, &mut percepts)?;
+    Ok(percepts)
+}
+
+pub(super) fn plan_of(body: &Body, scene: &Scene) -> Plan {
+    Plan::new(body, &FieldSet::new(body).unwrap(), scene, &Calibration::identity(body.taxels.len())).unwrap()
 }
 
 #[test]
 fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
     let Ok(device) = adapter::shared() else { return skip("GPU", "no adapter answers") };
     let body = Body::from_bytes("hand", include_bytes!("../../../bodies/hand.glb")).unwrap();
-    let calibration = Calibration::identity(body.taxels.len());
     let scene = Scene { outputs: Outputs::USUAL - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
-    let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+    let plan = plan_of(&body, &scene);
     // One that must be calibrated, though nothing comes of it: what is so small counts as 0 anyway.
-    let mut careful = plan.clone();
-    careful.taxels[0].dead_band = 1e-30;
+    let mut calibrated = plan.clone();
+    calibrated.taxels[0].dead_band = 1e-30;
     for frames in [1, 7, 70, 300] {
         let mut gpu = Gpu::on(device.clone(), &plan, frames).unwrap();
         assert!(gpu.packer.form != Form::Rows);
         let percepts = percepts_of_odd_values(&mut gpu, frames);
         gpu.restore(&BackendState::initial(&plan)).unwrap();
-        gpu.recalibrate(&careful);
+        gpu.recalibrate(&calibrated);
         assert!(gpu.packer.form == Form::Rows);
         assert!(percepts == percepts_of_odd_values(&mut gpu, frames), "{frames} frames");
         let faulty = (0..frames)

@@ -73,7 +73,7 @@ fn field(body: &Body, fields: &[Field], field: &Field) -> Value {
 
 fn finding(finding: &Finding) -> Value {
     json!({
-        "kind": finding.kind.name(),
+        "kind": finding.kind,
         "taxels": finding.taxels,
         "fields": finding.fields,
         "worst": finding.worst,

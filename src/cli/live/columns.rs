@@ -17,7 +17,6 @@ const BAR_WIDTH: usize = 8;
 /// Context of a percept's cells.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
-    /// The largest total so far.
     pub(super) largest_total: f64,
     /// Number of separate touches of the field.
     pub(super) touches: usize,

@@ -4,6 +4,7 @@ use comfy_table::ColumnConstraint;
 use console::style;
 use serde_json::{Value, json};
 use somatic::Agreement;
+use somatic::tradeoff::Words;
 
 use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};
@@ -20,8 +21,8 @@ impl Bill {
         line("a frame", format!("{moved}, {:.2} µs {}", self.measured.whole_us, self.measured.on));
         let (name, what, why) = &self.backend;
         line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
-        let [_, knobs @ ..] = self.knobs.words();
-        line("knobs", knobs.join(", "));
+        let Words { arithmetic, charts, orientation_by, coverage, cadence, .. } = self.knobs.words();
+        line("knobs", [arithmetic, charts, orientation_by, coverage, cadence].join(", "));
         if let Some(kept) = &self.kept {
             line("measured", kept.clone());
         }
@@ -57,17 +58,6 @@ impl Bill {
         shown(&table)
     }
 
-    fn knobs_json(&self) -> Value {
-        let [_, arithmetic, charts, orientation_by, coverage, cadence] = self.knobs.words();
-        json!({
-            "arithmetic": arithmetic,
-            "charts": charts,
-            "orientation_by": orientation_by,
-            "coverage": coverage,
-            "cadence": cadence,
-        })
-    }
-
     pub(super) fn json(&self) -> Value {
         let (name, what, why) = &self.backend;
         let stage = |Stage { planned, measured_us }: &Stage| {
@@ -75,6 +65,8 @@ impl Bill {
             row["us"] = json!(measured_us.map(rounded));
             row
         };
+        let mut knobs = json!(self.knobs.knobs);
+        knobs["arithmetic"] = self.knobs.words().arithmetic.into();
         let mut bill = json!({
             "body": self.body,
             "fields": self.fields[0],
@@ -87,7 +79,7 @@ impl Bill {
             "backend": name,
             "adapter": what,
             "why": why,
-            "knobs": self.knobs_json(),
+            "knobs": knobs,
             "kept_charts": self.kept_charts,
             "measured": self.kept,
             "batch": self.batch,

@@ -7,19 +7,14 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::error::nearest;
+use somatic::error::suggestion;
 use somatic::scene::MotionFilter;
 use somatic::{Error, Outputs, Result};
 
-/// The output called `name`.
 pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
     Outputs::named(name).ok_or_else(|| {
         let names: Vec<String> = Outputs::all().names().collect();
-        let hint = match nearest(name, names.iter().map(String::as_str)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("there are {}", names.join(", ")),
-        };
-        Error::usage(format!("there is no output `{name}`; {hint}"))
+        Error::usage(format!("there is no output `{name}`; {}", suggestion(name, names.iter().map(String::as_str))))
     })
 }
 
@@ -73,7 +68,6 @@ pub(super) fn word<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(fro
     Parsed::deserialize(from).map(|Parsed(one)| Some(one))
 }
 
-/// A string that parses as a `T`.
 struct Checked<T>(String, PhantomData<T>);
 
 impl<T: FromStr> FromStr for Checked<T> {

@@ -30,7 +30,6 @@ pub(super) fn software() -> Option<String> {
     None
 }
 
-/// What is measured for `asked`.
 pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f64) -> Result<MeasureOptions> {
     let backends = match options.backend {
         BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],

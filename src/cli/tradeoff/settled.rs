@@ -31,9 +31,6 @@ pub(super) fn driver() -> String {
 }
 
 /// The options of `asked` for `body` and calls of `batch` frames, with what it leaves open settled.
-///
-/// # Errors
-/// What is asked for makes no sense, or no knobs grant it.
 pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(body, &ids, batch)?;
@@ -58,7 +55,7 @@ pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &
     };
     // Another run may have been asked to measure it.
     let report = report.map(|mut report| {
-        let is_gpu = |row: &Measurement| row.backend == "gpu";
+        let is_gpu = |row: &Measurement| row.words.backend == "gpu";
         let is_left_open = options.backend == BackendKind::Auto;
         if is_left_open && report.rows.iter().any(is_gpu) && software().is_some() {
             report.rows.retain(|row| !is_gpu(row));
@@ -107,7 +104,7 @@ fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, targe
 /// The combination of `row` as a scene would say it: an orientation that is asked for by name stays as it was asked for.
 pub(super) fn of_row(row: &Measurement, report: &Report) -> Result<Combination> {
     let mut combination = row.combination()?;
-    if row.orientation_by == report.asked_by {
+    if row.words.orientation_by == report.asked_by {
         combination.knobs.orientation_by = OrientationBy::AsAsked;
     }
     Ok(combination)

@@ -1,7 +1,7 @@
 //! Writes the selected combination into a scene file in place of the target; keeps everything else, comments too.
 
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Combination, Target};
+use somatic::tradeoff::{Combination, Target, Words};
 use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
@@ -13,10 +13,9 @@ pub(super) fn write(scene: OutputPath, combination: &Combination, target: &Targe
     scene.write(text.as_bytes())
 }
 
-/// `text` with `combination` in it.
 fn with(text: &str, combination: &Combination, target: &Target) -> Result<String> {
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
-    let [backend, arithmetic, ..] = combination.words();
+    let Words { backend, arithmetic, .. } = combination.words();
     let Knobs { charts, orientation_by, coverage, cadence, .. } = combination.knobs;
     let table = document.entry("accuracy").or_insert_with(|| Item::Table(Table::new()));
     let Some(table) = table.as_table_like_mut() else { return Err(Error::failed("`accuracy` is not a table")) };
@@ -30,7 +29,7 @@ fn with(text: &str, combination: &Combination, target: &Target) -> Result<String
             table.insert(key, value(word));
         }
     };
-    knob("arithmetic", arithmetic, combination.backend == BackendKind::Reference);
+    knob("arithmetic", &arithmetic, combination.backend == BackendKind::Reference);
     knob("charts", charts.word(), charts == Charts::AsAuthored);
     knob("orientation_by", orientation_by.word(), orientation_by == OrientationBy::AsAsked);
     knob("coverage", coverage.word(), coverage == Coverage::Auto);

@@ -92,9 +92,6 @@ pub(super) fn wiring(wiring: &Wiring) -> String {
 }
 
 /// A calibration for the paper's circuit.
-///
-/// # Errors
-/// The sensors are not in the paper's circuit.
 pub(super) fn fsr(tuning: &Tuning, body: &str) -> Result<String> {
     if !tuning.falls() || tuning.sensors().iter().any(|sensor| sensor.most != f64::from(FsrCircuit::OPEN_COUNTS)) {
         return Err(Error::failed(

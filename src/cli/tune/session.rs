@@ -24,14 +24,12 @@ const RESTORE_TIMEOUT: Duration = Duration::from_secs(4);
 /// Time between updates of the press count.
 const UPDATE_INTERVAL: Duration = Duration::from_millis(150);
 
-/// When a phase ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum PhaseLimit {
     After(Duration),
     Enter,
 }
 
-/// How a phase ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum PhaseEnd {
     Completed,
@@ -245,7 +243,6 @@ impl TuningSession {
         enter.try_iter().count() > 0
     }
 
-    /// Marks in `tuning` the taps that are not set.
     pub(super) fn mark_failed_taps(&mut self, tuning: &mut Tuning) {
         let taps = self.lines.taps();
         for (index, at) in self.places.iter().enumerate() {

@@ -11,6 +11,9 @@ use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result, failed};
 
+/// First limit of a search, over the straight distance to the farthest point: half a circle, and a margin.
+pub(crate) const FIRST_LIMIT: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
+
 /// Number of windows at which a surface counts as too rough.
 const MAX_WINDOWS: usize = 2_000_000;
 
@@ -28,7 +31,6 @@ const MIN_RIVAL_ANGLE: f64 = PI / 9.0;
 struct Window {
     /// The edge, as half-edge of the triangle that is entered.
     edge: u32,
-    /// Index of the source.
     source: u32,
     /// The edge's ends, unfolded with the source at the origin.
     ends: [DVec2; 2],
@@ -138,7 +140,6 @@ pub struct LogMap<'a> {
     limit_m: f64,
     sources: Vec<Source>,
     arrivals: Vec<Arrival>,
-    /// All windows, followed or not.
     windows: Vec<Window>,
     followed: usize,
     /// Per triangle the last window that enters it.

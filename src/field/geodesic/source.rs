@@ -40,7 +40,6 @@ impl Source {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wedge {
     pub(super) triangle: u32,
-    /// Its corners.
     pub(super) corners: [DVec2; 3],
     /// The angle of the x-axis, rad.
     pub(super) base_rad: f64,
@@ -145,7 +144,6 @@ impl Fan {
     }
 }
 
-/// The wedge's angle at its apex.
 fn wedge_angle(wedge: &Wedge) -> f64 {
     let far = wedge.corners[(wedge.apex.unwrap_or(0) as usize + 2) % 3];
     angle(far)

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::keys::Text;
 use crate::signal::upkeep::UpkeepKeys;
 
@@ -84,7 +84,7 @@ impl Calibration {
 }
 
 fn check_checks(checks: &Checks) -> Result<()> {
-    let wrong = |key: &str, must: &str| Err(Error::failed(format!("[checks] `{key}` must be {must}")));
+    let wrong = |key: &str, must: &str| Err(failed!("[checks] `{key}` must be {must}"));
     if checks.broken_frame_share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
         return wrong("broken_frame_share", "between 0 and 1");
     }

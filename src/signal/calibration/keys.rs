@@ -122,7 +122,6 @@ impl Draft {
         Ok(())
     }
 
-    /// Applies the keys of the response.
     fn apply_response(&mut self, keys: &Keys, curves: &[&str], text: Text<'_>) -> Result<()> {
         if let (Some(curve), Some(_)) = (&keys.curve, &keys.sensor) {
             let what = "`curve` and `sensor` both define the response; keep one of them";

@@ -34,10 +34,8 @@ struct Group {
     rate: f64,
 }
 
-/// The drift of all groups.
 #[derive(Clone, Debug)]
 pub(super) struct CommonDrift {
-    /// The most specific first.
     groupings: Vec<Grouping>,
     /// Per taxel the time up to which its drift is estimated, s.
     estimated_until_s: Vec<f64>,

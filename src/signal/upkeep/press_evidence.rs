@@ -12,14 +12,12 @@ const PRESS_SHARE: f64 = 0.5;
 /// A rise up to this share of its maximum is residual: sensors do not return exactly to their rest.
 const RESIDUAL_SHARE: f64 = 1.0 / 16.0;
 
-/// The evidence of one taxel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PressEvidence {
     /// The raw value from which changes are measured.
     level: f64,
     /// Sum of fast changes towards a press, raw units.
     rise: f64,
-    /// Its maximum since the taxel was at rest.
     max_rise: f64,
 }
 
@@ -33,7 +31,6 @@ pub(super) struct TouchSense {
 }
 
 impl TouchSense {
-    /// Whether `change` is slow.
     pub(super) fn is_slow(self, change: f64) -> bool {
         change.abs() <= SLOW_SHARE * self.felt
     }
@@ -60,7 +57,6 @@ impl PressEvidence {
         self.max_rise = self.max_rise.max(self.rise);
     }
 
-    /// Whether the taxel is pressed.
     pub(super) fn is_press(&self, sense: TouchSense) -> bool {
         self.rise > (PRESS_SHARE * sense.felt).max(RESIDUAL_SHARE * self.max_rise)
     }

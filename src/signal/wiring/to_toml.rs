@@ -27,15 +27,10 @@ impl WiredBoard {
         key("baud", self.baud.map(|baud| baud.to_string()));
         key("channels", Some(self.taxels.len().to_string()));
         text += "taxels = [\n";
-        let mut from = 0;
-        while from < self.taxels.len() {
-            let has_tap = |channel: usize| self.taps.get(channel).copied().flatten().is_some();
-            let belongs = |&channel: &usize| self.taxels[channel].is_some() && has_tap(channel) == has_tap(from);
-            let end = (from..self.taxels.len()).take_while(belongs).last().map_or(from, |last| last + 1);
-            if end > from {
-                text += &self.run(from, end);
-            }
-            from = end.max(from + 1);
+        let has_tap = |channel: usize| self.taps.get(channel).copied().flatten().is_some();
+        let wired: Vec<usize> = (0..self.taxels.len()).filter(|&channel| self.taxels[channel].is_some()).collect();
+        for run in wired.chunk_by(|&a, &b| a + 1 == b && has_tap(a) == has_tap(b)) {
+            text += &self.run(run[0], run[run.len() - 1] + 1);
         }
         text + "]\n"
     }

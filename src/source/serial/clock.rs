@@ -9,7 +9,6 @@ use std::collections::VecDeque;
 
 /// Length of a bucket, of which the earliest arrival counts, s of board time.
 const BUCKET_S: f64 = 0.5;
-/// Number of buckets kept.
 const BUCKETS: usize = 240;
 /// The drift is assumed to be 0 for less data than this, s.
 const FIT_DRIFT_S: f64 = 1.0;
@@ -18,7 +17,6 @@ const REPORT_DRIFT_S: f64 = 30.0;
 /// A larger offset means that the board's clock was set; it is then estimated anew, s.
 const JUMP_S: f64 = 2.0;
 
-/// The estimate of a board's clock.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clock {
     first_us: Option<u64>,
@@ -81,7 +79,6 @@ impl Clock {
         board_us.wrapping_sub(first) as i64 as f64 * 1e-6
     }
 
-    /// Fits the line below the buckets.
     fn fit(&mut self) {
         let (first, last) = (self.buckets[0].0, self.buckets[self.buckets.len() - 1].0);
         if last - first < FIT_DRIFT_S {
@@ -110,23 +107,16 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// SplitMix64's stream as numbers in 0..1.
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
+    use crate::author::random::Random;
 
     /// The largest error of placing, s, after `from_s`, and the drift found, of a clock with this `drift` whose frames come
     /// every 20 ms with delays of 3 ms and up to `jitter_s` more, now and then 50 ms more.
     fn followed(drift: f64, jitter_s: f64, from_s: f64) -> (f64, f64) {
-        let (mut clock, mut state, mut worst) = (Clock::default(), 7, 0.0_f64);
+        let (mut clock, mut random, mut worst) = (Clock::default(), Random::new(7), 0.0_f64);
         for frame in 0..6000 {
             let read_s = 5.0 + 0.02 * f64::from(frame);
-            let late = if random(&mut state) < 0.05 { 0.05 } else { 0.0 };
-            let arrived_s = read_s + 0.003 + jitter_s * random(&mut state) + late;
+            let late = if random.unit() < 0.05 { 0.05 } else { 0.0 };
+            let arrived_s = read_s + 0.003 + jitter_s * random.unit() + late;
             let host_s = clock.host_time_s((read_s * (1.0 + drift) * 1e6) as u64, arrived_s);
             assert!(host_s <= arrived_s);
             if read_s > from_s {

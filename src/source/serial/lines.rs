@@ -7,14 +7,11 @@ use std::time::{Duration, Instant};
 
 use super::merge::BoardFrame;
 use super::taps::{self, ChannelTap, TapTrouble};
-use crate::error::Error;
+use crate::error::{Error, failed};
 use crate::signal::Wiring;
 
-/// Maximum number of queued frames per line.
 const MAX_QUEUED_FRAMES: usize = 64;
-/// Maximum number of queued notices.
 const MAX_NOTICES: usize = 256;
-/// Timeout for closing the lines.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(300);
 
 /// The state of a board.
@@ -250,7 +247,6 @@ impl State {
         due.map(|tap| tap.trouble = Some(why)).count()
     }
 
-    /// The next frame of a board.
     pub(super) fn take(&mut self) -> Option<(BoardFrame, Instant)> {
         let (mut frame, read_at) = self.queue.pop_front()?;
         frame.lost += std::mem::take(&mut self.gaps[frame.board]);
@@ -269,7 +265,6 @@ impl State {
         (*owner != line).then_some(*owner)
     }
 
-    /// Releases the boards of `line`.
     pub(super) fn release(&mut self, line: usize) {
         self.owners.iter_mut().filter(|owner| **owner == Some(line)).for_each(|owner| *owner = None);
     }
@@ -292,7 +287,7 @@ impl State {
         let bad = self.verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Bad(_))).count();
         match &self.verdicts[..] {
             [Verdict::Bad(error)] => Some(error.clone()),
-            all if bad == all.len() => Some(Error::failed(format!("none of {bad} serial lines can be used"))),
+            all if bad == all.len() => Some(failed!("none of {bad} serial lines can be used")),
             _ => None,
         }
     }

@@ -23,7 +23,6 @@ const TAKEOVER_SHARE: f64 = 0.8;
 const MAX_WAIT_S: f64 = 0.005;
 const MAX_WAIT_PERIODS: f64 = 0.25;
 
-/// When frames are merged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pace {
     /// At each frame of the fastest board.
@@ -34,7 +33,6 @@ pub(super) enum Pace {
     Every(f64),
 }
 
-/// A frame of one board.
 #[derive(Clone, Debug)]
 pub(super) struct BoardFrame {
     /// Index of the board in the wiring.
@@ -49,7 +47,6 @@ pub(super) struct BoardFrame {
     pub(super) restarted: bool,
     /// Whether omitted channels are unchanged.
     pub(super) partial: bool,
-    /// Channels and their values.
     pub(super) values: Vec<(u16, u16)>,
 }
 
@@ -63,7 +60,7 @@ struct Known {
     sure: bool,
 }
 
-/// The state of a board.
+#[derive(Default)]
 struct Board {
     /// Per channel, the index of its taxel in a frame's values.
     places: Vec<Option<usize>>,
@@ -122,12 +119,10 @@ impl Board {
     }
 }
 
-/// Merges frames of boards.
 pub(super) struct Merge {
     boards: Vec<Board>,
     pace: Pace,
     max_age_s: Option<f64>,
-    /// The board that sets the pace.
     leader: Option<usize>,
     last_s: f64,
     /// When a frame is due without input, s.
@@ -139,15 +134,9 @@ pub(super) struct Merge {
 impl Merge {
     /// `boards` has per board and channel the index in a frame's values.
     pub(super) fn new(boards: Vec<Vec<Option<usize>>>, pace: Pace, max_age_s: Option<f64>) -> Self {
-        let board = |places: Vec<Option<usize>>| Board {
-            known: vec![None; places.len()],
-            places,
-            clock: Clock::default(),
-            period_s: DEFAULT_PERIOD_S,
-            last: None,
-            arrived_s: 0.0,
-            waiting: false,
-            replaced: 0,
+        let board = |places: Vec<Option<usize>>| {
+            let known = vec![None; places.len()];
+            Board { known, places, period_s: DEFAULT_PERIOD_S, ..Board::default() }
         };
         let boards = boards.into_iter().map(board).collect();
         Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None, held_s: None }
@@ -185,7 +174,6 @@ impl Merge {
         })
     }
 
-    /// Whether a frame waits for other boards.
     pub(super) fn is_waiting(&self) -> bool {
         self.held_s.is_some()
     }
@@ -203,7 +191,6 @@ impl Merge {
         leads
     }
 
-    /// Whether frames have a fixed rate.
     pub(super) fn is_timed(&self) -> bool {
         matches!(self.pace, Pace::Every(_))
     }

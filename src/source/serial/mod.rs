@@ -24,7 +24,7 @@ use self::lines::Shared;
 use self::merge::{Merge, Pace};
 use self::session::{LineConfig, Session};
 use super::Source;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, Wiring};
 
 /// The default speed of a line, baud.
@@ -97,7 +97,7 @@ impl SerialSource {
             thread::Builder::new()
                 .name(format!("line {}", line + 1))
                 .spawn(move || port::read(session, start))
-                .map_err(|e| Error::failed(format!("cannot start a thread: {e}")).at(port))?;
+                .map_err(|e| failed!("cannot start a thread: {e}").at(port))?;
         }
         let merge = Merge::new(places, pace, options.max_age_s);
         Ok(Self { lines: Lines(shared), merge, taxels, wiring, start, read_at: None })

@@ -28,7 +28,6 @@ const PROBE_INTERVAL: Duration = Duration::from_secs(5);
 const SILENT_AFTER: Duration = Duration::from_secs(1);
 /// A board that sends frames but does not answer for this long is accepted without identification.
 const ACCEPT_AFTER: Duration = Duration::from_millis(1500);
-/// Retries of commands.
 const RETRY: RetryPolicy = RetryPolicy { wait: Duration::from_millis(120), tries: 4 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,13 +42,9 @@ enum Stage {
     Speaking,
 }
 
-/// The settings of a line.
 pub(super) struct LineConfig {
-    /// The line's number.
     pub(super) line: usize,
-    /// The port's name, for messages.
     pub(super) port: String,
-    /// Expected baud rate.
     pub(super) baud: u32,
     /// Whether the user has set the baud rate; if not, another one is accepted.
     pub(super) fixed: bool,
@@ -67,10 +62,8 @@ pub(super) struct Session {
 struct LineState {
     config: LineConfig,
     dialogue: Dialogue,
-    /// Current baud rate.
     baud: u32,
     stage: Stage,
-    /// When the stage began.
     since: Duration,
     /// Bytes since the line was opened, without echoes.
     bytes: u64,
@@ -124,7 +117,6 @@ impl Session {
         &self.line.config
     }
 
-    /// The baud rate to use.
     pub(super) fn baud(&self) -> u32 {
         self.line.baud
     }
@@ -179,7 +171,6 @@ impl Session {
         }
     }
 
-    /// The bytes to send at `now`.
     pub(super) fn send(&mut self, now: Duration) -> Option<&[u8]> {
         self.line.dialogue.send(now)
     }
@@ -263,7 +254,6 @@ impl LineState {
         }
     }
 
-    /// Reports that no board was found at any baud rate.
     fn report_nothing_found(&mut self) {
         let baud = self.config.baud;
         if let Some(version) = self.version {
@@ -285,7 +275,6 @@ impl LineState {
         }
     }
 
-    /// Checks whether the board still sends.
     fn watch(&mut self, now: Duration) {
         let waits = now.saturating_sub(self.asked) >= IDENTIFY_TIMEOUT && self.dialogue.is_idle();
         if self.board.is_none() {

@@ -22,7 +22,6 @@ impl Sensor {
         text
     }
 
-    /// The keys for all sensors.
     fn keys(&self) -> Vec<(&'static str, String)> {
         let noise = DEAD_BAND_SIGMAS * self.noise_sigma;
         match self.kind {

@@ -8,15 +8,25 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Indenter {
     /// A rigid cylinder lying on the skin.
-    Rod { radius_m: f64, length_m: f64 },
-    /// A rigid ball.
-    Ball { radius_m: f64 },
+    Rod {
+        radius_m: f64,
+        length_m: f64,
+    },
+    Ball {
+        radius_m: f64,
+    },
     /// The pad of a human finger: a soft ball.
-    Fingertip { radius_m: f64 },
+    Fingertip {
+        radius_m: f64,
+    },
     /// The flat end of a cylinder: even pressure over a disc.
-    Flat { radius_m: f64 },
+    Flat {
+        radius_m: f64,
+    },
     /// A blade, without width.
-    Edge { length_m: f64 },
+    Edge {
+        length_m: f64,
+    },
 }
 
 impl Indenter {
@@ -72,7 +82,6 @@ struct Strip {
     across_m: f64,
     /// Half its length; 0 for a point.
     half_m: f64,
-    /// Its share of the force.
     part: f64,
 }
 

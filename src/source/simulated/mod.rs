@@ -30,7 +30,7 @@ use self::setup::{Setup, Touch};
 use super::Source;
 use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::field::FieldSet;
 use crate::keys::Text;
 use crate::signal::{Frame, RawValue};
@@ -117,15 +117,12 @@ impl SimulatedSource {
         let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Pressure);
         let ids: Vec<u32> = pressure().map(|(_, taxel)| taxel.id).collect();
         if ids.is_empty() {
-            return Err(Error::failed(format!("the body `{}` has no pressure taxels", body.name)));
+            return Err(failed!("the body `{}` has no pressure taxels", body.name));
         }
         let area = file.sensor.area_m2.as_ref().map(|area| text.positive("area_m2", area)).transpose()?;
         let side = |taxel: &Taxel| match area.unwrap_or(taxel.area) {
             area if area > 0.0 => Ok(area.sqrt()),
-            _ => Err(Error::failed(format!(
-                "taxel {} has no area in the layout; give all one as [sensor] `area_m2`",
-                taxel.id
-            ))),
+            _ => Err(failed!("taxel {} has no area in the layout; give all one as [sensor] `area_m2`", taxel.id)),
         };
         let taxels = pressure().map(|(index, taxel)| Ok((index, side(taxel)?))).collect::<Result<Vec<_>>>()?;
         let fields = FieldSet::new(&body)?;

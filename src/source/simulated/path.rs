@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use crate::body::SurfaceIndex;
-use crate::field::{Chart, Lift};
+use crate::field::{Chart, Lift, default_u};
 
 /// Maximum distance of a waypoint in a link's frame from the surface, and of a chart's surface beyond its members' depth.
 const MAX_SURFACE_DISTANCE_M: f64 = 0.02;
@@ -13,10 +13,7 @@ const MAX_SURFACE_DISTANCE_M: f64 = 0.02;
 const STEP_M: f64 = 5e-4;
 /// Maximum number of points checked between two waypoints.
 const MAX_STEPS: f64 = 20_000.0;
-/// cos 10°: if the normal is nearer to the link's +x, +z is used instead.
-const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
 
-/// The coordinates of the waypoints.
 #[derive(Clone, Debug)]
 pub(super) enum PathFrame {
     /// (u, v, 0) in a field's chart, taken along its normal to the surface.
@@ -34,7 +31,6 @@ impl PathFrame {
     }
 }
 
-/// A point on the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactPoint {
     pub(super) position_in_link: DVec3,
@@ -103,7 +99,7 @@ impl Path {
                 (chart.unproject(lift.at(ahead).0 - lift.at(at).0), normal)
             }
             PathFrame::Link => {
-                let u = if normal.x.abs() > PARALLEL_COSINE { DVec3::Z } else { DVec3::X };
+                let u = default_u(normal);
                 let u = (u - normal * u.dot(normal)).normalize();
                 (u * cos + normal.cross(u) * sin, normal)
             }

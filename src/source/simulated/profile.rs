@@ -15,7 +15,6 @@ impl Profile {
         Self { points }
     }
 
-    /// One value at all times.
     pub(super) fn constant(value: f64) -> Self {
         Self { points: vec![(0.0, value)] }
     }
@@ -60,7 +59,6 @@ impl Profile {
         self.within(t_s).unwrap_or(if t_s < first.0 { first.1 } else { last.1 })
     }
 
-    /// The times of its points, s.
     pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.points.iter().map(|&(t_s, _)| t_s)
     }

@@ -10,7 +10,6 @@ use crate::output::{OutputFile, OutputPath};
 use crate::signal::Frame;
 use crate::source::{Source as _, csv_file::put_value};
 
-/// The truth's columns.
 const COLUMNS: [&str; 22] = [
     "t", "frame", "touch", "name", "link", "field", "x", "y", "z", "nx", "ny", "nz", "u", "v", "angle", "vx", "vy",
     "vz", "vu", "vv", "speed", "force",

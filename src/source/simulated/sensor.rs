@@ -25,7 +25,6 @@ pub(super) enum Kind {
     Linear { offset: f64, gain: f64, bits: Option<u32> },
 }
 
-/// A fault of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fault {
     /// It always reads as if untouched.
@@ -45,7 +44,6 @@ pub(super) struct Sensor {
     pub(super) noise_sigma: f64,
     /// Drift of all readings per minute, in the same unit.
     pub(super) drift_per_minute: f64,
-    /// One per taxel.
     pub(super) faults: Vec<Option<Fault>>,
 }
 
@@ -61,7 +59,6 @@ pub(super) struct Reading {
 }
 
 impl Sensor {
-    /// The raw value.
     pub(super) fn read(&self, reading: &Reading) -> f64 {
         let sigma = match self.faults[reading.index] {
             Some(Fault::Dead) => return self.kind.value(0.0, 0.0),

@@ -11,7 +11,6 @@ use crate::source::serial::taps::ChannelTap;
 use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, PacketOrder, layout_hash};
 
 impl LineState {
-    /// Counts the frames lost before a packet.
     pub(super) fn count_losses(&mut self, head: &Head, order: &PacketOrder, now: Duration) {
         let Some((board, id)) = self.joined.filter(|(_, id)| *id == head.board) else { return };
         let mut state = self.config.shared.lock();
@@ -27,7 +26,6 @@ impl LineState {
         }
     }
 
-    /// The board must be identified again.
     fn reset_identity(&mut self, now: Duration) {
         (self.board, self.since) = (None, now);
     }
@@ -153,7 +151,6 @@ impl LineState {
     }
 }
 
-/// Whether `identity` fits the wiring's board.
 fn fits(wired: &WiredBoard, identity: &Identity<'_>) -> Result<(), String> {
     let (channels, taxels) = (usize::from(identity.channels), &wired.taxels);
     if channels < taxels.len() {

@@ -20,7 +20,6 @@ impl LineState {
         }
     }
 
-    /// Handles the result of a tap request.
     pub(super) fn tap_ended(&mut self, ended: Ended) {
         let (Command::Tap { channel, tap }, Some((board, id))) = (ended.command, self.joined) else { return };
         let mut state = self.config.shared.lock();
