@@ -41,9 +41,9 @@
 //!
 //! # Features
 //!
-//! `cli` (default) is the command and what only it needs; `gpu` (default) is the WGSL backend; `page` (default) is the page
-//! that shows a run in a browser. A robot that embeds the
-//! library on its CPU goes without both, and builds in a fraction of the time.
+//! All of these are there by default: `cli` is the command and what only it needs, `gpu` the WGSL backend, `page` the page
+//! that shows a run in a browser. `serial` (boards on serial lines) and `mcap` (recordings) come with `cli`. A robot that embeds
+//! the library on its CPU goes without all of them, and builds in a fraction of the time.
 
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]

@@ -65,6 +65,17 @@ impl Server {
         self.listen.url(self.address, &self.token)
     }
 
+    /// What to tell people: the page's address, and a warning where other machines reach it; lines that end.
+    #[must_use]
+    pub fn announcement(&self) -> String {
+        let mut text = format!("page at {}\n", self.url());
+        if self.listen.is_open_to_others() {
+            text += "somatic: other machines reach this page, and its token travels in clear text; an SSH tunnel to \
+                     127.0.0.1 keeps it private\n";
+        }
+        text
+    }
+
     /// What viewers ask for, in order, for a player to answer through [`Server::replies`]. Without a player the server
     /// answers that frames come as they come. A second call gives none.
     pub fn requests(&mut self) -> Option<Receiver<(ViewerId, Request)>> {

@@ -18,7 +18,7 @@ pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;
 pub use self::survey::{Rhythm, Survey, Topic};
-pub(crate) use self::view::{Arrow, Cloud, Scene, Transforms};
+pub(crate) use self::view::{Arrow, Cloud, Scene, Transforms, scalars, surface};
 
 /// The topic of the frames.
 pub const FRAMES: &str = "/somatic/frames";
@@ -30,6 +30,11 @@ pub const TAXELS: &str = "/somatic/taxels";
 pub const TOUCHES: &str = "/somatic/touches";
 /// The topic of where links are.
 pub const LINKS: &str = "/somatic/links";
+
+/// The topic of the body's surface.
+pub const SURFACE: &str = "/somatic/body";
+/// What the topics of top fields begin with; the field's name follows.
+pub const FIELDS: &str = "/somatic/fields/";
 
 /// Media type of the attached body.
 pub const BODY: &str = "model/gltf-binary";

@@ -10,8 +10,8 @@ use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 
 use super::{
-    FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, TAXEL_IDS, TAXELS, TOUCHES, frames, nanoseconds, schemas,
-    words_of,
+    FIELDS, FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, SURFACE, TAXEL_IDS, TAXELS, TOUCHES, frames,
+    nanoseconds, schemas, words_of,
 };
 use crate::error::{Error, Result, failed};
 use crate::output::{GrowingFile, OutputPath};
@@ -32,7 +32,7 @@ pub struct Recorder {
     /// `None` once the end is written.
     writer: Option<Writer>,
     /// By topic, in the order in which they came up.
-    channels: Vec<(&'static str, u16, u32)>,
+    channels: Vec<(String, u16, u32)>,
     taxels: String,
     message: Vec<u8>,
     flushed: Instant,
@@ -107,15 +107,15 @@ impl Recorder {
     ///
     /// # Errors
     /// It cannot be written.
-    pub(crate) fn write(&mut self, topic: &'static str, t_s: f64, message: &[u8]) -> Result<()> {
-        let index = match self.channels.iter().position(|(known, ..)| *known == topic) {
+    pub(crate) fn write(&mut self, topic: &str, t_s: f64, message: &[u8]) -> Result<()> {
+        let index = match self.channels.iter().position(|(known, ..)| known == topic) {
             Some(index) => index,
             None => {
                 // The first one is that of frames, as the preface says.
                 let first = Some(FRAMES).filter(|_| self.channels.is_empty() && topic != FRAMES);
                 for topic in first.into_iter().chain([topic]) {
                     let id = self.add_channel(topic)?;
-                    self.channels.push((topic, id, 0));
+                    self.channels.push((topic.to_owned(), id, 0));
                 }
                 self.channels.len() - 1
             }
@@ -129,13 +129,14 @@ impl Recorder {
         self.with(|writer| writer.write_to_known_channel(&header, message))
     }
 
-    fn add_channel(&mut self, topic: &'static str) -> Result<u16> {
+    fn add_channel(&mut self, topic: &str) -> Result<u16> {
         let (schema, encoding, message_encoding, data) = match topic {
             FRAMES => ("somatic.Frame", "protobuf", "protobuf", schemas::somatic()),
             PERCEPTS => ("somatic.Percepts", "jsonschema", "json", schemas::PERCEPTS.as_bytes().to_vec()),
             TAXELS => ("foxglove.PointCloud", "protobuf", "protobuf", schemas::foxglove()),
-            TOUCHES => ("foxglove.SceneUpdate", "protobuf", "protobuf", schemas::foxglove()),
+            SURFACE | TOUCHES => ("foxglove.SceneUpdate", "protobuf", "protobuf", schemas::foxglove()),
             LINKS => ("foxglove.FrameTransforms", "protobuf", "protobuf", schemas::foxglove()),
+            topic if topic.starts_with(FIELDS) => ("somatic.Field", "protobuf", "protobuf", schemas::somatic()),
             _ => unreachable!("a recording has no topic {topic}"),
         };
         let metadata = match topic {

@@ -79,18 +79,22 @@ const ENUMERATIONS: [Enumeration; 3] = [
 ];
 
 /// The messages of [`super::frames`].
-const SOMATIC: [Message; 2] = [
+const SOMATIC: [Message; 3] = [
     (
         "Frame",
         "double t 1; repeated float values 2; repeated uint32 missing 3; repeated uint32 present 4; repeated LinkPose poses 5; \
          repeated uint32 stale 6",
     ),
     ("LinkPose", "string link 1; repeated double pose 2"),
+    ("Field", "google.protobuf.Timestamp timestamp 1; double total 2; double area 3"),
 ];
 
 pub(super) fn somatic() -> Vec<u8> {
     let mut set = Vec::new();
-    file(&mut Writer(&mut set), "somatic.proto", "somatic", &[], &SOMATIC, &[]);
+    let mut writer = Writer(&mut set);
+    let (path, message) = GOOGLE[0];
+    file(&mut writer, path, "google.protobuf", &[], &[message], &[]);
+    file(&mut writer, "somatic.proto", "somatic", &[path], &SOMATIC, &[]);
     set
 }
 

@@ -15,6 +15,8 @@ const FLOAT32: u64 = 7;
 /// Red, green and blue of what is touched, and of a taxel that is not.
 const TOUCHED: [f64; 3] = [0.95, 0.35, 0.1];
 const UNTOUCHED: [f64; 3] = [0.35, 0.4, 0.5];
+/// Red, green, blue and opacity of the body's surface.
+const SURFACE_COLOUR: [f64; 4] = [0.62, 0.62, 0.60, 1.0];
 /// `ALL` of `SceneEntityDeletion.Type`.
 const ALL: u64 = 1;
 
@@ -41,13 +43,46 @@ fn pose(writer: &mut Writer<'_>, field: u32, place: [f64; 3], rotation: DQuat) {
     });
 }
 
-/// [`TOUCHED`], so opaque.
-fn colour(writer: &mut Writer<'_>, field: u32, alpha: f64) {
+fn rgba(writer: &mut Writer<'_>, field: u32, colour: [f64; 4]) {
     writer.message(field, |writer| {
-        for (field, value) in (1..).zip(TOUCHED.into_iter().chain([alpha])) {
+        for (field, value) in (1..).zip(colour) {
             writer.double(field, value);
         }
     });
+}
+
+/// [`TOUCHED`], so opaque.
+fn colour(writer: &mut Writer<'_>, field: u32, alpha: f64) {
+    let [r, g, b] = TOUCHED;
+    rgba(writer, field, [r, g, b, alpha]);
+}
+
+/// The surface of a body as `foxglove.SceneUpdate`, appended to `to`: of each link its triangles, corners in the link's frame, m.
+pub(crate) fn surface(time_ns: u64, links: &[(&str, Vec<[DVec3; 3]>)], to: &mut Vec<u8>) {
+    let mut writer = Writer(to);
+    for (link, triangles) in links.iter().filter(|(_, triangles)| !triangles.is_empty()) {
+        writer.message(2, |entity| {
+            entity.time(1, time_ns);
+            entity.text(2, link);
+            entity.text(3, &format!("surface/{link}"));
+            entity.number(5, 1);
+            entity.message(12, |list| {
+                pose(list, 1, [0.0; 3], DQuat::IDENTITY);
+                triangles.iter().flatten().for_each(|corner| vector(list, 2, corner.to_array()));
+                rgba(list, 3, SURFACE_COLOUR);
+            });
+        });
+    }
+}
+
+/// What plots show of a field, `somatic.Field`, appended to `to`: its total, and its area, m², where it is known.
+pub(crate) fn scalars(time_ns: u64, total: f64, area: Option<f64>, to: &mut Vec<u8>) {
+    let mut writer = Writer(to);
+    writer.time(1, time_ns);
+    writer.double(2, total);
+    if let Some(area) = area {
+        writer.double(3, area);
+    }
 }
 
 /// Taxels as points, m in the world, each with its pressure and a colour for it.

@@ -33,13 +33,8 @@ impl PageSink {
             recorded_max: None,
         };
         let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
-        let mut text = format!("page at {}\n", server.url());
-        if listen.is_open_to_others() {
-            text += "somatic: other machines reach this page, and its token travels in clear text; an SSH tunnel to \
-                     127.0.0.1 keeps it private\n";
-        }
         // A closed standard error is no reason to stop.
-        let _ = io::stderr().write_all(text.as_bytes());
+        let _ = io::stderr().write_all(server.announcement().as_bytes());
         Ok(Self { publisher, server })
     }
 

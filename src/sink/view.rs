@@ -8,7 +8,9 @@ use super::{FieldNames, InputFrames};
 use crate::body::Body;
 use crate::error::Result;
 use crate::percept::Percepts;
-use crate::recording::{Arrow, Cloud, LINKS, Recorder, Scene, TAXELS, TOUCHES, Transforms, nanoseconds};
+use crate::recording::{
+    Arrow, Cloud, FIELDS, LINKS, Recorder, SURFACE, Scene, TAXELS, TOUCHES, Transforms, nanoseconds, scalars, surface,
+};
 use crate::signal::Frame;
 
 /// Period of the taxels' messages, s.
@@ -52,6 +54,10 @@ pub(super) struct ViewWriter {
     /// Per taxel id, its link and position in it, m.
     taxels: HashMap<u32, (usize, DVec3)>,
     fields: Vec<(String, String)>,
+    /// Topics of the fields without parents, each with the field's index.
+    top_fields: Vec<(String, usize)>,
+    /// By link, the corners of its triangles in its frame, m, until they are written.
+    surface: Option<Vec<Vec<[DVec3; 3]>>>,
     cloud: Cloud,
     pressures: Vec<(u32, f64)>,
     max_total: f64,
@@ -81,12 +87,26 @@ impl ViewWriter {
             let name = marks.fold(names.field.clone(), |name, mark| format!("{name} ({mark})"));
             (name, names.link.clone())
         };
+        let mut surface = vec![Vec::new(); links.len()];
+        for (link, corners) in body.triangles_at_rest() {
+            let link_from_world = body.links[link].world_from_link.inverse();
+            surface[link].push(corners.map(|corner| link_from_world.transform_point3(corner)));
+        }
+        let is_computed = |name: &str| names.iter().any(|names| names.field == name);
+        let is_top = |name: &str| {
+            let parent = body.fields.iter().find(|spec| spec.name == name).and_then(|spec| spec.parent.as_deref());
+            !parent.is_some_and(is_computed)
+        };
+        let fields: Vec<(String, String)> = names.iter().map(field).collect();
+        let top = names.iter().zip(&fields).enumerate().filter(|(_, (names, _))| is_top(&names.field));
         Self {
+            top_fields: top.map(|(index, (_, (name, _)))| (format!("{FIELDS}{name}"), index)).collect(),
+            surface: Some(surface),
             index_of: links.iter().enumerate().map(|(index, link)| (link.name.clone(), index)).collect(),
             world: links.iter().map(|link| link.world_from_link).collect(),
             taxels: body.taxels.iter().map(|taxel| (taxel.id, (taxel.link, taxel.position_in_link))).collect(),
             links,
-            fields: names.iter().map(field).collect(),
+            fields,
             cloud: Cloud::default(),
             pressures: Vec::new(),
             max_total: 0.0,
@@ -99,6 +119,12 @@ impl ViewWriter {
 
     /// Writes links and taxels.
     pub(super) fn write_frames(&mut self, input: &InputFrames<'_>, recorder: &mut Recorder) -> Result<()> {
+        if let (Some(first), Some(corners)) = (input.frames.first(), self.surface.take()) {
+            let links: Vec<_> = self.links.iter().map(|link| link.name.as_str()).zip(corners).collect();
+            self.message.clear();
+            surface(nanoseconds(first.t_s), &links, &mut self.message);
+            recorder.write(SURFACE, first.t_s, &self.message)?;
+        }
         for frame in input.frames {
             let [taxels, _, links] = &mut self.timers;
             let period_s = if frame.pose.is_empty() { LINKS_PERIOD_S } else { TOUCHES_PERIOD_S };
@@ -156,6 +182,14 @@ impl ViewWriter {
     pub(super) fn write_touches(&mut self, percepts: &Percepts, recorder: &mut Recorder) -> Result<()> {
         for frame in 0..percepts.frames() {
             let t_s = percepts.t_s(frame);
+            for (topic, field) in &self.top_fields {
+                let percept = percepts.get(frame, *field);
+                if let Some(total) = percept.total {
+                    self.message.clear();
+                    scalars(nanoseconds(t_s), total, percept.area, &mut self.message);
+                    recorder.write(topic, t_s, &self.message)?;
+                }
+            }
             if !self.timers[1].is_due(t_s, TOUCHES_PERIOD_S) {
                 continue;
             }

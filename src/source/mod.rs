@@ -5,12 +5,12 @@
 mod csv;
 mod csv_file;
 mod ndjson;
-#[cfg(feature = "cli")]
+#[cfg(feature = "serial")]
 mod ports;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod replay;
-#[cfg(feature = "cli")]
+#[cfg(feature = "serial")]
 mod serial;
 mod simulated;
 mod spec;
@@ -19,10 +19,10 @@ mod unknown_taxels;
 pub use self::csv::CsvSource;
 pub use csv_file::CsvFile;
 pub use ndjson::NdjsonSource;
-#[cfg(feature = "cli")]
+#[cfg(feature = "serial")]
 pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
-#[cfg(feature = "cli")]
+#[cfg(feature = "serial")]
 pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, Notice, SerialOptions, SerialSource, TapTrouble};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;

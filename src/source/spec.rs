@@ -133,14 +133,14 @@ impl SourceSpec {
                 Err(Error::failed("this build reads no MCAP; build with feature `mcap`").at(path.display()))
             }
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
-            #[cfg(feature = "cli")]
+            #[cfg(feature = "serial")]
             Self::Serial { port, baud } => {
                 let ports = [(port.clone(), *baud)];
                 Ok(Box::new(super::SerialSource::open(&ports, taxels, &super::SerialOptions::default())?))
             }
-            #[cfg(not(feature = "cli"))]
+            #[cfg(not(feature = "serial"))]
             Self::Serial { port, .. } => {
-                Err(Error::failed("this build reads no serial lines; build with feature `cli`").at(port))
+                Err(Error::failed("this build reads no serial lines; build with feature `serial`").at(port))
             }
         }
     }

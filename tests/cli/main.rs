@@ -4,6 +4,8 @@ mod author;
 mod bench;
 #[cfg(unix)]
 mod board;
+#[cfg(feature = "page")]
+mod browser;
 mod calibrate;
 mod devices;
 mod doubts;
@@ -31,6 +33,8 @@ mod sources;
 mod tradeoff;
 #[cfg(unix)]
 mod tune;
+#[cfg(all(unix, feature = "page"))]
+mod view;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

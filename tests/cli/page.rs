@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 use super::{code_of, fails, somatic};
 
 /// A run with a page.
-struct Run {
+pub(super) struct Run {
     child: Child,
     port: u16,
     token: String,
@@ -22,8 +22,12 @@ struct Run {
 impl Run {
     /// The bundled touch, over and over.
     fn start(arguments: &[&str]) -> Self {
-        let all = [&["run", "--quiet", "--loop", "--sink", "page:127.0.0.1:0"], arguments].concat();
-        let mut child = somatic(&all).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        Self::of(&[&["run", "--quiet", "--loop", "--sink", "page:127.0.0.1:0"], arguments].concat())
+    }
+
+    /// A command that serves a page.
+    pub(super) fn of(arguments: &[&str]) -> Self {
+        let mut child = somatic(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let address = lines.find_map(|line| line.unwrap().strip_prefix("page at http://127.0.0.1:").map(str::to_owned));
         let address = address.expect("it says where the page is");
@@ -78,13 +82,13 @@ impl Run {
         self.socket(&self.host(), Some(&format!("http://{}", self.host()))).unwrap()
     }
 
-    fn viewer(&self) -> Viewer {
+    pub(super) fn viewer(&self) -> Viewer {
         let mut socket = self.own_socket();
         say(&mut socket, &json!({"type": "hello", "version": 1, "token": self.token, "after_event": null}));
         Viewer { socket, texts: Vec::new() }
     }
 
-    fn interrupt(&mut self) -> Option<i32> {
+    pub(super) fn interrupt(&mut self) -> Option<i32> {
         Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         code_of(&mut self.child)
     }
@@ -105,7 +109,7 @@ impl Drop for Run {
     }
 }
 
-fn say(socket: &mut WebSocket<TcpStream>, message: &Value) {
+pub(super) fn say(socket: &mut WebSocket<TcpStream>, message: &Value) {
     socket.send(Message::text(message.to_string())).unwrap();
 }
 
@@ -121,14 +125,14 @@ fn closed(mut socket: WebSocket<TcpStream>) -> u16 {
 }
 
 /// A client that is let in.
-struct Viewer {
-    socket: WebSocket<TcpStream>,
-    texts: Vec<Value>,
+pub(super) struct Viewer {
+    pub(super) socket: WebSocket<TcpStream>,
+    pub(super) texts: Vec<Value>,
 }
 
 impl Viewer {
     /// The next binary message; texts are kept.
-    fn binary(&mut self) -> Vec<u8> {
+    pub(super) fn binary(&mut self) -> Vec<u8> {
         loop {
             match self.socket.read().unwrap() {
                 Message::Binary(bytes) => return bytes.to_vec(),
@@ -139,23 +143,23 @@ impl Viewer {
     }
 
     /// The next frame, said to be drawn.
-    fn frame(&mut self) -> Vec<u8> {
+    pub(super) fn frame(&mut self) -> Vec<u8> {
         let frame = self.binary();
         assert_eq!((frame[0], frame[1]), (2, 1));
         say(&mut self.socket, &json!({"type": "drawn", "seq": u32_at(&frame, 4)}));
         frame
     }
 
-    fn text(&self, kind: &str) -> Option<&Value> {
+    pub(super) fn text(&self, kind: &str) -> Option<&Value> {
         self.texts.iter().find(|text| text["type"] == kind)
     }
 }
 
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
+pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
 }
 
-fn f32_at(bytes: &[u8], at: usize) -> f32 {
+pub(super) fn f32_at(bytes: &[u8], at: usize) -> f32 {
     f32::from_bits(u32_at(bytes, at))
 }
 

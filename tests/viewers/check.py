@@ -70,11 +70,13 @@ def points(cloud):
 
 
 said = messages(sys.argv[1])
-rows = {}
+rows, fields = {}, {}
 for chunk in McapReader(sys.argv[1]).stream():
     listed = chunk.to_record_batch().to_pylist()
     if any(name.startswith(("Points3D", "Transform3D")) for name in (listed[0] if listed else [])):
         rows.setdefault(chunk.entity_path, []).extend(listed)
+    if str(chunk.entity_path).startswith("/somatic/fields/"):
+        fields.setdefault(str(chunk.entity_path), []).extend(listed)
 
 clouds, shown = said["/somatic/taxels"], rows["/somatic/taxels"]
 assert len(shown) == len(clouds) > 50
@@ -84,6 +86,13 @@ for row, (time, cloud) in zip(shown, clouds):
     assert row["CoordinateFrame:frame"] == [cloud.frame_id] == ["world"]
 many = {colour for row in shown for colour in row["Points3D:colors"]}
 assert len(many) > 20, "what is pressed has another colour"
+surfaces = [entity for _, update in said["/somatic/body"] for entity in update.entities]
+corners = {entity.frame_id: len(entity.triangles[0].points) for entity in surfaces}
+assert len(surfaces) == 5 and all(count > 0 and count % 3 == 0 for count in corners.values()), corners
+print(f"the surfaces of {', '.join(corners)} lie in the recording, {sum(corners.values()) // 3} triangles in all")
+totals = [row for path, of in fields.items() if path == "/somatic/fields/hand" for row in of]
+assert len(totals) == 280, len(totals)
+print(f"Rerun lists {len(totals)} totals of the field hand: {sorted(totals[0])}")
 print(f"Rerun shows {len(clouds)} clouds of {len(places)} taxels, in {len(many)} colours")
 
 told = [(link.parent_frame_id, link.child_frame_id, [link.translation.x, link.translation.y, link.translation.z])

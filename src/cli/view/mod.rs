@@ -7,6 +7,7 @@ mod recording;
 mod subject;
 mod timeline;
 
+use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -109,10 +110,8 @@ impl Opening<'_> {
     /// Serves `scene` and says where.
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
-        if self.listen.is_open_to_others() {
-            say("other machines can reach this page, and its token travels in clear text; an SSH tunnel is safer");
-        }
-        say(&format!("page at {} (Ctrl-C ends)", server.url()));
+        // A closed standard error is no reason to stop.
+        let _ = std::io::stderr().write_all(server.announcement().as_bytes());
         let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,
             Err(error) => {

@@ -1,0 +1,156 @@
+//! `somatic view`: a recording played, entered anywhere, and explained.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::page::{Run, Viewer, f32_at, say, u32_at};
+use super::{done, fails, frames};
+
+const VIEW: [&str; 5] = ["view", "--listen", "127.0.0.1:0", "--backend", "cpu"];
+
+/// Waits for a text of `kind` that `is` so.
+fn text(viewer: &mut Viewer, kind: &str, is: impl Fn(&Value) -> bool) -> Value {
+    let start = Instant::now();
+    loop {
+        if let Some(at) = viewer.texts.iter().position(|text| text["type"] == kind && is(text)) {
+            return viewer.texts.remove(at);
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "no {kind} among {:?}", viewer.texts);
+        match viewer.socket.read().unwrap() {
+            tungstenite::Message::Text(text) => viewer.texts.push(serde_json::from_str(&text).unwrap()),
+            tungstenite::Message::Binary(bytes) if bytes[0] == 2 => {
+                say(&mut viewer.socket, &json!({"type": "drawn", "seq": u32_at(&bytes, 4)}));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The frame of number `number`.
+fn frame(viewer: &mut Viewer, number: u64) -> Vec<u8> {
+    let start = Instant::now();
+    loop {
+        let frame = viewer.frame();
+        if u64::from_le_bytes(frame[8..16].try_into().unwrap()) == number {
+            return frame;
+        }
+        assert!(start.elapsed() < Duration::from_secs(20));
+    }
+}
+
+/// A frame's fields in contact, each with its total, which is the only column asked for.
+fn totals(frame: &[u8], taxels: usize) -> Vec<(u32, f32)> {
+    let sections = u16::from_le_bytes([frame[2], frame[3]]);
+    let count = u32_at(frame, 36) as usize;
+    let padded = |bytes: usize| bytes.next_multiple_of(8);
+    let at = 64 + if sections & 1 == 1 { padded(5 * taxels) } else { 0 };
+    assert!(sections & 0b110 == 0b100 || count == 0, "percepts, and no poses: {sections:b}");
+    (0..count).map(|k| (u32_at(frame, at + 4 * k), f32_at(frame, at + 4 * (3 * count + k)))).collect()
+}
+
+#[test]
+fn a_recording_is_entered_anywhere_with_the_percepts_of_an_uninterrupted_run() {
+    let run = frames(&done(&["run", "--quiet", "--backend", "cpu", "--sink", "-"]));
+    let mut view = Run::of(&VIEW);
+    let mut viewer = view.viewer();
+    viewer.binary();
+    let welcome = text(&mut viewer, "welcome", |_| true);
+    assert_eq!((&welcome["mode"], &welcome["time"]["frames"]), (&"recording".into(), &run.len().into()));
+    let taxels = 40;
+    say(&mut viewer.socket, &json!({"type": "columns", "columns": ["total"]}));
+    say(&mut viewer.socket, &json!({"type": "pause"}));
+    text(&mut viewer, "status", |status| status["playing"] == false);
+    for number in [150, 20, 208, 150, 279] {
+        let expected = &run[number];
+        say(&mut viewer.socket, &json!({"type": "seek", "t_s": expected["t"]}));
+        let shown = totals(&frame(&mut viewer, number as u64), taxels);
+        let expected: Vec<(&str, f32)> = expected["fields"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|percept| (percept["field"].as_str().unwrap(), percept["total"].as_f64().unwrap() as f32))
+            .collect();
+        let label = |field: u32| welcome["fields"][field as usize]["label"].as_str().unwrap();
+        let shown: Vec<(&str, f32)> = shown.into_iter().map(|(field, total)| (label(field), total)).collect();
+        assert_eq!(shown, expected, "frame {number}");
+    }
+    // A step back, and over the end.
+    say(&mut viewer.socket, &json!({"type": "step", "frames": -3}));
+    frame(&mut viewer, 276);
+    say(&mut viewer.socket, &json!({"type": "step", "frames": 1000}));
+    frame(&mut viewer, 279);
+    text(&mut viewer, "status", |status| status["at_end"] == true);
+    let timeline = text(&mut viewer, "timeline", |_| true);
+    let peaks = timeline["peak"].as_array().unwrap();
+    assert!(peaks.iter().any(Value::is_null) && peaks.iter().any(|peak| peak.as_f64() > Some(100.0)), "{timeline}");
+    assert_eq!(view.interrupt(), Some(0));
+}
+
+#[test]
+fn a_percept_is_explained_and_its_history_told() {
+    let run = frames(&done(&["run", "--quiet", "--backend", "cpu", "--sink", "-"]));
+    let mut view = Run::of(&VIEW);
+    let mut viewer = view.viewer();
+    viewer.binary();
+    let welcome = text(&mut viewer, "welcome", |_| true);
+    let field = welcome["fields"].as_array().unwrap().iter().position(|field| field["name"] == "hand/back").unwrap();
+    say(&mut viewer.socket, &json!({"type": "pause"}));
+    say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
+    text(&mut viewer, "status", |status| status["playing"] == false);
+    frame(&mut viewer, 145);
+    say(&mut viewer.socket, &json!({"type": "explain", "field": field}));
+    let why = text(&mut viewer, "explain", |_| true);
+    assert_eq!((&why["frame"], &why["backend"], &why["t_s"]), (&145.into(), &"cpu".into(), &2.9.into()));
+    let columns = why["columns"].as_array().unwrap();
+    assert!(columns.len() > 10 && columns.iter().all(|column| column["verdict"] == "agrees"), "{why}");
+    let total = columns.iter().find(|column| column["name"] == "total").unwrap();
+    let [value, reference] = ["value", "reference"].map(|of| total[of][0].as_f64().unwrap());
+    assert!((value - reference).abs() <= total["bound"].as_f64().unwrap());
+    let sum: f64 = why["members"].as_array().unwrap().iter().filter_map(|member| member["pressure"].as_f64()).sum();
+    assert_eq!(sum, reference, "weights of the hand are 1");
+
+    let series = json!([{"field": field, "column": "total", "component": 0}]);
+    let ask = json!({"type": "history", "id": 9, "from_s": 0.0, "to_s": 5.6, "bins": 7, "series": series});
+    say(&mut viewer.socket, &ask);
+    let history = loop {
+        let bytes = viewer.binary();
+        if bytes[0] == 3 {
+            break bytes;
+        }
+    };
+    assert_eq!([4, 8, 12].map(|at| u32_at(&history, at)), [9, 7, 1]);
+    let most = (0..7).map(|bin| f32_at(&history, 32 + 4 * (7 + bin))).fold(0.0, f32::max);
+    let totals = run.iter().flat_map(|frame| frame["fields"].as_array().unwrap().clone());
+    let of_back = totals.filter(|percept| percept["field"] == "hand/back");
+    let largest = of_back.map(|percept| percept["total"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert_eq!(most, largest as f32, "no peak is lost");
+    assert_eq!(view.interrupt(), Some(0));
+}
+
+#[test]
+fn a_body_is_shown_at_rest() {
+    let mut view = Run::of(&["view", "humanoid", "--listen", "127.0.0.1:0"]);
+    let mut viewer = view.viewer();
+    let mesh = viewer.binary();
+    assert_eq!(mesh[0], 1);
+    text(&mut viewer, "ended", |ended| ended["reason"].as_str().unwrap().contains("at rest"));
+    assert_eq!(view.interrupt(), Some(0));
+}
+
+#[test]
+fn what_cannot_be_shown_is_one_line() {
+    for (code, arguments, word) in [
+        (2, &["view", "robot"][..], "give a body"),
+        (1, &["view", "none.mcap"], "no such file"),
+        (1, &["view", "none.toml"], "no such file"),
+        (2, &["view", "hand", "--body", "mat"], "give one of them"),
+        (2, &["view", "a.csv", "--source", "b.csv"], "give one of them"),
+        (2, &["view", "--source", "-"], "--sink page"),
+        (2, &["view", "--listen", "0.0.0.0:0"], "--allow-host"),
+        (2, &["view", "--for", "soon"], "is not a time"),
+    ] {
+        let line = fails(code, arguments);
+        assert!(line.contains(word) && line.lines().count() == 1, "{arguments:?}: {line}");
+    }
+}
