@@ -10,7 +10,7 @@ use self::skips::skip;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
 const RUN_ELSEWHERE: [&str; 15] = [
-    "cargo run --release -- run",
+    "cargo run --release -- view --open",
     "cargo run --release --example embed",
     "cargo run --example bodies",
     "cargo run --example bodies -- --check",

@@ -59,11 +59,10 @@ const GREETING: &str = concat!(
     ", a sense of touch for whole robots: touch frames in, percepts out
 
   somatic run         turn touch frames into percepts; alone, on a bundled touch
-  somatic view        show a body or a recording in a browser; alone, a bundled touch
+  somatic view        show it in a browser: a body, a recording or a scene
   somatic inspect     show the taxels and fields of a body
   somatic author      put taxels and fields on a mesh
   somatic calibrate   calibrate the sensors from a rest and a press
-  somatic bench       measure how fast this machine computes percepts
 
 All commands: somatic --help. First flags of one: somatic run -h
 "

@@ -25,9 +25,9 @@ Examples:
   somatic render hand -o touch.png --source touch.csv --at 2.9
   somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
 
-With a recording, taxels have the colours of their pressures, and each touched field without
-children has its centroid, the line of its orientation, its principal axis as an ellipse and its
-motion of a quarter of a second as an arrow. A taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
+With a recording, taxels have the colours of their pressures, and each touched field has its
+centroid, the line of its orientation, its principal axis as an ellipse and its motion of a
+quarter of a second as an arrow; of nested fields the largest with a chart. Otherwise a taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
 side by side differ in colour.";
 
 /// Draw a body, its taxels coloured by field, or by their pressures in a recording.

@@ -107,12 +107,6 @@ pub(super) struct RunOptions {
     #[arg(long)]
     pub(super) verify: bool,
 
-    /// Let browsers reach the page by this host name too; without one it is for this machine alone. May be repeated.
-    #[arg(long = "allow-host", value_name = "NAME", help_heading = OUTPUT)]
-    #[serde(rename = "allow_host", deserialize_with = "words")]
-    #[schemars(with = "OneOrMany")]
-    pub(super) allow_hosts: Vec<String>,
-
     /// Replace output files that exist; a file that is read is never replaced.
     #[arg(long)]
     pub(super) force: bool,
@@ -236,6 +230,12 @@ pub(super) struct RunOptions {
     #[serde(deserialize_with = "batch")]
     #[schemars(range(min = 1, max = 65536))]
     pub(super) batch: Option<u32>,
+
+    /// Let browsers reach the page by this host name too; without one it is for this machine alone. May be repeated.
+    #[arg(long = "allow-host", value_name = "NAME", help_heading = OUTPUT)]
+    #[serde(rename = "allow_host", deserialize_with = "words")]
+    #[schemars(with = "OneOrMany")]
+    pub(super) allow_hosts: Vec<String>,
 
     /// Write fields without contact too.
     #[arg(long, help_heading = OUTPUT)]

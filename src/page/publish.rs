@@ -166,7 +166,8 @@ impl Publisher {
     pub fn ended(&mut self, reason: &str) {
         self.flush();
         self.exchange.lock().ended = Some(reason.to_owned());
-        self.exchange.wake_for_viewers();
+        // Also where nobody looks yet: whoever comes later is told.
+        self.exchange.waker().wake();
     }
 
     fn hand_over(&mut self, mut shared: MutexGuard<'_, Shared>) {

@@ -417,7 +417,7 @@ fn standard_streams_led_into_an_input_are_that_input() {
 }
 
 /// Flags and places of arguments that name what is read.
-const READ: [&str; 11] = [
+const READ: [&str; 12] = [
     "--body",
     "--source",
     "--calibration",
@@ -429,6 +429,7 @@ const READ: [&str; 11] = [
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
+    "[WHAT]",
 ];
 
 /// What values that name no file are called.
@@ -442,6 +443,7 @@ const NO_FILES: &[&str] = &[
     "FRAME",
     "GLOB",
     "HOW",
+    "HOST:PORT",
     "HZ",
     "ID",
     "K",
@@ -453,6 +455,7 @@ const NO_FILES: &[&str] = &[
     "M",
     "MEASURE",
     "N",
+    "NAME",
     "OUTPUT,...",
     "P",
     "PART,...",

@@ -732,6 +732,24 @@ fn another_library_reads_the_same() {
     let links = said["links"][0].as_array().unwrap();
     assert_eq!(links.len(), body.links.len());
     assert!(links.iter().all(|link| link["parent"] == "world"));
+    // The surface, each link's in its frame, once; and the totals of the field without a parent, every frame.
+    let [surface] = &said["body"].as_array().unwrap()[..] else { panic!("{}", said["body"]) };
+    let triangles = body.triangles_at_rest();
+    let (link, corners) = &triangles[0];
+    let first = &surface[&body.links[*link].name][0];
+    let corner = body.links[*link].world_from_link.inverse().transform_point3(corners[0]);
+    assert_eq!(first, &serde_json::json!(corner.to_array()));
+    let points = surface.as_object().unwrap().values().map(|points| points.as_array().unwrap().len());
+    assert_eq!(points.sum::<usize>(), 3 * triangles.len());
+    let totals = said["fields"].as_array().unwrap();
+    assert!(totals.len() == rows.len() && totals.iter().all(|total| total["field"] == "hand"));
+    let of_hand = |line: &Value| line["fields"].as_array().unwrap().iter().find(|f| f["field"] == "hand").cloned();
+    for (total, line) in totals.iter().zip(&lines) {
+        let (wanted, area) =
+            of_hand(line).map_or((0.0, 0.0), |of| (of["total"].as_f64().unwrap(), of["area"].as_f64().unwrap()));
+        assert!(total["total"].as_f64().unwrap() as f32 == wanted as f32, "{total} {line}");
+        assert!(total["area"].as_f64().unwrap() as f32 == area as f32, "{total} {line}");
+    }
     assert!(said["attached"]["hand"][1].as_u64().unwrap() > 1000);
     let (_, info) = json(&path);
     let counted: u64 = info["topics"].as_array().unwrap().iter().map(|t| t["messages"].as_u64().unwrap()).sum();

@@ -90,6 +90,53 @@ fn a_chart_is_drawn_flat() {
     assert!(files_in(folder.path()).is_empty());
 }
 
+/// The colours of pressure at the ends of their scale.
+const LEAST: [u8; 3] = [0x26, 0x2F, 0x8B];
+const MOST: [u8; 3] = [0xFA, 0xEE, 0x76];
+
+#[test]
+fn a_touch_is_drawn_at_a_time_and_as_an_animation() {
+    let source = concat!("csv:", env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+    let of = |more: &[&str]| render(&[&["hand", "--source", source, "--size", "600", "--view", "top"], more].concat());
+    let (Some(rest), Some(touched)) = (of(&["--at", "0"]), of(&["--at", "2.9"])) else { return };
+    assert_eq!((rest.width, touched.width), (600, 600));
+    // The legend alone has the colours of pressure until something is touched.
+    for colour in [LEAST, MOST] {
+        let (before, after) = (rest.of_colour(colour), touched.of_colour(colour));
+        assert!(before > 10 && after > before + 100, "{colour:?}: {before} and {after} pixels");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let range = ["--from", "2", "--to", "3", "--rate", "5", "-o", text_of(&path)];
+    done(&[&["render", "hand", "--source", source, "--size", "400", "--view", "top"], &range[..]].concat());
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let control = *reader.info().animation_control().expect("an animation");
+    assert_eq!((control.num_frames, control.num_plays), (6, 0));
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let areas: Vec<u32> = (0..6)
+        .map(|_| {
+            let info = reader.next_frame(&mut pixels).unwrap();
+            info.width * info.height
+        })
+        .collect();
+    assert!(areas[1..].iter().all(|&area| area < areas[0]), "of later pictures what differs is stored: {areas:?}");
+    assert!(fails(2, &["render", "hand", "--at", "1", "-o", "b.png"]).contains("--source"));
+    let late = ["render", "hand", "--source", source, "--from", "60", "-o", "b.png"];
+    assert!(fails(2, &late).contains("no frames at that time"));
+}
+
+#[test]
+fn a_part_of_a_body_fills_a_picture_with_ids() {
+    let near = ["humanoid", "--size", "500", "--view", "front", "--ids"];
+    let Some(all) = render(&near) else { return };
+    let part = render(&[&near[..], &["--look-at", "head"]].concat()).unwrap();
+    let dark = |picture: &Picture| picture.pixels.chunks_exact(3).filter(|pixel| pixel.iter().all(|&p| p < 80)).count();
+    assert!(dark(&part) != dark(&all) && all.width == part.width);
+    let line = fails(2, &["render", "hand", "--look-at", "hand/plam", "-o", "b.png"]);
+    assert!(line.contains("did you mean `hand/palm`?"), "{line}");
+}
+
 #[test]
 fn what_cannot_be_drawn_is_told_in_a_line_and_leaves_nothing() {
     let (folder, path) = file("there.png", "not a picture");

@@ -45,17 +45,28 @@ def scene(message):
              "diameter": e.spheres[0].size.x, "arrows": len(e.arrows)} for e in message.entities]
 
 
+def surface(message):
+    return {e.frame_id: [vector(point) for point in e.triangles[0].points] for e in message.entities}
+
+
+def scalars(message):
+    name, field = message
+    return {"field": name, "total": field.total, "area": field.area, "ns": field.timestamp.ToNanoseconds()}
+
+
 def links(message):
     return [{"parent": t.parent_frame_id, "child": t.child_frame_id, "translation": vector(t.translation),
              "rotation": [t.rotation.x, t.rotation.y, t.rotation.z, t.rotation.w]} for t in message.transforms]
 
 
-said = {"schemas": {}, "frames": [], "percepts": [], "taxels": [], "touches": [], "links": []}
-decoders = {"frames": frame, "percepts": lambda m: m, "taxels": points, "touches": scene, "links": links}
+said = {"schemas": {}, "frames": [], "percepts": [], "taxels": [], "touches": [], "links": [], "body": [], "fields": []}
+decoders = {"frames": frame, "percepts": lambda m: m, "taxels": points, "touches": scene, "links": links, "body": surface, "fields": scalars}
 with open(sys.argv[1], "rb") as file:
     reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory(), Json()])
     for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
-        name = channel.topic.rsplit("/")[-1]
+        name = channel.topic.removeprefix("/somatic/")
+        if name.startswith("fields/"):
+            name, decoded = "fields", (name.removeprefix("fields/"), decoded)
         said["schemas"][channel.topic] = [schema.name, schema.encoding]
         said[name].append(decoders[name](decoded))
     said["attached"] = {a.name: [a.media_type, len(a.data)] for a in reader.iter_attachments()}

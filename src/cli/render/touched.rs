@@ -121,7 +121,7 @@ impl Flags {
         let scene: Scene = options.scene.clone().coordinates(Coordinates::Anchor);
         let mut engine = Engine::new(body, options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
-        let drawn: Vec<Option<usize>> = leaves(&engine, fields);
+        let drawn = marked(&engine, fields);
         let animated = self.from.is_some() || self.to.is_some();
         let (from_s, to_s) = match self.at {
             Some(t_s) => (f64::NEG_INFINITY, t_s),
@@ -142,7 +142,8 @@ impl Flags {
                 continue;
             }
             // The last one up to a time, every one that is due, or the one where most is pressed.
-            let is_due = if animated { frame.t_s >= next_s } else { self.at.is_some() || sum > most };
+            // A picture may be early by less than recordings tell times apart.
+            let is_due = if animated { frame.t_s >= next_s - 1e-6 } else { self.at.is_some() || sum > most };
             if !is_due {
                 continue;
             }
@@ -170,11 +171,15 @@ impl Flags {
     }
 }
 
-/// By field of the engine's plan, its index in `fields` if it has no children there.
-fn leaves(engine: &Engine, fields: &[Field]) -> Vec<Option<usize>> {
+/// By field of the engine's plan, its index in `fields` if it is marked: the largest fields with charts, and fields without
+/// children in none of those.
+fn marked(engine: &Engine, fields: &[Field]) -> Vec<Option<usize>> {
+    let above = |index: usize| std::iter::successors(fields[index].parent, |&parent| fields[parent].parent);
     let index = |name: &str| {
         let index = fields.iter().position(|field| field.name == name)?;
-        fields.iter().all(|field| field.parent != Some(index)).then_some(index)
+        let is_leaf = fields.iter().all(|field| field.parent != Some(index));
+        let within_another = above(index).any(|parent| fields[parent].chart.is_ok());
+        ((fields[index].chart.is_ok() || is_leaf) && !within_another).then_some(index)
     };
     engine.plan().fields().map(|(name, _)| index(name)).collect()
 }
