@@ -15,7 +15,6 @@ use crate::stage::{GivenLimit, Pressed, U, axis, centroid, contact, filter, hyst
 /// How far a single-precision percept may be off in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct CellBound {
-    /// Flags that may differ.
     pub(crate) in_doubt: Flags,
     /// By output, as its bit counts; of vectors as distances.
     pub(super) limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
@@ -103,7 +102,6 @@ impl BoundedReference {
         Self { reference: Reference::new(plan), doubts: vec![Doubt::default(); plan.fields.len()] }
     }
 
-    /// Calibrates from now on as `plan` does.
     pub(crate) fn recalibrate(&mut self, plan: &Plan) {
         self.reference.recalibrate(plan);
     }
@@ -128,7 +126,6 @@ impl BoundedReference {
             .collect()
     }
 
-    /// Goes on from the state of another backend.
     pub(crate) fn restore(&mut self, state: &BackendState) -> Result<()> {
         self.reference.restore(state)?;
         state.fields.iter().enumerate().for_each(|(index, field)| self.restore_field(index, *field));
@@ -248,7 +245,6 @@ impl BoundedReference {
         }
     }
 
-    /// Adds the bounds of separate touches.
     fn touches(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, doubt: &mut touches::Doubt) {
         let field = &self.reference.plan.fields[cell.index];
         let pulls = |member: usize, slot: u32, weight: f32| {

@@ -25,7 +25,6 @@ pub(crate) struct Chosen {
     pub(crate) why: String,
 }
 
-/// Makes the backend that `kind` asks for.
 pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Chosen> {
     let chosen = |backend: Box<dyn Backend>, why: String| Ok(Chosen { backend, why });
     match kind {

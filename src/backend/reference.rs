@@ -184,7 +184,6 @@ impl Reference {
     }
 }
 
-/// A cell that is made.
 struct Cell<'a> {
     parts: &'a mut Components<f64>,
     at: usize,

@@ -256,7 +256,6 @@ fn words(shape: &Shape) -> String {
     format!("{fields} of {members}{wide}, out of {}; {frames} a call", shape.sensors)
 }
 
-/// A time in the unit that suits it.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 1e-3 => format!("{:.2} µs", s * 1e6),

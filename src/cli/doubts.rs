@@ -30,7 +30,6 @@ pub(super) struct Doubts {
     /// Whether a taxel's pressure is its raw value.
     is_raw: bool,
     begin_s: Option<f64>,
-    /// Whether the check is over.
     is_over: bool,
     seen: Vec<ValueHistory>,
 }
@@ -78,7 +77,6 @@ impl Doubts {
         self.is_over
     }
 
-    /// The warnings.
     pub(super) fn of_frames(&self, plan: &Plan) -> Vec<String> {
         // Single frames on standard input may have few taxels.
         let of_body = (self.holds_any && self.is_over).then(|| self.of_body(plan, |seen| seen.came)).flatten();

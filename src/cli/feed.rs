@@ -13,7 +13,6 @@ pub(super) enum Arrival {
     Frames(Vec<Frame>, FrameInfo),
     /// The end; a line per kind of loss.
     End(Vec<String>),
-    /// Reading failed.
     Failed(Error),
 }
 
@@ -32,7 +31,6 @@ pub(super) struct FrameInfo {
     pub(super) losses: Vec<String>,
 }
 
-/// How frames are read and passed on.
 #[derive(Clone, Copy)]
 pub(super) struct ReadMode {
     /// Maximum number of frames per arrival.
@@ -104,7 +102,6 @@ impl Feed {
         Some(Arrival::Frames(frames, info))
     }
 
-    /// Takes back frames to reuse their memory.
     pub(super) fn give_back(&self, frames: Vec<Frame>) {
         let _ = self.spare.send(frames);
     }

@@ -24,7 +24,6 @@ impl FilesRead {
         self
     }
 
-    /// Bodies, with the files they refer to.
     pub(super) fn bodies<'a>(self, names: impl IntoIterator<Item = &'a String>) -> Self {
         self.files(names.into_iter().flat_map(Body::files))
     }

@@ -36,7 +36,6 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// What is known of a recording.
 struct Known {
     kind: &'static str,
     bytes: u64,

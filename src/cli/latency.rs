@@ -51,7 +51,6 @@ impl Latency {
         self.total == 0
     }
 
-    /// What `share` of all are no longer than.
     fn quantile(&self, share: f64) -> Duration {
         let wanted = ((self.total as f64 * share).ceil() as u64).max(1);
         let mut seen = 0;

@@ -204,7 +204,6 @@ fn told(account: &BoardAccount) -> String {
     text
 }
 
-/// Many boards in one row.
 fn together(accounts: &[BoardAccount]) -> String {
     let sum = |of: fn(&BoardAccount) -> u64| accounts.iter().map(of).sum::<u64>();
     let mut text = format!(

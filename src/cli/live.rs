@@ -19,7 +19,6 @@ const FADE_TIME: Duration = Duration::from_millis(700);
 /// Fields that a summary lists.
 const MAX_SUMMARY_ROWS: usize = 40;
 
-/// Which view a run gets.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum ViewKind {
     Table,
@@ -64,7 +63,6 @@ impl View {
         self.table.is_some()
     }
 
-    /// Adds what `percepts` say.
     pub(super) fn see(&mut self, percepts: &Percepts, progress: Option<f64>) {
         self.pace.see(percepts, progress);
         if let Some(table) = &mut self.table {
@@ -83,7 +81,6 @@ impl View {
         }
     }
 
-    /// Draws, if it is time to.
     pub(super) fn draw(&mut self) {
         if !self.is_due() {
             return;
@@ -137,7 +134,6 @@ impl ViewKind {
     }
 }
 
-/// Progress and rate.
 struct Progress {
     on_stderr: bool,
     started: Instant,
@@ -196,7 +192,6 @@ impl Progress {
     }
 }
 
-/// The state of a field.
 struct FieldRow {
     name: String,
     latest: Option<Percept>,

@@ -5,7 +5,6 @@ use std::path::Path;
 use somatic::output::{OutputPath, OutputPaths};
 use somatic::{Error, Result};
 
-/// A plot that is to be drawn.
 pub(super) struct Plot {
     format: Format,
     output: OutputPath,

@@ -53,7 +53,6 @@ impl LineFlags {
         }
     }
 
-    /// The wiring, if one is given.
     pub(super) fn wiring(&self) -> Result<Option<Wiring>> {
         self.wiring.as_ref().map(Wiring::load).transpose()
     }

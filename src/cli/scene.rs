@@ -3,12 +3,11 @@
 mod accuracy;
 mod check;
 mod deserialize;
+mod flags;
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Arg, Args};
+use clap::Args;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::error::parse_toml;
@@ -21,34 +20,10 @@ use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, S
 use self::accuracy::Accuracy;
 pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
+use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS};
+pub(super) use self::flags::{LIVE, first, grouped, one_of};
 use super::attached;
 use super::ports::LineFlags;
-
-/// Headings of flags that `-h` leaves out.
-const COMPUTED: &str = "What is computed";
-const RECORDINGS: &str = "Recordings";
-pub(super) const LIVE: &str = "Live";
-const ACCURACY: &str = "Accuracy and speed";
-const OUTPUT: &str = "Output";
-
-/// Leaves `arg` out of `-h` if it has a heading.
-pub(super) fn grouped(arg: Arg) -> Arg {
-    let has_heading = arg.get_help_heading().is_some();
-    arg.hide_short_help(has_heading)
-}
-
-/// `arg` among the flags that come first.
-pub(super) fn first(arg: Arg) -> Arg {
-    arg.help_heading(None::<&str>).hide_short_help(false)
-}
-
-/// Reads one of `words`.
-pub(super) fn one_of<T>(words: &'static [&'static str]) -> impl TypedValueParser<Value = T>
-where
-    T: FromStr<Err = Error> + Clone + Send + Sync + 'static,
-{
-    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
-}
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -318,7 +293,6 @@ impl RunOptions {
         Ok(asked)
     }
 
-    /// The outputs that are wanted.
     pub(super) fn outputs(&self) -> Outputs {
         outputs_or_usual(&self.outputs)
     }

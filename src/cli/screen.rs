@@ -10,7 +10,6 @@ pub(super) struct Screen {
 }
 
 impl Screen {
-    /// On `term`, at the cursor.
     pub(super) fn new(term: Term) -> Self {
         let _ = term.hide_cursor();
         Self { term, drawn: Vec::new() }

@@ -102,7 +102,6 @@ impl<'a> Found<'a> {
         self.count == AT_ONCE
     }
 
-    /// Puts all of them where they belong.
     #[inline(always)]
     fn put(&mut self, links: &Links, frames: &[Frame], cells: &mut PlaceCells<'_>) {
         let inverse = self.normals.map(inverse_length);

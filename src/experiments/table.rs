@@ -230,7 +230,6 @@ struct TableRow {
 }
 
 impl TableRow {
-    /// The row of all cases in `group`.
     fn new(angle_deg: Option<f64>, signal: usize, group: &[Scored<'_>]) -> Self {
         let case = group[0].0;
         let mut scores = Scores::default();
@@ -311,7 +310,6 @@ impl Table {
         Ok(table)
     }
 
-    /// The table as Markdown.
     pub(super) fn markdown(&self) -> String {
         let mut text = format!(
             "Each cell is RMS / worst over all frames of all angles and, with noise, of {SEEDS} seeds; in brackets the\n\

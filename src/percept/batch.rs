@@ -238,7 +238,6 @@ impl Percepts {
         &self.host[host as usize][cell * count..][..count]
     }
 
-    /// Whether `host` is asked for.
     pub(super) fn has_host(&self, host: Host) -> bool {
         !self.host[host as usize].is_empty()
     }

@@ -47,7 +47,6 @@ impl CellsMut<'_> {
         self.flags.len() / self.fields.max(1)
     }
 
-    /// The first `frames` frames, and the rest.
     pub(crate) fn split_at(mut self, frames: usize) -> (Self, Self) {
         let (fields, slots, cells) = (self.fields, self.slots, frames * self.fields);
         let first = Self {
@@ -134,7 +133,6 @@ impl Percepts {
 }
 
 impl PlaceCells<'_> {
-    /// The first `cells` cells, and the rest.
     pub(crate) fn split_at(mut self, cells: usize) -> (Self, Self) {
         let centroids = match &mut self.centroids {
             Centroids::F32(columns) => Centroids::F32(columns.each_mut().map(|column| take(column, cells))),

@@ -352,7 +352,6 @@ const fn is_same(a: &[u8], b: &[u8]) -> bool {
 }
 
 impl Column {
-    /// What shaders call its bit.
     #[cfg(feature = "gpu")]
     pub(crate) fn shader_constant(&self) -> String {
         self.name.to_uppercase()

@@ -49,7 +49,6 @@ impl Percepts {
         of.unwrap_or(self).touches(from, field).to_vec()
     }
 
-    /// Multiplies a cell's speeds.
     pub(crate) fn scale_speeds(&mut self, cell: usize, by: f64) {
         fn scale<T: Copy + Into<f64>>(parts: &mut Components<T>, cell: usize, scaled: impl Fn(f64) -> T) {
             for part in [Component::Speed, Component::RadialSpeed] {

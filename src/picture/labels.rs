@@ -29,7 +29,6 @@ const GAP: u32 = 24;
 /// Width reserved for the scale bar at the right of the last row.
 const BAR: u32 = 220;
 
-/// The labels of a picture.
 pub(super) struct Labels {
     title: String,
     /// Pixels across the picture.
@@ -45,7 +44,6 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// For a picture of `width` pixels.
     pub(super) fn new(title: &str, width: u32) -> Self {
         Self {
             title: title.to_owned(),
@@ -63,12 +61,10 @@ impl Labels {
         (f64::from(pixels) * (f64::from(self.width) / BASE_WIDTH).max(1.0)).round() as u32
     }
 
-    /// Pixels above the views, for the title.
     pub(super) fn above(&self) -> u32 {
         self.scaled(TITLE)
     }
 
-    /// Pixels above each view, for its name.
     pub(super) fn above_view(&self) -> u32 {
         self.scaled(CAPTION)
     }
@@ -106,7 +102,6 @@ impl Labels {
         self.scaled(SWATCH) + ink::width(name, self.scaled(SIZE)).unwrap_or_default()
     }
 
-    /// Adds `text` centred at `at`.
     pub(super) fn caption(&mut self, text: &str, at: [u32; 2]) {
         self.captions.push((text.to_owned(), at));
     }
@@ -140,7 +135,6 @@ impl Labels {
         places
     }
 
-    /// Size at which the title fits, pixels.
     fn title_size(&self) -> u32 {
         let room = self.width.saturating_sub(2 * self.scaled(SIDE));
         let sizes = (MIN_TITLE_SIZE..=self.scaled(TITLE_SIZE)).rev();
@@ -148,7 +142,6 @@ impl Labels {
         fitting.next().unwrap_or(MIN_TITLE_SIZE)
     }
 
-    /// Draws the labels into `pixels`.
     pub(super) fn draw(&self, pixels: &mut [u8], size: [u32; 2]) -> Result<()> {
         ink::font()?;
         let [width, height] = size;

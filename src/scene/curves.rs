@@ -7,7 +7,6 @@ use crate::signal::{Calibration, Curve, FsrSignal, Response, TaxelCalibration, s
 use crate::stage::calibrate::Table;
 use crate::stage::layout;
 
-/// Curves, one after the other.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Curves {
     pub(crate) curves: Vec<layout::Curve>,

@@ -55,7 +55,6 @@ struct Summary<'a> {
 struct FieldSummary<'a> {
     field: &'a str,
     link: &'a str,
-    /// Its index in `letters`.
     letter: usize,
     members: usize,
     chart: bool,

@@ -75,26 +75,20 @@ impl MotionFilter {
 
     fn check(&self) -> Result<()> {
         let mm = |metres: f64| format!("{} mm", metres * 1e3);
-        if let Some(low) = self.low_m.filter(|low| !(low.is_finite() && *low >= 0.0)) {
-            return Err(Error::usage(format!(
-                "a window of motion from {} lets nothing pass; give a length from 0",
-                mm(low)
-            )));
-        }
-        if let Some(high) = self.high_m.filter(|high| high.is_nan() || *high <= 0.0) {
-            return Err(Error::usage(format!(
-                "a window of motion to {} lets nothing pass; give a length over 0",
-                mm(high)
-            )));
-        }
-        if let (Some(low), Some(high)) = (self.low_m, self.high_m)
-            && low > high
-        {
-            return Err(Error::usage(format!(
-                "a window of motion from {} to {} lets nothing pass; give the smaller first",
-                mm(low),
-                mm(high)
-            )));
+        let nothing_passes = |ends: String, what: &str| -> Result<()> {
+            Err(Error::usage(format!("a window of motion {ends} lets nothing pass; {what}")))
+        };
+        match (self.low_m, self.high_m) {
+            (Some(low), _) if !(low.is_finite() && low >= 0.0) => {
+                nothing_passes(format!("from {}", mm(low)), "give a length from 0")?;
+            }
+            (_, Some(high)) if high.is_nan() || high <= 0.0 => {
+                nothing_passes(format!("to {}", mm(high)), "give a length over 0")?;
+            }
+            (Some(low), Some(high)) if low > high => {
+                nothing_passes(format!("from {} to {}", mm(low), mm(high)), "give the smaller first")?;
+            }
+            _ => {}
         }
         if !(self.time_constant_s.is_finite() && self.time_constant_s >= 0.0) {
             return Err(Error::usage(format!(

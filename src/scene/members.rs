@@ -34,7 +34,6 @@ pub(super) fn unit_of(radius_m: f64) -> f32 {
     exponent.exp2() as f32
 }
 
-/// The surface over `field`'s chart, if it has one.
 pub(super) fn surface(nearest: &Nearest<'_>, field: &Field) -> Option<Surface> {
     let (chart, lift) = (field.chart.as_ref().ok()?, Lift::on(nearest, field)?);
     Some(Surface::new(chart, &lift, field.origin_in_anchor))

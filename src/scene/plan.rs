@@ -99,7 +99,6 @@ pub(crate) struct PlanField {
     pub(crate) thresholds: Thresholds,
     /// The distance in the unit up to which its centroid counts as still.
     pub(crate) still: layout::Still,
-    /// How its motion is filtered.
     pub(crate) filter: filter::Settings,
     /// Per member, the members beside it, where separate touches are wanted.
     pub(crate) beside: Vec<Vec<u32>>,

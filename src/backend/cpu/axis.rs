@@ -24,7 +24,6 @@ pub(super) fn moments<S: Simd, A: Sum<S>, P: Members<S>>(simd: S, members: P, at
     sums
 }
 
-/// Adds a member's part to a, b and d.
 #[inline(always)]
 pub(super) fn add<S: Simd, A: Sum<S>, P: Members<S>>(
     simd: S,

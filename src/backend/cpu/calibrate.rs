@@ -74,7 +74,6 @@ impl Calibrated {
 }
 
 impl Tile {
-    /// Of up to sixteen `taxels`.
     fn new(taxels: &[Taxel]) -> Self {
         let sort = if taxels.len() == LANES && taxels.iter().all(Taxel::raw_is_pressure) {
             Sort::Raw

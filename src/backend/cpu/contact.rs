@@ -17,7 +17,6 @@ pub(super) struct Sums<S: Simd, A> {
 }
 
 impl<S: Simd, A: Sum<S>> Sums<S, A> {
-    /// The sums' values.
     #[inline(always)]
     pub(super) fn totals(self) -> Sums<S, F<S>> {
         Sums { total: self.total.total(), active: self.active, u: self.u.total(), v: self.v.total() }

@@ -150,7 +150,6 @@ impl Gate {
         }
     }
 
-    /// Calibrates a tile if it has changed.
     #[inline(always)]
     fn tile<S: Simd>(
         &mut self,

@@ -37,7 +37,6 @@ impl<'a> Moment<'a> {
 /// From how many memberships on a frame is shared among the cores: below, waking them costs more than they save.
 const SHARED: usize = 1 << 16;
 
-/// Whether `threads` share a frame of `plan`.
 pub(super) fn is_shared(plan: &Plan, threads: usize) -> bool {
     plan.memberships() >= SHARED && threads > 1
 }
@@ -54,7 +53,6 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// Makes room for so many rows and sets of cells.
     fn reserve(&mut self, rows: usize, sets: usize) {
         if self.values.pressures.len() < rows {
             self.values = Calibrated::new(rows);
@@ -196,7 +194,6 @@ impl Live {
     }
 }
 
-/// A calibrated frame.
 #[derive(Clone, Copy)]
 struct Frame<'a> {
     level: Level,
@@ -271,7 +268,6 @@ impl Frame<'_> {
         }
     }
 
-    /// Groups together.
     #[inline(never)]
     fn piece(&self, groups: &[Narrow], gathered: &mut Gathered, answers: &mut [Answers]) {
         gathered.reserve(groups.iter().map(|group| group.rows.count()).sum(), groups.len());

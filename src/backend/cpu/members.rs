@@ -211,7 +211,6 @@ pub(super) struct Kinds {
 }
 
 impl Kinds {
-    /// Of up to sixteen `fields`.
     pub(super) fn new<'a>(fields: impl Iterator<Item = &'a PlanField>) -> Self {
         let none = [0; LANES];
         let (any_charted, any_uncharted, unit_m) = (false, false, [1.0; LANES]);
@@ -263,7 +262,6 @@ pub(super) struct MemberRows {
     areas: Lines<f32>,
 }
 
-/// Where a row's members are.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct PlaceRow {
@@ -341,7 +339,6 @@ impl MemberRows {
 #[derive(Clone, Copy)]
 pub(super) struct InFrame<'a, const WEIGHTED: bool> {
     rows: &'a MemberRows,
-    /// Empty if not `WEIGHTED`.
     weights: &'a [Row<f32>],
     pressures: &'a [Row<f32>],
     statuses: &'a [Row<u32>],

@@ -57,7 +57,6 @@ impl Cpu {
         Self::with_level(plan, Level::new())
     }
 
-    /// With the instructions of `level`.
     fn with_level(plan: &Plan, level: Level) -> Self {
         Self {
             level,
@@ -73,7 +72,6 @@ impl Cpu {
     }
 }
 
-/// What `level` is called.
 fn instructions(level: Level) -> &'static str {
     let name = format!("{level:?}");
     let known = [("Avx512", "AVX-512"), ("Avx2", "AVX2"), ("Sse", "SSE"), ("Neon", "NEON"), ("Wasm", "SIMD128")];

@@ -21,7 +21,6 @@ use crate::stage::calibrate::UNUSABLE;
 pub(super) trait Sweep<S: Simd>: Copy {
     /// S, how many are pressed, and the centroid's numerators where `centroid` says so.
     fn sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> Sums<S, F<S>>;
-    /// The same for two vectors of lanes.
     #[inline(always)]
     fn two_sums<A: Sum<S>>(self, simd: S, at: usize, centroid: bool) -> [Sums<S, F<S>>; 2] {
         [self.sums::<A>(simd, at, centroid), self.sums::<A>(simd, at + width::<S>(), centroid)]
@@ -90,7 +89,6 @@ pub(super) struct Wanted {
     pub(super) outputs: Outputs,
     /// Whether any value has a status.
     pub(super) faults: bool,
-    /// Whether sums are compensated.
     pub(super) compensated: bool,
 }
 

@@ -233,7 +233,6 @@ enum Way {
 }
 
 impl Brief {
-    /// Of all fields of `plan`.
     fn all(plan: &Plan) -> Vec<Self> {
         let of = |field: &PlanField| {
             let narrow = if field.unweighted { Way::Unweighted } else { Way::Weighted };
@@ -315,7 +314,6 @@ impl InWindow {
         }
     }
 
-    /// Copies all pressures to where percepts keep them.
     fn keep_pressures(&self, plan: &Plan, cells: &mut CellsMut<'_>) {
         let (slots, frames) = (plan.slots(), cells.frames());
         let tiles = self.values.pressures[..slots.next_multiple_of(LANES)].chunks(LANES).zip(&self.tiles).enumerate();

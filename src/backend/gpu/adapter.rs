@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
-/// An open device, shared.
 #[derive(Clone)]
 pub(crate) struct Device {
     pub(crate) device: wgpu::Device,
@@ -146,7 +145,6 @@ fn best(backends: wgpu::Backends) -> Result<wgpu::Adapter> {
     })
 }
 
-/// Opens `adapter` with those of `features` that it has.
 fn device_of(adapter: &wgpu::Adapter, features: wgpu::Features) -> Result<Device> {
     let info = adapter.get_info();
     let descriptor = wgpu::DeviceDescriptor {

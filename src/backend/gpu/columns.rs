@@ -78,7 +78,6 @@ impl Columns {
             .collect()
     }
 
-    /// What the program over fields is told.
     pub(super) fn of_fields(&self, plan: &Plan) -> Vec<(&'static str, f64)> {
         let mut overrides = self.overrides(&["contact", "centroid", "orientation", "axis"]);
         overrides.push(("DEPTH_AT", self.at(Column::Component(Component::CentroidDepth))));
@@ -94,12 +93,10 @@ impl Columns {
         overrides
     }
 
-    /// What hysteresis is told.
     pub(super) fn of_hysteresis(&self) -> Vec<(&'static str, f64)> {
         vec![("TOTAL_AT", self.at(Column::Component(Component::Total)))]
     }
 
-    /// What motion is told.
     pub(super) fn of_motion(&self) -> Vec<(&'static str, f64)> {
         let mut overrides = self.overrides(&["motion"]);
         overrides.extend([

@@ -21,7 +21,6 @@ impl MemberTable {
         Self::Few(table_as(device, "members", members, wgpu::BufferUsages::UNIFORM, all))
     }
 
-    /// What a program that reads it is told.
     pub(super) fn kind(&self) -> Members {
         match self {
             Self::Many(_) => Members::Many,
@@ -29,7 +28,6 @@ impl MemberTable {
         }
     }
 
-    /// What such a program binds.
     pub(super) fn binding(&self) -> wgpu::BindingResource<'_> {
         let (Self::Many(buffer) | Self::Few(buffer)) = self;
         buffer.as_entire_binding()

@@ -49,7 +49,6 @@ pub(super) struct Bound<'a> {
     pub(super) at: (BindingResource<'a>, Option<BindingResource<'a>>),
 }
 
-/// Members that one table on `device` holds.
 pub(super) fn most_members(device: &Device) -> usize {
     device.device.limits().max_storage_buffer_binding_size as usize / size_of::<layout::Member>()
 }
@@ -84,7 +83,6 @@ impl OverFields {
         }
     }
 
-    /// The programs, in their order.
     pub(super) fn stages(&self, device: &Device, bound: &Bound<'_>) -> Vec<Stage> {
         let (at, statuses) = &bound.at;
         let by_parts = || (8, self.by_parts.as_entire_binding());

@@ -42,12 +42,10 @@ pub(super) struct Packer {
 }
 
 impl Packer {
-    /// For calls of up to `frames` frames of `channels` values.
     pub(super) fn new(form: Form, channels: usize, frames: usize) -> Self {
         Self { form, channels, steps: Vec::with_capacity(frames), row: Vec::new() }
     }
 
-    /// Bytes that the raw values of `frames` frames go up in.
     pub(super) fn bytes(&self, frames: usize) -> usize {
         self.form.bytes(self.channels, frames)
     }

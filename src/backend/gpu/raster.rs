@@ -18,13 +18,11 @@ const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 /// Longest side of a picture, pixels, that every device can draw.
 pub(crate) const LONGEST_SIDE: u32 = 8192;
 
-/// A corner of the surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Corner {
     /// In the world.
     pub(crate) position: [f32; 3],
-    /// Unit normal.
     pub(crate) normal: [f32; 3],
 }
 
@@ -65,7 +63,6 @@ pub(crate) struct Drawing {
     /// Linear red, green and blue where nothing is.
     pub(crate) background: [f64; 3],
     pub(crate) corners: Vec<Corner>,
-    /// Three corners a triangle.
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) slices: Vec<Slice>,
     /// Triangles that each slice is made of.

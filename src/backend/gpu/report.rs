@@ -87,7 +87,6 @@ fn timed(
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Writes `bytes` into the upload buffer of `set`.
 fn fill(device: &Device, set: &Set, bytes: &[u8]) -> Result<()> {
     let mapped = set.upload.get_mapped_range_mut(..bytes.len() as u64);
     mapped.map_err(|e| device.lost(&e))?.slice(..).copy_from_slice(bytes);
@@ -209,7 +208,6 @@ impl EmptyCall {
     }
 }
 
-/// The device's clock.
 struct Clock {
     queries: wgpu::QuerySet,
     ticks: wgpu::Buffer,

@@ -151,7 +151,6 @@ pub(super) fn pipeline(
     })
 }
 
-/// A read-only table on the device.
 pub(super) fn table<T: Pod>(device: &Device, name: &str, rows: &[T]) -> wgpu::Buffer {
     table_as(device, name, rows, wgpu::BufferUsages::STORAGE, 16)
 }

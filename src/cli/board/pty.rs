@@ -34,7 +34,6 @@ impl Pty {
         Ok(Self { end, path })
     }
 
-    /// Whether the other end is open.
     pub(super) fn is_open(&self) -> bool {
         let mut ask = [PollFd::new(&self.end, PollFlags::IN)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };

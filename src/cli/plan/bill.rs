@@ -36,7 +36,6 @@ pub(super) struct Stage {
     pub(super) measured_us: Option<f64>,
 }
 
-/// What was measured.
 pub(super) struct Measured {
     /// On what, in words.
     pub(super) on: String,
@@ -47,7 +46,6 @@ pub(super) struct Measured {
 }
 
 impl Bill {
-    /// The bill of `asked`.
     pub(super) fn of(asked: &RunOptions, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.speed.is_none();

@@ -12,7 +12,7 @@ use somatic::tradeoff::{Target, angle, length, time};
 use somatic::{BackendKind, Error, Outputs, Result};
 
 use super::deserialize::word;
-use super::{ACCURACY, one_of};
+use super::flags::{ACCURACY, one_of};
 
 /// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
 /// by measurement, or the knobs themselves.

@@ -28,7 +28,6 @@ pub(super) enum OneOrMany {
     Many(Vec<String>),
 }
 
-/// A value parsed from a string.
 struct Parsed<T>(T);
 
 impl<'de, T: FromStr<Err: fmt::Display>> Deserialize<'de> for Parsed<T> {
@@ -85,7 +84,6 @@ pub(super) fn names_of<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>
     Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
 }
 
-/// The one output of a name.
 struct Output(Outputs);
 
 impl FromStr for Output {

@@ -46,7 +46,6 @@ pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f6
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
 pub(super) fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize) -> Result<TestFrames> {
     let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
-    /// Adds the next frame of `source`, if there is one.
     fn next(played: &mut TestFrames, source: &mut dyn Source) -> Result<bool> {
         if played.frames.is_empty() {
             played.taxels = source.taxels().to_vec();

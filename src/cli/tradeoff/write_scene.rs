@@ -5,7 +5,6 @@ use somatic::tradeoff::{Combination, Target, Words};
 use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
-/// Writes `combination` into the scene file that is edited.
 pub(super) fn write(scene: OutputPath, combination: &Combination, target: &Target) -> Result<()> {
     let path = scene.name();
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;

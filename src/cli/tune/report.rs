@@ -86,7 +86,6 @@ pub(super) fn json(tuning: &Tuning, places: &[TunedChannel]) -> String {
     format!("{json:#}\n")
 }
 
-/// The wiring's file.
 pub(super) fn wiring(wiring: &Wiring) -> String {
     format!("# With the taps that `somatic tune` found. docs/wire.md has the keys.\n{}", wiring.to_toml())
 }

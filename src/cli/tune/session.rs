@@ -36,7 +36,6 @@ pub(super) enum PhaseEnd {
     Stopped,
 }
 
-/// A channel whose tap is tuned.
 #[derive(Clone, Copy)]
 pub(super) struct TunedChannel {
     /// The board's number in the wiring, and its id.
@@ -253,7 +252,6 @@ impl TuningSession {
         }
     }
 
-    /// The tuned channels, and whether their taps are confirmed.
     pub(super) fn places(&self, wiring: &Wiring) -> Vec<TunedChannel> {
         let taps = self.lines.taps();
         debug_assert_eq!(taps.len(), wiring.boards().len());

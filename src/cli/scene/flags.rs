@@ -1,0 +1,33 @@
+//! What flags have in common: headings, and parsers of words.
+
+use std::str::FromStr;
+
+use clap::Arg;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use somatic::Error;
+
+/// Headings of flags that `-h` leaves out.
+pub(super) const COMPUTED: &str = "What is computed";
+pub(super) const RECORDINGS: &str = "Recordings";
+pub(in crate::cli) const LIVE: &str = "Live";
+pub(super) const ACCURACY: &str = "Accuracy and speed";
+pub(super) const OUTPUT: &str = "Output";
+
+/// Leaves `arg` out of `-h` if it has a heading.
+pub(in crate::cli) fn grouped(arg: Arg) -> Arg {
+    let has_heading = arg.get_help_heading().is_some();
+    arg.hide_short_help(has_heading)
+}
+
+/// `arg` among the flags that come first.
+pub(in crate::cli) fn first(arg: Arg) -> Arg {
+    arg.help_heading(None::<&str>).hide_short_help(false)
+}
+
+/// Reads one of `words`.
+pub(in crate::cli) fn one_of<T>(words: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = Error> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
+}
