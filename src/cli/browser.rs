@@ -1,10 +1,9 @@
 //! Starts a browser.
 
-use std::io::Write as _;
 use std::process::{Command, Stdio};
 
+use somatic::output::PrivateFile;
 use somatic::{Error, Result};
-use tempfile::NamedTempFile;
 
 /// What opens a file with the program that people have chosen for it.
 const OPENER: &str = if cfg!(target_os = "macos") {
@@ -20,15 +19,13 @@ const OPENER: &str = if cfg!(target_os = "macos") {
 ///
 /// # Errors
 /// There is no program that opens files.
-pub(super) fn open(url: &str) -> Result<NamedTempFile> {
-    let failed = |e: &std::io::Error| Error::failed(format!("cannot start a browser: {e}"));
-    let mut file = tempfile::Builder::new().prefix("somatic-").suffix(".html").tempfile().map_err(|e| failed(&e))?;
+pub(super) fn open(url: &str) -> Result<PrivateFile> {
     let page = format!(
         "<!doctype html><meta charset=utf-8><meta http-equiv=refresh content=\"0;url={url}\"><title>somatic</title>"
     );
-    file.write_all(page.as_bytes()).and_then(|()| file.flush()).map_err(|e| failed(&e))?;
+    let file = PrivateFile::new(".html", page.as_bytes())?;
     let mut opener = Command::new(OPENER);
     opener.arg(file.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    opener.spawn().map_err(|e| failed(&e).at(OPENER))?;
+    opener.spawn().map_err(|e| Error::failed(format!("cannot start a browser: {e}")).at(OPENER))?;
     Ok(file)
 }

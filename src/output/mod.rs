@@ -26,7 +26,9 @@ mod folder;
 #[cfg(unix)]
 mod link;
 mod path;
+mod private;
 
+pub use self::private::PrivateFile;
 pub use file::{GrowingFile, OutputFile};
 pub use folder::OutputFolder;
 #[cfg(unix)]

@@ -105,6 +105,14 @@ impl Connection {
         }
     }
 
+    /// When its viewer is to be told of a taxel again, if it has read everything before.
+    pub(super) fn taxel_due_at(&self, published: u64) -> Option<Instant> {
+        match &self.state {
+            State::Viewing(socket, viewer) if socket.is_idle() => viewer.taxel_due_at(published),
+            _ => None,
+        }
+    }
+
     /// What it waits for.
     pub(super) fn interest(&self) -> Option<(&TcpStream, Interest)> {
         let read = Interest { read: true, write: false };

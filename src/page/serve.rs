@@ -1,5 +1,6 @@
 //! What the server's thread does: connections in, frames out.
 
+use std::io::ErrorKind;
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -42,6 +43,8 @@ pub(super) struct Serving {
     connections: Vec<(ViewerId, Connection)>,
     /// A connection that there is no room for yet.
     next: Option<TcpStream>,
+    /// Whether new connections are looked for later: the system has none to give.
+    is_full: bool,
     next_id: u64,
     content: Content,
     /// Whether a connection has messages that have been read from the system already.
@@ -94,6 +97,7 @@ impl Serving {
             requests,
             connections,
             next,
+            is_full: false,
             next_id: 0,
             content,
             has_more: false,
@@ -128,25 +132,28 @@ impl Serving {
 
     fn wait(&self, waits: &Waits, now: Instant) {
         let published = self.content.current.snapshot().published;
-        let mut due = self.next.is_some().then_some(now + ACCEPT_PERIOD);
+        let accepts = self.next.is_none() && !self.is_full;
+        let mut due = (!accepts).then_some(now + ACCEPT_PERIOD);
         for (_, connection) in &self.connections {
-            let viewer = connection.seen().and_then(|viewer| viewer.taxel_due_at(published));
-            due = [due, connection.due_at(), viewer].into_iter().flatten().min();
+            due = [due, connection.due_at(), connection.taxel_due_at(published)].into_iter().flatten().min();
         }
         let most = if self.has_more { Some(Duration::ZERO) } else { due.map(|due| due.saturating_duration_since(now)) };
-        let listener = self.next.is_none().then_some(&self.listener);
+        let listener = accepts.then_some(&self.listener);
         let sockets = self.connections.iter().filter_map(|(_, connection)| connection.interest());
         waits.wait(self.exchange.waker(), listener, sockets, most);
     }
 
     /// Takes new connections. Where there is no room, one that says nothing goes; where all are viewers, the new one.
     fn accept(&mut self, now: Instant) {
+        self.is_full = false;
         loop {
             if self.next.is_none() {
                 match self.listener.accept() {
                     Ok((stream, _)) => self.next = Some(stream),
-                    // Nobody, or nobody that could be served.
-                    Err(_) => return,
+                    Err(e) => {
+                        self.is_full = e.kind() != ErrorKind::WouldBlock;
+                        return;
+                    }
                 }
             }
             if self.connections.len() >= MAX_CONNECTIONS {
@@ -242,10 +249,14 @@ impl Serving {
         let Self { connections, content, exchange, .. } = self;
         let connection = &mut connections[index].1;
         connection.send();
-        if let Some((socket, viewer)) = connection.viewer()
+        // All events of the log at most, and a frame.
+        while let Some((socket, viewer)) = connection.viewer()
             && socket.is_idle()
         {
             content.push_due(socket, viewer, exchange, now);
+            if socket.is_idle() {
+                return;
+            }
             connection.send();
         }
     }

@@ -1,5 +1,7 @@
 //! Frames from an engine to the bytes that a viewer gets; and the file of messages that the page decodes in its own tests.
 
+mod decode;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -7,6 +9,7 @@ use std::time::{Duration, Instant};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
+use self::decode::{decode_frame, decode_history, decode_mesh};
 use super::current::Current;
 use super::encode::History;
 use super::exchange::Exchange;
@@ -20,7 +23,7 @@ use super::viewer::Viewer;
 use super::wake::Waits;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Home, Link, MemberSpec, Modality, Surface, Taxel};
 use crate::signal::{BoardHealth, Calibration, Frame, Pose, RawValue, Receptor, Wiring};
-use crate::{BackendKind, Engine, Letter, Options, Outputs};
+use somatic::{BackendKind, Engine, Letter, Options, Outputs, Scene};
 
 /// Three links, two of them with a triangle and taxels and no common ancestor, and three fields, one of them on both.
 fn body() -> Body {
@@ -82,7 +85,7 @@ impl Bench {
     fn new(outputs: Outputs, letters: &[Receptor], calibration: &str) -> Self {
         let body = body();
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let scene = crate::Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[]));
+        let scene = Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[]));
         let options = Options::default()
             .scene(scene)
             .calibration(Calibration::parse(calibration, &ids).unwrap())
@@ -151,130 +154,6 @@ impl Bench {
     }
 }
 
-/// Reads what a page reads, by the protocol's tables.
-struct Reader<'a>(&'a [u8], usize);
-
-impl Reader<'_> {
-    fn bytes<const N: usize>(&mut self) -> [u8; N] {
-        let bytes = self.0[self.1..self.1 + N].try_into().unwrap();
-        self.1 += N;
-        bytes
-    }
-
-    fn u32(&mut self) -> u32 {
-        u32::from_le_bytes(self.bytes())
-    }
-
-    fn f32(&mut self) -> Value {
-        let number = f32::from_le_bytes(self.bytes());
-        if number.is_nan() { Value::Null } else { f64::from(number).into() }
-    }
-
-    fn f64(&mut self) -> f64 {
-        f64::from_le_bytes(self.bytes())
-    }
-
-    fn u32s(&mut self, count: u32) -> Vec<u32> {
-        (0..count).map(|_| self.u32()).collect()
-    }
-
-    fn f32s(&mut self, count: u32) -> Vec<Value> {
-        (0..count).map(|_| self.f32()).collect()
-    }
-
-    fn pad(&mut self) {
-        while !self.1.is_multiple_of(8) {
-            assert_eq!(self.bytes::<1>(), [0]);
-        }
-    }
-
-    fn ends(self) {
-        assert_eq!(self.1, self.0.len());
-    }
-}
-
-fn decode_mesh(bytes: &[u8]) -> Value {
-    let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [1, 1, 0, 0]);
-    let [v, t, n, l] = [0; 4].map(|_| from.u32());
-    let mesh = json!({
-        "position": from.f32s(3 * v), "normal": from.f32s(3 * v), "link": from.u32s(v), "corners": from.u32s(3 * t),
-        "taxelId": from.u32s(n), "taxelLink": from.u32s(n), "taxelPosition": from.f32s(3 * n),
-        "taxelNormal": from.f32s(3 * n), "taxelRadius": from.f32s(n), "taxelArea": from.f32s(n),
-        "restPose": from.f32s(7 * l),
-    });
-    from.ends();
-    mesh
-}
-
-fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
-    let mut from = Reader(bytes, 0);
-    let [kind, version, sections, zero] = from.bytes();
-    assert_eq!((kind, version, zero), (2, 1, 0));
-    let mut frame = json!({"seq": from.u32()});
-    frame["frame"] = u64::from_le_bytes(from.bytes()).into();
-    frame["t"] = from.f64().into();
-    frame["skipped"] = from.u32().into();
-    frame["p50"] = from.f32();
-    frame["p99"] = from.f32();
-    let [fields, touches, samples, newest, columns] = [0; 5].map(|_| from.u32());
-    frame["newestEvent"] = newest.into();
-    frame["engineMicroseconds"] = from.f32();
-    let answers = from.u32();
-    for part in ["pressure", "health", "pose", "percepts", "touches", "samples"] {
-        frame[part] = Value::Null;
-    }
-    let taxels = scene.counts.taxels as u32;
-    if sections & 1 != 0 {
-        frame["pressure"] = from.f32s(taxels).into();
-        frame["health"] = (0..taxels).map(|_| from.bytes::<1>()[0]).collect::<Vec<_>>().into();
-        from.pad();
-    }
-    if sections & 2 != 0 {
-        frame["pose"] = from.f32s(7 * scene.poses.seven().len() as u32).into();
-        from.pad();
-    }
-    if sections & 4 != 0 {
-        let mut percepts = json!({"field": from.u32s(fields), "flags": from.u32s(fields), "present": from.u32s(fields), "columns": {}});
-        for (index, column) in scene.counts.columns.iter().enumerate().filter(|(index, _)| columns >> index & 1 != 0) {
-            percepts["columns"][index.to_string()] = from.f32s(fields * column.components as u32).into();
-        }
-        from.pad();
-        frame["percepts"] = percepts;
-    }
-    if sections & 8 != 0 {
-        let mut touch = |_| {
-            let [field, identity] = [0; 2].map(|_| from.u32());
-            let (total, active) = (from.f32(), from.u32());
-            json!({"field": field, "identity": identity, "total": total, "active": active, "centroid": from.f32s(2),
-                   "position": from.f32s(3)})
-        };
-        frame["touches"] = (0..touches).map(&mut touch).collect::<Vec<_>>().into();
-        from.pad();
-    }
-    if sections & 16 != 0 {
-        let t: Vec<f64> = (0..samples).map(|_| from.f64()).collect();
-        let series = (bytes.len() - from.1) as u32 / (4 * samples);
-        let values: Vec<Vec<Value>> = (0..series).map(|_| from.f32s(samples)).collect();
-        frame["samples"] = json!({"answers": answers, "t": t, "values": values});
-        from.pad();
-    }
-    from.ends();
-    frame
-}
-
-fn decode_history(bytes: &[u8]) -> Value {
-    let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [3, 1, 0, 0]);
-    let [id, bins, series] = [0; 3].map(|_| from.u32());
-    let (begin, end) = (from.f64(), from.f64());
-    let ends: Vec<[Vec<Value>; 2]> = (0..series).map(|_| [from.f32s(bins), from.f32s(bins)]).collect();
-    from.ends();
-    json!({"id": id, "bins": bins, "from": begin, "to": end,
-           "least": ends.iter().map(|ends| &ends[0]).collect::<Vec<_>>(),
-           "most": ends.iter().map(|ends| &ends[1]).collect::<Vec<_>>()})
-}
-
 /// Messages one after the other, and what they hold.
 #[derive(Default)]
 struct Book {
@@ -283,7 +162,7 @@ struct Book {
 }
 
 impl Book {
-    fn add(&mut self, name: &str, message: &[u8], values: &Value) {
+    fn add(&mut self, name: &str, message: &[u8], values: Value) {
         let binary = std::str::from_utf8(message).map_or(true, |text| !text.starts_with('{'));
         self.entries.push(json!({
             "name": name, "binary": binary, "offset": self.bytes.len(), "length": message.len(), "values": values,
@@ -295,7 +174,7 @@ impl Book {
 
     fn add_text(&mut self, text: &str) {
         let values: Value = serde_json::from_str(text).unwrap();
-        self.add(values["type"].as_str().unwrap(), text.as_bytes(), &values);
+        self.add(values["type"].as_str().unwrap(), text.as_bytes(), values.clone());
     }
 }
 
@@ -308,10 +187,10 @@ fn book() -> Book {
     let mut book = Book::default();
     book.add_text(&bench.scene.welcome("00ff", bench.scene.scale).replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
     let mesh = bench.scene.mesh.clone();
-    book.add("mesh", &mesh, &decode_mesh(&mesh));
+    book.add("mesh", &mesh, decode_mesh(&mesh));
     let add_frame = |book: &mut Book, bench: &mut Bench, viewer: &mut Viewer, name: &str| {
         let message = bench.send(viewer);
-        book.add(name, &message, &decode_frame(&message, &bench.scene));
+        book.add(name, &message, decode_frame(&message, &bench.scene));
         viewer.drawn(u32::from_le_bytes(message[4..8].try_into().unwrap()), bench.arrived + Duration::from_millis(5));
     };
     let first = bench.frame(0.0, [0.0; 5]);
@@ -357,7 +236,7 @@ fn book() -> Book {
         series: vec![[vec![1.0, f32::NAN, 0.25], vec![2.0, f32::NAN, 0.5]], [vec![f32::NAN; 3], vec![f32::NAN; 3]]],
     };
     let message = history.message();
-    book.add("history", &message, &decode_history(&message));
+    book.add("history", &message, decode_history(&message));
     book.add_text(&text::scale(Scale { max: 0.2, from: ScaleFrom::Grown }));
     bench.publisher.event(EventKind::Board, 0.5, None, "tty1: unplugged".to_owned());
     bench.publisher.flush();
@@ -380,15 +259,16 @@ fn book() -> Book {
 fn messages_are_those_that_the_page_decodes() {
     let book = book();
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page");
-    let text = format!("{:#}\n", Value::from(book.entries));
-    let files = [("messages.bin", book.bytes), ("messages.json", text.into_bytes())];
-    for (name, bytes) in files {
-        if std::env::var("SOMATIC_WRITE_MESSAGES").is_ok_and(|wanted| wanted == "1") {
-            std::fs::write(folder.join(name), &bytes).unwrap();
-        }
-        let kept = std::fs::read(folder.join(name)).unwrap_or_default();
-        assert!(kept == bytes, "tests/page/{name} is of other messages; if that is right, SOMATIC_WRITE_MESSAGES=1");
+    let entries = Value::from(book.entries);
+    if std::env::var("SOMATIC_WRITE_MESSAGES").is_ok_and(|wanted| wanted == "1") {
+        std::fs::write(folder.join("messages.bin"), &book.bytes).unwrap();
+        std::fs::write(folder.join("messages.json"), format!("{entries:#}\n")).unwrap();
     }
+    let kept = |name: &str| std::fs::read(folder.join(name)).unwrap_or_default();
+    let why = "tests/page has other messages; if these are right, write them with SOMATIC_WRITE_MESSAGES=1";
+    assert!(kept("messages.bin") == book.bytes, "{why}");
+    // A formatter may have been at it.
+    assert!(serde_json::from_slice::<Value>(&kept("messages.json")).is_ok_and(|kept| kept == entries), "{why}");
 }
 
 fn named(book: &Book) -> BTreeMap<String, Value> {

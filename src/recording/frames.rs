@@ -38,30 +38,29 @@ struct LinkPose {
 
 /// Puts `frame` into `to`, in place of what it holds.
 pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
-    let indices = |wanted: fn(&RawValue) -> bool| -> Vec<u32> {
-        (0..).zip(&frame.values).filter(|(_, value)| wanted(value)).map(|(index, _)| index).collect()
+    let values = &frame.values;
+    let indices = |are_missing: bool| -> Vec<u32> {
+        let chosen = (0..).zip(values).filter(|(_, value)| value.is_missing() == are_missing);
+        chosen.map(|(index, _)| index).collect()
     };
-    let missing = indices(|value| value.is_missing());
+    let missing = indices(true);
+    let stale = missing.iter().copied().filter(|&index| values[index as usize] == RawValue::STALE).collect();
     let pose = |(link, Pose { translation: p, rotation: q }): &(String, Pose)| LinkPose {
         link: link.clone(),
         pose: vec![p.x, p.y, p.z, q.x, q.y, q.z, q.w],
     };
-    let mut message = FrameMessage {
-        t: Some(frame.t_s),
-        poses: frame.pose.iter().map(pose).collect(),
-        stale: indices(|value| *value == RawValue::STALE),
-        ..FrameMessage::default()
-    };
-    let bytes = if 2 * missing.len() > frame.values.len() {
-        message.present = indices(|value| !value.is_missing());
-        let present = frame.values.iter().filter(|value| !value.is_missing());
+    let poses = frame.pose.iter().map(pose).collect();
+    let mut message = FrameMessage { t: Some(frame.t_s), poses, stale, ..FrameMessage::default() };
+    let bytes = if 2 * missing.len() > values.len() {
+        message.present = indices(false);
+        let present = values.iter().filter(|value| !value.is_missing());
         present.flat_map(|value| value.to_bits().to_le_bytes()).collect()
     } else {
         message.missing = missing;
         if cfg!(target_endian = "little") {
-            bytemuck::cast_slice(&frame.values).to_vec()
+            bytemuck::cast_slice(values).to_vec()
         } else {
-            frame.values.iter().flat_map(|value| value.to_bits().to_le_bytes()).collect()
+            values.iter().flat_map(|value| value.to_bits().to_le_bytes()).collect()
         }
     };
     message.values = Some(bytes);

@@ -13,9 +13,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use somatic::output::PrivateFile;
 use somatic::page::{Listen, Mode, PageInfo, PageScene, Publisher, Server};
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
-use tempfile::NamedTempFile;
 
 use self::checkpoints::Checkpoints;
 use self::explain::Explainer;
@@ -93,7 +93,7 @@ struct Opened {
     server: Server,
     publisher: Publisher,
     /// The file that a browser was given.
-    _handed_over: Option<NamedTempFile>,
+    _handed_over: Option<PrivateFile>,
 }
 
 pub(super) fn view(arguments: &Arguments) -> Result<u8> {

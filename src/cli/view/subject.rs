@@ -34,7 +34,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
     match ending.as_deref() {
         Some("mcap") => as_source("mcap"),
         Some("csv") => as_source("csv"),
-        Some("toml") if is_simulation(Path::new(what)) => as_source("sim"),
+        Some("toml") if SimulatedSource::is_named(what) => as_source("sim"),
         Some("toml") => Ok(Subject::Recording(Box::new(asked.with(Some(Path::new(what)))?))),
         _ if ending.is_none() && bundled::body(what).is_none() && !Path::new(what).exists() => Err(Error::usage(
             "give a body (.glb, .gltf or a bundled one), a recording (.mcap, .csv), a scene or a simulation (.toml)",
@@ -55,11 +55,4 @@ fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
     let mut asked = asked.with(None)?;
     asked.body = Some(what.to_owned());
     Ok(Subject::Recording(Box::new(asked)))
-}
-
-/// Whether the file has the keys of a simulation, not those of a scene.
-fn is_simulation(path: &Path) -> bool {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    let keys = text.parse::<toml::Table>().unwrap_or_default();
-    keys.contains_key("duration_s") || SimulatedSource::open(path).is_ok()
 }

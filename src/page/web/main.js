@@ -101,11 +101,16 @@ function moved() {
   view.request();
 }
 
+/** @type {import("./math.js").Vec3} */
+const NO_NORMAL = [0, 0, 0];
+
 /** Whether somebody has turned the body: from then on it stays as it is. */
 let turned = false;
 for (const event of ["pointerdown", "wheel"])
   stage.addEventListener(event, () => (turned = true), { passive: true });
-window.addEventListener("keydown", () => (turned = true));
+window.addEventListener("keydown", (event) => {
+  if (/^(Arrow\w+|[0-9f+=-])$/.test(event.key)) turned = true;
+});
 
 /** The field whose side was shown last. @type {number | null} */
 let shownSide = null;
@@ -116,7 +121,7 @@ function showTouchedSide() {
   if (turned || field === null || field === shownSide || !model.inContact.has(field)) return;
   shownSide = field;
   const members = model.welcome?.fields[field]?.members ?? [];
-  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? [0, 0, 0]);
+  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? NO_NORMAL);
   const facing = normals.reduce((sum, normal) => sum + dot(normal, camera.back), 0) / normals.length;
   if (facing > 0.2) return;
   chooseDirection(

@@ -71,6 +71,13 @@ impl SimulatedSource {
         Self::from_text(&path.display().to_string(), &text, folder)
     }
 
+    /// Whether the file at `path` has the keys of a simulation, and so is no scene.
+    #[must_use]
+    pub fn is_named(path: impl AsRef<Path>) -> bool {
+        let keys = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+        keys.is_some_and(|keys| keys.contains_key("duration_s") || keys.contains_key("touch"))
+    }
+
     /// The files that the simulation at `path` reads: itself and its body's files, as far as they can be found.
     #[must_use]
     pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {

@@ -1,0 +1,129 @@
+//! Decodes binary messages by the tables of the protocol, apart from what encodes them.
+
+use serde_json::{Value, json};
+
+use super::super::scene::PageScene;
+
+/// Reads what a page reads, by the protocol's tables.
+struct Reader<'a>(&'a [u8], usize);
+
+impl Reader<'_> {
+    fn bytes<const N: usize>(&mut self) -> [u8; N] {
+        let bytes = self.0[self.1..self.1 + N].try_into().unwrap();
+        self.1 += N;
+        bytes
+    }
+
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.bytes())
+    }
+
+    fn f32(&mut self) -> Value {
+        let number = f32::from_le_bytes(self.bytes());
+        if number.is_nan() { Value::Null } else { f64::from(number).into() }
+    }
+
+    fn f64(&mut self) -> f64 {
+        f64::from_le_bytes(self.bytes())
+    }
+
+    fn u32s(&mut self, count: u32) -> Vec<u32> {
+        (0..count).map(|_| self.u32()).collect()
+    }
+
+    fn f32s(&mut self, count: u32) -> Vec<Value> {
+        (0..count).map(|_| self.f32()).collect()
+    }
+
+    fn pad(&mut self) {
+        while self.1 % 8 != 0 {
+            assert_eq!(self.bytes::<1>(), [0]);
+        }
+    }
+
+    fn ends(self) {
+        assert_eq!(self.1, self.0.len());
+    }
+}
+
+pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
+    let mut from = Reader(bytes, 0);
+    assert_eq!(from.bytes(), [1, 1, 0, 0]);
+    let [v, t, n, l] = [0; 4].map(|_| from.u32());
+    let mesh = json!({
+        "position": from.f32s(3 * v), "normal": from.f32s(3 * v), "link": from.u32s(v), "corners": from.u32s(3 * t),
+        "taxelId": from.u32s(n), "taxelLink": from.u32s(n), "taxelPosition": from.f32s(3 * n),
+        "taxelNormal": from.f32s(3 * n), "taxelRadius": from.f32s(n), "taxelArea": from.f32s(n),
+        "restPose": from.f32s(7 * l),
+    });
+    from.ends();
+    mesh
+}
+
+pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
+    let mut from = Reader(bytes, 0);
+    let [kind, version, sections, zero] = from.bytes();
+    assert_eq!((kind, version, zero), (2, 1, 0));
+    let mut frame = json!({"seq": from.u32()});
+    frame["frame"] = u64::from_le_bytes(from.bytes()).into();
+    frame["t"] = from.f64().into();
+    frame["skipped"] = from.u32().into();
+    frame["p50"] = from.f32();
+    frame["p99"] = from.f32();
+    let [fields, touches, samples, newest, columns] = [0; 5].map(|_| from.u32());
+    frame["newestEvent"] = newest.into();
+    frame["engineMicroseconds"] = from.f32();
+    let answers = from.u32();
+    for part in ["pressure", "health", "pose", "percepts", "touches", "samples"] {
+        frame[part] = Value::Null;
+    }
+    let taxels = scene.counts.taxels as u32;
+    if sections & 1 != 0 {
+        frame["pressure"] = from.f32s(taxels).into();
+        frame["health"] = (0..taxels).map(|_| from.bytes::<1>()[0]).collect::<Vec<_>>().into();
+        from.pad();
+    }
+    if sections & 2 != 0 {
+        frame["pose"] = from.f32s(7 * scene.poses.seven().len() as u32).into();
+        from.pad();
+    }
+    if sections & 4 != 0 {
+        let mut percepts = json!({"field": from.u32s(fields), "flags": from.u32s(fields), "present": from.u32s(fields), "columns": {}});
+        for (index, column) in scene.counts.columns.iter().enumerate().filter(|(index, _)| columns >> index & 1 != 0) {
+            percepts["columns"][index.to_string()] = from.f32s(fields * column.components as u32).into();
+        }
+        from.pad();
+        frame["percepts"] = percepts;
+    }
+    if sections & 8 != 0 {
+        let mut touch = |_| {
+            let [field, identity] = [0; 2].map(|_| from.u32());
+            let (total, active) = (from.f32(), from.u32());
+            json!({"field": field, "identity": identity, "total": total, "active": active, "centroid": from.f32s(2),
+                   "position": from.f32s(3)})
+        };
+        frame["touches"] = (0..touches).map(&mut touch).collect::<Vec<_>>().into();
+        from.pad();
+    }
+    if sections & 16 != 0 {
+        let t: Vec<f64> = (0..samples).map(|_| from.f64()).collect();
+        let series = (bytes.len() - from.1) as u32 / (4 * samples);
+        let values: Vec<Vec<Value>> = (0..series).map(|_| from.f32s(samples)).collect();
+        frame["samples"] = json!({"answers": answers, "t": t, "values": values});
+        from.pad();
+    }
+    from.ends();
+    frame
+}
+
+pub(super) fn decode_history(bytes: &[u8]) -> Value {
+    let mut from = Reader(bytes, 0);
+    assert_eq!(from.bytes(), [3, 1, 0, 0]);
+    let [id, bins, series] = [0; 3].map(|_| from.u32());
+    let (begin, end) = (from.f64(), from.f64());
+    let ends: Vec<[Vec<Value>; 2]> = (0..series).map(|_| [from.f32s(bins), from.f32s(bins)]).collect();
+    from.ends();
+    json!({"id": id, "bins": bins, "from": begin, "to": end,
+           "least": ends.iter().map(|ends| &ends[0]).collect::<Vec<_>>(),
+           "most": ends.iter().map(|ends| &ends[1]).collect::<Vec<_>>()})
+}
