@@ -40,8 +40,15 @@ fn the_page_does_in_a_browser_what_it_promises() {
         Err(why) => return skip("BROWSER", format!("no browser tests: {why}")),
     };
     let mut node = Command::new("node");
-    node.args(["--test", "--test-concurrency=1", "wire.test.js", "parts.test.js", "browser.test.js"])
-        .current_dir(folder);
+    node.args([
+        "--test",
+        "--test-concurrency=1",
+        "wire.test.js",
+        "messages.test.js",
+        "parts.test.js",
+        "browser.test.js",
+    ])
+    .current_dir(folder);
     node.env("SOMATIC", env!("CARGO_BIN_EXE_somatic")).env("CHROMIUM", browser);
     let output = node.output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
