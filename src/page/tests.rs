@@ -162,7 +162,7 @@ struct Book {
 }
 
 impl Book {
-    fn add(&mut self, name: &str, message: &[u8], values: Value) {
+    fn add(&mut self, name: &str, message: &[u8], values: &Value) {
         let binary = std::str::from_utf8(message).map_or(true, |text| !text.starts_with('{'));
         self.entries.push(json!({
             "name": name, "binary": binary, "offset": self.bytes.len(), "length": message.len(), "values": values,
@@ -174,7 +174,7 @@ impl Book {
 
     fn add_text(&mut self, text: &str) {
         let values: Value = serde_json::from_str(text).unwrap();
-        self.add(values["type"].as_str().unwrap(), text.as_bytes(), values.clone());
+        self.add(values["type"].as_str().unwrap(), text.as_bytes(), &values);
     }
 }
 
@@ -187,10 +187,10 @@ fn book() -> Book {
     let mut book = Book::default();
     book.add_text(&bench.scene.welcome("00ff", bench.scene.scale).replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
     let mesh = bench.scene.mesh.clone();
-    book.add("mesh", &mesh, decode_mesh(&mesh));
+    book.add("mesh", &mesh, &decode_mesh(&mesh));
     let add_frame = |book: &mut Book, bench: &mut Bench, viewer: &mut Viewer, name: &str| {
         let message = bench.send(viewer);
-        book.add(name, &message, decode_frame(&message, &bench.scene));
+        book.add(name, &message, &decode_frame(&message, &bench.scene));
         viewer.drawn(u32::from_le_bytes(message[4..8].try_into().unwrap()), bench.arrived + Duration::from_millis(5));
     };
     let first = bench.frame(0.0, [0.0; 5]);
@@ -236,7 +236,7 @@ fn book() -> Book {
         series: vec![[vec![1.0, f32::NAN, 0.25], vec![2.0, f32::NAN, 0.5]], [vec![f32::NAN; 3], vec![f32::NAN; 3]]],
     };
     let message = history.message();
-    book.add("history", &message, decode_history(&message));
+    book.add("history", &message, &decode_history(&message));
     book.add_text(&text::scale(Scale { max: 0.2, from: ScaleFrom::Grown }));
     bench.publisher.event(EventKind::Board, 0.5, None, "tty1: unplugged".to_owned());
     bench.publisher.flush();

@@ -36,7 +36,7 @@ impl Reader<'_> {
     }
 
     fn pad(&mut self) {
-        while self.1 % 8 != 0 {
+        while !self.1.is_multiple_of(8) {
             assert_eq!(self.bytes::<1>(), [0]);
         }
     }
