@@ -15,6 +15,8 @@ mod completions;
 mod convert;
 mod devices;
 mod doubts;
+#[cfg(feature = "page")]
+mod explanation;
 mod feed;
 mod files;
 mod info;

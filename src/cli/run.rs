@@ -11,6 +11,8 @@ use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Resu
 
 use super::attachments::attachments;
 use super::doubts::Doubts;
+#[cfg(feature = "page")]
+use super::explanation::LiveExplainer;
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
@@ -124,6 +126,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let settled = settled(&asked, Some(&input), &body, batch)?;
     let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
     asked.line_flags().check_taps(settled.options.calibration.as_ref(), &ids)?;
+    #[cfg(feature = "page")]
+    let options = settled.options.clone();
     let mut engine = Engine::new(&body, settled.options)?;
     let verify = asked.verify && has_another_to_compare(&engine, settled.why.as_deref())?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
@@ -174,6 +178,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         wiring: wiring.as_ref(),
     };
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
+    #[cfg(feature = "page")]
+    let taxels = source.taxels().to_vec();
     let about = RunInfo { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
     // Where standard input is the source, what is typed there are frames.
@@ -182,6 +188,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let feed = match live {
         None => Feed::start(source, ReadMode { most: batch, gather, speed }),
         Some(_) => Feed::start_live(source, batch),
+    };
+    #[cfg(feature = "page")]
+    let explainer = match has_page {
+        true => Some(LiveExplainer::start(body.clone(), options.backend(engine.backend().0.parse()?), taxels)),
+        false => None,
     };
     let agreement = verify.then(Agreement::default);
     let heeds_stale = live.is_some();
@@ -196,6 +207,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         live,
         heeds_stale,
         doubts,
+        #[cfg(feature = "page")]
+        explainer,
     };
     #[cfg(unix)]
     let is_ended = || stop.load(Ordering::Relaxed) || keys.as_ref().is_some_and(Keys::ends);
@@ -246,6 +259,9 @@ struct Pump {
     heeds_stale: bool,
     /// What is looked for in the first frames.
     doubts: Option<Doubts>,
+    /// With a page.
+    #[cfg(feature = "page")]
+    explainer: Option<LiveExplainer>,
 }
 
 /// A call of the engine.
@@ -270,6 +286,8 @@ impl Pump {
                         self.engine.track_stale();
                     }
                     let begin = Instant::now();
+                    #[cfg(feature = "page")]
+                    self.explain(&frames)?;
                     if let Some(sum) = &mut self.agreement {
                         sum.merge(self.engine.process_and_compare(&frames)?.1);
                     } else {
@@ -310,6 +328,17 @@ impl Pump {
             self.view.draw();
         }
         Ok(losses)
+    }
+
+    /// Has percepts of `frames`, which come next, explained where viewers ask for that.
+    #[cfg(feature = "page")]
+    fn explain(&mut self, frames: &[Frame]) -> Result<()> {
+        let Some(explainer) = &self.explainer else { return Ok(()) };
+        let questions: Vec<_> = self.sinks.iter_mut().flat_map(|sink| sink.questions()).collect();
+        if !questions.is_empty() {
+            explainer.explain(questions, self.engine.state()?, frames);
+        }
+        Ok(())
     }
 
     /// Gives `frames`, and what the engine made of them, to every sink.

@@ -29,6 +29,8 @@ pub(super) struct Exchange {
     viewers: AtomicUsize,
     /// Whether somebody plays, and answers requests.
     pub(super) has_player: AtomicBool,
+    /// Whether somebody explains percepts, though nobody plays.
+    pub(super) has_explainer: AtomicBool,
     /// Whether the server is to end.
     pub(super) stops: AtomicBool,
 }
@@ -79,6 +81,7 @@ impl Exchange {
             waker,
             viewers: AtomicUsize::new(0),
             has_player: AtomicBool::new(false),
+            has_explainer: AtomicBool::new(false),
             stops: AtomicBool::new(false),
         }
     }

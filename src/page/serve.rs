@@ -367,7 +367,8 @@ fn pass_on(
     exchange: &Exchange,
     content: &Content,
 ) {
-    if exchange.has_player.load(Ordering::Relaxed) {
+    let explains = matches!(request, Request::Explain { .. }) && exchange.has_explainer.load(Ordering::Relaxed);
+    if explains || exchange.has_player.load(Ordering::Relaxed) {
         if let Err(TrySendError::Full(_)) = requests.try_send((id, request)) {
             connection.close(CloseReason::Overload, "too many requests");
         }

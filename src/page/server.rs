@@ -84,6 +84,12 @@ impl Server {
         requests
     }
 
+    /// What percepts viewers of a live run ask to have explained, as [`Server::requests`]; the server answers all else.
+    pub fn explanations(&mut self) -> Option<Receiver<(ViewerId, Request)>> {
+        self.exchange.has_explainer.store(true, Ordering::Relaxed);
+        self.requests.take()
+    }
+
     /// Sends messages to viewers.
     #[must_use]
     pub fn replies(&self) -> Replies {

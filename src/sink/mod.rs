@@ -52,6 +52,11 @@ pub trait Sink {
         Ok(Flow::Open)
     }
 
+    /// Percepts of the next frame that somebody behind the sink asks to have explained.
+    fn questions(&mut self) -> Vec<Question> {
+        Vec::new()
+    }
+
     /// Writes buffered output: at once, or in a recording within half a second.
     ///
     /// # Errors
@@ -73,6 +78,14 @@ pub enum Flow {
     Open,
     /// The reader has closed the pipe, which is a normal end.
     Closed,
+}
+
+/// A percept to explain.
+pub struct Question {
+    /// Its field, as [`crate::Percept::field`] counts.
+    pub field: usize,
+    /// Takes the answer: the message `explain` of `docs/page.md`.
+    pub answer: Box<dyn FnOnce(String) + Send>,
 }
 
 /// The names of a field in the output.

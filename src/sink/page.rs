@@ -1,10 +1,11 @@
 //! The sink that shows a run in browsers.
 
 use std::io::{self, Write as _};
+use std::sync::mpsc::Receiver;
 
-use super::{BoardNews, Flow, InputFrames, Session, Sink};
+use super::{BoardNews, Flow, InputFrames, Question, Session, Sink};
 use crate::error::{Error, Result};
-use crate::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use crate::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Request, Server, ViewerId};
 use crate::percept::Percepts;
 
 /// Shows a run on a page.
@@ -13,6 +14,7 @@ pub struct PageSink {
     // In this order: what is published last is sent before the server ends.
     publisher: Publisher,
     server: Server,
+    questions: Option<Receiver<(ViewerId, Request)>>,
 }
 
 impl PageSink {
@@ -32,10 +34,11 @@ impl PageSink {
             wiring: session.wiring,
             recorded_max: None,
         };
-        let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
+        let (mut server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
         // A closed standard error is no reason to stop.
         let _ = io::stderr().write_all(server.announcement().as_bytes());
-        Ok(Self { publisher, server })
+        let questions = server.explanations();
+        Ok(Self { publisher, server, questions })
     }
 
     /// Its server.
@@ -74,6 +77,16 @@ impl Sink for PageSink {
         }
         self.publisher.flush();
         Ok(Flow::Open)
+    }
+
+    fn questions(&mut self) -> Vec<Question> {
+        let asked = self.questions.iter().flat_map(Receiver::try_iter);
+        let question = |(viewer, request)| {
+            let Request::Explain { field } = request else { return None };
+            let replies = self.server.replies();
+            Some(Question { field, answer: Box::new(move |message| replies.text(viewer, message)) })
+        };
+        asked.filter_map(question).collect()
     }
 
     fn flush(&mut self) -> Result<Flow> {

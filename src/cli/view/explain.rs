@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use serde_json::{Value, json};
 use somatic::page::{History, Replies, Request, Series, ViewerId};
-use somatic::{Body, Engine, Options, Result, Verdict};
+use somatic::{Body, Engine, Options, Result};
 
+use super::super::explanation::{explanation, no_explanation};
 use super::checkpoints::Checkpoints;
 use super::recording::{CHUNK, Recording};
 
@@ -63,6 +63,7 @@ fn answer<'a>(
             Some(started) => Ok(started),
             None => start(),
         };
+        let field = if let Question::Explain { field, .. } = question { field } else { 0 };
         let outcome = started.and_then(|mut started| {
             match question {
                 Question::Explain { field, frame } => replies.text(viewer, started.explain(field, frame)?),
@@ -77,7 +78,7 @@ fn answer<'a>(
         match outcome {
             Ok(started) => answering = Some(started),
             Err(error) => {
-                replies.text(viewer, json!({"type": "explain", "error": error.to_string()}).to_string());
+                replies.text(viewer, no_explanation(field, &error.to_string()));
             }
         }
     }
@@ -111,50 +112,13 @@ impl<'a> Answering<'a> {
         }
     }
 
-    /// The message that says how `field` came about in frame `frame`, beside the reference, which has the same state before.
+    /// The message that says how `field` came about in frame `frame`.
     fn explain(&mut self, field: usize, frame: usize) -> Result<String> {
         self.go_to(frame)?;
-        let read = &self.recording.frames[frame];
-        let (percepts, _) = self.engine.process_and_compare(std::slice::from_ref(read))?;
+        let read = &self.recording.frames[frame..=frame];
+        let explained = explanation(&mut self.engine, read, field, (&self.recording.taxels, &self.ids));
         self.done = frame + 1;
-        let flags: Vec<String> = percepts.get(0, field).flags.names().collect();
-        let columns = self.engine.compared(0, field).into_iter().map(|compared| {
-            let components = compared.column.components;
-            let numbers = |value: Option<[f64; 3]>| value.map(|value| value[..components].to_vec());
-            json!({
-                "name": compared.column.name,
-                "value": numbers(compared.value),
-                "reference": numbers(compared.reference),
-                "bound": compared.bound,
-                "verdict": match compared.verdict {
-                    Verdict::Agrees => "agrees",
-                    Verdict::Differs => "differs",
-                    Verdict::TooClose => "too close",
-                    _ => "not compared",
-                },
-            })
-        });
-        let columns: Vec<Value> = columns.collect();
-        let mut pressures = Vec::new();
-        self.engine.pressures(read, &mut pressures);
-        let members = self.engine.plan().taxels_of(field).map(|taxel| {
-            let id = self.ids[taxel];
-            let pressure = pressures.iter().find(|&&(of, _)| of == id).map(|&(_, pressure)| pressure);
-            let place = self.recording.taxels.iter().position(|&of| of == id);
-            let raw = place.and_then(|place| read.values[place].number());
-            json!({"taxel": taxel, "raw": raw, "pressure": pressure})
-        });
-        Ok(json!({
-            "type": "explain",
-            "field": field,
-            "frame": frame,
-            "t_s": read.t_s,
-            "backend": self.engine.backend().0,
-            "flags": flags,
-            "members": members.collect::<Vec<Value>>(),
-            "columns": columns,
-        })
-        .to_string())
+        explained
     }
 
     /// The least and most of each of `series` in each bin of `history`.
