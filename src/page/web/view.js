@@ -49,10 +49,12 @@ export class View {
     this.parts = null;
     /** The body alone with its depth, and the body with taxels. @type {{body: Target | null, picture: Target | null}} */
     this.targets = { body: null, picture: null };
+    /** Counts the contexts that were lost. */
+    this.contexts = 0;
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.lost = true;
-      this.busy = false;
+      this.contexts++;
       this.parts = null;
       this.targets = { body: null, picture: null };
       model.tell("context");
@@ -227,13 +229,15 @@ export class View {
     const fence = gl?.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl?.flush();
     this.busy = true;
+    const context = this.contexts;
     const look = () => {
-      if (!this.busy) return;
-      if (gl && fence && !gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
+      // What was under way in a lost context ends now, or the server would wait for it for ever.
+      const isSame = context === this.contexts;
+      if (gl && fence && isSame && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
         setTimeout(look, 1);
         return;
       }
-      if (gl && fence) gl.deleteSync(fence);
+      if (gl && fence && isSame) gl.deleteSync(fence);
       this.busy = false;
       then();
       if (this.again) {
