@@ -33,7 +33,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("page", vec!["error", "percept", "signal", "body", "stage", "scene", "colours"]),
         ("sink", vec!["error", "output", "percept", "signal", "body", "scene", "recording", "page"]),
         ("ink", vec!["error"]),
-        ("picture", vec!["error", "body", "field", "backend", "ink"]),
+        ("picture", vec!["error", "percept", "body", "field", "backend", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
     ])
 }
