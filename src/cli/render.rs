@@ -58,7 +58,7 @@ pub(super) struct Arguments {
     look_at: Option<String>,
 
     /// Label taxels with their ids.
-    #[arg(long, conflicts_with = "uv")]
+    #[arg(long, conflicts_with_all = ["uv", "fields"])]
     ids: bool,
 
     #[command(flatten)]

@@ -23,6 +23,8 @@ use super::viewer::Viewer;
 use super::wake::Waits;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Home, Link, MemberSpec, Modality, Surface, Taxel};
 use crate::signal::{BoardHealth, Calibration, Frame, Pose, RawValue, Receptor, Wiring};
+// Before it an engine, as in a run.
+#[cfg(test)]
 use somatic::{BackendKind, Engine, Letter, Options, Outputs, Scene};
 
 /// Three links, two of them with a triangle and taxels and no common ancestor, and three fields, one of them on both.

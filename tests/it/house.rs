@@ -87,10 +87,6 @@ fn arrows_point_one_way() {
     let (allowed, paths) = (allowed(), paths());
     for (file, used) in paths.uses(true) {
         let room_of = room(file);
-        // Tests of the page run an engine before it, as a run does.
-        if file.ends_with("page/tests.rs") {
-            continue;
-        }
         // The command sees the library's public face alone.
         if ["lib", "tradeoff", "cli", "experiments", "survey"].contains(&room_of) {
             continue;

@@ -127,12 +127,8 @@ test("the first picture comes soon, and a taxel has the legend's colour of its p
     );
     expected.forEach((taxel, index) => {
       const off = Math.max(...taxel.colour.map((part, k) => Math.abs(part - seen[index][k])));
-      if (off <= 2) compared += 1;
-      else console.log(`taxel ${taxel.taxel}: ${seen[index]} for ${taxel.colour}`);
-      assert.ok(
-        off <= 2 || taxel.covered,
-        `taxel ${taxel.taxel} at ${taxel.at}: ${seen[index]}, not ${taxel.colour}`,
-      );
+      compared += 1;
+      assert.ok(off <= 2, `taxel ${taxel.taxel} at ${taxel.at}: ${seen[index]}, not ${taxel.colour}`);
     });
   }
   assert.ok(compared > 6);
@@ -188,7 +184,7 @@ test("percepts at any time are those of an uninterrupted run, to the bit", async
   await server.stop();
 });
 
-test("every key does something, and a percept is explained", async () => {
+test("keys act without an error, and a percept is explained", async () => {
   const server = await view();
   const { page, problems } = await open(server.url);
   await page.keyboard.press(" ");

@@ -22,7 +22,7 @@ const MAX_SIDES: usize = 2;
 #[derive(Args)]
 pub(super) struct Flags {
     /// Show the pressures and percepts of this recording: csv:FILE, mcap:FILE or sim:FILE.toml.
-    #[arg(long, value_name = "SOURCE")]
+    #[arg(long, value_name = "SOURCE", conflicts_with_all = ["uv", "fields"])]
     source: Option<String>,
 
     /// The calibration of the sensors, a TOML file [default: the source's own, if it has one].

@@ -1,14 +1,14 @@
 //! What takes longer than a frame: why a percept is what it is, and the history of some outputs.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use somatic::page::{History, Replies, Request, Series, ViewerId};
-use somatic::{Body, Engine, Options, Result};
+use somatic::page::{History, Request, Series, ViewerId};
+use somatic::{Engine, Error, Result};
 
 use super::super::explanation::{explanation, no_explanation};
 use super::checkpoints::Checkpoints;
 use super::recording::{CHUNK, Recording};
+use super::shared::Shared;
 
 /// A question of a viewer.
 enum Question {
@@ -21,21 +21,9 @@ pub(super) struct Explainer(Sender<(ViewerId, Question)>);
 
 impl Explainer {
     /// Starts the thread. It ends when the explainer is dropped.
-    pub(super) fn start(
-        body: &Arc<Body>,
-        options: &Options,
-        recording: &Arc<Recording>,
-        checkpoints: &Arc<Checkpoints>,
-        replies: &Replies,
-    ) -> Self {
+    pub(super) fn start(shared: Shared) -> Self {
         let (sender, questions) = channel();
-        let (body, options) = (Arc::clone(body), options.clone());
-        let (recording, checkpoints) = (Arc::clone(recording), Arc::clone(checkpoints));
-        let replies = replies.clone();
-        std::thread::spawn(move || {
-            let start = || Answering::new(&body, options.clone(), &recording, &checkpoints);
-            answer(&questions, &replies, start);
-        });
+        std::thread::spawn(move || answer(&questions, &shared));
         Self(sender)
     }
 
@@ -51,37 +39,39 @@ impl Explainer {
     }
 }
 
-/// Answers `questions`; the engine is made with the first.
-fn answer<'a>(
-    questions: &Receiver<(ViewerId, Question)>,
-    replies: &Replies,
-    start: impl Fn() -> Result<Answering<'a>>,
-) {
-    let mut answering = None;
+/// Answers `questions`; the engine is made with the first, and again after an error.
+fn answer(questions: &Receiver<(ViewerId, Question)>, shared: &Shared) {
+    let mut answering: Option<Answering<'_>> = None;
     while let Ok((viewer, question)) = questions.recv() {
-        let started = match answering.take() {
-            Some(started) => Ok(started),
-            None => start(),
-        };
-        let field = if let Question::Explain { field, .. } = question { field } else { 0 };
-        let outcome = started.and_then(|mut started| {
-            match question {
-                Question::Explain { field, frame } => replies.text(viewer, started.explain(field, frame)?),
-                Question::History(Request::History { id, from_s, to_s, bins, series }) => {
-                    let empty = History { id, from_s, to_s, bins, series: Vec::new() };
-                    replies.binary(viewer, started.history(empty, &series)?.message());
-                }
-                Question::History(_) => {}
+        let mut started = answering.take().map_or_else(|| Answering::new(shared), Ok);
+        match question {
+            Question::Explain { field, frame } => {
+                let explained = with(&mut started, |answering| answering.explain(field, frame));
+                let failed = |e: Error| no_explanation(field, &e.to_string());
+                shared.replies.text(viewer, explained.unwrap_or_else(failed));
             }
-            Ok(started)
-        });
-        match outcome {
-            Ok(started) => answering = Some(started),
-            Err(error) => {
-                replies.text(viewer, no_explanation(field, &error.to_string()));
+            Question::History(Request::History { id, from_s, to_s, bins, series }) => {
+                let nothing = vec![[vec![f32::NAN; bins], vec![f32::NAN; bins]]; series.len()];
+                let empty = History { id, from_s, to_s, bins, series: nothing };
+                let history = with(&mut started, |answering| answering.history(empty.clone(), &series));
+                shared.replies.binary(viewer, history.unwrap_or(empty).message());
             }
+            Question::History(_) => {}
         }
+        answering = started.ok();
     }
+}
+
+/// Does something with the engine, which is given up where that fails.
+fn with<'a, T>(
+    started: &mut Result<Answering<'a>>,
+    something: impl FnOnce(&mut Answering<'a>) -> Result<T>,
+) -> Result<T> {
+    let done = started.as_mut().map_err(|e| e.clone()).and_then(something);
+    if let Err(error) = &done {
+        *started = Err(error.clone());
+    }
+    done
 }
 
 /// An engine somewhere in the recording.
@@ -95,11 +85,10 @@ struct Answering<'a> {
 }
 
 impl<'a> Answering<'a> {
-    fn new(body: &Body, options: Options, recording: &'a Recording, checkpoints: &'a Checkpoints) -> Result<Self> {
-        let mut engine = Engine::new(body, options)?;
-        engine.set_channels(&recording.taxels)?;
-        let ids = body.taxels.iter().map(|taxel| taxel.id).collect();
-        Ok(Self { engine, ids, recording, checkpoints, done: 0 })
+    fn new(shared: &'a Shared) -> Result<Self> {
+        let ids = shared.body.taxels.iter().map(|taxel| taxel.id).collect();
+        let Shared { recording, checkpoints, .. } = shared;
+        Ok(Self { engine: shared.engine()?, ids, recording, checkpoints, done: 0 })
     }
 
     /// Brings the engine to before frame `frame`.
@@ -121,10 +110,9 @@ impl<'a> Answering<'a> {
         explained
     }
 
-    /// The least and most of each of `series` in each bin of `history`.
+    /// `history`, in which nothing is known yet, with the least and most of each of `series` in each bin.
     fn history(&mut self, mut history: History, series: &[Series]) -> Result<History> {
         let History { from_s, to_s, bins, .. } = history;
-        history.series = vec![[vec![f32::NAN; bins], vec![f32::NAN; bins]]; series.len()];
         let first = self.recording.index_at(from_s);
         let end = self.recording.index_at(to_s) + 1;
         self.go_to(first)?;

@@ -4,6 +4,7 @@ mod checkpoints;
 mod explain;
 mod player;
 mod recording;
+mod shared;
 mod subject;
 mod timeline;
 
@@ -21,6 +22,7 @@ use self::checkpoints::Checkpoints;
 use self::explain::Explainer;
 use self::player::Player;
 use self::recording::Recording;
+use self::shared::Shared;
 use self::subject::{Subject, subject};
 use super::browser;
 use super::input::Input;
@@ -97,6 +99,12 @@ struct Opened {
 }
 
 pub(super) fn view(arguments: &Arguments) -> Result<u8> {
+    let asked = &arguments.asked;
+    if !asked.sinks.is_empty() || asked.verify {
+        return Err(Error::usage(
+            "a view writes and compares nothing; use `somatic run` with --sink page beside others",
+        ));
+    }
     let listen = Listen::new(arguments.listen.as_deref(), &arguments.asked.allow_hosts)?;
     let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
     let opening = Opening { arguments, listen, until: lasts.map(|span| Instant::now() + span) };
@@ -179,10 +187,11 @@ impl Opening<'_> {
         let options = settled.options.backend(name.parse()?);
         let checkpoints = Arc::new(Checkpoints::new(&mut engine)?);
         let Opened { mut server, publisher, _handed_over } = self.start(scene)?;
-        let replies = server.replies();
-        let timeline = timeline::start(&body, &options, &recording, &checkpoints, &replies);
-        let explainer = Explainer::start(&body, &options, &recording, &checkpoints, &replies);
-        let player = Player::new(engine, Arc::clone(&recording), checkpoints, publisher, replies, explainer, timeline);
+        let shared =
+            Shared { body, options, recording: Arc::clone(&recording), checkpoints, replies: server.replies() };
+        let timeline = timeline::start(shared.clone());
+        let explainer = Explainer::start(shared.clone());
+        let player = Player::new(engine, shared, publisher, explainer, timeline);
         let speed = asked.speed.unwrap_or(1.0);
         let requests = server.requests().ok_or_else(|| Error::failed("the server has no requests"))?;
         let is_ended = || stop.load(Ordering::Relaxed) || self.until.is_some_and(|until| Instant::now() >= until);

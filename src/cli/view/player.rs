@@ -5,12 +5,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use somatic::page::{PageInput, Publisher, Replies, Request, ViewerId};
+use somatic::page::{PageInput, Publisher, Request, ViewerId};
 use somatic::{Engine, Result};
 
-use super::checkpoints::Checkpoints;
 use super::explain::Explainer;
-use super::recording::{CHUNK, Recording};
+use super::recording::CHUNK;
+use super::shared::Shared;
 use super::timeline::Timeline;
 
 /// The longest wait for a request, so that Ctrl-C is seen.
@@ -19,10 +19,8 @@ const MAX_WAIT: Duration = Duration::from_millis(50);
 /// A recording being played.
 pub(super) struct Player {
     engine: Engine,
-    recording: Arc<Recording>,
-    checkpoints: Arc<Checkpoints>,
+    shared: Shared,
     publisher: Publisher,
-    replies: Replies,
     explainer: Explainer,
     timeline: Arc<Timeline>,
     /// Frames that the engine has processed: the frame shown is the last of them.
@@ -40,20 +38,16 @@ pub(super) struct Player {
 impl Player {
     pub(super) fn new(
         engine: Engine,
-        recording: Arc<Recording>,
-        checkpoints: Arc<Checkpoints>,
+        shared: Shared,
         publisher: Publisher,
-        replies: Replies,
         explainer: Explainer,
         timeline: Arc<Timeline>,
     ) -> Self {
-        let due = (Instant::now(), recording.span_s()[0]);
+        let due = (Instant::now(), shared.recording.span_s()[0]);
         Self {
             engine,
-            recording,
-            checkpoints,
+            shared,
             publisher,
-            replies,
             explainer,
             timeline,
             done: 0,
@@ -107,7 +101,7 @@ impl Player {
         if self.target.is_some() {
             return Duration::ZERO;
         }
-        let next = self.recording.frames.get(self.done).filter(|_| self.playing);
+        let next = self.shared.recording.frames.get(self.done).filter(|_| self.playing);
         next.map_or(MAX_WAIT, |frame| {
             let (since, due_s) = self.due;
             let left = Duration::try_from_secs_f64((frame.t_s - due_s) / self.speed).unwrap_or_default();
@@ -118,8 +112,8 @@ impl Player {
     fn answer(&mut self, viewer: ViewerId, request: Request) {
         match request {
             Request::Joined => {
-                self.replies.text(viewer, self.timeline.message(0));
-                self.replies.text(viewer, self.status());
+                self.shared.replies.text(viewer, self.timeline.message(0));
+                self.shared.replies.text(viewer, self.status());
                 return;
             }
             Request::Explain { field } => return self.explainer.explain(viewer, field, self.shown()),
@@ -131,10 +125,10 @@ impl Player {
                 self.playing = true;
             }
             Request::Pause => self.playing = false,
-            Request::Seek { t_s } => self.target = Some(self.recording.index_at(t_s)),
+            Request::Seek { t_s } => self.target = Some(self.shared.recording.index_at(t_s)),
             Request::Step { frames } => {
                 self.playing = false;
-                let last = self.recording.frames.len() - 1;
+                let last = self.shared.recording.frames.len() - 1;
                 let from = self.target.unwrap_or(self.shown());
                 self.target = Some(from.saturating_add_signed(frames as isize).min(last));
             }
@@ -142,7 +136,7 @@ impl Player {
             _ => return,
         }
         self.restart_clock();
-        self.replies.all(self.status());
+        self.shared.replies.all(self.status());
     }
 
     /// The frame that is shown.
@@ -151,12 +145,12 @@ impl Player {
     }
 
     fn is_at_end(&self) -> bool {
-        self.done == self.recording.frames.len()
+        self.done == self.shared.recording.frames.len()
     }
 
     /// Recorded time goes on from the frame that is shown.
     fn restart_clock(&mut self) {
-        self.due = (Instant::now(), self.recording.frames[self.target.unwrap_or(self.shown())].t_s);
+        self.due = (Instant::now(), self.shared.recording.frames[self.target.unwrap_or(self.shown())].t_s);
     }
 
     fn status(&self) -> String {
@@ -168,17 +162,17 @@ impl Player {
     fn approach(&mut self, index: usize) -> Result<()> {
         let started = Instant::now();
         let before = self.done;
-        self.done = self.checkpoints.advance(&mut self.engine, &self.recording, before, index)?;
+        self.done = self.shared.checkpoints.advance(&mut self.engine, &self.shared.recording, before, index)?;
         if self.done < index {
             return Ok(());
         }
         self.publisher.jump();
-        self.engine.process(&self.recording.frames[index..=index])?;
+        self.engine.process(&self.shared.recording.frames[index..=index])?;
         self.done = index + 1;
         self.target = None;
         self.publish(1, started);
         self.restart_clock();
-        self.replies.all(self.status());
+        self.shared.replies.all(self.status());
         Ok(())
     }
 
@@ -189,7 +183,7 @@ impl Player {
         }
         let (since, due_s) = self.due;
         let now_s = due_s + since.elapsed().as_secs_f64() * self.speed;
-        let rest = &self.recording.frames[self.done..];
+        let rest = &self.shared.recording.frames[self.done..];
         let count = rest.iter().take(CHUNK).take_while(|frame| frame.t_s <= now_s).count();
         if count > 0 {
             let started = Instant::now();
@@ -207,14 +201,14 @@ impl Player {
             } else {
                 self.playing = false;
             }
-            self.replies.all(self.status());
+            self.shared.replies.all(self.status());
         }
         Ok(())
     }
 
     /// Hands over the last of `count` frames that the engine has processed since `started`.
     fn publish(&mut self, count: usize, started: Instant) {
-        let frame = &self.recording.frames[self.done - 1];
+        let frame = &self.shared.recording.frames[self.done - 1];
         let call_us = started.elapsed().as_secs_f32() * 1e6 / count as f32;
         self.publisher.read(&PageInput {
             frame,

@@ -4,12 +4,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use somatic::page::Replies;
-use somatic::{Body, Engine, Options, Percepts, Result};
+use somatic::{Percepts, Result};
 
 use super::super::stdio::say;
-use super::checkpoints::Checkpoints;
 use super::recording::{CHUNK, Recording};
+use super::shared::Shared;
 
 /// Parts of the recording that the page shows.
 const BINS: usize = 600;
@@ -74,34 +73,20 @@ impl Timeline {
 }
 
 /// Starts the pass on a thread of its own. It ends with the recording.
-pub(super) fn start(
-    body: &Arc<Body>,
-    options: &Options,
-    recording: &Arc<Recording>,
-    checkpoints: &Arc<Checkpoints>,
-    replies: &Replies,
-) -> Arc<Timeline> {
-    let timeline = Arc::new(Timeline::new(recording));
-    let (body, options, recording) = (Arc::clone(body), options.clone(), Arc::clone(recording));
-    let (checkpoints, replies, filled) = (Arc::clone(checkpoints), replies.clone(), Arc::clone(&timeline));
+pub(super) fn start(shared: Shared) -> Arc<Timeline> {
+    let timeline = Arc::new(Timeline::new(&shared.recording));
+    let filled = Arc::clone(&timeline);
     std::thread::spawn(move || {
-        if let Err(error) = pass(&body, options, &recording, &checkpoints, &replies, &filled) {
+        if let Err(error) = pass(&shared, &filled) {
             say(&format!("{error}; the recording can be played, but jumps take long"));
         }
     });
     timeline
 }
 
-fn pass(
-    body: &Body,
-    options: Options,
-    recording: &Recording,
-    checkpoints: &Checkpoints,
-    replies: &Replies,
-    timeline: &Timeline,
-) -> Result<()> {
-    let mut engine = Engine::new(body, options)?;
-    engine.set_channels(&recording.taxels)?;
+fn pass(shared: &Shared, timeline: &Timeline) -> Result<()> {
+    let Shared { recording, checkpoints, replies, .. } = shared;
+    let mut engine = shared.engine()?;
     let (mut done, mut first_bin) = (0, 0);
     let mut state_at_s = timeline.start_s;
     let mut told = Instant::now();

@@ -1,0 +1,28 @@
+//! What the parts of a view have in common.
+
+use std::sync::Arc;
+
+use somatic::page::Replies;
+use somatic::{Body, Engine, Options, Result};
+
+use super::checkpoints::Checkpoints;
+use super::recording::Recording;
+
+/// What the player, the pass behind it and the explainer share.
+#[derive(Clone)]
+pub(super) struct Shared {
+    pub(super) body: Arc<Body>,
+    pub(super) options: Options,
+    pub(super) recording: Arc<Recording>,
+    pub(super) checkpoints: Arc<Checkpoints>,
+    pub(super) replies: Replies,
+}
+
+impl Shared {
+    /// An engine of its own for one of them.
+    pub(super) fn engine(&self) -> Result<Engine> {
+        let mut engine = Engine::new(&self.body, self.options.clone())?;
+        engine.set_channels(&self.recording.taxels)?;
+        Ok(engine)
+    }
+}
