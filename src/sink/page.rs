@@ -95,7 +95,7 @@ impl Sink for PageSink {
     }
 
     fn finish(mut self: Box<Self>) -> Result<()> {
-        self.publisher.ended("the source has ended");
+        self.publisher.ended("The source has ended; this is its last frame.");
         Ok(())
     }
 }

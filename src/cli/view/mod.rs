@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use somatic::output::PrivateFile;
-use somatic::page::{Listen, Mode, PageInfo, PageScene, Publisher, Server};
+use somatic::page::{Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
 use self::checkpoints::Checkpoints;
@@ -132,7 +132,7 @@ impl Opening<'_> {
 
     /// A body at rest.
     fn body(&self, body: &Body) -> Result<u8> {
-        let engine = Engine::new(body, Options::default().backend(BackendKind::Cpu))?;
+        let mut engine = Engine::new(body, Options::default().backend(BackendKind::Cpu))?;
         let (name, what, why) = engine.backend();
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let scene = PageScene::new(
@@ -149,7 +149,19 @@ impl Opening<'_> {
         );
         let stop = stop_on_signal()?;
         let mut opened = self.start(scene)?;
-        opened.publisher.ended("the body at rest: there are no frames");
+        // Without frames every taxel's value is missing, and so it is shown.
+        let frame = engine.frame(0.0);
+        engine.process_one(&frame)?;
+        opened.publisher.read(&PageInput {
+            frame: &frame,
+            values_read: None,
+            plan: engine.plan(),
+            arrived: None,
+            call_us: f32::NAN,
+            number: None,
+        });
+        opened.publisher.publish(engine.percepts());
+        opened.publisher.ended("The body at rest, without frames.");
         while !stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until) {
             std::thread::sleep(Duration::from_millis(50));
         }

@@ -28,6 +28,8 @@ pub(super) struct Player {
     /// The frame that is to be shown, if it takes more than a call.
     target: Option<usize>,
     playing: bool,
+    /// Whether it begins to play with the first viewer.
+    waits: bool,
     /// Whether it begins again at its end.
     loops: bool,
     speed: f64,
@@ -51,8 +53,9 @@ impl Player {
             explainer,
             timeline,
             done: 0,
-            target: None,
-            playing: true,
+            target: Some(0),
+            playing: false,
+            waits: true,
             loops: false,
             speed: 1.0,
             due,
@@ -113,8 +116,11 @@ impl Player {
         match request {
             Request::Joined => {
                 self.shared.replies.text(viewer, self.timeline.message(0));
-                self.shared.replies.text(viewer, self.status());
-                return;
+                if !std::mem::take(&mut self.waits) {
+                    self.shared.replies.text(viewer, self.status());
+                    return;
+                }
+                self.playing = true;
             }
             Request::Explain { field } => return self.explainer.explain(viewer, field, self.shown()),
             Request::History { .. } => return self.explainer.history(viewer, request),

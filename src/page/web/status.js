@@ -66,7 +66,7 @@ export class Status {
     else if (state === "silent") text = `No frames since ${clock(since)}.`;
     else if (state === "connecting") text = "Connecting …";
     else if (view.lost) text = "The graphics were lost. Waiting for them to come back.";
-    else if (model.ended !== null) text = `The source has ended: ${model.ended} This is its last frame.`;
+    else if (model.ended !== null) text = model.ended;
     if (reason) text += ` ${reason}`;
     setText(this.banner, text);
     this.banner.hidden = text === "";
