@@ -106,6 +106,7 @@ impl Serving {
 
     /// Serves until it is told to stop.
     pub(super) fn run(mut self, waits: &Waits) {
+        Waits::lower_priority();
         loop {
             let stops = self.exchange.stops.load(Ordering::Relaxed);
             let now = Instant::now();
