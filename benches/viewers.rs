@@ -30,6 +30,8 @@ const FIELDS: usize = 600;
 const MEMBERS: usize = 16;
 const PERIOD: Duration = Duration::from_millis(4);
 const PAIRS: usize = 5;
+/// Frames before the first that counts.
+const WARM_FRAMES: usize = 250;
 const TURN: Duration = Duration::from_secs(12);
 
 fn main() {
@@ -87,7 +89,7 @@ fn stopped() {
         } else if state == 1 && at.elapsed > go_on {
             signal("-CONT");
             state = 2;
-            newest = at.frame;
+            newest = at.frame + WARM_FRAMES;
             marks.push((at.frame, resident_kb()));
         }
     });
@@ -132,6 +134,7 @@ struct Run {
 
 /// Where a run is.
 struct At {
+    /// Of the frames that count.
     frame: usize,
     elapsed: Duration,
 }
@@ -178,7 +181,6 @@ impl Run {
         let mut frame = self.engine.frame(0.0);
         let (mut calls_us, mut hand_over_us) = (Vec::new(), Vec::new());
         let start = Instant::now();
-        let warm = 250;
         for number in 0.. {
             let due = PERIOD * number as u32;
             if due > time {
@@ -201,10 +203,10 @@ impl Run {
                 number: None,
             });
             self.publisher.publish(&percepts);
-            if number >= warm {
+            if number >= WARM_FRAMES {
                 calls_us.push(call.as_secs_f64() * 1e6);
                 hand_over_us.push(begin.elapsed().as_secs_f64() * 1e6);
-                step(&At { frame: number - warm, elapsed: start.elapsed() });
+                step(&At { frame: number - WARM_FRAMES, elapsed: start.elapsed() });
             }
         }
         drop((self.publisher, self.server));

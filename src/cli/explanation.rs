@@ -7,7 +7,8 @@ use somatic::sink::Question;
 use somatic::{Body, Engine, EngineState, Frame, Options, Result, Verdict};
 
 /// The message that says how `field` came about in the last of `frames`, which `engine` processes beside the reference, from the
-/// same state. `taxels` are the ids of a frame's values, `ids` those of the body's taxels.
+/// same state. `taxels` are the ids of a frame's values, `ids` those of the body's taxels; `recorded` are quantities that a
+/// recording holds and that differ from those computed now.
 ///
 /// # Errors
 /// The device was lost.
@@ -16,6 +17,7 @@ pub(super) fn explanation(
     frames: &[Frame],
     field: usize,
     (taxels, ids): (&[u32], &[u32]),
+    recorded: &[(&str, Option<Vec<f64>>)],
 ) -> Result<String> {
     let Some(last) = frames.len().checked_sub(1) else { return Ok(String::new()) };
     let frame = &frames[last];
@@ -25,8 +27,11 @@ pub(super) fn explanation(
     let columns = engine.compared(last, field).into_iter().map(|compared| {
         let components = compared.column.components;
         let numbers = |value: Option<[f64; 3]>| value.map(|value| value[..components].to_vec());
+        let other = recorded.iter().find(|(name, _)| *name == compared.column.name);
         json!({
             "name": compared.column.name,
+            // Null where the recording has the same, or no percepts.
+            "recorded": other.map(|(_, value)| json!({"value": value})),
             "value": numbers(compared.value),
             "reference": numbers(compared.reference),
             "bound": compared.bound,
@@ -88,7 +93,7 @@ impl LiveExplainer {
                     let explained = engine.and_then(|mut engine: Engine| {
                         engine.set_channels(&taxels)?;
                         engine.restore(&state)?;
-                        let explained = explanation(&mut engine, &frames, field, (&taxels, &ids))?;
+                        let explained = explanation(&mut engine, &frames, field, (&taxels, &ids), &[])?;
                         started = Some(engine);
                         Ok(explained)
                     });

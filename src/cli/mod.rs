@@ -28,6 +28,7 @@ mod keys;
 mod latency;
 mod lines;
 mod live;
+mod names;
 mod paper;
 mod plan;
 mod plot;

@@ -5,9 +5,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use somatic::sink::{FieldNames, Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
+use somatic::sink::{Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Plan, Result};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Result};
 
 use super::attachments::attachments;
 use super::doubts::Doubts;
@@ -21,6 +21,7 @@ use super::interrupt::stop_on_signal;
 use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
+use super::names::field_names;
 use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{FAILED, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
@@ -76,20 +77,6 @@ pub(super) struct Arguments {
     /// At the end, write how many frames each board sent and lost, and how long percepts took, to this file, as JSON.
     #[arg(long, value_name = "FILE", help_heading = LIVE)]
     summary: Option<PathBuf>,
-}
-
-/// What sinks call the fields.
-fn field_names(plan: &Plan) -> Vec<FieldNames> {
-    let name = |(index, (field, link)): (usize, (&str, &str))| {
-        let mark = plan.mark(index);
-        FieldNames {
-            field: field.into(),
-            link: link.into(),
-            letter: mark.receptor.map(|receptor| receptor.to_string()),
-            signal: mark.signal.map(|signal| signal.to_string()),
-        }
-    };
-    plan.fields().enumerate().map(name).collect()
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {

@@ -138,6 +138,53 @@ fn a_percept_is_explained_and_its_history_told() {
 }
 
 #[test]
+fn percepts_that_a_recording_holds_are_compared_with_those_computed_now() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (recorded, calibration) = (at("touch.mcap"), at("half.toml"));
+    std::fs::write(&calibration, "[all]\ngain = 0.5\n").unwrap();
+    let sink = format!("mcap:{recorded}");
+    // Not the backend that views: what it rounds otherwise is no difference.
+    done(&["run", "--quiet", "--backend", "reference", "--record", "frames,percepts", "--sink", &sink]);
+    let touched =
+        frames(&done(&["run", "--quiet", "--sink", "-"])).iter().filter(|frame| !frame["fields"][0].is_null()).count();
+    for (calibration, differing) in [(None, 0), (Some(&*calibration), touched)] {
+        let given = calibration.map_or(vec![], |file| vec!["--calibration", file]);
+        let mut view = Run::of(&[&VIEW[..], &[&*recorded], &given].concat());
+        let mut viewer = view.viewer();
+        viewer.binary();
+        let welcome = text(&mut viewer, "welcome", |_| true);
+        let mut counts = vec![0; 600];
+        loop {
+            let part = text(&mut viewer, "timeline", |_| true);
+            let first = part["first_bin"].as_u64().unwrap() as usize;
+            for (bin, count) in part["differing"].as_array().into_iter().flatten().enumerate() {
+                counts[first + bin] = count.as_u64().unwrap();
+            }
+            if part["computed_until_s"].as_f64() >= welcome["time"]["end_s"].as_f64() {
+                break;
+            }
+        }
+        assert_eq!(counts.iter().sum::<u64>(), differing as u64, "{calibration:?}");
+        let fields = welcome["fields"].as_array().unwrap();
+        let field = fields.iter().position(|field| field["name"] == "hand/back").unwrap();
+        say(&mut viewer.socket, &json!({"type": "pause"}));
+        say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
+        text(&mut viewer, "status", |status| status["playing"] == false);
+        frame(&mut viewer, 145);
+        say(&mut viewer.socket, &json!({"type": "explain", "field": field}));
+        let why = text(&mut viewer, "explain", |_| true);
+        let column =
+            |name: &str| why["columns"].as_array().unwrap().iter().find(|column| column["name"] == name).unwrap();
+        let [now, then] = [column("total")["value"][0].as_f64(), column("total")["recorded"]["value"][0].as_f64()];
+        assert_eq!(then, calibration.and(now).map(|now| 2.0 * now));
+        // Where the hand is touched does not depend on a gain.
+        assert!(column("centroid")["recorded"].is_null());
+        assert_eq!(view.interrupt(), Some(0));
+    }
+}
+
+#[test]
 fn a_body_is_shown_at_rest() {
     let mut view = Run::of(&["view", "humanoid", "--listen", "127.0.0.1:0"]);
     let mut viewer = view.viewer();

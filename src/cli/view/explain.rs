@@ -7,6 +7,7 @@ use somatic::{Engine, Error, Result};
 
 use super::super::explanation::{explanation, no_explanation};
 use super::checkpoints::Checkpoints;
+use super::recorded::Differences;
 use super::recording::{CHUNK, Recording};
 use super::shared::Shared;
 
@@ -80,6 +81,7 @@ struct Answering<'a> {
     /// By the body's taxels.
     ids: Vec<u32>,
     recording: &'a Recording,
+    differences: &'a Differences,
     checkpoints: &'a Checkpoints,
     done: usize,
 }
@@ -87,8 +89,8 @@ struct Answering<'a> {
 impl<'a> Answering<'a> {
     fn new(shared: &'a Shared) -> Result<Self> {
         let ids = shared.body.taxels.iter().map(|taxel| taxel.id).collect();
-        let Shared { recording, checkpoints, .. } = shared;
-        Ok(Self { engine: shared.engine()?, ids, recording, checkpoints, done: 0 })
+        let Shared { recording, checkpoints, differences, .. } = shared;
+        Ok(Self { engine: shared.engine()?, ids, recording, differences, checkpoints, done: 0 })
     }
 
     /// Brings the engine to before frame `frame`.
@@ -105,7 +107,9 @@ impl<'a> Answering<'a> {
     fn explain(&mut self, field: usize, frame: usize) -> Result<String> {
         self.go_to(frame)?;
         let read = &self.recording.frames[frame..=frame];
-        let explained = explanation(&mut self.engine, read, field, (&self.recording.taxels, &self.ids));
+        let recorded = self.differences.of(frame, field);
+        let recorded: Vec<_> = recorded.into_iter().map(|other| (other.column, other.recorded)).collect();
+        let explained = explanation(&mut self.engine, read, field, (&self.recording.taxels, &self.ids), &recorded);
         self.done = frame + 1;
         explained
     }

@@ -3,6 +3,7 @@
 mod checkpoints;
 mod explain;
 mod player;
+mod recorded;
 mod recording;
 mod shared;
 mod subject;
@@ -16,11 +17,13 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use somatic::output::PrivateFile;
 use somatic::page::{Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use somatic::source::SourceSpec;
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
 use self::checkpoints::Checkpoints;
 use self::explain::Explainer;
 use self::player::Player;
+use self::recorded::{Differences, Recorded};
 use self::recording::Recording;
 use self::shared::Shared;
 use self::subject::{Subject, subject};
@@ -199,9 +202,19 @@ impl Opening<'_> {
         let options = settled.options.backend(name.parse()?);
         let checkpoints = Arc::new(Checkpoints::new(&mut engine)?);
         let Opened { mut server, publisher, _handed_over } = self.start(scene)?;
-        let shared =
-            Shared { body, options, recording: Arc::clone(&recording), checkpoints, replies: server.replies() };
-        let timeline = timeline::start(shared.clone());
+        let recorded = match input.spec {
+            Some(SourceSpec::Mcap(ref path)) => Recorded::open(path, engine.plan())?,
+            _ => None,
+        };
+        let shared = Shared {
+            body,
+            options,
+            recording: Arc::clone(&recording),
+            checkpoints,
+            differences: Arc::new(Differences::default()),
+            replies: server.replies(),
+        };
+        let timeline = timeline::start(shared.clone(), recorded);
         let explainer = Explainer::start(shared.clone());
         let player = Player::new(engine, shared, publisher, explainer, timeline);
         let speed = asked.speed.unwrap_or(1.0);

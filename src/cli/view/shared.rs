@@ -6,6 +6,7 @@ use somatic::page::Replies;
 use somatic::{Body, Engine, Options, Result};
 
 use super::checkpoints::Checkpoints;
+use super::recorded::Differences;
 use super::recording::Recording;
 
 /// What the player, the pass behind it and the explainer share.
@@ -15,6 +16,8 @@ pub(super) struct Shared {
     pub(super) options: Options,
     pub(super) recording: Arc<Recording>,
     pub(super) checkpoints: Arc<Checkpoints>,
+    /// What the recording holds of percepts that differ from those computed now.
+    pub(super) differences: Arc<Differences>,
     pub(super) replies: Replies,
 }
 

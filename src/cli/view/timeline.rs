@@ -7,6 +7,7 @@ use serde_json::json;
 use somatic::{Percepts, Result};
 
 use super::super::stdio::say;
+use super::recorded::Recorded;
 use super::recording::{CHUNK, Recording};
 use super::shared::Shared;
 
@@ -26,13 +27,15 @@ struct Known {
     until_s: f64,
     /// By bin, the largest peak; none where nothing is touched.
     peaks: Vec<Option<f64>>,
+    /// By bin, how many frames have other percepts in the recording; none where it holds no percepts.
+    differing: Option<Vec<u32>>,
 }
 
 impl Timeline {
     /// Of a recording of which nothing has been computed.
     pub(super) fn new(recording: &Recording) -> Self {
         let [start_s, end_s] = recording.span_s();
-        let known = Mutex::new(Known { until_s: start_s, peaks: vec![None; BINS] });
+        let known = Mutex::new(Known { until_s: start_s, peaks: vec![None; BINS], differing: None });
         Self { start_s, bin_s: (end_s - start_s).max(1e-9) / BINS as f64, known }
     }
 
@@ -58,6 +61,15 @@ impl Timeline {
         }
     }
 
+    /// Adds which frames from `first` on have other percepts in the recording.
+    fn add_differing(&self, differs: &[bool], recording: &Recording, first: usize) {
+        let mut known = self.known();
+        let counts = known.differing.get_or_insert_with(|| vec![0; BINS]);
+        for (frame, _) in differs.iter().enumerate().filter(|(_, differs)| **differs) {
+            counts[self.bin(recording.frames[first + frame].t_s)] += 1;
+        }
+    }
+
     /// The message that holds what is known from bin `first_bin` on.
     pub(super) fn message(&self, first_bin: usize) -> String {
         let known = self.known();
@@ -67,31 +79,36 @@ impl Timeline {
             "bins": BINS,
             "first_bin": first_bin,
             "peak": known.peaks[first_bin..=self.bin(known.until_s)],
+            "differing": known.differing.as_ref().map(|counts| &counts[first_bin..=self.bin(known.until_s)]),
         })
         .to_string()
     }
 }
 
-/// Starts the pass on a thread of its own. It ends with the recording.
-pub(super) fn start(shared: Shared) -> Arc<Timeline> {
+/// Starts the pass on a thread of its own, which compares with what is `recorded`. It ends with the recording.
+pub(super) fn start(shared: Shared, recorded: Option<Recorded>) -> Arc<Timeline> {
     let timeline = Arc::new(Timeline::new(&shared.recording));
     let filled = Arc::clone(&timeline);
     std::thread::spawn(move || {
-        if let Err(error) = pass(&shared, &filled) {
+        if let Err(error) = pass(&shared, recorded, &filled) {
             say(&format!("{error}; the recording can be played, but jumps take long"));
         }
     });
     timeline
 }
 
-fn pass(shared: &Shared, timeline: &Timeline) -> Result<()> {
-    let Shared { recording, checkpoints, replies, .. } = shared;
+fn pass(shared: &Shared, mut recorded: Option<Recorded>, timeline: &Timeline) -> Result<()> {
+    let Shared { recording, checkpoints, replies, differences, .. } = shared;
     let mut engine = shared.engine()?;
     let (mut done, mut first_bin) = (0, 0);
     let mut state_at_s = timeline.start_s;
     let mut told = Instant::now();
     for frames in recording.frames.chunks(CHUNK) {
-        timeline.add(engine.process(frames)?, recording, done);
+        let percepts = engine.process(frames)?;
+        timeline.add(percepts, recording, done);
+        if let Some(recorded) = &mut recorded {
+            timeline.add_differing(&recorded.compare(percepts, recording, done, differences)?, recording, done);
+        }
         done += frames.len();
         let now_s = frames[frames.len() - 1].t_s;
         if now_s - state_at_s >= checkpoints.spacing_s() {

@@ -120,7 +120,7 @@ export class PerceptPanel {
     for (const column of explanation.columns) {
       const unit = welcome.columns.find((c) => c.name === column.name)?.unit ?? "1";
       const { value, reference } = column;
-      if (!value && !reference) continue;
+      if (!value && !reference && !column.recorded) continue;
       const apart = value && reference ? Math.hypot(...value.map((x, i) => x - (reference[i] ?? NaN))) : null;
       const by = scaleFor(unit, Math.max(...(value ?? reference ?? [0]).map(Math.abs)), quantity);
       const row = line("td", [
@@ -130,6 +130,11 @@ export class PerceptPanel {
         column.verdict,
       ]);
       row.classList.add(`verdict-${column.verdict.replaceAll(" ", "-")}`);
+      if (column.recorded) {
+        row.classList.add("differs-from-recording");
+        const other = `recorded: ${digits(column.recorded.value, by.factor, 7)}`;
+        row.children[1].append(make("div", "recorded", other));
+      }
       values.append(row);
     }
     const members = make("table", "explain-members");

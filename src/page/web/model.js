@@ -63,7 +63,7 @@ export class Model extends Observed {
     /** @type {import("./wire.js").Board[]} */
     this.boards = [];
     this.status = { playing: false, speed: 1, at_end: false };
-    this.timeline = { until: -Infinity, peak: /** @type {(number | null)[]} */ ([]) };
+    this.timeline = noTimeline();
     /** Why the source has ended. @type {string | null} */
     this.ended = null;
     /** @type {import("./wire.js").TaxelValue | null} */
@@ -99,7 +99,7 @@ export class Model extends Observed {
     this.frame = null;
     this.boards = [];
     this.ended = null;
-    this.timeline = { until: -Infinity, peak: [] };
+    this.timeline = noTimeline();
     if (!sameRun) this.forgetEvents();
   }
 
@@ -177,6 +177,10 @@ export class Model extends Observed {
         while (peak.length < message.bins) peak.push(null);
         message.peak.forEach((/** @type {number | null} */ p, /** @type {number} */ i) => {
           peak[message.first_bin + i] = p;
+        });
+        const { differing } = this.timeline;
+        message.differing?.forEach((/** @type {number} */ count, /** @type {number} */ i) => {
+          differing[message.first_bin + i] = count;
         });
         this.timeline.until = message.computed_until_s;
         break;
@@ -264,4 +268,14 @@ export class Model extends Observed {
     const likely = REASONS[column]?.find((name) => flags.includes(name));
     return likely ?? flags.join(", ");
   }
+}
+
+/** What is known of a recording before its first message. */
+function noTimeline() {
+  return {
+    until: -Infinity,
+    peak: /** @type {(number | null)[]} */ ([]),
+    /** By bin, how many frames have other percepts in the recording; empty where it holds none. */
+    differing: /** @type {number[]} */ ([]),
+  };
 }

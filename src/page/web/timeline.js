@@ -8,6 +8,9 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 /** While the pointer drags, a place is asked for at most so often. */
 const SCRUB_MS = 50;
 
+/** Height of the mark over frames whose recorded percepts differ. */
+const DIFFERENCE_PX = 5;
+
 export class Timeline {
   /**
    * @param {import("./model.js").Model} model
@@ -21,6 +24,7 @@ export class Timeline {
     this.playButton = byId("play", HTMLButtonElement);
     this.time = byId("time", HTMLElement);
     this.speedBox = byId("speed", HTMLSelectElement);
+    this.differences = byId("differences", HTMLElement);
     this.linkButton = byId("link", HTMLButtonElement);
     /** @type {number | null} */
     this.hover = null;
@@ -76,6 +80,13 @@ export class Timeline {
     if (!SPEEDS.includes(speed) && ![...this.speedBox.options].some((o) => Number(o.value) === speed))
       this.speedBox.add(new Option(`${speed}×`, String(speed)));
     this.speedBox.value = String(speed);
+  }
+
+  /** @param {number[]} differing */
+  showDifferences(differing) {
+    const count = differing.reduce((sum, of) => sum + of, 0);
+    this.differences.hidden = count === 0;
+    setText(this.differences, `${count} ${count === 1 ? "frame differs" : "frames differ"}`);
   }
 
   /** @param {number} x */
@@ -154,7 +165,7 @@ export class Timeline {
     if (!fitted) return;
     const { context, width, height } = fitted;
     const x = (/** @type {number} */ t) => ((t - time.start_s) / (time.end_s - time.start_s)) * width;
-    const { peak, until } = this.model.timeline;
+    const { peak, until, differing } = this.model.timeline;
     const most = peak.reduce((/** @type {number} */ m, p) => Math.max(m, p ?? 0), 0);
     const computed = Math.max(0, Math.min(width, x(until)));
     context.fillStyle = cssColour("track");
@@ -188,6 +199,11 @@ export class Timeline {
       const h = 3 + (height - 8) * Math.sqrt(p / most);
       context.fillRect(i * bin, height - h, bin + 0.3, h);
     });
+    context.fillStyle = cssColour("warn");
+    differing.forEach((count, i) => {
+      if (count > 0) context.fillRect(i * bin, 0, bin + 0.3, DIFFERENCE_PX);
+    });
+    this.showDifferences(differing);
     const at = x(now);
     context.fillStyle = cssColour("accent");
     context.fillRect(at - 1, 0, 2, height);

@@ -38,7 +38,8 @@ export const HEALTH = ["good", "missing", "stale", "faulty", "saturated", "out o
  * @typedef {{name: string, state: string, rate_hz: number | null, frames: number, lost: number, age_s: number | null}} Board
  * @typedef {{type: "explain", field: number, frame: number, t_s: number, backend: string, flags: string[],
  *   members: {taxel: number, raw: number | null, pressure: number | null}[],
- *   columns: {name: string, value: number[] | null, reference: number[] | null, bound: number | null, verdict: string}[],
+ *   columns: {name: string, value: number[] | null, reference: number[] | null, bound: number | null, verdict: string,
+ *     recorded: {value: number[] | null} | null}[],
  *   error?: string}} Explanation
  * @typedef {{type: "taxel", taxel: number, t_s: number, raw: number | null, pressure: number | null, health: string}} TaxelValue
  */
