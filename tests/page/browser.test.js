@@ -1,85 +1,23 @@
-// The page in a real Chromium, before the real program: SOMATIC is the program, CHROMIUM the browser, PICTURES a folder
-// for screenshots. Run by `tests/cli/browser.rs`.
+// The page in a real Chromium, before the real program: what it shows, its keys, lost connections, who is refused, how fast.
 import assert from "node:assert/strict";
-import { execFileSync, spawn } from "node:child_process";
+import { execFileSync } from "node:child_process";
 import { createServer } from "node:http";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
-import { chromium } from "playwright-core";
-
-const SOMATIC = process.env.SOMATIC ?? "somatic";
-const PICTURES = process.env.PICTURES;
-const folder = mkdtempSync(join(tmpdir(), "somatic-browser-"));
-const started = new Set();
-/** @type {import("playwright-core").BrowserContext} */
-let browser;
-
-before(async () => {
-  browser = await chromium.launchPersistentContext(join(folder, "profile"), {
-    executablePath: process.env.CHROMIUM,
-    headless: true,
-    args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"],
-    viewport: { width: 1280, height: 720 },
-    colorScheme: "dark",
-  });
-});
-after(async () => {
-  await browser?.close();
-  for (const child of started) child.kill();
-  rmSync(folder, { recursive: true, force: true });
-});
-
-/** Starts the program and gives its page's address. */
-async function serve(...parts) {
-  const child = spawn(SOMATIC, parts, { stdio: ["pipe", "ignore", "pipe"], cwd: folder });
-  started.add(child);
-  let said = "";
-  const url = await new Promise((found, failed) => {
-    child.stderr.on("data", (text) => {
-      said += text;
-      const address = said.match(/http:\/\/\S+/);
-      if (address) found(address[0]);
-    });
-    child.on("exit", () => failed(new Error(`somatic ended: ${said}`)));
-  });
-  const stop = async () => {
-    const ended = new Promise((over) => child.once("exit", over));
-    child.kill("SIGINT");
-    await ended;
-    started.delete(child);
-  };
-  return { url, child, stop, port: new URL(url).port };
-}
-
-const view = (...parts) => serve("view", "--listen", "127.0.0.1:0", "--backend", "cpu", ...parts);
-
-/** Opens an address and waits for the first picture. */
-async function open(url) {
-  const page = await browser.newPage();
-  const problems = [];
-  page.on("pageerror", (error) => problems.push(String(error)));
-  page.on("console", (line) => line.type() === "error" && problems.push(line.text()));
-  await page.goto(url);
-  await page.waitForFunction(() => window.somatic?.firstPictureMs > 0, null, { timeout: 60000 });
-  return { page, problems };
-}
-
-/** Pauses and goes to a time; waits until it is shown. */
-async function seek(page, t) {
-  await page.evaluate((t) => (location.hash = `#t=${t}`), t);
-  await page.waitForFunction((t) => Math.abs(window.somatic.model.frame?.t - t) < 1e-9, t, {
-    timeout: 60000,
-  });
-  await page.waitForTimeout(300);
-}
-
-async function picture(page, name) {
-  if (!PICTURES) return;
-  mkdirSync(PICTURES, { recursive: true });
-  await page.screenshot({ path: join(PICTURES, name) });
-}
+import { test } from "node:test";
+import {
+  browser,
+  coloursAt,
+  folder,
+  open,
+  picture,
+  seek,
+  serve,
+  SOMATIC,
+  taxelIds,
+  view,
+  writeRecording,
+} from "./program.js";
 
 test("the first picture comes soon, and a taxel has the legend's colour of its pressure", async () => {
   const server = await view();
@@ -111,19 +49,9 @@ test("the first picture comes soon, and a taxel has the legend's colour of its p
       })).filter((taxel) => taxel.at && taxel.pressure > 0);
     });
     assert.ok(expected.length > 3, `${expected.length} pressed taxels in sight`);
-    const shot = (await page.screenshot()).toString("base64");
-    const seen = await page.evaluate(
-      async ([shot, places]) => {
-        const bytes = Uint8Array.from(atob(shot), (letter) => letter.charCodeAt(0));
-        const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-        const canvas = new OffscreenCanvas(image.width, image.height);
-        const context = canvas.getContext("2d");
-        context.drawImage(image, 0, 0);
-        return places.map(([x, y]) =>
-          Array.from(context.getImageData(Math.round(x), Math.round(y), 1, 1).data),
-        );
-      },
-      [shot, expected.map((taxel) => taxel.at)],
+    const seen = await coloursAt(
+      page,
+      expected.map((taxel) => taxel.at),
     );
     expected.forEach((taxel, index) => {
       const off = Math.max(...taxel.colour.map((part, k) => Math.abs(part - seen[index][k])));
@@ -334,12 +262,9 @@ test("names from files are text", async () => {
 });
 
 test("a thousand taxels are drawn fast enough", async () => {
-  const ids = JSON.parse(
-    execFileSync(SOMATIC, ["inspect", "humanoid", "--json"], { encoding: "utf8", maxBuffer: 1e9 }),
-  ).taxels.map((taxel) => taxel.id);
+  const ids = taxelIds("humanoid");
   const row = (n) => ids.map((_, i) => Math.max(0, Math.round(400 * Math.sin(i / 40 + n / 60) - 200)));
-  const rows = Array.from({ length: 2500 }, (_, n) => [n / 250, ...row(n)].join(","));
-  writeFileSync(join(folder, "skin.csv"), `t,${ids.join(",")}\n${rows.join("\n")}\n`);
+  writeRecording("skin.csv", ids, 2500, 1 / 250, row);
   const server = await view("skin.csv", "--body", "humanoid");
   const { page } = await open(server.url);
   const rate = (move) =>
