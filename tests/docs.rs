@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use self::skips::skip;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
-const RUN_ELSEWHERE: [&str; 15] = [
+const RUN_ELSEWHERE: [&str; 16] = [
     "cargo run --release -- view --open",
     "cargo run --release --example embed",
     "cargo run --example bodies",
@@ -23,6 +23,7 @@ const RUN_ELSEWHERE: [&str; 15] = [
     "cargo bench --bench engine -- live",
     "cargo bench --bench gpu > gpu.json",
     "cargo bench --bench activity",
+    "cargo bench --bench viewers",
     "cargo bench -- --max-time 5",
     "benches/peers/run",
     "benches/recordings/run",

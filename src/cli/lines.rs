@@ -7,7 +7,7 @@ use console::style;
 use serde_json::{Value, json};
 use somatic::output::OutputPath;
 use somatic::signal::BoardHealth;
-use somatic::sink::BoardNews;
+use somatic::sink::News;
 use somatic::source::{BoardAccount, BoardState, Lines};
 use somatic::{Error, Result};
 
@@ -42,7 +42,7 @@ pub(super) struct LineReport {
     summary: Option<OutputPath>,
     quiet: bool,
     /// What sinks have not been told.
-    news: BoardNews,
+    news: News,
     told_health: Option<Instant>,
     /// By board, its frames and when there was one more.
     last_frames: HashMap<u16, (u64, Instant)>,
@@ -58,14 +58,14 @@ impl LineReport {
             latest: VecDeque::new(),
             summary,
             quiet,
-            news: BoardNews::default(),
+            news: News::default(),
             told_health: None,
             last_frames: HashMap::new(),
         }
     }
 
     /// What sinks are to be told now, if anything.
-    pub(super) fn news(&mut self) -> Option<BoardNews> {
+    pub(super) fn news(&mut self) -> Option<News> {
         let now = Instant::now();
         if self.told_health.is_none_or(|told| now - told >= HEALTH_PERIOD) {
             self.told_health = Some(now);

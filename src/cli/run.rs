@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use somatic::sink::{Flow, InputFrames, Session, Sink, SinkSpec, SinkTarget};
+use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Result};
 
@@ -295,9 +295,7 @@ impl Pump {
                     }
                     self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
                     feed.give_back(frames);
-                    if !self.view.is_table() {
-                        self.unfit.tell(&self.engine);
-                    }
+                    self.report_unfit()?;
                 }
                 Some(Arrival::End(losses)) => return Ok(losses),
                 Some(Arrival::Failed(error)) => return Err(error),
@@ -315,6 +313,19 @@ impl Pump {
             self.view.draw();
         }
         Ok(losses)
+    }
+
+    /// Reports taxels that are left out, or used again, to sinks and, unless a table fills the terminal, to people.
+    fn report_unfit(&mut self) -> Result<()> {
+        let messages = self.unfit.changes(&self.engine);
+        if messages.is_empty() {
+            return Ok(());
+        }
+        messages.iter().filter(|_| !self.view.is_table()).for_each(|message| say(message));
+        let at_s = self.unfit.at_s;
+        let taxels = messages.into_iter().map(|message| (at_s, message)).collect();
+        let news = News { taxels, ..News::default() };
+        self.each_sink(|sink| sink.write_news(&news))
     }
 
     /// Has percepts of `frames`, which come next, explained where viewers ask for that.
@@ -355,8 +366,8 @@ impl Pump {
         if let Some(live) = self.live {
             losses = live.finish()?;
         }
-        self.unfit.tell(&self.engine);
-        self.unfit.tell_rest();
+        self.unfit.changes(&self.engine).iter().for_each(|message| say(message));
+        self.unfit.print_repeats();
         tell_doubts(&self.engine, &mut self.doubts);
         let code = tell_losses(&losses);
         if let Some(agreement) = self.agreement {

@@ -1,4 +1,4 @@
-//! Says which taxels upkeep leaves out.
+//! Which taxels upkeep leaves out.
 
 use somatic::Engine;
 use somatic::signal::Unfit;
@@ -6,7 +6,7 @@ use somatic::signal::Unfit;
 use super::repeats::Repeats;
 use super::stdio::say;
 
-/// What was told of taxels that are left out.
+/// The taxels that are left out, as last reported.
 #[derive(Default)]
 pub(super) struct UnfitReport {
     unfit: Vec<(u32, Unfit)>,
@@ -16,23 +16,21 @@ pub(super) struct UnfitReport {
 }
 
 impl UnfitReport {
-    /// Says which taxels are left out from now on and which are used again, where that differs from what was told.
-    pub(super) fn tell(&mut self, engine: &Engine) {
+    /// Messages on taxels that are left out from now on, and on those that are used again. Repeated ones are held back.
+    pub(super) fn changes(&mut self, engine: &Engine) -> Vec<String> {
         let now: Vec<(u32, Unfit)> = engine.unfit().collect();
         let left_out = now.iter().filter(|taxel| !self.unfit.contains(taxel));
         let left_out = left_out.map(|(id, why)| format!("taxel {id} is {why} and left out"));
         let again = self.unfit.iter().filter(|(id, _)| !now.iter().any(|(other, _)| other == id));
         let again = again.map(|(id, _)| format!("taxel {id} is used again"));
-        for text in left_out.chain(again) {
-            if let Some(told) = self.repeats.tell(self.at_s, &text) {
-                say(&told);
-            }
-        }
+        let Self { repeats, at_s, .. } = self;
+        let messages = left_out.chain(again).filter_map(|text| repeats.tell(*at_s, &text)).collect();
         self.unfit = now;
+        messages
     }
 
-    /// Says how often it was told what was told more than once.
-    pub(super) fn tell_rest(&self) {
-        self.repeats.rest().for_each(|told| say(&told));
+    /// Prints how often repeated messages were held back.
+    pub(super) fn print_repeats(&self) {
+        self.repeats.rest().for_each(|message| say(&message));
     }
 }

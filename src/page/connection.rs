@@ -95,6 +95,12 @@ impl Connection {
         }
     }
 
+    /// Since when its viewer has not said that it has drawn what it was sent.
+    pub(super) fn owes_since(&self) -> Option<Instant> {
+        let State::Viewing(_, viewer) = &self.state else { return None };
+        viewer.owes_since()
+    }
+
     /// When it is to be looked at again although nothing comes.
     pub(super) fn due_at(&self) -> Option<Instant> {
         match &self.state {

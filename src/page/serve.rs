@@ -23,6 +23,8 @@ use crate::signal::BoardHealth;
 
 /// The most connections.
 const MAX_CONNECTIONS: usize = 16;
+/// A viewer that has not drawn a frame for so long gives its place to a new one, if there is no other.
+const GONE_TIME: Duration = Duration::from_secs(120);
 /// Bytes of answers that wait for a viewer at most, beside the scene.
 const MAX_WAITING_BYTES: usize = 4 << 20;
 /// Events of a message at most.
@@ -160,6 +162,10 @@ impl Serving {
             if self.connections.len() >= MAX_CONNECTIONS {
                 if let Some(idle) = self.connections.iter().position(|(_, connection)| connection.is_idle(now)) {
                     self.connections.remove(idle);
+                } else if let Some(gone) = self.gone(now) {
+                    // There is room once it has been told so.
+                    self.connections[gone].1.close(CloseReason::Overload, "nothing was drawn for two minutes");
+                    return;
                 } else if self.connections.iter().all(|(_, connection)| connection.seen().is_some()) {
                     self.next = None;
                     continue;
@@ -172,6 +178,12 @@ impl Serving {
                 self.connections.push((ViewerId(self.next_id), Connection::new(stream, now)));
             }
         }
+    }
+
+    /// A viewer that has drawn nothing for so long that its computer may be gone.
+    fn gone(&self, now: Instant) -> Option<usize> {
+        let is_gone = |connection: &Connection| connection.owes_since().is_some_and(|since| now - since >= GONE_TIME);
+        self.connections.iter().position(|(_, connection)| is_gone(connection))
     }
 
     /// Takes what the engine's thread has left.

@@ -370,3 +370,16 @@ fn the_steady_state_does_not_allocate() {
     // The counter does count.
     assert!(allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8]))).count_total > 0);
 }
+
+#[test]
+fn a_viewer_owes_what_it_has_not_drawn() {
+    let mut bench = Bench::new(Outputs::USUAL, &ALL_LETTERS[..1], "");
+    let mut viewer = Viewer::new(0);
+    assert_eq!(viewer.owes_since(), None);
+    let frame = bench.frame(0.0, [1.0; 5]);
+    bench.process(std::slice::from_ref(&frame));
+    let message = bench.send(&mut viewer);
+    assert!(viewer.owes_since().is_some_and(|since| since.elapsed() < Duration::from_secs(60)));
+    viewer.drawn(u32::from_le_bytes(message[4..8].try_into().unwrap()), bench.arrived);
+    assert_eq!(viewer.owes_since(), None);
+}

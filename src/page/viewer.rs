@@ -22,8 +22,7 @@ const HOVER_PERIOD: Duration = Duration::from_millis(100);
 /// What one viewer has and wants.
 #[derive(Debug)]
 pub(super) struct Viewer {
-    /// Frames that are not drawn yet: number, and arrival if it was new.
-    under_way: VecDeque<(u32, Option<Instant>)>,
+    under_way: VecDeque<UnderWay>,
     seq: u32,
     skipped: u64,
     /// Frames that had been published with the last one that was sent.
@@ -44,6 +43,15 @@ pub(super) struct Viewer {
     pub(super) seen_boards: u64,
     /// Whether the end has been sent.
     pub(super) seen_end: bool,
+}
+
+/// A frame that is not drawn yet.
+#[derive(Clone, Copy, Debug)]
+struct UnderWay {
+    seq: u32,
+    sent_at: Instant,
+    /// When it arrived, if it was new.
+    arrived: Option<Instant>,
 }
 
 /// What the last frame of each kind was of.
@@ -86,12 +94,17 @@ impl Viewer {
 
     /// The frame `seq` is on the screen, and so is or was every one before it.
     pub(super) fn drawn(&mut self, seq: u32, now: Instant) {
-        while let Some(&(under_way, arrived)) = self.under_way.front().filter(|(under_way, _)| *under_way <= seq) {
+        while let Some(&frame) = self.under_way.front().filter(|frame| frame.seq <= seq) {
             self.under_way.pop_front();
-            if let Some(arrived) = arrived.filter(|_| under_way == seq) {
+            if let Some(arrived) = frame.arrived.filter(|_| frame.seq == seq) {
                 self.latencies.add(now.saturating_duration_since(arrived));
             }
         }
+    }
+
+    /// When the oldest frame was sent that it has not drawn.
+    pub(super) fn owes_since(&self) -> Option<Instant> {
+        self.under_way.front().map(|frame| frame.sent_at)
     }
 
     pub(super) fn set_columns(&mut self, columns: u32) {
@@ -216,7 +229,8 @@ impl Viewer {
             percepts: Some(current.percept_changes()),
             touches: current.touch_changes(),
         };
-        self.under_way.push_back((self.seq, is_new.then_some(snapshot.arrived)));
+        let arrived = is_new.then_some(snapshot.arrived);
+        self.under_way.push_back(UnderWay { seq: self.seq, sent_at: Instant::now(), arrived });
         to.finish()
     }
 

@@ -48,7 +48,7 @@ pub trait Sink {
     ///
     /// # Errors
     /// As [`Sink::write`].
-    fn write_news(&mut self, _news: &BoardNews) -> Result<Flow> {
+    fn write_news(&mut self, _news: &News) -> Result<Flow> {
         Ok(Flow::Open)
     }
 
@@ -120,13 +120,15 @@ pub struct InputFrames<'a> {
 /// Writes taxel ids and pressures of a frame into a list.
 pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
 
-/// How boards are doing, and messages about them: time (s) and text.
+/// How boards are doing, and messages: time (s) and text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct BoardNews {
+pub struct News {
     /// How each board is doing, if it is time to tell.
     pub boards: Option<Vec<BoardHealth>>,
-    /// Messages since the last news.
+    /// Messages about boards since the last news.
     pub notices: Vec<(f64, String)>,
+    /// Messages about taxels that are left out, or used again.
+    pub taxels: Vec<(f64, String)>,
 }
 
 /// What sinks get before the first frame.

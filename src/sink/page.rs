@@ -3,7 +3,7 @@
 use std::io::{self, Write as _};
 use std::sync::mpsc::Receiver;
 
-use super::{BoardNews, Flow, InputFrames, Question, Session, Sink};
+use super::{Flow, InputFrames, News, Question, Session, Sink};
 use crate::error::{Error, Result};
 use crate::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Request, Server, ViewerId};
 use crate::percept::Percepts;
@@ -14,6 +14,7 @@ pub struct PageSink {
     // In this order: what is published last is sent before the server ends.
     publisher: Publisher,
     server: Server,
+    /// What viewers ask, once somebody looks for it; the server answers that nobody does.
     questions: Option<Receiver<(ViewerId, Request)>>,
 }
 
@@ -34,11 +35,10 @@ impl PageSink {
             wiring: session.wiring,
             recorded_max: None,
         };
-        let (mut server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
+        let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
         // A closed standard error is no reason to stop.
         let _ = io::stderr().write_all(server.announcement().as_bytes());
-        let questions = server.explanations();
-        Ok(Self { publisher, server, questions })
+        Ok(Self { publisher, server, questions: None })
     }
 
     /// Its server.
@@ -68,9 +68,12 @@ impl Sink for PageSink {
         Ok(Flow::Open)
     }
 
-    fn write_news(&mut self, news: &BoardNews) -> Result<Flow> {
+    fn write_news(&mut self, news: &News) -> Result<Flow> {
         for (t_s, text) in &news.notices {
             self.publisher.event(EventKind::Board, *t_s, None, text.clone());
+        }
+        for (t_s, text) in &news.taxels {
+            self.publisher.event(EventKind::Notice, *t_s, None, text.clone());
         }
         if let Some(boards) = &news.boards {
             self.publisher.boards(boards.clone());
@@ -80,6 +83,9 @@ impl Sink for PageSink {
     }
 
     fn questions(&mut self) -> Vec<Question> {
+        if self.questions.is_none() {
+            self.questions = self.server.explanations();
+        }
         let asked = self.questions.iter().flat_map(Receiver::try_iter);
         let question = |(viewer, request)| {
             let Request::Explain { field } = request else { return None };

@@ -379,6 +379,39 @@ fn a_viewer_that_never_reads_holds_nobody_up() {
 }
 
 #[test]
+fn a_taxel_that_is_left_out_is_an_event() {
+    let rows: String = (0..400).map(|n| format!("{},{},\n", f64::from(n) * 0.01, n % 7)).collect();
+    let (_folder, recording) = super::file("a.csv", &format!("t,4,5\n{rows}"));
+    let calibration = recording.with_file_name("upkeep.toml");
+    std::fs::write(&calibration, "[upkeep]\ncadence_s = 0.2\ndead_s = 0.5\n").unwrap();
+    let mut run = Run::of(&[
+        "run",
+        "--quiet",
+        "--loop",
+        "--source",
+        &format!("csv:{}", recording.display()),
+        "--calibration",
+        calibration.to_str().unwrap(),
+        "--sink",
+        "page:127.0.0.1:0",
+    ]);
+    let mut viewer = run.viewer();
+    viewer.binary();
+    let start = Instant::now();
+    let is_notice = |text: &Value| {
+        let events = text["events"].as_array().into_iter().flatten();
+        events.into_iter().any(|event| {
+            event["kind"] == "notice" && event["text"].as_str().unwrap().starts_with("taxel 5 is dead and left out")
+        })
+    };
+    while !viewer.texts.iter().any(is_notice) {
+        viewer.frame();
+        assert!(start.elapsed() < Duration::from_secs(20), "{:?}", viewer.texts);
+    }
+    assert_eq!(run.interrupt(), Some(0));
+}
+
+#[test]
 fn an_address_for_others_needs_a_name() {
     let why = fails(2, &["run", "--sink", "page:0.0.0.0:0"]);
     assert!(why.contains("--allow-host"), "{why}");

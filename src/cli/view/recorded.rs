@@ -184,13 +184,15 @@ fn is_same(column: &Column, recorded: &[f64], computed: &[f64]) -> bool {
 mod tests {
     use super::*;
 
+    use std::f64::consts::PI;
+
     #[test]
     fn rounding_is_no_difference_and_an_angle_goes_round() {
         let column = |name: &str| COLUMNS.iter().find(|column| column.name == name).unwrap();
         let same = |name: &str, a: &[f64], b: &[f64]| is_same(column(name), a, b);
         assert!(same("total", &[100.0], &[100.05]) && !same("total", &[100.0], &[100.5]));
         assert!(same("centroid", &[0.0, 0.01], &[0.0, 0.010001]) && !same("centroid", &[0.0, 0.01], &[0.001, 0.01]));
-        assert!(same("orientation", &[0.0001], &[3.1415]) && !same("orientation", &[0.0], &[1.57]));
-        assert!(!same("direction", &[0.0], &[3.14159]) && same("direction", &[-3.1415], &[3.1415]));
+        assert!(same("orientation", &[0.0001], &[PI - 0.0001]) && !same("orientation", &[0.0], &[1.57]));
+        assert!(!same("direction", &[0.0], &[PI]) && same("direction", &[0.0001 - PI], &[PI - 0.0001]));
     }
 }
