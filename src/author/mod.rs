@@ -23,6 +23,8 @@ pub mod group;
 pub mod icub;
 mod lattice;
 mod lint;
+#[cfg(feature = "meshes")]
+pub mod mesh;
 mod origin;
 mod place;
 mod placed;

@@ -1,5 +1,6 @@
 //! `somatic author`: a mesh in, a body with a skin out.
 
+mod convert;
 mod grid;
 mod report;
 
@@ -11,6 +12,7 @@ use somatic::body::Original;
 use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
+use self::convert::{MeshArguments, MeshFile};
 use self::grid::GridArguments;
 use self::report::{summary, text};
 use super::bar::Bar;
@@ -23,6 +25,8 @@ Examples:
   somatic author arm.glb --spacing 8mm --region 'forearm*' -o skin.glb
   somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
   somatic author --grid 31x11 --pitch 8.6mm -o insole.glb       a flat sheet; it needs no mesh
+  somatic author finger.stl --unit mm --spacing 3mm -o finger.glb
+  somatic author robot.urdf --package my_robot=. --taxels 800 -o robot.glb   its links become links
   somatic inspect skin.glb
   somatic run --body skin.glb --source touch.csv
 
@@ -47,7 +51,8 @@ is brought up to date, as after editing it in Blender:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The mesh: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
+    /// humanoid.
     #[arg(value_name = "MESH", required_unless_present = "grid", conflicts_with = "grid")]
     mesh: Option<String>,
 
@@ -71,9 +76,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m, as glTF says].
+    /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
+
+    #[command(flatten)]
+    mesh_file: MeshArguments,
 
     #[command(flatten)]
     sheet: GridArguments,
@@ -93,18 +101,17 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     check_ending(&arguments.output)?;
+    let mut recipe = if arguments.sheet.is_asked() { None } else { Some(recipe(arguments)?) };
+    let foreign = arguments.mesh_file.opener(arguments.mesh.as_deref(), recipe.as_mut())?;
     let read = FilesRead::default().bodies(&arguments.mesh).files(&arguments.recipe).files(arguments.sheet.files());
-    let (read, recipe) = match arguments.sheet.is_asked() {
-        true => (read, None),
-        false => {
-            let recipe = recipe(arguments)?;
-            (read.files(recipe.files()), Some(recipe))
-        }
-    };
+    let read = read.files(recipe.iter().flat_map(Recipe::files)).files(foreign.iter().flat_map(MeshFile::files));
     let output = read.outputs(arguments.force).add(&arguments.output)?;
     let authored = match (&recipe, &arguments.mesh) {
         (Some(recipe), Some(mesh)) => {
-            let file = open(mesh)?;
+            let file = foreign.as_ref().map_or_else(|| open(mesh), MeshFile::open)?;
+            if foreign.is_some() && recipe.is_empty() {
+                return convert::save(&file, output, arguments.json);
+            }
             let mut bar = Bar::new("placing taxels");
             author(file, recipe, |share| bar.show(share))?
         }

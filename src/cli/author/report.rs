@@ -6,6 +6,7 @@ use comfy_table::Cell;
 use console::style;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport};
+use somatic::field::FieldSet;
 
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count, millimetres};
@@ -40,6 +41,7 @@ pub(super) fn text(output: &Path, authored: &Authored) -> String {
     } else {
         text += &format!("\n{}", table(&authored.places));
     }
+    text += &centroids(authored);
     for place in &authored.places {
         text += &moves(place);
     }
@@ -47,6 +49,21 @@ pub(super) fn text(output: &Path, authored: &Authored) -> String {
         text += &bullet(note);
     }
     text
+}
+
+/// How many fields have a chart, in which a centroid is measured.
+fn with_centroids(authored: &Authored) -> usize {
+    FieldSet::new(&authored.body).map_or(0, |set| set.fields.iter().filter(|field| field.chart.is_ok()).count())
+}
+
+/// The last line of the table.
+fn centroids(authored: &Authored) -> String {
+    let (with, all) = (with_centroids(authored), authored.body.fields.len());
+    let others = match all - with {
+        0 => "",
+        _ => "; the others, around a part or over several links, report totals and positions",
+    };
+    format!(" {with} of {all} fields have centroids{others}\n")
 }
 
 fn table(places: &[PlaceReport]) -> String {
@@ -118,6 +135,7 @@ pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
         "taxels": authored.body.taxels.len(),
         "fields": authored.body.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>(),
         "places": authored.places.iter().map(place).collect::<Vec<_>>(),
+        "with_centroids": with_centroids(authored),
         "notes": authored.notes,
     })
 }
