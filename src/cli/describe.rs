@@ -14,7 +14,7 @@ pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) ->
                 "--describe is for csv: and parquet:; a recording has its schemas in itself: somatic info FILE"
             }
             SinkSpec::Page(_) => "--describe is for csv: and parquet:; docs/page.md has the messages of a page",
-            _ => "--describe is for csv: and parquet:; docs/percepts.md has the keys of NDJSON",
+            _ => "--describe is for csv: and parquet:; README.md shows the keys of NDJSON",
         };
         return Err(Error::usage(what));
     }

@@ -33,6 +33,9 @@ const LINES: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
 ];
+/// Of the line of a field that holds all others: under theirs, and seen beside them.
+const WHOLE: RGBColor = RGBColor(176, 184, 192);
+const WHOLE_WIDTH: f64 = 4.0;
 /// Quantities that a map shows.
 const PEAK: usize = 0;
 const INTEGRAL: usize = 1;
@@ -67,6 +70,8 @@ struct Plot<'a> {
     colours: BTreeMap<String, usize>,
     /// Most of what maps show: the highest pressure, the highest integral.
     most: [f64; 2],
+    /// Pixels of a metre, in all maps.
+    per_m: f64,
     pressure_colours: Vec<RGBColor>,
 }
 
@@ -91,9 +96,20 @@ impl<'a> Plot<'a> {
             let taxels = all.iter().flat_map(|gathered| &gathered.maps).flat_map(|map| &map.taxels);
             taxels.map(of).fold(0.0, f64::max)
         };
+        let page = Page::of(all);
+        let per_m = all.iter().enumerate().flat_map(|(column, gathered)| {
+            let area = page.map(column, 0, 2 * gathered.maps.len());
+            gathered.maps.iter().map(move |map| {
+                let [low, high] = map.extent();
+                let (width_m, height_m) = ((high.0 - low.0).max(1e-6), (high.1 - low.1).max(1e-6));
+                (f64::from(area.width) / width_m).min(f64::from(area.height) / height_m)
+            })
+        });
+        let per_m = per_m.fold(f64::INFINITY, f64::min);
         Ok(Self {
             all,
-            page: Page::of(all),
+            per_m: if per_m.is_finite() { per_m } else { 1.0 },
+            page,
             colours: colours_of(all),
             most: [most(|taxel| taxel.peak), most(|taxel| taxel.integral)],
             pressure_colours: pressure_colours().iter().map(|&[r, g, b]| RGBColor(r, g, b)).collect(),
@@ -152,7 +168,9 @@ impl<'a> Plot<'a> {
             if x + 26 + width > legend.right() {
                 return pen.text("…", 12, GREY, HPos::Left, (x, y));
             }
-            pen.line(&[(x, y), (x + 20, y)], self.colour(line), 2.4)?;
+            let is_whole = self.all.iter().any(|gathered| gathered.first_is_whole && gathered.lines[0] == *line);
+            let (colour, stroke) = if is_whole { (WHOLE, WHOLE_WIDTH) } else { (self.colour(line), 2.4) };
+            pen.line(&[(x, y), (x + 20, y)], colour, stroke)?;
             pen.text(line, 12, INK, HPos::Left, (x + 26, y))?;
             x += 26 + width + 22;
         }
@@ -200,13 +218,14 @@ impl<'a> Plot<'a> {
         let name = panel.column.name.replace('_', " ");
         let label = if unit.is_empty() { name } else { format!("{name} [{unit}]") };
         pen.upwards(&label, 12, INK, (area.left - LEFT + 12, area.top + area.height / 2))?;
-        for (line, components) in gathered.lines.iter().zip(&panel.lines) {
+        for (index, (line, components)) in gathered.lines.iter().zip(&panel.lines).enumerate() {
+            let is_whole = index == 0 && gathered.first_is_whole;
+            let (own, width) = if is_whole { (WHOLE, WHOLE_WIDTH) } else { (self.colour(line), 1.5) };
             for (component, series) in components.iter().enumerate() {
-                let colour = paler(self.colour(line), component);
+                let colour = paler(own, component);
                 for run in series.runs() {
-                    let points: Vec<(i32, i32)> =
-                        run.iter().map(|&(t, value)| (scaled(x(t - start_s)), scaled(y(value * factor)))).collect();
-                    pen.dots(&points, colour, 1.5)?;
+                    let at = |&(t, value): &(f64, f64)| (scaled(x(t - start_s)), scaled(y(value * factor)));
+                    pen.dots(&run.iter().map(at).collect::<Vec<_>>(), colour, width)?;
                 }
             }
         }
@@ -234,7 +253,22 @@ impl<'a> Plot<'a> {
             let area = Area { width: last.right() - first.left, ..first };
             self.draw_key(pen, quantity, area)?;
         }
-        Ok(())
+        let last = self.page.map(column, 2 * count - 1, 2 * count);
+        self.draw_length(pen, (last.right(), last.bottom()))
+    }
+
+    /// A length in all maps, its right end at `end`.
+    fn draw_length<B: DrawingBackend>(&self, pen: &Pen<'_, B>, (right, y): (i32, i32)) -> Result<()> {
+        let steps = ticks([0.0, 90.0 / self.per_m], 1);
+        let Some(&length_m) = steps.last().filter(|length| **length > 0.0) else { return Ok(()) };
+        let left = right - (length_m * self.per_m).round() as i32;
+        pen.line(&[(left, y), (right, y)], INK, 1.6)?;
+        for x in [left, right] {
+            pen.line(&[(x, y - 3), (x, y + 3)], INK, 1.2)?;
+        }
+        let mm = length_m * 1e3;
+        let text = if mm >= 10.0 { format!("{:.0} cm", mm / 10.0) } else { format!("{mm} mm") };
+        pen.text(&text, 11, GREY, HPos::Right, (left - 6, y))
     }
 
     fn draw_map<B: DrawingBackend>(
@@ -245,8 +279,7 @@ impl<'a> Plot<'a> {
         area: Area,
     ) -> Result<()> {
         let [low, high] = map.extent();
-        let (width_m, height_m) = ((high.0 - low.0).max(1e-9), (high.1 - low.1).max(1e-9));
-        let per_m = (f64::from(area.width) / width_m).min(f64::from(area.height) / height_m);
+        let per_m = self.per_m;
         let middle = (area.left + area.width / 2, area.top + area.height / 2);
         let place = |(u, v): (f64, f64)| {
             let (u, v) = (u - (low.0 + high.0) / 2.0, v - (low.1 + high.1) / 2.0);

@@ -40,6 +40,8 @@ pub struct Gathered {
     pub(super) span_s: [f64; 2],
     /// The fields of the lines, in the order of their colours.
     pub(super) lines: Vec<String>,
+    /// Whether the first of them holds all the others.
+    pub(super) first_is_whole: bool,
     /// Quantities over time.
     pub(super) panels: Vec<Panel>,
     pub(super) maps: Vec<PressureMap>,
@@ -66,6 +68,8 @@ pub struct Gatherer {
     peaks: Vec<f64>,
     integrals: Vec<f64>,
     last: Vec<f64>,
+    /// m².
+    areas: Vec<f64>,
     index_of: HashMap<u32, usize>,
     pressures: Vec<(u32, f64)>,
 }
@@ -79,6 +83,8 @@ struct Followed {
     series: Vec<Vec<Series>>,
     path: Path,
     most_load: f64,
+    /// The integral of its load over time.
+    impulse: f64,
 }
 
 impl Gatherer {
@@ -96,7 +102,7 @@ impl Gatherer {
         let followed = |(in_plan, (name, _)): (usize, (&str, &str))| {
             let in_body = *index_of_name.get(name)?;
             let series = columns.iter().map(|column| vec![Series::default(); column.components]).collect();
-            Some(Followed { in_plan, in_body, series, path: Path::default(), most_load: 0.0 })
+            Some(Followed { in_plan, in_body, series, path: Path::default(), most_load: 0.0, impulse: 0.0 })
         };
         let mut fields: Vec<Followed> = engine.plan().fields().enumerate().filter_map(followed).collect();
         fields.sort_by_key(|field| (depth(&set, field.in_body), field.in_body));
@@ -119,6 +125,7 @@ impl Gatherer {
             peaks: vec![0.0; taxels],
             integrals: vec![0.0; taxels],
             last: vec![0.0; taxels],
+            areas: body.taxels.iter().map(|taxel| taxel.area).collect(),
             index_of: body.taxels.iter().enumerate().map(|(index, taxel)| (taxel.id, index)).collect(),
             pressures: Vec::new(),
         })
@@ -132,11 +139,11 @@ impl Gatherer {
             let before = self.span_s.map(|[_, last]| last);
             self.span_s = Some([self.span_s.map_or(t_s, |[first, _]| first), t_s]);
             self.frames += 1;
-            self.see_fields(percepts, index, t_s);
             let mut pressures = std::mem::take(&mut self.pressures);
             engine.pressures(frame, &mut pressures);
             let dt_s =
                 before.map(|before| t_s - before).filter(|dt_s| (0.0..=MAX_STEP_S).contains(dt_s)).unwrap_or(0.0);
+            self.see_fields(percepts, index, t_s, dt_s);
             for &(id, pressure) in &pressures {
                 let Some(&taxel) = self.index_of.get(&id) else { continue };
                 self.peaks[taxel] = self.peaks[taxel].max(pressure);
@@ -148,7 +155,7 @@ impl Gatherer {
         }
     }
 
-    fn see_fields(&mut self, percepts: &Percepts, frame: usize, t_s: f64) {
+    fn see_fields(&mut self, percepts: &Percepts, frame: usize, t_s: f64, dt_s: f64) {
         for field in &mut self.fields {
             for (column, series) in self.columns.iter().zip(&mut field.series) {
                 let value = percepts.value(frame, field.in_plan, column);
@@ -158,7 +165,9 @@ impl Gatherer {
             }
             let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(|output| column_of(output));
             let of = |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
-            field.most_load = field.most_load.max(of(total).map_or(0.0, |total| total[0]));
+            let load = of(total).map_or(0.0, |total| total[0]);
+            field.most_load = field.most_load.max(load);
+            field.impulse += load * dt_s;
             field.path.push(of(centroid).map(|[u, v, _]| [u, v]));
         }
     }
@@ -192,9 +201,14 @@ impl Gatherer {
                 followed.path.runs.clone(),
                 &self.peaks,
                 &self.integrals,
+                &self.areas,
             )
         });
+        let above =
+            |field: usize, below: usize| is_above(&self.set, self.fields[field].in_body, self.fields[below].in_body);
+        let first_is_whole = lines.len() > 1 && lines[1..].iter().all(|&line| above(lines[0], line));
         Gathered {
+            first_is_whole,
             maps: maps.collect(),
             lines: lines.iter().map(|&line| self.set.fields[self.fields[line].in_body].name.clone()).collect(),
             panels,
@@ -236,10 +250,10 @@ impl Gatherer {
         self.heaviest(charted.collect(), MAX_MAPS)
     }
 
-    /// The `most` of `fields` with the largest loads, in their order.
+    /// The `most` of `fields` with the largest integrals of load over time, in their order.
     fn heaviest(&self, fields: Vec<usize>, most: usize) -> Vec<usize> {
         let mut sorted = fields;
-        sorted.sort_by(|&a, &b| self.fields[b].most_load.total_cmp(&self.fields[a].most_load).then(a.cmp(&b)));
+        sorted.sort_by(|&a, &b| self.fields[b].impulse.total_cmp(&self.fields[a].impulse).then(a.cmp(&b)));
         sorted.truncate(most);
         sorted.sort_unstable();
         sorted

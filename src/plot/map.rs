@@ -2,7 +2,7 @@
 
 use crate::field::Field;
 
-/// Share of the distance to the nearest neighbour that a disc's radius is.
+/// Share of the distance to the nearest neighbour that a disc's radius is at most.
 const RADIUS_SHARE: f64 = 0.46;
 
 /// A field's taxels on its chart, their highest pressures and integrals over time, and the path of the centre of pressure.
@@ -10,7 +10,7 @@ const RADIUS_SHARE: f64 = 0.46;
 pub(super) struct PressureMap {
     pub(super) field: String,
     pub(super) taxels: Vec<MappedTaxel>,
-    /// Radius of a taxel's disc, m.
+    /// Radius of a taxel's disc, m: that of its area, but no larger than leaves a gap between neighbours.
     pub(super) radius_m: f64,
     /// The path of the centre of pressure, (u, v), m.
     pub(super) path: Vec<Vec<(f64, f64)>>,
@@ -26,8 +26,14 @@ pub(super) struct MappedTaxel {
 }
 
 impl PressureMap {
-    /// The map of `field`; `peaks` and `integrals` are by taxel of the body.
-    pub(super) fn new(field: &Field, path: Vec<Vec<(f64, f64)>>, peaks: &[f64], integrals: &[f64]) -> Self {
+    /// The map of `field`; `peaks`, `integrals` and `areas_m2` are by taxel of the body.
+    pub(super) fn new(
+        field: &Field,
+        path: Vec<Vec<(f64, f64)>>,
+        peaks: &[f64],
+        integrals: &[f64],
+        areas_m2: &[f64],
+    ) -> Self {
         let taxels: Vec<MappedTaxel> = field
             .members
             .iter()
@@ -37,7 +43,12 @@ impl PressureMap {
                 integral: integrals[member.taxel],
             })
             .collect();
-        Self { field: field.name.clone(), radius_m: radius_m(&taxels), taxels, path }
+        let widest_m = widest_radius_m(&taxels);
+        let mut areas: Vec<f64> = field.members.iter().map(|member| areas_m2[member.taxel]).collect();
+        areas.sort_by(f64::total_cmp);
+        let own_m = (areas.get(areas.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::PI).sqrt();
+        let radius_m = if own_m > 0.0 { own_m.min(widest_m) } else { widest_m };
+        Self { field: field.name.clone(), radius_m, taxels, path }
     }
 
     /// The lower and upper corner of what is drawn, m.
@@ -51,7 +62,7 @@ impl PressureMap {
 }
 
 /// By the median distance to the nearest neighbour.
-fn radius_m(taxels: &[MappedTaxel]) -> f64 {
+fn widest_radius_m(taxels: &[MappedTaxel]) -> f64 {
     // A sample is enough, and so is a square number of comparisons of it.
     let step = taxels.len().div_ceil(400).max(1);
     let mut nearest: Vec<f64> = taxels

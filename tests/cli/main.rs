@@ -17,6 +17,7 @@ mod outputs;
 mod page;
 mod paper;
 mod plan;
+mod plot;
 mod python;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]

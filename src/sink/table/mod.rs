@@ -149,7 +149,7 @@ pub fn percept_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let mut columns = keys(&session.names);
     columns.push(TableColumn::new("contact", "", TableType::Bool, "Whether the field is touched.", ValueOf::Contact));
     columns.extend(output_columns(session));
-    let help = "Why quantities are absent or in doubt; docs/percepts.md.";
+    let help = "Why quantities are absent or in doubt; docs/tables.md.";
     columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
     columns
 }
