@@ -65,7 +65,7 @@ pub mod author;
 pub mod backend;
 pub mod body;
 pub mod bundled;
-#[cfg(feature = "page")]
+#[cfg(any(feature = "page", feature = "cli"))]
 mod colours;
 mod engine;
 pub mod error;
@@ -83,6 +83,8 @@ mod parallel;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
+#[cfg(feature = "cli")]
+pub mod plot;
 #[cfg(feature = "mcap")]
 pub mod recording;
 pub mod scene;

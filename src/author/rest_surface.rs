@@ -1,6 +1,7 @@
 //! All surfaces of a body in the world at rest, to place taxels on.
 
 use std::cell::OnceCell;
+use std::collections::BTreeSet;
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -134,8 +135,8 @@ impl<'a> RestSurface<'a> {
         Err(failed!("no mesh has an attribute `{name}`; {hint}"))
     }
 
-    /// The taxel `id` at `placed`, whose triangle is one of this surface.
-    pub(super) fn mesh_taxel(&self, placed: &Placed, id: u32, modality: Modality) -> MeshTaxel {
+    /// The taxel `id` at `placed`, whose triangle is one of this surface. On a skinned mesh it rides on the heaviest of `links`.
+    pub(super) fn mesh_taxel(&self, placed: &Placed, id: u32, modality: Modality, links: &BTreeSet<u32>) -> MeshTaxel {
         let (part, index) = self.origin[placed.triangle];
         let part = part as usize;
         let surface = &self.body.surfaces[part];
@@ -144,8 +145,14 @@ impl<'a> RestSurface<'a> {
         let at = |corner: usize| surface.positions[corners[corner] as usize] * placed.barycentric[corner];
         let in_mesh = surface.triangles[index as usize].map(|v| surface.positions[v as usize]);
         let normal = area_vector(in_mesh).normalize_or_zero();
-        let carriers =
+        let mut carriers =
             self.skinning[part].as_ref().map(|skinning| blend_skinning(skinning, corners, placed.barycentric));
+        if let (Home::Skinned { joints, .. }, Some((own, _))) = (&surface.home, &mut carriers) {
+            // At the rim of a region, the heaviest joint may be one outside: it changes places with one inside.
+            let is_inside = |joint: u16| links.contains(&(joints[usize::from(joint)].0 as u32));
+            let slot = own.iter().position(|&joint| is_inside(joint)).unwrap_or(0);
+            own.swap(0, slot);
+        }
         let (link, link_from_mesh) = match (&surface.home, &carriers) {
             (Home::Rigid { link, link_from_mesh }, _) => (*link, *link_from_mesh),
             (Home::Skinned { joints, .. }, carriers) => {

@@ -129,8 +129,9 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         ids.take(own.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
         notes.extend(without_area(place, &filled, &own));
         let first = seated.len();
-        seated
-            .extend(filled.iter().zip(&own).map(|(one, &id)| rest_surface.mesh_taxel(&one.placed, id, place.modality)));
+        let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
+        let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
+        seated.extend(filled.iter().zip(&own).map(seat));
         reports.push(report(&rest_surface, place, own, &filled, &seated[first..]));
     }
     progress(PROGRESS_PLACED);

@@ -222,14 +222,14 @@ pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
     let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     let what = match ending.as_deref() {
         _ if bytes.is_empty() || bytes.starts_with(b"glTF") || text.starts_with(b"{") => return Ok(()),
-        Some("stl") => "an STL mesh, not a glTF; import it",
-        Some("obj") => "an OBJ mesh, not a glTF; import it",
-        Some("dae") => "a COLLADA mesh, not a glTF; import it",
-        Some("ply") => "a PLY mesh, not a glTF; import it",
-        Some("urdf" | "xacro") => "a URDF, which only names mesh files; import those",
+        Some("stl") => "an STL mesh",
+        Some("obj") => "an OBJ mesh",
+        Some("dae") => "a COLLADA mesh",
+        Some("ply") => "a PLY mesh",
+        Some("urdf" | "xacro") => "a URDF",
         _ => return Ok(()),
     };
-    Err(failed!("this is {what} in Blender (File ▸ Import) and export a .glb (File ▸ Export ▸ glTF 2.0)"))
+    Err(failed!("this is {what}, not a glTF; make one of it: somatic author {name} --taxels 500 -o body.glb"))
 }
 
 /// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.

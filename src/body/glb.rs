@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use serde_json::{Map, Value, json};
 
 use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
@@ -156,6 +156,17 @@ impl Glb {
         match owner.get_mut(key).and_then(Value::as_array_mut) {
             Some(children) => children.push(index.into()),
             None => owner[key] = json!([index]),
+        }
+        index
+    }
+
+    /// Adds a node as [`Self::node`] does, moved and turned by the rigid transform `parent_from_node`.
+    pub fn placed_node(&mut self, name: &str, parent: Option<usize>, parent_from_node: DAffine3) -> usize {
+        let (_, rotation, translation) = parent_from_node.to_scale_rotation_translation();
+        let index = self.node(name, parent, translation);
+        let own = self.element("nodes", index).expect("it was just added");
+        if rotation.xyz().length() > 0.0 {
+            own["rotation"] = json!(rotation.as_quat().to_array());
         }
         index
     }

@@ -14,7 +14,7 @@ use super::bodies::load_body;
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
-use super::plot::Plot;
+use super::plot_file::PlotFile;
 use super::ports::LineFlags;
 use super::stdio::{print, say, tell_losses};
 use super::table::{more, plain, shown};
@@ -96,7 +96,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
         return Err(Error::usage("--rest and --press are times over 0, in seconds"));
     }
-    let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
+    let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;

@@ -13,6 +13,7 @@ mod browser;
 mod calibrate;
 mod completions;
 mod convert;
+mod describe;
 mod devices;
 mod doubts;
 #[cfg(feature = "page")]
@@ -32,6 +33,7 @@ mod names;
 mod paper;
 mod plan;
 mod plot;
+mod plot_file;
 mod ports;
 #[cfg(feature = "gpu")]
 mod render;
@@ -75,18 +77,20 @@ const EXAMPLES: &str = "\
 Examples:
   somatic run                                   watch a recorded touch on the bundled hand
   somatic run | jq -c '.fields[] | [.field, .total]'
-  somatic run --body robot.glb --source touch.csv --sink percepts.ndjson
+  somatic run --body robot.glb --source touch.csv --sink percepts.ndjson   or percepts.csv, a table
   robot-driver | somatic run --body robot.glb --source - | controller
   somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
   somatic view touch.mcap --open                see a recording on the body, in a browser
   somatic inspect robot.glb                     what taxels and fields a body has
   somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
+  somatic author --grid 64x32 --pitch 25.4mm -o mat.glb   a flat sheet of sensors
   somatic render robot.glb -o robot.png         a picture of them
   somatic plan --outputs centroid               what is computed, what is not, and the cost
   somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs within a tolerance, here
   somatic simulate touch.toml -o touch.csv      a simulated touch, with the truth
   somatic tune --source serial:/dev/ttyUSB0 -o hand.toml   set the sensors' potentiometers
   somatic board --link /tmp/hand                a simulated hand on a serial line
+  somatic plot touch.mcap -o touch.svg          load over time, highest pressures, their centre's path
   somatic info touch.mcap                       how long a recording is, and what is in it
   somatic bench --sensors 1000 --fields 100     the speed of this machine
   somatic devices                               which GPUs and serial ports it has
@@ -118,6 +122,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Info(info::Arguments),
     Convert(convert::Arguments),
+    Plot(Box<plot::Arguments>),
     Paper(paper::Arguments),
     #[cfg(unix)]
     Board(Box<board::Arguments>),
@@ -147,6 +152,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Info(arguments) => info::info(arguments),
         Command::Convert(arguments) => convert::convert(arguments),
+        Command::Plot(arguments) => plot::plot(arguments),
         Command::Paper(arguments) => paper::paper(arguments),
         #[cfg(unix)]
         Command::Board(arguments) => board::run(arguments),

@@ -1,46 +1,166 @@
-//! Plots that commands draw beside what they say.
+//! `somatic plot`: a recording as a picture.
 
-use std::path::Path;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
-use somatic::output::{OutputPath, OutputPaths};
-use somatic::{Error, Result};
+use clap::Args;
+use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
-pub(super) struct Plot {
-    format: Format,
-    output: OutputPath,
+use super::bar::Bar;
+use super::files::FilesRead;
+use super::input::{Input, RECORDED_BATCH};
+use super::interrupt::stop_on_signal;
+use super::plot_file::PlotFile;
+use super::scene::{RunOptions, output};
+use super::stdio::{DONE, say, tell_losses};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic plot -o touch.svg                          the bundled touch on the bundled hand
+  somatic plot --body insole.glb walk.csv -o walk.png
+  somatic plot touch.mcap --from 60 --to 90 --outputs total,speed,orientation -o minute.svg
+  somatic plot --body mat before.csv after.csv -o compared.png     side by side, with one scale
+  somatic plot touch.mcap --fields 'hand/palm*' -o palm.svg
+
+Above, quantities over time: load and area, or those of --outputs. Below, for each field with a
+chart, the highest pressure that each taxel felt, with the path of the centre of pressure from its
+first contact (ring) to its last (dot), and the pressure–time integral. All recordings have the
+same scales. Without --fields, it shows the topmost fields, or those below a single one.";
+
+/// Most recordings of a plot.
+const MAX_RECORDINGS: usize = 8;
+
+/// Draw recordings: load and area over time, highest pressures with the path of their centre, pressure–time integrals.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The recordings: csv:FILE, mcap:FILE or sim:FILE.toml, or just the file [default: a bundled touch].
+    #[arg(value_name = "SOURCE")]
+    sources: Vec<String>,
+
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the recording's own, or hand].
+    #[arg(long, value_name = "BODY")]
+    body: Option<String>,
+
+    /// The calibration of the sensors, a TOML file [default: the recording's own].
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+
+    /// Show only the fields whose names match, such as 'hand/palm*'; may be repeated [default: the topmost].
+    #[arg(long, value_name = "GLOB")]
+    fields: Vec<String>,
+
+    /// Plot these quantities over time instead of load and area.
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = plot_outputs_help())]
+    outputs: Vec<Outputs>,
+
+    /// Frames per second of a CSV recording that has no column t, in Hz.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+
+    /// Begin at this time of the recording, s.
+    #[arg(long, value_name = "S")]
+    from: Option<f64>,
+
+    /// End at this time of the recording, s.
+    #[arg(long, value_name = "S")]
+    to: Option<f64>,
+
+    /// The plot to write, .svg or .png.
+    #[arg(short, long, value_name = "PLOT")]
+    output: PathBuf,
+
+    /// Replace the output if it is there.
+    #[arg(long)]
+    force: bool,
 }
 
-enum Format {
-    Svg,
-    Png,
+fn plot_outputs_help() -> String {
+    let names: Vec<&str> = COLUMNS.iter().map(|column| column.name).collect();
+    format!("Plot these quantities over time: {} [default: load and area]", names.join(", "))
 }
 
-impl Plot {
-    /// One in the format that the ending of `path` names, which is one of `outputs`.
-    pub(super) fn at(path: &Path, outputs: &mut OutputPaths) -> Result<Self> {
-        let format = match path.extension().and_then(|ending| ending.to_str()) {
-            Some("svg") => Format::Svg,
-            Some("png") => Format::Png,
-            _ => {
-                return Err(Error::usage(format!(
-                    "--plot {} is neither .svg nor .png; a plot ends in .svg or .png",
-                    path.display()
-                )));
+pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
+    let wanted = arguments.outputs.iter().fold(Outputs::empty(), |all, &one| all | one);
+    if wanted.contains(Outputs::TOUCHES) {
+        return Err(Error::usage("touches have no line over time; take them from `somatic run --sink csv:FILE`")
+            .at("--outputs"));
+    }
+    if arguments.sources.len() > MAX_RECORDINGS {
+        return Err(Error::usage(format!("at most {MAX_RECORDINGS} recordings have room side by side")));
+    }
+    let runs: Vec<RunOptions> = match &arguments.sources[..] {
+        [] => vec![asked(arguments, None, wanted)],
+        sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect(),
+    };
+    let read = runs.iter().fold(FilesRead::default(), |read, asked| {
+        read.files(&asked.calibration).bodies(&asked.body).sources(&asked.sources)
+    });
+    let mut outputs = read.outputs(arguments.force);
+    let file = PlotFile::at(&arguments.output, "-o", &mut outputs)?;
+    let (mut all, mut losses) = (Vec::new(), Vec::new());
+    for asked in &runs {
+        let (gathered, lost) = gather(asked, wanted)?;
+        all.push(gathered);
+        losses.extend(lost);
+    }
+    file.draw(|| svg(&all), || png(&all))?;
+    say(&format!("{} is drawn", arguments.output.display()));
+    Ok(if losses.is_empty() { DONE } else { tell_losses(&losses) })
+}
+
+/// What is run for the recording `source`.
+fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> RunOptions {
+    RunOptions {
+        body: arguments.body.clone(),
+        sources: source.cloned().into_iter().collect(),
+        fields: arguments.fields.clone(),
+        outputs: vec![outputs_for(wanted)],
+        calibration: arguments.calibration.clone(),
+        backend: Some(BackendKind::Cpu),
+        rate: arguments.rate,
+        from: arguments.from,
+        to: arguments.to,
+        ..RunOptions::default()
+    }
+}
+
+/// Runs a recording and keeps what is plotted of it; also gives what the source lost.
+fn gather(asked: &RunOptions, wanted: Outputs) -> Result<(Gathered, Vec<String>)> {
+    let input = Input::named(asked)?;
+    if !input.is_recording() {
+        return Err(Error::usage("only recordings are plotted; record what is live with `somatic run`").at(&input.name));
+    }
+    let body = input.body(asked)?;
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let mut source = input.open(&ids, asked)?;
+    source.report_stale();
+    let mut engine = Engine::new(&body, asked.options(&body, &ids, RECORDED_BATCH)?)?;
+    engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+    let mut gatherer = Gatherer::new(&input.name, &body, &engine, wanted, !asked.fields.is_empty())?;
+    let stop = stop_on_signal()?;
+    let mut bar = Bar::new("reading");
+    let width = source.taxels().len();
+    let mut frames: Vec<Frame> = Vec::with_capacity(RECORDED_BATCH);
+    loop {
+        frames.clear();
+        while frames.len() < RECORDED_BATCH {
+            let mut frame = Frame::missing(0.0, width);
+            if !source.next_frame(&mut frame)? {
+                break;
             }
-        };
-        Ok(Self { format, output: outputs.add(path)? })
+            frames.push(frame);
+        }
+        if frames.is_empty() {
+            break;
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::failed("interrupted"));
+        }
+        engine.process(&frames)?;
+        gatherer.see(&engine, &frames);
+        bar.show(source.progress().unwrap_or(0.0));
     }
-
-    /// Draws it in its format and writes it, whole or not at all.
-    pub(super) fn draw(
-        self,
-        svg: impl FnOnce() -> Result<String>,
-        png: impl FnOnce() -> Result<Vec<u8>>,
-    ) -> Result<()> {
-        let bytes = match self.format {
-            Format::Svg => svg()?.into_bytes(),
-            Format::Png => png()?,
-        };
-        self.output.write(&bytes)
-    }
+    Ok((gatherer.finish(), source.losses()))
 }

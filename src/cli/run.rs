@@ -5,11 +5,12 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget};
+use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
 use somatic::source::Source;
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Result};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Outputs, Percepts, Precision, Result};
 
 use super::attachments::attachments;
+use super::describe::describe;
 use super::doubts::Doubts;
 #[cfg(feature = "page")]
 use super::explanation::LiveExplainer;
@@ -23,7 +24,7 @@ use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::names::field_names;
 use super::scene::{LIVE, RunOptions, grouped};
-use super::stdio::{FAILED, say, tell_losses};
+use super::stdio::{DONE, FAILED, print, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
 use super::words;
@@ -40,6 +41,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic run                                            the bundled touch on the bundled hand
   somatic run --source touch.csv --sink percepts.ndjson  a recording, as fast as possible
+  somatic run --source touch.csv --sink percepts.csv     the same as a table; --wide for a row per frame
   somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
   somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
   somatic run --source touch.csv --letters sustained,change --outputs total
@@ -70,6 +72,14 @@ pub(super) struct Arguments {
     #[command(flatten)]
     asked: RunOptions,
 
+    /// In csv: one row per frame, with columns of their own for each field, instead of a row per field in contact.
+    #[arg(long)]
+    wide: bool,
+
+    /// Print the columns of csv: or parquet: with their units and types, and run nothing.
+    #[arg(long)]
+    describe: bool,
+
     /// Stop after this time, such as 10s.
     #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
     lasts: Option<String>,
@@ -83,9 +93,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
+    let table = TableWish { wide: arguments.wide, touches: asked.outputs().contains(Outputs::TOUCHES) };
+    if arguments.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !arguments.describe {
+        return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
+    }
     let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
-    let targets =
-        sinks.iter().map(|sink| sink.target(&mut outputs, &asked.allow_hosts)).collect::<Result<Vec<SinkTarget>>>()?;
+    // A description makes no file.
+    let targets = sinks
+        .iter()
+        .filter(|_| !arguments.describe)
+        .map(|sink| sink.target(&mut outputs, &asked.allow_hosts, table))
+        .collect::<Result<Vec<SinkTarget>>>()?;
     let summary = arguments.summary.as_deref().map(|path| outputs.add(path)).transpose()?;
     if sinks.is_empty() {
         outputs.add_standard_output()?;
@@ -150,11 +168,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let stop = stop_on_signal()?;
     let targets = if sinks.is_empty() && !at_terminal { vec![SinkTarget::Stdout] } else { targets };
     let names = field_names(engine.plan());
-    let records = targets.iter().any(|target| matches!(target, SinkTarget::Mcap(_)));
+    let records = targets.iter().any(SinkTarget::holds_attached);
     let (backend, device, why) = engine.backend();
     let session = Session {
         names,
         all_fields: asked.all_fields,
+        outputs: engine.percepts().outputs(),
+        is_double: engine.percepts().precision() == Precision::F64,
+        p_unit: "",
         taxels: source.taxels(),
         body: Some(&body),
         attached: if records { attachments(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },
@@ -164,6 +185,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         backend: [backend, &device, settled.why.as_deref().unwrap_or(why)],
         wiring: wiring.as_ref(),
     };
+    if arguments.describe {
+        print(&describe(&sinks, &session, arguments.wide)?)?;
+        return Ok(DONE);
+    }
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
     #[cfg(feature = "page")]
     let taxels = source.taxels().to_vec();

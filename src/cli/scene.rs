@@ -43,8 +43,8 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, mcap:FILE, page[:HOST:PORT] for browsers, or - for NDJSON on standard output; may
-    /// be repeated [default: a table at a terminal, else -].
+    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, page[:HOST:PORT] for browsers, or -
+    /// for NDJSON on standard output; may be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -263,6 +263,8 @@ impl RunOptions {
         for sink in &mut asked.sinks {
             match sink.parse()? {
                 SinkSpec::Ndjson(file) => *sink = format!("ndjson:{}", there(&file)),
+                SinkSpec::Csv(file) => *sink = format!("csv:{}", there(&file)),
+                SinkSpec::Parquet(file) => *sink = format!("parquet:{}", there(&file)),
                 SinkSpec::Mcap(file) => *sink = format!("mcap:{}", there(&file)),
                 _ => {}
             }

@@ -19,7 +19,7 @@ use super::bar::Bar;
 use super::files::FilesRead;
 use super::input::Input;
 use super::interrupt::stop_on_signal;
-use super::plot::Plot;
+use super::plot_file::PlotFile;
 use super::scene::{RunOptions, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, shown};
@@ -86,7 +86,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage(format!("--seconds {} is not a time span; give seconds over 0", arguments.seconds)));
     }
     let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
-    let plot = arguments.plot.as_deref().map(|path| Plot::at(path, &mut outputs)).transpose()?;
+    let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
         (Some(_), true) if target.is_empty() => {

@@ -282,6 +282,16 @@ impl Percepts {
         (0..self.fields).filter(move |&field| self.in_contact(frame, field)).map(move |field| self.get(frame, field))
     }
 
+    /// Why quantities of field `field` in the batch's frame `frame` are absent or in doubt.
+    pub(crate) fn flags(&self, frame: usize, field: usize) -> Flags {
+        self.flags[frame * self.fields + field]
+    }
+
+    /// Whether its position and normal are in the world.
+    pub(crate) fn in_world(&self, frame: usize, field: usize) -> bool {
+        self.in_world[frame * self.fields + field]
+    }
+
     pub(crate) fn in_contact(&self, frame: usize, field: usize) -> bool {
         !self.flags[frame * self.fields + field].contains(Flags::NO_CONTACT)
     }

@@ -9,6 +9,7 @@ mod page;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod spec;
+mod table;
 #[cfg(feature = "mcap")]
 mod view;
 
@@ -17,14 +18,17 @@ pub use ndjson::NdjsonSink;
 pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
-pub use spec::{SinkSpec, SinkTarget};
+pub use spec::{SinkSpec, SinkTarget, TableWish};
+#[cfg(feature = "parquet")]
+pub use table::ParquetSink;
+pub use table::{CsvSink, TableColumn, TableType, percept_columns, touch_columns};
 
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
-use crate::percept::Percepts;
+use crate::percept::{Outputs, Percepts};
 use crate::scene::Plan;
 use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
@@ -138,11 +142,17 @@ pub struct Session<'a> {
     pub names: Vec<FieldNames>,
     /// Whether fields without contact are listed.
     pub all_fields: bool,
+    /// The outputs of the percepts.
+    pub outputs: Outputs,
+    /// Whether the percepts are in double precision.
+    pub is_double: bool,
+    /// What pressures are measured in; empty where nobody said it.
+    pub p_unit: &'a str,
     /// The ids of a frame's values, in their order.
     pub taxels: &'a [u32],
     /// The robot.
     pub body: Option<&'a Body>,
-    /// Files to attach to a recording: name, media type, bytes.
+    /// Files that say what is run, for recordings and tables: name, media type, bytes.
     pub attached: Vec<(String, String, Vec<u8>)>,
     /// The parts that recordings hold; empty for all.
     pub parts: Vec<RecordPart>,

@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{NdjsonSink, Session, Sink};
+use super::table::touches_path;
+use super::{CsvSink, NdjsonSink, Session, Sink};
 use crate::error::{Error, Result, nearest};
 use crate::output::{OutputPath, OutputPaths};
 
-const FORMS: &str = "ndjson:FILE, mcap:FILE, page[:HOST:PORT], or - for NDJSON on standard output";
+const FORMS: &str =
+    "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, page[:HOST:PORT], or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,6 +17,10 @@ const FORMS: &str = "ndjson:FILE, mcap:FILE, page[:HOST:PORT], or - for NDJSON o
 pub enum SinkSpec {
     /// `ndjson:FILE`, or a bare `FILE.ndjson`: a line of JSON a frame.
     Ndjson(PathBuf),
+    /// `csv:FILE`, or a bare `FILE.csv`: a table, a row per frame and field in contact.
+    Csv(PathBuf),
+    /// `parquet:FILE`, or a bare `FILE.parquet`: the same table in Parquet.
+    Parquet(PathBuf),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
     /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
@@ -36,14 +42,20 @@ impl FromStr for SinkSpec {
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
-            "ndjson" | "mcap" if rest.is_empty() => bad(format!("nothing follows `{kind}:`; {FORMS}")),
+            "ndjson" | "csv" | "parquet" | "mcap" if rest.is_empty() => {
+                bad(format!("nothing follows `{kind}:`; {FORMS}"))
+            }
             "ndjson" => Ok(Self::Ndjson(rest.into())),
+            "csv" => Ok(Self::Csv(rest.into())),
+            "parquet" => Ok(Self::Parquet(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
             _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
+            _ if ending("csv") => Ok(Self::Csv(text.into())),
+            _ if ending("parquet") => Ok(Self::Parquet(text.into())),
             _ if ending("mcap") => Ok(Self::Mcap(text.into())),
-            kind => match nearest(kind, ["ndjson", "mcap", "page"]) {
+            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "page"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -51,19 +63,46 @@ impl FromStr for SinkSpec {
     }
 }
 
+/// What is asked of tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TableWish {
+    /// Whether a CSV has one row per frame, with columns of their own for each field.
+    pub wide: bool,
+    /// Whether separate touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
+    pub touches: bool,
+}
+
 impl SinkSpec {
-    /// Reserves its file or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
+    /// Whether it is a table, of which [`TableWish`] says more.
+    #[must_use]
+    pub fn is_table(&self) -> bool {
+        matches!(self, Self::Csv(_) | Self::Parquet(_))
+    }
+
+    /// Reserves its files or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
     ///
     /// # Errors
     /// As [`OutputPaths::add`]; a page cannot be at this address, or for these hosts.
     #[cfg_attr(not(feature = "page"), expect(unused_variables, reason = "only a page is for hosts"))]
-    pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String]) -> Result<SinkTarget> {
+    pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String], table: TableWish) -> Result<SinkTarget> {
+        let touches_of =
+            |path: &Path, outputs: &mut OutputPaths| table.touches.then(|| outputs.add(touches_path(path))).transpose();
         Ok(match self {
             #[cfg(feature = "page")]
             Self::Page(address) => SinkTarget::Page(crate::page::Listen::new(address.as_deref(), allow_hosts)?),
             #[cfg(not(feature = "page"))]
             Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
+            Self::Csv(path) => {
+                SinkTarget::Csv { percepts: outputs.add(path)?, touches: touches_of(path, outputs)?, wide: table.wide }
+            }
+            Self::Parquet(path) => {
+                if cfg!(not(feature = "parquet")) {
+                    let what = "built without the feature `parquet`: cargo install somatic --features parquet; or use csv:FILE";
+                    return Err(Error::failed(what).at(path.display()));
+                }
+                SinkTarget::Parquet { percepts: outputs.add(path)?, touches: touches_of(path, outputs)? }
+            }
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
             Self::Stdout => {
                 outputs.add_standard_output()?;
@@ -79,6 +118,22 @@ impl SinkSpec {
 pub enum SinkTarget {
     /// A line of JSON a frame.
     Ndjson(OutputPath),
+    /// A table in CSV.
+    Csv {
+        /// The file.
+        percepts: OutputPath,
+        /// That of separate touches.
+        touches: Option<OutputPath>,
+        /// Whether it has one row per frame.
+        wide: bool,
+    },
+    /// A table in Parquet.
+    Parquet {
+        /// The file.
+        percepts: OutputPath,
+        /// That of separate touches.
+        touches: Option<OutputPath>,
+    },
     /// A recording in MCAP.
     Mcap(OutputPath),
     /// A page for browsers.
@@ -89,6 +144,12 @@ pub enum SinkTarget {
 }
 
 impl SinkTarget {
+    /// Whether it holds the files that say what is run ([`Session::attached`]).
+    #[must_use]
+    pub fn holds_attached(&self) -> bool {
+        matches!(self, Self::Mcap(_) | Self::Parquet { .. })
+    }
+
     /// Opens the sink for `session`.
     ///
     /// # Errors
@@ -99,6 +160,15 @@ impl SinkTarget {
             Self::Ndjson(output) => Ok(Box::new(NdjsonSink::to_file(output, names, all_fields)?)),
             Self::Stdout => {
                 Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
+            }
+            Self::Csv { percepts, touches, wide } => Ok(Box::new(CsvSink::create(percepts, touches, wide, session)?)),
+            #[cfg(feature = "parquet")]
+            Self::Parquet { percepts, touches } => {
+                Ok(Box::new(super::ParquetSink::create(percepts, touches, session)?))
+            }
+            #[cfg(not(feature = "parquet"))]
+            Self::Parquet { percepts, .. } => {
+                Err(Error::failed("built without the feature `parquet`").at(percepts.name().display()))
             }
             #[cfg(feature = "page")]
             Self::Page(listen) => Ok(Box::new(super::PageSink::start(&listen, session)?)),
@@ -133,7 +203,11 @@ mod tests {
         assert!(why("json:a").contains("did you mean `ndjson:`"));
         assert!(why("page:").contains("HOST:PORT") && why("pgae:x").contains("did you mean `page:`"));
         assert!(why("ndjson:").contains("nothing follows"));
-        assert!(why("a.csv").contains("ndjson:FILE"));
+        assert!(why("a.txt").contains("ndjson:FILE"));
+        assert_eq!(parsed("csv:a"), SinkSpec::Csv("a".into()));
+        assert_eq!(parsed("a.csv"), SinkSpec::Csv("a.csv".into()));
+        assert_eq!(parsed("a/b.parquet"), SinkSpec::Parquet("a/b.parquet".into()));
+        assert!(why("parqet:a").contains("did you mean `parquet:`") && why("csv:").contains("nothing follows"));
         assert_eq!(parsed("a.mcap"), SinkSpec::Mcap("a.mcap".into()));
     }
 }

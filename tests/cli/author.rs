@@ -18,8 +18,20 @@ fn skin(more: &[&str]) -> (tempfile::TempDir, std::path::PathBuf, String) {
 #[test]
 fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
     let (folder, path, text) = skin(&["--taxels", "300", "--seed", "1"]);
-    assert!(text.contains("300 taxels in 17 fields") && text.contains("0–299") && text.contains("least mm"), "{text}");
+    assert!(text.contains("300 taxels in ") && text.contains("0–299") && text.contains("least mm"), "{text}");
     let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let fields = told["fields"].as_array().unwrap();
+    let charted = fields.iter().filter(|field| !field["chart"].is_null()).count();
+    assert!(text.contains(&format!(" {charted} of {} fields have centroids", fields.len())), "{text}");
+    // Every taxel is in a field that has centroids, below the field of its link.
+    for taxel in told["taxels"].as_array().unwrap() {
+        let holds = |field: &&Value| {
+            let members = field["members"].as_array().unwrap();
+            !field["chart"].is_null() && members.iter().any(|member| member["taxel"] == taxel["id"])
+        };
+        let name = fields.iter().find(holds).expect("it has one")["name"].as_str().unwrap();
+        assert!(name.starts_with(taxel["link"].as_str().unwrap()), "{name}");
+    }
     assert_eq!(told["taxels"].as_array().unwrap().len(), 300);
     // Each taxel pressed in its turn is felt by the field of its link.
     let mut csv = format!("t,{}\n", (0..300).map(|id| id.to_string()).collect::<Vec<_>>().join(","));
@@ -33,9 +45,51 @@ fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
     let felt = frames(&percepts);
     assert_eq!(felt.len(), 300);
     for (frame, taxel) in felt.iter().zip(told["taxels"].as_array().unwrap()) {
-        let [field] = &frame["fields"].as_array().unwrap()[..] else { panic!("{frame}") };
-        assert_eq!((&field["field"], &field["total"]), (&taxel["link"], &Value::from(50.0)));
+        let touched = frame["fields"].as_array().unwrap();
+        assert_eq!((&touched[0]["field"], &touched[0]["total"]), (&taxel["link"], &Value::from(50.0)));
+        let least = touched.iter().filter(|field| !field["centroid"].is_null());
+        assert!(least.count() > 0, "{frame}");
     }
+}
+
+#[test]
+fn a_sheet_needs_no_mesh() {
+    let (folder, mask) = file("mask.csv", "0,1\n1,1\n1,0\n");
+    let path = folder.path().join("sole.glb");
+    let grid = ["author", "--grid", "3x2", "--pitch", "8.6mm,5mm", "-o", text_of(&path)];
+    let text = done(&[&grid[..], &["--cells", text_of(&mask), "--regions", "3x1"]].concat());
+    assert!(text.contains("4 taxels in 4 fields") && text.contains("4 of 4 fields have centroids"), "{text}");
+    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let ids: Vec<u64> = told["taxels"].as_array().unwrap().iter().map(|taxel| taxel["id"].as_u64().unwrap()).collect();
+    assert_eq!(ids, [1, 2, 3, 4]);
+    let area = told["taxels"][0]["area"].as_f64().unwrap();
+    assert!((area - 0.0086 * 0.005).abs() < 1e-11, "{area}");
+    let left_of_middle = |told: &Value| told["taxels"][0]["position"][0].as_f64().unwrap() < 0.0;
+    assert!(!left_of_middle(&told), "cell 1 is the second of its row");
+    done(&[&grid[..], &["--cells", text_of(&mask), "--ids", "columns", "--force"]].concat());
+    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    assert!(left_of_middle(&told), "cell 1 is the second of its column");
+    let (_folder, touch) = file("touch.csv", "t,1,2,3,4\n0,0,0,5,5\n");
+    let percepts = done(&["run", "--body", text_of(&path), "--source", text_of(&touch), "--backend", "cpu"]);
+    let felt = frames(&percepts);
+    let [field] = &felt[0]["fields"].as_array().unwrap()[..] else { panic!("{percepts}") };
+    assert_eq!((&field["field"], &field["total"]), (&"sole".into(), &Value::from(10.0)));
+}
+
+#[test]
+fn what_no_sheet_can_be_is_said_in_a_line() {
+    let (folder, mask) = file("mask.csv", "1,1\n1,oops\n");
+    let path = folder.path().join("sole.glb");
+    let why = |more: &[&str]| fails(2, &[&["author", "-o", text_of(&path)], more].concat());
+    assert!(why(&["--grid", "3x2"]).contains("--pitch"));
+    assert!(why(&["--grid", "3", "--pitch", "5mm"]).contains("31x11"));
+    assert!(why(&["--grid", "3x2", "--pitch", "5"]).contains("--pitch"));
+    assert!(why(&["--grid", "3x2", "--pitch", "5mm,5mm,5mm"]).contains("two"));
+    assert!(why(&["--grid", "3x2", "--pitch", "5mm", "--regions", "4x1"]).contains("regions"));
+    assert!(why(&["hand", "--grid", "3x2", "--pitch", "5mm"]).contains("--grid"));
+    let masked = ["author", "--grid", "2x2", "--pitch", "5mm", "--cells", text_of(&mask), "-o", text_of(&path)];
+    assert!(fails(1, &masked).contains("mask.csv: line 2: `oops`"));
+    assert!(!path.exists());
 }
 
 #[test]

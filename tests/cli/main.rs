@@ -17,6 +17,8 @@ mod outputs;
 mod page;
 mod paper;
 mod plan;
+mod plot;
+mod python;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]
 mod random;
@@ -30,6 +32,7 @@ mod simulate;
 #[path = "../skips/mod.rs"]
 mod skips;
 mod sources;
+mod tables;
 mod tradeoff;
 #[cfg(unix)]
 mod tune;

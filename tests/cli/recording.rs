@@ -1,15 +1,15 @@
 //! Recordings in MCAP: what goes in comes out, whatever happens to the file meanwhile.
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use somatic::recording::{Reader, Recorder};
 use somatic::{Frame, OutputPath, RawValue};
 
+use super::python::python_with;
 use super::random::Random;
 use super::skips::skip;
 use super::{code_of, done, fails, files_in, frames, output, somatic, stderr, text_of};
@@ -635,34 +635,9 @@ fn what_is_stale_is_stale_in_a_recording() {
     assert!(said.contains("cannot mark stale values"), "{said}");
 }
 
-/// Python with the format's own library, or why there is none.
-fn python() -> Result<PathBuf, String> {
-    static ONCE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    let install = || {
-        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mcap");
-        let python = place.join("bin/python");
-        let works = || {
-            Command::new(&python).args(["-c", "import mcap, mcap_protobuf"]).output().is_ok_and(|o| o.status.success())
-        };
-        if works() {
-            return Ok(python);
-        }
-        let run = |command: &mut Command| match command.output() {
-            Err(e) => Err(format!("python cannot be run: {e}")),
-            Ok(output) if !output.status.success() => Err(stderr(&output)),
-            Ok(_) => Ok(()),
-        };
-        run(Command::new("python3").args(["-m", "venv"]).arg(&place))?;
-        let requirements = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mcap/requirements.txt");
-        run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--requirement", requirements]))?;
-        if works() { Ok(python) } else { Err("it does not import mcap".to_owned()) }
-    };
-    ONCE.get_or_init(install).clone()
-}
-
 #[test]
 fn another_library_reads_the_same() {
-    let python = match python() {
+    let python = match python_with("mcap", "import mcap, mcap_protobuf") {
         Ok(python) => python,
         Err(why) => return skip("MCAP", format!("no other reader of MCAP: {why}")),
     };

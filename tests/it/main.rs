@@ -18,6 +18,7 @@ mod geodesic;
 mod grouping;
 mod house;
 mod icub;
+mod imported;
 mod knobs;
 mod legal;
 mod letters;

@@ -7,6 +7,9 @@ pub(super) const POOR_DISTORTION: f64 = 0.25;
 
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
 
+/// Fields that a note names.
+const MAX_LISTED: usize = 6;
+
 #[derive(Default)]
 pub(super) struct ChartNotes {
     /// Fields that were split, into how many parts and why.
@@ -54,7 +57,12 @@ fn fields<'a>(names: impl Iterator<Item = &'a String>) -> String {
     let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
     match &names[..] {
         [name] => format!("field {name}:"),
-        names => format!("fields {}:", names.join(", ")),
+        names => match names.split_at_checked(MAX_LISTED) {
+            Some((first, rest)) if !rest.is_empty() => {
+                format!("fields {} and {} more:", first.join(", "), rest.len())
+            }
+            _ => format!("fields {}:", names.join(", ")),
+        },
     }
 }
 

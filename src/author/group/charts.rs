@@ -224,7 +224,7 @@ impl Grouper<'_> {
 }
 
 /// The unit vector most perpendicular to `normals`.
-fn least_axis(normals: &[DVec3]) -> DVec3 {
+pub(super) fn least_axis(normals: &[DVec3]) -> DVec3 {
     let products = |m: DMat3, n: &DVec3| m + DMat3::from_cols(*n * n.x, *n * n.y, *n * n.z);
     let moments = normals.iter().fold(DMat3::ZERO, products);
     let trace = moments.x_axis.x + moments.y_axis.y + moments.z_axis.z;

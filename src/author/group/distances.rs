@@ -104,6 +104,11 @@ impl LinkDistances {
         self.along_net(nearest, limit_m)
     }
 
+    /// Distances from taxel `from` along the net, m: longer than along the surface, by up to a third, but soon known.
+    pub(super) fn along_net_from(&mut self, from: usize) -> Vec<f64> {
+        self.along_net(from, f64::INFINITY).into_iter().map(|way| way.distance_m).collect()
+    }
+
     /// Distances along the net (Dijkstra).
     fn along_net(&mut self, from: usize, limit_m: f64) -> Vec<TaxelDistance> {
         let first_taxel = if self.places.is_empty() { 0 } else { self.surface.topology.positions.len() };

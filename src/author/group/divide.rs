@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use super::distances::LinkDistances;
+use super::even::even_patches;
 use super::grouper::Grouper;
 use super::patches::{patches, spread};
 use super::rule::{Each, FieldRule, Patches, Rows, Seeds};
@@ -45,7 +46,8 @@ impl Grouper<'_> {
         if let Some(wanted) = rule.patches {
             let count = match wanted {
                 Patches::Number(number) => number,
-                Patches::Of { of } => chosen.len().div_ceil(of),
+                Patches::Of { of, even: true } => return Ok(numbered(&stem("patch"), self.even_patches(chosen, of))),
+                Patches::Of { of, .. } => chosen.len().div_ceil(of),
             };
             let patches = self.patches(chosen, count, MAX_ROUNDS);
             if patches.len() != count && matches!(wanted, Patches::Number(_)) {
@@ -96,10 +98,18 @@ impl Grouper<'_> {
         let patches = patches(&mut links, count, most_rounds);
         self.note_approximate(&links);
         let taxels = |(link, patch): (usize, Vec<usize>)| patch.into_iter().map(|i| links[link].taxels[i]).collect();
-        let mut patches: Vec<Vec<usize>> = patches.into_iter().map(taxels).collect();
-        patches.iter_mut().for_each(|patch| patch.sort_unstable());
-        patches.sort_by_key(|patch| patch[0]);
-        patches
+        sorted(patches.into_iter().map(taxels).collect())
+    }
+
+    /// `chosen` in patches of about `of` taxels, equal in number on each link and surface part, ordered by lowest id.
+    pub(super) fn even_patches(&mut self, chosen: &[usize], of: usize) -> Vec<Vec<usize>> {
+        let mut links = self.distances(chosen);
+        let mut patches = Vec::new();
+        for distances in &mut links {
+            let of_link = even_patches(distances, of);
+            patches.extend(of_link.into_iter().map(|patch| patch.into_iter().map(|i| distances.taxels[i]).collect()));
+        }
+        sorted(patches)
     }
 
     fn note_approximate(&mut self, links: &[LinkDistances]) {
@@ -271,6 +281,13 @@ impl Grouper<'_> {
         // Empty rows count.
         runs.into_iter().map(|(run, taxels)| (format!("{stem}_{:0width$}", run + 1), taxels)).collect()
     }
+}
+
+/// `patches` with their taxels in order, ordered by their first.
+fn sorted(mut patches: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    patches.iter_mut().for_each(|patch| patch.sort_unstable());
+    patches.sort_by_key(|patch| patch[0]);
+    patches
 }
 
 /// Children numbered from 1 with a fixed number of digits.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::painted::Painted;
-use super::rule::{ChartWish, Each, FieldRule, Wrap};
+use super::rule::{ChartWish, FieldRule, Wrap};
 use crate::body::{Body, FieldSpec, MemberSpec};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::{Unroller, unions};
@@ -17,7 +17,8 @@ pub struct Grouping {
     pub notes: Vec<String>,
 }
 
-/// Groups the taxels of `body` by `rules`; without rules, one field for each link.
+/// Groups the taxels of `body` by `rules`. Without rules, there is a field for each link, and below it patches of about twelve
+/// taxels, equal in number, that have charts.
 ///
 /// ```
 /// use somatic::{Body, author::group::group, bundled};
@@ -38,7 +39,7 @@ pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<
         grower.apply(rule).map_err(|e| e.at(format!("field rule {number}")))?;
     }
     if rules.is_empty() {
-        grower.apply(&FieldRule { each: Some(Each::Link), ..FieldRule::default() })?;
+        grower.apply_usual()?;
     }
     grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
@@ -143,7 +144,7 @@ impl<'a> Grouper<'a> {
     }
 
     /// Adds the field `name` with the levels above it.
-    fn add(&mut self, name: &str, taxels: &[usize], rule: &FieldRule) -> Result<()> {
+    pub(super) fn add(&mut self, name: &str, taxels: &[usize], rule: &FieldRule) -> Result<()> {
         for name in [Some(name), rule.parent.as_deref()].into_iter().flatten() {
             if name.split('/').any(|level| level.trim().is_empty()) {
                 return Err(failed!("`{name}` is no name for a field: a level of it is empty"));

@@ -8,10 +8,12 @@ mod charts;
 mod choose;
 mod distances;
 mod divide;
+mod even;
 mod grouper;
 mod painted;
 mod patches;
 mod rule;
+mod usual;
 
 pub use charts::MAX_PLANE_DISTORTION;
 pub use grouper::{Grouper, Grouping, group};

@@ -85,7 +85,10 @@ impl FieldRule {
                 "it has several of `each`, `patches`, `radius`, `rows` and `columns`: keep one, and divide further by a rule `within`",
             ),
             (divides == 0 && self.name.is_none(), "add a `name`, or `each`, `patches`, `radius`, `rows` or `columns`"),
-            (matches!(self.patches, Some(Patches::Number(0) | Patches::Of { of: 0 })), "`patches` must be 1 or more"),
+            (
+                matches!(self.patches, Some(Patches::Number(0) | Patches::Of { of: 0, .. })),
+                "`patches` must be 1 or more",
+            ),
             (self.parent.is_some() && self.within.is_some(), "`parent` has no effect beside `within`; remove one"),
             (
                 self.rows.or(self.columns).is_some_and(|rows| rows.of == 0 || rows.stride == Some(0)),
@@ -130,6 +133,9 @@ pub enum Patches {
     Of {
         /// Taxels a patch.
         of: usize,
+        /// Whether patches of a link have equal numbers of taxels, rather than equal extents.
+        #[serde(default)]
+        even: bool,
     },
 }
 

@@ -173,6 +173,17 @@ impl Recipe {
         Ok(Self { unit: Some((unit.to_owned(), unit_metres(unit)?)), ..self })
     }
 
+    /// Whether it asks for nothing: neither taxels nor fields.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty() && self.fields.is_empty()
+    }
+
+    /// Takes its unit out, m: for a file whose numbers are made metres when it is opened.
+    pub fn take_unit(&mut self) -> Option<f64> {
+        self.unit.take().map(|(_, metres)| metres)
+    }
+
     /// The seed of `place`, from its own or the recipe's seed and its name, so that it does not depend on other places.
     pub(in crate::author) fn seed_of(&self, place: &PlaceSpec) -> u64 {
         // FNV-1a.

@@ -1,0 +1,121 @@
+//! Meshes of other formats as glTF: STL, OBJ, COLLADA, PLY, and robots in URDF.
+//!
+//! A mesh becomes one link, a URDF a link for each of its own. What comes out is a file to author on, in metres.
+
+mod formats;
+mod ply;
+mod shapes;
+mod triangles;
+mod urdf;
+mod urdf_file;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DQuat};
+
+use crate::body::{Glb, Original};
+use crate::error::{Error, Result, failed};
+
+/// A body of over this size was probably not meant in metres, m.
+const MAX_LIKELY_SIZE_M: f64 = 20.0;
+
+/// The axis that points up in a mesh's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// y, as in glTF.
+    Y,
+    /// z, as in URDF and most CAD programs.
+    Z,
+}
+
+/// The geometry of a URDF that taxels are put on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Geometry {
+    /// What a person sees.
+    #[default]
+    Visual,
+    /// What collisions are computed with: coarser, often of simple shapes.
+    Collision,
+}
+
+/// How a mesh of another format is read.
+#[derive(Clone, Debug, Default)]
+pub struct MeshOptions {
+    /// The unit of its numbers, m; by default that of the file if it has one, else m.
+    pub unit_m: Option<f64>,
+    /// The axis that points up; by default that of the file if it has one, else y.
+    pub up: Option<Up>,
+    /// Folders by name of a package, for `package://NAME/…` in a URDF.
+    pub packages: BTreeMap<String, PathBuf>,
+    /// The geometry of a URDF.
+    pub geometry: Geometry,
+}
+
+/// Whether `path` names a mesh or robot that this module reads, by its ending.
+#[must_use]
+pub fn is_mesh(path: &Path) -> bool {
+    matches!(ending(path).as_str(), "stl" | "obj" | "dae" | "ply" | "urdf" | "xacro")
+}
+
+/// The files that [`open`] reads, as far as they can be found out.
+#[must_use]
+pub fn files(path: &Path, options: &MeshOptions) -> Vec<PathBuf> {
+    let mut files = vec![path.to_owned()];
+    if ending(path) == "urdf"
+        && let Ok(robot) = urdf_file::Robot::load(path, options)
+    {
+        files.extend(robot.mesh_files());
+    }
+    files
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// Opens the mesh or robot at `path` as a glTF to author on.
+///
+/// # Errors
+/// The file cannot be read, is damaged, or is a xacro; a mesh that it names is missing. One line says where.
+pub fn open(path: &Path, options: &MeshOptions) -> Result<Original> {
+    let (glb, size_m) = match ending(path).as_str() {
+        "urdf" | "xacro" => urdf::robot(path, options)?,
+        _ => one_link(path, options)?,
+    };
+    let mut file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;
+    if size_m > MAX_LIKELY_SIZE_M {
+        file.notes.push(format!("it is {size_m:.0} m across: if its numbers are millimetres, give --unit mm"));
+    }
+    Ok(file)
+}
+
+/// A mesh as one link called as the file, and its size, m.
+fn one_link(path: &Path, options: &MeshOptions) -> Result<(Glb, f64)> {
+    let (mut mesh, own_up) = formats::load(path, options.unit_m).map_err(|e| e.at(path.display()))?;
+    if mesh.triangles.is_empty() {
+        return Err(Error::failed("it has no triangles; export a mesh with faces").at(path.display()));
+    }
+    let up = options.up.or(own_up).unwrap_or(Up::Y);
+    mesh.transform(&y_up_from(up));
+    let size_m = mesh.size_m();
+    let name = path.file_stem().map_or_else(|| "mesh".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let mut glb = Glb::new();
+    let material = glb.material("mesh", [0.6, 0.62, 0.66], 0.8);
+    let link = glb.node(&name, None, glam::DVec3::ZERO);
+    glb.mesh(link, &name, &mesh.into_mesh_data(), Some(material), None);
+    Ok((glb, size_m))
+}
+
+/// Turns what points up in a file to y.
+fn y_up_from(up: Up) -> DAffine3 {
+    match up {
+        Up::Y => DAffine3::IDENTITY,
+        Up::Z => DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
+    }
+}
+
+/// `metres` as a length that a mesh's unit may have.
+fn check_unit(metres: f64) -> Result<f64> {
+    if metres.is_finite() && metres > 0.0 { Ok(metres) } else { Err(failed!("a unit of {metres} m; give one over 0")) }
+}

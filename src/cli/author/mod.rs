@@ -1,0 +1,170 @@
+//! `somatic author`: a mesh in, a body with a skin out.
+
+mod convert;
+mod grid;
+mod report;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use somatic::author::{Recipe, author};
+use somatic::body::Original;
+use somatic::error::nearest;
+use somatic::{Error, Result, bundled};
+
+use self::convert::{MeshArguments, MeshFile};
+use self::grid::GridArguments;
+use self::report::{summary, text};
+use super::bar::Bar;
+use super::files::FilesRead;
+use super::stdio::{DONE, print};
+
+const EXAMPLES: &str = "\
+Examples:
+  somatic author hand.glb --taxels 500 --seed 1 -o skin.glb     500 taxels, evenly over all of it
+  somatic author arm.glb --spacing 8mm --region 'forearm*' -o skin.glb
+  somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
+  somatic author --grid 31x11 --pitch 8.6mm -o insole.glb       a flat sheet; it needs no mesh
+  somatic author finger.stl --unit mm --spacing 3mm -o finger.glb
+  somatic author robot.urdf --package my_robot=. --taxels 800 -o robot.glb   its links become links
+  somatic inspect skin.glb
+  somatic run --body skin.glb --source touch.csv
+
+A recipe says it region by region:
+  seed = 1
+  bare = [\"nails\"]
+  [regions.palm]
+  node = \"palm*\"               # or material, attribute, box, except
+  [regions.nails]
+  material = \"nail\"
+  [[place]]
+  region = \"palm\"
+  first_id = 0
+  spacing = \"4 mm\"             # or taxels, with density; grid; points; csv; icub
+
+Whatever else the file holds stays as it is. A layout that it has is replaced; a recipe without
+[[place]] keeps its taxels and groups them anew. Without recipe, --taxels and --spacing the layout
+is brought up to date, as after editing it in Blender:
+  somatic author edited.glb -o skin.glb";
+
+/// Put a skin on a mesh: taxels placed as asked, in fields, in a file that Blender and every glTF viewer open.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
+    /// humanoid.
+    #[arg(value_name = "MESH", required_unless_present = "grid", conflicts_with = "grid")]
+    mesh: Option<String>,
+
+    /// What to place where, a TOML file.
+    #[arg(long, value_name = "RECIPE.toml", conflicts_with_all = ["taxels", "spacing", "region"])]
+    recipe: Option<PathBuf>,
+
+    /// How many taxels, as evenly as blue noise goes.
+    #[arg(long, value_name = "N")]
+    taxels: Option<u64>,
+
+    /// How far taxels are apart at least, such as 8mm; with --taxels exactly so many, else as many as fit.
+    #[arg(long, value_name = "LENGTH")]
+    spacing: Option<String>,
+
+    /// Nodes, meshes or links that get taxels, as a glob; may be given again [default: all].
+    #[arg(long, value_name = "GLOB")]
+    region: Vec<String>,
+
+    /// Which of many equally good placements [default: the recipe's, or 0].
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
+    #[arg(long, value_name = "UNIT")]
+    unit: Option<String>,
+
+    #[command(flatten)]
+    mesh_file: MeshArguments,
+
+    #[command(flatten)]
+    sheet: GridArguments,
+
+    /// The body to write, .glb or .gltf.
+    #[arg(short, long, value_name = "BODY.glb")]
+    output: PathBuf,
+
+    /// Replace the output if it is there. The mesh itself is never replaced.
+    #[arg(long)]
+    force: bool,
+
+    /// Print what was placed as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<u8> {
+    check_ending(&arguments.output)?;
+    let mut recipe = if arguments.sheet.is_asked() { None } else { Some(recipe(arguments)?) };
+    let foreign = arguments.mesh_file.opener(arguments.mesh.as_deref(), recipe.as_mut())?;
+    let read = FilesRead::default().bodies(&arguments.mesh).files(&arguments.recipe).files(arguments.sheet.files());
+    let read = read.files(recipe.iter().flat_map(Recipe::files)).files(foreign.iter().flat_map(MeshFile::files));
+    let output = read.outputs(arguments.force).add(&arguments.output)?;
+    let authored = match (&recipe, &arguments.mesh) {
+        (Some(recipe), Some(mesh)) => {
+            let file = foreign.as_ref().map_or_else(|| open(mesh), MeshFile::open)?;
+            if foreign.is_some() && recipe.is_empty() {
+                return convert::save(&file, output, arguments.json);
+            }
+            let mut bar = Bar::new("placing taxels");
+            author(file, recipe, |share| bar.show(share))?
+        }
+        _ => arguments.sheet.author(&name_of(&arguments.output))?,
+    };
+    authored.file.save(output)?;
+    print(&match arguments.json {
+        true => format!("{}\n", summary(&arguments.output, &authored)),
+        false => text(&arguments.output, &authored),
+    })?;
+    Ok(DONE)
+}
+
+fn recipe(arguments: &Arguments) -> Result<Recipe> {
+    let mut recipe = match &arguments.recipe {
+        Some(path) => Recipe::load(path)?,
+        None if arguments.taxels.is_none() && arguments.spacing.is_none() && arguments.region.is_empty() => {
+            Recipe::none()
+        }
+        None => Recipe::simple(arguments.taxels, arguments.spacing.as_deref(), &arguments.region)?,
+    };
+    if let Some(seed) = arguments.seed {
+        recipe = recipe.with_seed(seed);
+    }
+    if let Some(unit) = &arguments.unit {
+        recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;
+    }
+    Ok(recipe)
+}
+
+/// What the output `path` is called without folder and ending.
+fn name_of(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Refuses an output that would be no body, before any work is done.
+fn check_ending(path: &Path) -> Result<()> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    if !matches!(ending.as_deref(), Some("glb" | "gltf")) {
+        return Err(Error::usage("a body is a .glb or a .gltf; name the output so").at(path.display()));
+    }
+    Ok(())
+}
+
+/// The file `name`, or the bundled body of that name where there is no such file.
+fn open(name: &str) -> Result<Original> {
+    if !Path::new(name).exists() {
+        if let Some(bytes) = bundled::body(name) {
+            return Original::from_bytes(name, bytes, None);
+        }
+        if let Some(near) = nearest(name, bundled::BODIES) {
+            return Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name));
+        }
+    }
+    Original::open(name)
+}

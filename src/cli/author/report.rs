@@ -1,0 +1,141 @@
+//! What `somatic author` says about what it made.
+
+use std::path::Path;
+
+use comfy_table::Cell;
+use console::style;
+use serde_json::{Value, json};
+use somatic::author::{Authored, PlaceReport};
+use somatic::field::FieldSet;
+
+use crate::cli::table::{plain, shown};
+use crate::cli::words::{bullet, count, millimetres};
+
+/// Links, ids and moves that a person is shown.
+const MOST_LISTED: usize = 6;
+
+/// `ids` as runs: `0–499, 1000`.
+fn runs(ids: &[u32]) -> Vec<(u32, u32)> {
+    let mut ids = ids.to_vec();
+    ids.sort_unstable();
+    let mut runs: Vec<(u32, u32)> = Vec::new();
+    for id in ids {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == id => *last = id,
+            _ => runs.push((id, id)),
+        }
+    }
+    runs
+}
+
+pub(super) fn text(output: &Path, authored: &Authored) -> String {
+    let body = &authored.body;
+    let taxels = count(body.taxels.len() as u64, "taxel");
+    let fields = count(body.fields.len() as u64, "field");
+    let mut text = format!("{}: {taxels} in {fields}\n", style(output.display()).bold());
+    if authored.places.is_empty() {
+        text += &format!(
+            "  its taxels are those it had{}\n",
+            if authored.notes.is_empty() { ", and nothing of them is stale" } else { "" }
+        );
+    } else {
+        text += &format!("\n{}", table(&authored.places));
+    }
+    text += &centroids(authored);
+    for place in &authored.places {
+        text += &moves(place);
+    }
+    for note in &authored.notes {
+        text += &bullet(note);
+    }
+    text
+}
+
+/// How many fields have a chart, in which a centroid is measured.
+fn with_centroids(authored: &Authored) -> usize {
+    FieldSet::new(&authored.body).map_or(0, |set| set.fields.iter().filter(|field| field.chart.is_ok()).count())
+}
+
+/// The last line of the table.
+fn centroids(authored: &Authored) -> String {
+    let (with, all) = (with_centroids(authored), authored.body.fields.len());
+    let others = match all - with {
+        0 => "",
+        _ => "; the others, around a part or over several links, report totals and positions",
+    };
+    format!(" {with} of {all} fields have centroids{others}\n")
+}
+
+fn table(places: &[PlaceReport]) -> String {
+    let mut table = plain(["place", "taxels", "least mm", "mean mm", "ids", "links"], 1..4);
+    for place in places {
+        let length = |metres: Option<f64>| Cell::new(metres.map_or_else(|| "–".to_owned(), millimetres));
+        let run =
+            |(first, last): &(u32, u32)| if first == last { first.to_string() } else { format!("{first}–{last}") };
+        let ids: Vec<String> = runs(&place.ids).iter().map(run).collect();
+        let links: Vec<String> = place.links.iter().map(|(link, number)| format!("{link} {number}")).collect();
+        table.add_row([
+            Cell::new(&place.name),
+            Cell::new(place.ids.len()),
+            length(place.least_spacing_m),
+            length(place.mean_spacing_m),
+            Cell::new(listed(&ids)),
+            Cell::new(listed(&links)),
+        ]);
+    }
+    shown(&table)
+}
+
+fn listed(words: &[String]) -> String {
+    match words.get(..MOST_LISTED) {
+        Some(first) if words.len() > MOST_LISTED => {
+            format!("{} and {} more", first.join(", "), words.len() - MOST_LISTED)
+        }
+        _ => words.join(", "),
+    }
+}
+
+/// How far places that were given had to be moved, the worst first.
+fn moves(place: &PlaceReport) -> String {
+    if place.moved_m.is_empty() {
+        return String::new();
+    }
+    let mut worst = place.moved_m.clone();
+    worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let mean = worst.iter().map(|(_, moved)| moved).sum::<f64>() / worst.len() as f64;
+    let shown: Vec<String> =
+        worst.iter().take(MOST_LISTED).map(|(id, moved)| format!("{id} by {} mm", millimetres(*moved))).collect();
+    bullet(&format!(
+        "place `{}`: moved to the surface by {} mm on average; farthest {}",
+        place.name,
+        millimetres(mean),
+        shown.join(", ")
+    ))
+}
+
+pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
+    let place = |place: &PlaceReport| {
+        let moved: Vec<Value> = place.moved_m.iter().map(|(id, moved)| json!({"id": id, "moved": moved})).collect();
+        let mut object = json!({
+            "name": place.name,
+            "taxels": place.ids.len(),
+            "ids": runs(&place.ids),
+            "links": place.links,
+        });
+        if let (Some(least), Some(mean)) = (place.least_spacing_m, place.mean_spacing_m) {
+            object["spacing"] = json!({"least": least, "mean": mean});
+        }
+        if !moved.is_empty() {
+            object["moved"] = moved.into();
+        }
+        object
+    };
+    json!({
+        "output": output.display().to_string(),
+        "taxels": authored.body.taxels.len(),
+        "fields": authored.body.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>(),
+        "places": authored.places.iter().map(place).collect::<Vec<_>>(),
+        "with_centroids": with_centroids(authored),
+        "notes": authored.notes,
+    })
+}

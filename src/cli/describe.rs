@@ -1,0 +1,47 @@
+//! `run --describe`: the columns of the tables that sinks write.
+
+use comfy_table::Cell;
+use somatic::sink::{Session, SinkSpec, TableColumn, percept_columns, touch_columns};
+use somatic::{Error, Outputs, Result};
+
+use super::table::{plain, shown};
+
+/// The columns of `sinks`, or of a table if there are none.
+pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) -> Result<String> {
+    if let Some(other) = sinks.iter().find(|sink| !sink.is_table()) {
+        let what = match other {
+            SinkSpec::Mcap(_) => {
+                "--describe is for csv: and parquet:; a recording has its schemas in itself: somatic info FILE"
+            }
+            SinkSpec::Page(_) => "--describe is for csv: and parquet:; docs/page.md has the messages of a page",
+            _ => "--describe is for csv: and parquet:; README.md shows the keys of NDJSON",
+        };
+        return Err(Error::usage(what));
+    }
+    let mut text = match wide {
+        true => "one row per frame: t and frame, then, for each field and called by it, the columns from contact on\n",
+        false if session.all_fields => "one row per frame and field\n",
+        false => "one row per frame and field in contact\n",
+    }
+    .to_owned();
+    text += &table(&percept_columns(session));
+    if session.outputs.contains(Outputs::TOUCHES) {
+        text += "\nin a second file, one row per frame, field in contact and separate touch\n";
+        text += &table(&touch_columns(session));
+    }
+    Ok(text)
+}
+
+fn table(columns: &[TableColumn]) -> String {
+    let mut table = plain(["column", "unit", "type", "what"], []);
+    for column in columns {
+        let absent = if column.is_nullable { " or absent" } else { "" };
+        table.add_row([
+            Cell::new(&column.name),
+            Cell::new(&column.unit),
+            Cell::new(format!("{}{absent}", column.kind.name())),
+            Cell::new(&column.help),
+        ]);
+    }
+    shown(&table)
+}

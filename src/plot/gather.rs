@@ -1,0 +1,293 @@
+//! Sees an engine's percepts and pressures, and keeps what a plot shows of them.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::map::PressureMap;
+use super::path::Path;
+use super::series::Series;
+use crate::body::Body;
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::field::FieldSet;
+use crate::percept::{COLUMNS, Column, Outputs, Percepts};
+use crate::signal::Frame;
+
+/// Most fields that are gathered, and most that are shown.
+const MAX_GATHERED: usize = 64;
+const MAX_LINES: usize = 6;
+const MAX_MAPS: usize = 2;
+/// Most panels over time.
+pub(super) const MAX_PANELS: usize = 8;
+/// A longer time between two frames adds nothing to integrals over time, s.
+const MAX_STEP_S: f64 = 1.0;
+
+/// The outputs that an engine must give for a plot of `wanted`, or of load and area where that is empty.
+#[must_use]
+pub fn outputs_for(wanted: Outputs) -> Outputs {
+    let usual = Outputs::TOTAL | Outputs::AREA | Outputs::named("force").unwrap_or_default();
+    let panels = if wanted.is_empty() { usual } else { wanted };
+    panels | Outputs::TOTAL | Outputs::CENTROID
+}
+
+/// What is plotted of one recording.
+#[derive(Clone, Debug)]
+pub struct Gathered {
+    /// What people call the recording.
+    pub(super) name: String,
+    /// Number of frames.
+    pub(super) frames: u64,
+    /// First and last time, s.
+    pub(super) span_s: [f64; 2],
+    /// The fields of the lines, in the order of their colours.
+    pub(super) lines: Vec<String>,
+    /// Whether the first of them holds all the others.
+    pub(super) first_is_whole: bool,
+    /// Quantities over time.
+    pub(super) panels: Vec<Panel>,
+    pub(super) maps: Vec<PressureMap>,
+}
+
+/// A quantity over time.
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    pub(super) column: &'static Column,
+    /// By line, a series for each component.
+    pub(super) lines: Vec<Vec<Series>>,
+}
+
+/// Gathers what is plotted of a recording.
+pub struct Gatherer {
+    name: String,
+    frames: u64,
+    span_s: Option<[f64; 2]>,
+    set: FieldSet,
+    columns: Vec<&'static Column>,
+    fields: Vec<Followed>,
+    are_named: bool,
+    /// By taxel of the body.
+    peaks: Vec<f64>,
+    integrals: Vec<f64>,
+    last: Vec<f64>,
+    /// m².
+    areas: Vec<f64>,
+    index_of: HashMap<u32, usize>,
+    pressures: Vec<(u32, f64)>,
+}
+
+/// A field that is followed over time.
+struct Followed {
+    /// Its index in the engine's plan, and in the body's fields.
+    in_plan: usize,
+    in_body: usize,
+    /// By column, a series for each component.
+    series: Vec<Vec<Series>>,
+    path: Path,
+    most_load: f64,
+    /// The integral of its load over time.
+    impulse: f64,
+}
+
+impl Gatherer {
+    /// For what `engine` makes of a recording called `name` on `body`; `wanted` are the outputs over time, none for load and
+    /// area. If `are_named`, the fields of the engine are those that somebody wants to see.
+    ///
+    /// # Errors
+    /// A field of the body has no taxels.
+    pub fn new(name: &str, body: &Body, engine: &Engine, wanted: Outputs, are_named: bool) -> Result<Self> {
+        let set = FieldSet::new(body)?;
+        let shown = if wanted.is_empty() { outputs_for(wanted) - Outputs::CENTROID } else { wanted };
+        let columns: Vec<&'static Column> = COLUMNS.iter().filter(|column| shown.contains(column.output)).collect();
+        let index_of_name: HashMap<&str, usize> =
+            set.fields.iter().enumerate().map(|(index, field)| (field.name.as_str(), index)).collect();
+        let followed = |(in_plan, (name, _)): (usize, (&str, &str))| {
+            let in_body = *index_of_name.get(name)?;
+            let series = columns.iter().map(|column| vec![Series::default(); column.components]).collect();
+            Some(Followed { in_plan, in_body, series, path: Path::default(), most_load: 0.0, impulse: 0.0 })
+        };
+        let mut fields: Vec<Followed> = engine.plan().fields().enumerate().filter_map(followed).collect();
+        fields.sort_by_key(|field| (depth(&set, field.in_body), field.in_body));
+        // Deeper ones only where they are the first with a chart.
+        fields.retain(|field| {
+            are_named
+                || depth(&set, field.in_body) < 2
+                || (is_charted(&set, field.in_body) && !has_charted_above(&set, field.in_body))
+        });
+        fields.truncate(MAX_GATHERED);
+        let taxels = body.taxels.len();
+        Ok(Self {
+            name: name.to_owned(),
+            frames: 0,
+            span_s: None,
+            set,
+            columns,
+            fields,
+            are_named,
+            peaks: vec![0.0; taxels],
+            integrals: vec![0.0; taxels],
+            last: vec![0.0; taxels],
+            areas: body.taxels.iter().map(|taxel| taxel.area).collect(),
+            index_of: body.taxels.iter().enumerate().map(|(index, taxel)| (taxel.id, index)).collect(),
+            pressures: Vec::new(),
+        })
+    }
+
+    /// Takes `frames`, of which `engine` has just made percepts.
+    pub fn see(&mut self, engine: &Engine, frames: &[Frame]) {
+        let percepts = engine.percepts();
+        for (index, frame) in frames.iter().enumerate() {
+            let t_s = percepts.t_s(index);
+            let before = self.span_s.map(|[_, last]| last);
+            self.span_s = Some([self.span_s.map_or(t_s, |[first, _]| first), t_s]);
+            self.frames += 1;
+            let mut pressures = std::mem::take(&mut self.pressures);
+            engine.pressures(frame, &mut pressures);
+            let dt_s =
+                before.map(|before| t_s - before).filter(|dt_s| (0.0..=MAX_STEP_S).contains(dt_s)).unwrap_or(0.0);
+            self.see_fields(percepts, index, t_s, dt_s);
+            for &(id, pressure) in &pressures {
+                let Some(&taxel) = self.index_of.get(&id) else { continue };
+                self.peaks[taxel] = self.peaks[taxel].max(pressure);
+                // The trapezoid between two frames.
+                self.integrals[taxel] += 0.5 * (pressure + self.last[taxel]) * dt_s;
+                self.last[taxel] = pressure;
+            }
+            self.pressures = pressures;
+        }
+    }
+
+    fn see_fields(&mut self, percepts: &Percepts, frame: usize, t_s: f64, dt_s: f64) {
+        for field in &mut self.fields {
+            for (column, series) in self.columns.iter().zip(&mut field.series) {
+                let value = percepts.value(frame, field.in_plan, column);
+                for (component, series) in series.iter_mut().enumerate() {
+                    series.push(t_s, value.map(|value| value[component]));
+                }
+            }
+            let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(|output| column_of(output));
+            let of = |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
+            let load = of(total).map_or(0.0, |total| total[0]);
+            field.most_load = field.most_load.max(load);
+            field.impulse += load * dt_s;
+            field.path.push(of(centroid).map(|[u, v, _]| [u, v]));
+        }
+    }
+
+    /// What is plotted of all that was seen.
+    #[must_use]
+    pub fn finish(self) -> Gathered {
+        let lines = self.lines();
+        let mut panels: Vec<Panel> = self
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(index, column)| Panel {
+                column,
+                lines: lines.iter().map(|&line| self.fields[line].series[index].clone()).collect(),
+            })
+            .collect();
+        // With a force, a total says nothing more; without a unit there is no force.
+        let is_there = |panel: &Panel| panel.lines.iter().flatten().any(|series| series.range().is_some());
+        let force = panels.iter().find(|panel| panel.column.name == "force").map(is_there);
+        match force {
+            Some(true) => panels.retain(|panel| panel.column.output != Outputs::TOTAL || self.columns.len() > 3),
+            Some(false) => panels.retain(|panel| panel.column.name != "force"),
+            None => {}
+        }
+        panels.truncate(MAX_PANELS);
+        let maps = self.mapped().into_iter().map(|field| {
+            let followed = &self.fields[field];
+            PressureMap::new(
+                &self.set.fields[followed.in_body],
+                followed.path.runs.clone(),
+                &self.peaks,
+                &self.integrals,
+                &self.areas,
+            )
+        });
+        let above =
+            |field: usize, below: usize| is_above(&self.set, self.fields[field].in_body, self.fields[below].in_body);
+        let first_is_whole = lines.len() > 1 && lines[1..].iter().all(|&line| above(lines[0], line));
+        Gathered {
+            first_is_whole,
+            maps: maps.collect(),
+            lines: lines.iter().map(|&line| self.set.fields[self.fields[line].in_body].name.clone()).collect(),
+            panels,
+            name: self.name,
+            frames: self.frames,
+            span_s: self.span_s.unwrap_or([0.0; 2]),
+        }
+    }
+
+    /// The fields whose lines are drawn: those that were asked for; else the topmost, and below a single one its children.
+    fn lines(&self) -> Vec<usize> {
+        let all = 0..self.fields.len();
+        if self.are_named {
+            return self.heaviest(all.collect(), MAX_LINES);
+        }
+        let level = |wanted: usize| -> Vec<usize> {
+            all.clone().filter(|&field| depth(&self.set, self.fields[field].in_body) == wanted).collect()
+        };
+        let top = level(0);
+        match top[..] {
+            [only] => {
+                let children = level(1).into_iter().filter(|&field| self.fields[field].most_load > 0.0).collect();
+                [vec![only], self.heaviest(children, MAX_LINES - 1)].concat()
+            }
+            _ => self.heaviest(top, MAX_LINES),
+        }
+    }
+
+    /// The fields whose maps are drawn: those with a chart that are not part of another, the heaviest.
+    fn mapped(&self) -> Vec<usize> {
+        let charted = (0..self.fields.len()).filter(|&field| {
+            let in_body = self.fields[field].in_body;
+            let is_below = |other: usize| is_above(&self.set, self.fields[other].in_body, in_body);
+            let has_map = |other: usize| is_charted(&self.set, self.fields[other].in_body);
+            is_charted(&self.set, in_body)
+                && self.fields[field].most_load > 0.0
+                && !(0..self.fields.len()).any(|other| has_map(other) && is_below(other))
+        });
+        self.heaviest(charted.collect(), MAX_MAPS)
+    }
+
+    /// The `most` of `fields` with the largest integrals of load over time, in their order.
+    fn heaviest(&self, fields: Vec<usize>, most: usize) -> Vec<usize> {
+        let mut sorted = fields;
+        sorted.sort_by(|&a, &b| self.fields[b].impulse.total_cmp(&self.fields[a].impulse).then(a.cmp(&b)));
+        sorted.truncate(most);
+        sorted.sort_unstable();
+        sorted
+    }
+}
+
+fn column_of(output: Outputs) -> Option<&'static Column> {
+    COLUMNS.iter().find(|column| column.output == output)
+}
+
+/// How many fields are above `field`.
+fn depth(set: &FieldSet, field: usize) -> usize {
+    std::iter::successors(set.fields[field].parent, |&parent| set.fields[parent].parent).count()
+}
+
+fn is_above(set: &FieldSet, above: usize, field: usize) -> bool {
+    std::iter::successors(set.fields[field].parent, |&parent| set.fields[parent].parent).any(|parent| parent == above)
+}
+
+fn is_charted(set: &FieldSet, field: usize) -> bool {
+    set.fields[field].chart.is_ok()
+}
+
+fn has_charted_above(set: &FieldSet, field: usize) -> bool {
+    std::iter::successors(set.fields[field].parent, |&parent| set.fields[parent].parent)
+        .any(|parent| is_charted(set, parent))
+}
+
+/// The lines of all recordings, each name once, with the index of its colour.
+pub(super) fn colours_of(all: &[Gathered]) -> BTreeMap<String, usize> {
+    let mut colours = BTreeMap::new();
+    for line in all.iter().flat_map(|gathered| &gathered.lines) {
+        let next = colours.len();
+        colours.entry(line.clone()).or_insert(next);
+    }
+    colours
+}

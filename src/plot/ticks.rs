@@ -1,0 +1,64 @@
+//! Ticks of axes: round numbers.
+
+/// About `count` round numbers from `low` to `high`, 1, 2 or 5 times a power of ten apart.
+pub(super) fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+    let span = high - low;
+    if !(span > 0.0 && span.is_finite()) {
+        return vec![low];
+    }
+    let rough = span / count.max(1) as f64;
+    let power = 10_f64.powf(rough.log10().floor());
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|by| by * power).find(|step| *step >= rough * 0.999).unwrap_or(rough);
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last).map(|index| index as f64 * step).collect()
+}
+
+/// `[low, high]` widened to round numbers, with 0 if it is near.
+pub(super) fn rounded([low, high]: [f64; 2]) -> [f64; 2] {
+    let low = if low > 0.0 && low < 0.5 * high { 0.0 } else { low };
+    let high = if high < 0.0 && high > 0.5 * low { 0.0 } else { high };
+    if low == high {
+        let half = if low == 0.0 { 1.0 } else { low.abs() * 0.1 };
+        return [if low == 0.0 { 0.0 } else { low - half }, high + half];
+    }
+    let steps = ticks([low, high], 8);
+    let step = if steps.len() > 1 { steps[1] - steps[0] } else { high - low };
+    [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step]
+}
+
+/// `value` with as many digits as a scale with steps of `step` needs.
+pub(super) fn shown(value: f64, step: f64) -> String {
+    let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
+    let text = if value != 0.0 && !(1e-3..1e6).contains(&step.max(value.abs() * 1e-3).max(1e-12)) && step < 1e-3 {
+        format!("{value:.1e}")
+    } else {
+        let digits = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
+        format!("{value:.digits$}")
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks([0.0, 9.7], 4), [0.0, 5.0]);
+        assert_eq!(ticks([0.0, 9.7], 5), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(ticks([-0.03, 0.04], 3).len(), 1);
+        assert_eq!(ticks([5.0, 5.0], 3), [5.0]);
+        assert_eq!(rounded([3.0, 97.0]), [0.0, 100.0]);
+        assert_eq!(rounded([0.0, 0.0]), [0.0, 1.0]);
+        let [low, high] = rounded([-3.2, 7.1]);
+        assert!(low <= -3.2 && high >= 7.1 && high < 10.0);
+    }
+
+    #[test]
+    fn numbers_have_the_digits_of_their_scale() {
+        assert_eq!([shown(0.5, 0.5), shown(-20.0, 20.0), shown(0.0, 0.2)], ["0.5", "−20", "0.0"]);
+        assert_eq!(shown(2000.0, 500.0), "2000");
+    }
+}

@@ -1,0 +1,254 @@
+//! Writes percepts as CSV.
+//!
+//! Numbers have the fewest digits that read back to the same bits, as in NDJSON; what is absent is empty.
+
+use std::io::{self, ErrorKind};
+
+use csv::{QuoteStyle, Writer, WriterBuilder};
+use serde::Serialize;
+
+use super::{Row, TableColumn, TableType, ValueOf, output_columns, percept_columns, rows, touch_columns, touch_rows};
+use crate::error::{Error, Result, failed};
+use crate::output::{OutputFile, OutputPath};
+use crate::percept::{Flags, Percepts};
+use crate::sink::{FieldNames, Flow, Session, Sink};
+
+/// Between the words of a list.
+const BETWEEN_WORDS: &str = ";";
+
+/// Writes percepts as CSV: a row per frame and field in contact, or one per frame.
+pub struct CsvSink {
+    percepts: CsvFile,
+    touches: Option<CsvFile>,
+    rows: Rows,
+    names: Vec<FieldNames>,
+    flags: Vec<(Flags, String)>,
+    closed: bool,
+}
+
+enum Rows {
+    /// One for each field in contact, or for each.
+    PerField { all_fields: bool },
+    /// One for each frame, with these columns of each field.
+    PerFrame(Vec<TableColumn>),
+}
+
+/// A file and its columns.
+struct CsvFile {
+    name: String,
+    writer: Writer<OutputFile>,
+    columns: Vec<TableColumn>,
+    text: Vec<u8>,
+}
+
+impl CsvSink {
+    /// Writes to `output`, where the file appears when the sink is finished, and separate touches to `touches`. With `wide`
+    /// there is one row per frame, and every field has columns of its own.
+    ///
+    /// # Errors
+    /// A file cannot be made.
+    pub fn create(output: OutputPath, touches: Option<OutputPath>, wide: bool, session: &Session<'_>) -> Result<Self> {
+        let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
+        let names = session.names.clone();
+        let mut sink = Self {
+            percepts: CsvFile::begin(output, percept_columns(session))?,
+            touches: touches.map(|output| CsvFile::begin(output, touch_columns(session))).transpose()?,
+            rows: Rows::PerField { all_fields: session.all_fields },
+            names,
+            flags,
+            closed: false,
+        };
+        if wide {
+            let columns = wide_columns(session);
+            let keys = sink.percepts.columns.drain(..2).collect();
+            sink.percepts.columns = keys;
+            let titles = sink.percepts.columns.iter().map(TableColumn::title);
+            let of_field = |name: &FieldNames| {
+                let head = head_of(name);
+                columns.iter().map(|column| format!("{head} {}", column.title())).collect::<Vec<_>>()
+            };
+            let titles: Vec<String> = titles.chain(sink.names.iter().flat_map(of_field)).collect();
+            sink.rows = Rows::PerFrame(columns);
+            sink.percepts.record(titles)?;
+        } else {
+            let titles: Vec<String> = sink.percepts.columns.iter().map(TableColumn::title).collect();
+            sink.percepts.record(titles)?;
+        }
+        if let Some(touches) = &mut sink.touches {
+            let titles: Vec<String> = touches.columns.iter().map(TableColumn::title).collect();
+            touches.record(titles)?;
+        }
+        Ok(sink)
+    }
+
+    fn flow(&mut self, written: Result<(), csv::Error>) -> Result<Flow> {
+        flow_of(written.map_err(io_error), &self.percepts.name).inspect(|flow| self.closed |= *flow == Flow::Closed)
+    }
+
+    fn write_all(&mut self, percepts: &Percepts) -> Result<(), csv::Error> {
+        let Self { percepts: file, touches, rows: how, names, flags, .. } = self;
+        for frame in 0..percepts.frames() {
+            match how {
+                Rows::PerField { all_fields } => {
+                    for row in rows(percepts, frame, *all_fields) {
+                        for column in 0..file.columns.len() {
+                            file.field(&row, file.columns[column].kind, file.columns[column].value, names, flags)?;
+                        }
+                        file.writer.write_record(None::<&[u8]>)?;
+                    }
+                }
+                Rows::PerFrame(columns) => {
+                    let first = Row { percepts, frame, field: 0, touch: None };
+                    for column in 0..file.columns.len() {
+                        file.field(&first, file.columns[column].kind, file.columns[column].value, names, flags)?;
+                    }
+                    for row in rows(percepts, frame, true) {
+                        for column in columns.iter() {
+                            file.field(&row, column.kind, column.value, names, flags)?;
+                        }
+                    }
+                    file.writer.write_record(None::<&[u8]>)?;
+                }
+            }
+            if let Some(touches) = touches {
+                for row in touch_rows(percepts, frame) {
+                    for column in 0..touches.columns.len() {
+                        let TableColumn { kind, value, .. } = touches.columns[column];
+                        touches.field(&row, kind, value, names, flags)?;
+                    }
+                    touches.writer.write_record(None::<&[u8]>)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The columns that each field has in a table with one row per frame.
+fn wide_columns(session: &Session<'_>) -> Vec<TableColumn> {
+    let all = percept_columns(session);
+    let of = |value: ValueOf| all.iter().find(|column| column.value == value).cloned();
+    let outputs = output_columns(session);
+    of(ValueOf::Contact).into_iter().chain(outputs).chain(of(ValueOf::Flags)).collect()
+}
+
+/// What the columns of a field begin with.
+fn head_of(name: &FieldNames) -> String {
+    [Some(&name.field), name.letter.as_ref(), name.signal.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(String::as_str)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+impl CsvFile {
+    fn begin(output: OutputPath, columns: Vec<TableColumn>) -> Result<Self> {
+        let name = output.name().display().to_string();
+        let writer = WriterBuilder::new().quote_style(QuoteStyle::Necessary).from_writer(output.begin()?);
+        Ok(Self { name, writer, columns, text: Vec::new() })
+    }
+
+    fn record(&mut self, cells: Vec<String>) -> Result<()> {
+        self.writer.write_record(cells).map_err(|e| cannot_write(&io_error(e), &self.name))
+    }
+
+    /// Writes the value of a row in a column.
+    fn field(
+        &mut self,
+        row: &Row<'_>,
+        kind: TableType,
+        value: ValueOf,
+        names: &[FieldNames],
+        flags: &[(Flags, String)],
+    ) -> Result<(), csv::Error> {
+        let text = &mut self.text;
+        text.clear();
+        match (kind, value) {
+            (TableType::F64, _) => print(text, row.float(value).as_ref()),
+            (TableType::F32, _) => print(text, row.float(value).map(|number| number as f32).as_ref()),
+            (TableType::U64 | TableType::U32, _) => print(text, row.whole(value).as_ref()),
+            (_, ValueOf::Contact) => print(text, Some(&row.is_touched())),
+            (_, ValueOf::Flags) => {
+                let own = row.percepts.flags(row.frame, row.field);
+                for (index, (_, name)) in flags.iter().filter(|(flag, _)| own.contains(*flag)).enumerate() {
+                    text.extend_from_slice(if index == 0 { b"" } else { BETWEEN_WORDS.as_bytes() });
+                    text.extend_from_slice(name.as_bytes());
+                }
+            }
+            (_, ValueOf::Link) => return self.writer.write_field(row.link(names)),
+            (_, ValueOf::Letter) => {
+                return self.writer.write_field(names[row.field].letter.as_deref().unwrap_or_default());
+            }
+            (_, ValueOf::Signal) => {
+                return self.writer.write_field(names[row.field].signal.as_deref().unwrap_or_default());
+            }
+            _ => return self.writer.write_field(&names[row.field].field),
+        }
+        self.writer.write_field(&self.text)
+    }
+
+    fn finish(self) -> Result<OutputFile> {
+        self.writer.into_inner().map_err(|e| cannot_write(e.error(), &self.name))
+    }
+}
+
+fn print(text: &mut Vec<u8>, value: Option<&impl Serialize>) {
+    if let Some(value) = value {
+        serde_json::to_writer(text, value).expect("a number prints into memory");
+    }
+}
+
+fn io_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        _ => io::Error::other("a row has another number of cells"),
+    }
+}
+
+fn cannot_write(error: &io::Error, name: &str) -> Error {
+    failed!("cannot write: {error}").at(name)
+}
+
+/// Whether the output is still open: a closed pipe is a normal end.
+fn flow_of(written: io::Result<()>, name: &str) -> Result<Flow> {
+    match written {
+        Ok(()) => Ok(Flow::Open),
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(Flow::Closed),
+        Err(e) => Err(cannot_write(&e, name)),
+    }
+}
+
+impl Sink for CsvSink {
+    fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
+        assert_eq!(percepts.fields(), self.names.len(), "a sink is told the name of every field");
+        if self.closed {
+            return Ok(Flow::Closed);
+        }
+        let written = self.write_all(percepts);
+        self.flow(written)
+    }
+
+    fn flush(&mut self) -> Result<Flow> {
+        if self.closed {
+            return Ok(Flow::Closed);
+        }
+        let flushed = self.percepts.writer.flush();
+        let flushed = flushed.and_then(|()| self.touches.as_mut().map_or(Ok(()), |touches| touches.writer.flush()));
+        let flow = flow_of(flushed, &self.percepts.name)?;
+        self.closed |= flow == Flow::Closed;
+        Ok(flow)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        if self.flush()? == Flow::Closed {
+            // The rest has no reader.
+            return Ok(());
+        }
+        let percepts = self.percepts.finish()?;
+        match self.touches {
+            Some(touches) => percepts.finish_with(touches.finish()?),
+            None => percepts.finish(),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Plots of recordings: what is on them, and what cannot be drawn.
+
+use std::path::Path;
+
+use crate::{done, fails, files_in, output, stderr, text_of};
+
+fn drawn(folder: &Path, name: &str, arguments: &[&str]) -> Vec<u8> {
+    let path = folder.join(name);
+    done(&[&["plot", "-o", text_of(&path), "--force"], arguments].concat());
+    std::fs::read(path).unwrap()
+}
+
+/// The texts of an SVG, in their order.
+fn texts(svg: &[u8]) -> Vec<String> {
+    let text = std::str::from_utf8(svg).unwrap();
+    let parts = text.split("<text").skip(1).filter_map(|rest| rest.split('>').nth(1)?.split('<').next());
+    parts.map(|text| text.trim().to_owned()).collect()
+}
+
+#[test]
+fn a_plot_has_load_area_and_maps_without_any_option() {
+    let folder = tempfile::tempdir().unwrap();
+    let svg = drawn(folder.path(), "a.svg", &[]);
+    let texts = texts(&svg);
+    let has = |wanted: &str| texts.iter().any(|text| text.contains(wanted));
+    for wanted in ["bundled touch", "total [P]", "area [cm²]", "time [s]", "hand/palm", "pressure–time integral", "P·s"]
+    {
+        assert!(has(wanted), "{wanted}: {texts:?}");
+    }
+    // As PNG the same size.
+    let png = drawn(folder.path(), "a.png", &[]);
+    assert!(png.starts_with(b"\x89PNG"));
+    let size = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+    let head = String::from_utf8_lossy(&svg[..200]).into_owned();
+    assert!(head.contains(&format!("width=\"{}\" height=\"{}\"", size(16), size(20))), "{head}");
+    // The same recording gives the same picture.
+    assert_eq!(drawn(folder.path(), "b.svg", &[]), svg);
+}
+
+#[test]
+fn recordings_stand_side_by_side_on_one_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("mat.glb");
+    done(&["author", "--grid", "2x3", "--pitch", "1cm", "-o", text_of(&body)]);
+    let touch = |name: &str, most: u32| {
+        let path = folder.path().join(name);
+        let rows: String =
+            (0..50).map(|n| format!("{},{},{},0,0,0,0\n", f64::from(n) * 0.1, most * n / 49, most / 2)).collect();
+        std::fs::write(&path, format!("t,0,1,2,3,4,5\n{rows}")).unwrap();
+        path
+    };
+    let (one, other) = (touch("one.csv", 100), touch("other.csv", 1000));
+    let arguments = [text_of(&one), text_of(&other), "--body", text_of(&body), "--outputs", "total,speed"];
+    let both = texts(&drawn(folder.path(), "a.svg", &arguments));
+    let count = |wanted: &str| both.iter().filter(|text| text.contains(wanted)).count();
+    assert_eq!(
+        (count("one.csv"), count("other.csv"), count("speed [mm/s]"), count("time [s]")),
+        (1, 1, 2, 2),
+        "{both:?}"
+    );
+    assert_eq!((count("1500"), count("area")), (2, 0), "both have the scale of the larger one: {both:?}");
+    // Alone, the smaller one has its own.
+    let alone = texts(&drawn(folder.path(), "b.svg", &[&arguments[..1], &arguments[2..]].concat()));
+    assert!(!alone.contains(&"1500".to_owned()), "{alone:?}");
+}
+
+#[test]
+fn fields_and_times_are_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let some = texts(&drawn(folder.path(), "a.svg", &["--fields", "hand/palm/*", "--from", "1", "--to", "2"]));
+    assert!(
+        some.iter().any(|text| text.starts_with("hand/palm/")) && !some.contains(&"hand/back".to_owned()),
+        "{some:?}"
+    );
+    assert!(some.contains(&"1.0".to_owned()) && !some.contains(&"3.0".to_owned()), "{some:?}");
+}
+
+#[test]
+fn what_cannot_be_plotted_is_said_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text_of(&folder.path().join(name)).to_owned();
+    let svg = at("a.svg");
+    assert!(fails(2, &["plot", "-o", &at("a.pdf")]).contains(".svg or .png"));
+    assert!(fails(2, &["plot", "-o", &svg, "--outputs", "touches"]).contains("csv:FILE"));
+    assert!(fails(2, &["plot", "-", "-o", &svg]).contains("only recordings"));
+    assert!(fails(1, &["plot", &at("no.csv"), "-o", &svg]).contains("no.csv"));
+    std::fs::write(at("empty.csv"), "t,4\n").unwrap();
+    let none = output(&["plot", &at("empty.csv"), "-o", &svg]);
+    assert!(none.status.code() == Some(1) && stderr(&none).contains("no frames"), "{}", stderr(&none));
+    // A row that is cut off is left out, and said.
+    std::fs::write(at("cut.csv"), "t,4,5\n0,1,2\n1,2,3\n2,3").unwrap();
+    assert!(fails(3, &["plot", &at("cut.csv"), "-o", &svg]).contains("never processed"));
+    assert_eq!(files_in(folder.path()), ["a.svg", "cut.csv", "empty.csv"]);
+}

@@ -1,0 +1,292 @@
+//! Meshes and robots of other formats: the same shape however it is written, where it belongs, in metres.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use somatic::author::mesh::{Geometry, MeshOptions, Up, files, open};
+use somatic::author::{Recipe, author};
+use somatic::body::Body;
+
+/// The corners and sides, counter-clockwise seen from outside, of a box of 20 × 40 × 60 from the origin on.
+const CORNERS: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [20.0, 0.0, 0.0],
+    [0.0, 40.0, 0.0],
+    [20.0, 40.0, 0.0],
+    [0.0, 0.0, 60.0],
+    [20.0, 0.0, 60.0],
+    [0.0, 40.0, 60.0],
+    [20.0, 40.0, 60.0],
+];
+const SIDES: [[usize; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+
+fn triangles() -> Vec<[usize; 3]> {
+    SIDES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+}
+
+fn text_stl() -> Vec<u8> {
+    let mut text = "solid box\n".to_owned();
+    for triangle in triangles() {
+        text += " facet normal 0 0 0\n  outer loop\n";
+        for corner in triangle {
+            let [x, y, z] = CORNERS[corner];
+            writeln!(text, "   vertex {x} {y} {z}").unwrap();
+        }
+        text += "  endloop\n endfacet\n";
+    }
+    (text + "endsolid box\n").into_bytes()
+}
+
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles().len() as u32).to_le_bytes());
+    for triangle in triangles() {
+        bytes.extend([0; 12]);
+        for corner in triangle {
+            CORNERS[corner].iter().for_each(|&x| bytes.extend((x as f32).to_le_bytes()));
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+fn obj() -> Vec<u8> {
+    let mut text = "# a box\no box\n".to_owned();
+    CORNERS.iter().for_each(|[x, y, z]| writeln!(text, "v {x} {y} {z}").unwrap());
+    SIDES.iter().for_each(|[a, b, c, d]| writeln!(text, "f {} {} {} {}", a + 1, b + 1, c + 1, d + 1).unwrap());
+    text.into_bytes()
+}
+
+fn ply() -> Vec<u8> {
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+                    element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+        .to_owned();
+    CORNERS.iter().for_each(|[x, y, z]| writeln!(text, "{x} {y} {z}").unwrap());
+    SIDES.iter().for_each(|[a, b, c, d]| writeln!(text, "4 {a} {b} {c} {d}").unwrap());
+    text.into_bytes()
+}
+
+fn dae(up: &str, metre: f64) -> Vec<u8> {
+    let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(" ");
+    let places = list(&mut CORNERS.iter().flatten().map(ToString::to_string));
+    let corners = list(&mut triangles().iter().flatten().map(ToString::to_string));
+    format!(
+        r##"<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+  <asset><unit name="own" meter="{metre}"/><up_axis>{up}</up_axis></asset>
+  <library_geometries><geometry id="g" name="box"><mesh>
+    <source id="p"><float_array id="a" count="24">{places}</float_array>
+      <technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
+  </mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+  <scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>"##
+    )
+    .into_bytes()
+}
+
+fn options() -> MeshOptions {
+    MeshOptions::default()
+}
+
+fn unit(metres: f64) -> MeshOptions {
+    let mut options = options();
+    options.unit_m = Some(metres);
+    options
+}
+
+fn body(path: &Path, options: &MeshOptions) -> Body {
+    open(path, options).unwrap().read().unwrap().0
+}
+
+fn why(path: &Path, options: &MeshOptions) -> String {
+    let why = open(path, options).unwrap_err().to_string();
+    assert!(!why.contains('\n'), "{why}");
+    why
+}
+
+/// The lower and upper corner of a link's skin in the world, and its area.
+fn measured(body: &Body, link: &str) -> (DVec3, DVec3, f64) {
+    let index = body.link_index(link).unwrap_or_else(|| panic!("there is no {link}"));
+    let way = body.links[index].world_from_link;
+    let mut area = 0.0;
+    let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
+    for corners in body.triangles_in_link(index) {
+        let corners = corners.map(|p| way.transform_point3(p));
+        area += (corners[1] - corners[0]).cross(corners[2] - corners[0]).length() / 2.0;
+        corners.iter().for_each(|&p| (low, high) = (low.min(p), high.max(p)));
+    }
+    (low, high, area)
+}
+
+fn is_box(got: (DVec3, DVec3, f64), low: [f64; 3], high: [f64; 3]) {
+    let (low, high) = (DVec3::from_array(low), DVec3::from_array(high));
+    assert!(got.0.distance(low) < 1e-6 && got.1.distance(high) < 1e-6, "{got:?} is not from {low} to {high}");
+    let size = high - low;
+    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    assert!((got.2 - area).abs() < 1e-8, "{} is not {area} m²", got.2);
+}
+
+#[test]
+fn one_shape_in_every_format_is_one_body() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in
+        [("text.stl", text_stl()), ("binary.stl", binary_stl()), ("Box.OBJ", obj()), ("box.ply", ply())]
+    {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let body = body(&path, &unit(1e-3));
+        let link = path.file_stem().unwrap().to_str().unwrap();
+        is_box(measured(&body, link), [0.0; 3], [0.02, 0.04, 0.06]);
+        // With z up, z becomes y.
+        let mut turned = unit(1e-3);
+        turned.up = Some(Up::Z);
+        is_box(measured(&self::body(&path, &turned), link), [0.0, 0.0, -0.04], [0.02, 0.06, 0.0]);
+        // In metres it is too large to be likely.
+        let notes = open(&path, &options()).unwrap().notes;
+        assert!(notes.len() == 1 && notes[0].contains("--unit mm"), "{notes:?}");
+        // Its outside is outside, and taxels are put there.
+        let made =
+            author(open(&path, &unit(1e-3)).unwrap(), &Recipe::simple(Some(60), None, &[]).unwrap(), |_| {}).unwrap();
+        let middle = DVec3::new(0.01, 0.02, 0.03);
+        for taxel in &made.body.taxels {
+            assert!((taxel.position_in_link - middle).dot(taxel.normal_in_link) > 0.0, "{name}: {taxel:?}");
+        }
+    }
+}
+
+#[test]
+fn a_collada_file_says_its_unit_and_what_is_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("box.dae");
+    std::fs::write(&path, dae("Z_UP", 0.001)).unwrap();
+    is_box(measured(&body(&path, &options()), "box"), [0.0, 0.0, -0.04], [0.02, 0.06, 0.0]);
+    std::fs::write(&path, dae("Y_UP", 0.01)).unwrap();
+    is_box(measured(&body(&path, &options()), "box"), [0.0; 3], [0.2, 0.4, 0.6]);
+    assert!(why(&path, &unit(1e-3)).contains("leave --unit out"));
+}
+
+/// A robot of two links: a box of metres, and on a joint a mesh of a package, mirrored.
+fn robot(folder: &Path) -> PathBuf {
+    let path = folder.join("robot.urdf");
+    std::fs::create_dir(folder.join("meshes")).unwrap();
+    std::fs::write(folder.join("meshes/box.stl"), binary_stl()).unwrap();
+    let text = r#"<?xml version="1.0"?>
+<robot name="arm">
+  <link name="hand">
+    <visual><geometry><mesh filename="package://arm/meshes/box.stl" scale="0.001 0.001 -0.001"/></geometry></visual>
+    <collision><origin xyz="0 0 0.1"/><geometry><sphere radius="0.05"/></geometry></collision>
+  </link>
+  <link name="base">
+    <visual><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.4 1"/></geometry></visual>
+  </link>
+  <link name="tool"/>
+  <joint name="wrist" type="revolute"><parent link="base"/><child link="hand"/><origin xyz="1 0 2" rpy="0 0 1.5707963267948966"/></joint>
+  <joint name="end" type="fixed"><parent link="hand"/><child link="tool"/><origin xyz="0 0 0.25"/></joint>
+</robot>"#;
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn links_of_a_robot_are_links_where_its_joints_put_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = robot(folder.path());
+    let mut with = options();
+    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().to_owned())]);
+    let whole = body(&path, &with);
+    let links: Vec<(&str, Option<usize>)> = whole.links.iter().map(|l| (l.name.as_str(), l.parent)).collect();
+    assert_eq!(links, [("base", None), ("hand", Some(0)), ("tool", Some(1))]);
+    // URDF (x, y, z) is glTF (x, z, −y).
+    is_box(measured(&whole, "base"), [-0.1, 0.0, -0.2], [0.1, 1.0, 0.2]);
+    // A quarter turn around z takes x to y and y to −x; the mirror takes z to −z.
+    is_box(measured(&whole, "hand"), [1.0 - 0.04, 2.0 - 0.06, -0.02], [1.0, 2.0, 0.0]);
+    let tool = whole.links[2].world_from_link.translation;
+    assert!(tool.distance(DVec3::new(1.0, 2.25, 0.0)) < 1e-6, "{tool}");
+    // What was outside before the mirror is outside.
+    let made =
+        author(open(&path, &with).unwrap(), &Recipe::simple(Some(80), None, &["hand".to_owned()]).unwrap(), |_| {})
+            .unwrap();
+    let middle = DVec3::new(0.01, 0.02, -0.03);
+    assert!(made.body.taxels.iter().all(|t| (t.position_in_link - middle).dot(t.normal_in_link) > 0.0));
+    assert_eq!(files(&path, &with), [path.clone(), folder.path().join("meshes/box.stl")]);
+    // The coarse shapes instead.
+    with.geometry = Geometry::Collision;
+    let coarse = body(&path, &with);
+    let (low, high, area) = measured(&coarse, "hand");
+    assert!(
+        (area / (0.01 * std::f64::consts::PI) - 1.0).abs() < 0.01 && (high - low - DVec3::splat(0.1)).length() < 1e-3
+    );
+}
+
+#[test]
+fn what_a_robot_lacks_is_said_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = robot(folder.path());
+    assert!(why(&path, &options()).contains("line 4: `package://arm/meshes/box.stl` is in the package `arm`"));
+    let mut with = options();
+    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().join("elsewhere"))]);
+    let missing = why(&path, &with);
+    assert!(missing.contains("link `hand`") && missing.contains("box.stl: no such file"), "{missing}");
+    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().to_owned())]);
+    let whole = std::fs::read_to_string(&path).unwrap();
+    for (part, other, wanted) in [
+        ("<robot name=\"arm\">", "<robot name=\"arm\" xmlns:xacro=\"x\"><xacro:include/>", "xacro"),
+        ("<parent link=\"hand\"/>", "<parent link=\"hnad\"/>", "line 12: there is no link `hnad`"),
+        ("<child link=\"tool\"/>", "<child link=\"hand\"/>", "child of two joints"),
+        ("<box size=\"0.2 0.4 1\"/>", "<box size=\"0.2 0.4\"/>", "line 8: `size` is `0.2 0.4`"),
+        ("<box size=\"0.2 0.4 1\"/>", "<torus/>", "line 8: a <torus> is no shape"),
+        ("</robot>", "", "not valid XML"),
+        ("robot", "model", "not <robot>"),
+        ("name=\"base\"", "name=\"tool\"", "two links are called `tool`"),
+    ] {
+        std::fs::write(&path, whole.replace(part, other)).unwrap();
+        let why = why(&path, &with);
+        assert!(why.contains(wanted) && why.contains("robot.urdf"), "{part}: {why}");
+    }
+    let ring =
+        whole.replace("</robot>", "<joint name=\"r\"><parent link=\"tool\"/><child link=\"base\"/></joint></robot>");
+    std::fs::write(&path, ring).unwrap();
+    assert!(why(&path, &with).contains("ring"));
+    let xacro = folder.path().join("robot.urdf.xacro");
+    std::fs::write(&xacro, &whole).unwrap();
+    assert!(why(&xacro, &with).contains("xacro robot.urdf.xacro > robot.urdf"));
+}
+
+#[test]
+fn damaged_meshes_are_one_line_or_a_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut errors = 0;
+    for (name, whole) in [
+        ("a.stl", binary_stl()),
+        ("b.stl", text_stl()),
+        ("c.obj", obj()),
+        ("d.ply", ply()),
+        ("e.dae", dae("Z_UP", 1.0)),
+    ] {
+        let path = folder.path().join(name);
+        for round in 0..120 {
+            let mut bytes = whole.clone();
+            let at = bytes.len() * round / 120;
+            match round % 3 {
+                0 => bytes.truncate(at),
+                1 => bytes[at] ^= 0x55,
+                _ => bytes.splice(at..at, *b"-1e999 99999999 ").for_each(drop),
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            match open(&path, &options()) {
+                Ok(file) => drop(file.read()),
+                Err(error) => {
+                    let text = error.to_string();
+                    assert!(!text.contains('\n') && text.contains(name), "{text}");
+                    errors += 1;
+                }
+            }
+        }
+    }
+    assert!(errors > 100, "{errors}");
+}
