@@ -311,6 +311,7 @@ impl Pump {
                         tell_doubts(&self.engine, &mut self.doubts);
                     }
                     self.view.see(self.engine.percepts(), told.progress);
+                    self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
                     self.pass_on(&frames, call)?;
                     if self.sinks.is_empty() && !watched {
                         break;
@@ -318,7 +319,6 @@ impl Pump {
                     if let Some(live) = &mut self.live {
                         live.see(&told.read_at);
                     }
-                    self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
                     feed.give_back(frames);
                     self.report_unfit()?;
                 }

@@ -5,6 +5,7 @@
 
 mod entries;
 mod frames;
+mod percepts;
 mod proto;
 mod reader;
 mod recorder;

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::entries::{Attached, Channel, attached, channel, data_of, preface};
 use super::frames::FrameMessage;
 use super::records::{MAX_RECORD_BYTES, Next, Parts, Record, Records, op};
-use super::{FRAMES, PERCEPTS, nanoseconds, unpack};
+use super::{FRAMES, nanoseconds, unpack};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
 
@@ -229,22 +229,6 @@ impl Reader {
             }
             self.damaged(message.data.len() as u64);
         }
-    }
-
-    /// Reads the next percepts that the recording holds, as NDJSON has them, into `line`; frames are passed over. `false` at
-    /// the end.
-    ///
-    /// # Errors
-    /// As [`Reader::next_frame`].
-    pub fn next_percepts(&mut self, line: &mut Vec<u8>) -> Result<bool> {
-        while let Some(message) = self.next_message()? {
-            if self.channels.get(&message.channel).is_some_and(|channel| channel.topic == PERCEPTS) {
-                line.clear();
-                line.extend_from_slice(self.data(&message));
-                return Ok(true);
-            }
-        }
-        Ok(false)
     }
 
     /// Notes that there was a whole frame at `t_s`.

@@ -401,7 +401,7 @@ fn a_taxel_that_is_left_out_is_an_event() {
     let is_notice = |text: &Value| {
         let events = text["events"].as_array().into_iter().flatten();
         events.into_iter().any(|event| {
-            event["kind"] == "notice" && event["text"].as_str().unwrap().starts_with("taxel 5 is dead and left out")
+            event["kind"] == "notice" && event["text"].as_str().unwrap().contains("taxel 5 is dead and left out")
         })
     };
     while !viewer.texts.iter().any(is_notice) {
