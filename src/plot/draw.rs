@@ -9,6 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::gather::{Gathered, Panel, colours_of};
 use super::map::{MappedTaxel, PressureMap};
 use super::page::{Area, LEFT, LEGEND, Page, TITLE};
+use super::series::Series;
 use super::ticks::{rounded, shown, ticks};
 use crate::colours::pressure_colours;
 use crate::error::{Error, Result};
@@ -145,7 +146,7 @@ impl<'a> Plot<'a> {
         let mut ranges: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
         for panel in self.all.iter().flat_map(|gathered| &gathered.panels) {
             let factor = for_people(panel.column).0;
-            for [low, high] in panel.lines.iter().flatten().filter_map(|series| series.range()) {
+            for [low, high] in panel.lines.iter().flatten().filter_map(Series::range) {
                 let [low, high] = [low * factor, high * factor];
                 let known = ranges.entry(panel.column.name).or_insert([low, high]);
                 *known = [known[0].min(low), known[1].max(high)];

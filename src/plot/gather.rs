@@ -163,7 +163,7 @@ impl Gatherer {
                     series.push(t_s, value.map(|value| value[component]));
                 }
             }
-            let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(|output| column_of(output));
+            let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(column_of);
             let of = |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
             let load = of(total).map_or(0.0, |total| total[0]);
             field.most_load = field.most_load.max(load);

@@ -53,7 +53,7 @@ mod tests {
         assert_eq!(rounded([3.0, 97.0]), [0.0, 100.0]);
         assert_eq!(rounded([0.0, 0.0]), [0.0, 1.0]);
         let [low, high] = rounded([-3.2, 7.1]);
-        assert!(low <= -3.2 && high >= 7.1 && high < 10.0);
+        assert!(low <= -3.2 && (7.1..10.0).contains(&high));
     }
 
     #[test]
