@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::charts::least_axis;
+use super::axis::least_axis;
 use super::distances::LinkDistances;
 
 /// Cosine of the angle to their mean that the normals of a patch should keep within: beyond it a patch goes around its part.
@@ -14,7 +14,8 @@ const MAX_COMPARED: usize = 4;
 /// Divides the taxels of `distances` into patches of about `of`, equal in number to within one on each connected part of the
 /// surface: lists of indices.
 ///
-/// Distances are those along a net of the surface's edges, which tell well enough what is far. A set is cut across its longest distance. Where that leaves patches that go around a limb, it is cut along the limb.
+/// Distances are those along a net of the surface's edges, which tell well enough what is far. A set is cut across its
+/// longest distance; where that leaves patches that go around a limb, along the limb.
 pub(super) fn even_patches(distances: &mut LinkDistances, of: usize) -> Vec<Vec<usize>> {
     let mut patches = Vec::new();
     let mut rest: Vec<usize> = (0..distances.len()).collect();

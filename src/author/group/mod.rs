@@ -3,6 +3,7 @@
 //! Rules are applied in order, each to the taxels of a body and the fields of earlier rules; see [`FieldRule`]. The result
 //! can be written into the body's file.
 
+mod axis;
 mod chart_notes;
 mod charts;
 mod choose;
