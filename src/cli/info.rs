@@ -4,10 +4,11 @@ use clap::Args;
 use console::style;
 use serde_json::{Value, json};
 use somatic::recording::{Attached, Reader, Rhythm, Survey};
-use somatic::source::{CsvSource, Source as _, SourceSpec};
+use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
 use somatic::{Error, Frame, Result};
 
 use super::bar::Bar;
+use super::exports::{ExportFlags, source_of};
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
 use super::words::{number, span};
@@ -16,6 +17,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic info touch.mcap
   somatic info touch.csv --json | jq .rate_hz
+  somatic info insoles.csv                    a pressure system's export, by its content
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
 
@@ -23,13 +25,12 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording co
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: mcap:FILE or csv:FILE, or just the file.
+    /// The recording: mcap:FILE, csv:FILE or a pressure system's export, or just the file.
     #[arg(value_name = "FILE")]
     recording: String,
 
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[command(flatten)]
+    export: ExportFlags,
 
     /// Print JSON: times in seconds, sizes in bytes.
     #[arg(long)]
@@ -44,14 +45,17 @@ struct Known {
     attached: Vec<Attached>,
     has_end: bool,
     losses: Vec<String>,
+    /// Of a pressure system's export.
+    layout: Option<Layout>,
 }
 
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
-    let recording = SourceSpec::one_of(&arguments.recording, &["csv", "mcap"]);
+    let options = arguments.export.options()?;
+    let recording = source_of(&arguments.recording, Some(&["csv", "mcap", "export"]), &options);
     let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
-            if arguments.rate.is_some() {
+            if arguments.export.rate.is_some() {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
             }
             let mut reader = Reader::open(&path)?;
@@ -63,28 +67,18 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 attached: reader.attached().to_vec(),
                 has_end: reader.has_end(),
                 losses: reader.losses(),
+                layout: None,
                 survey,
             }
         }
         SourceSpec::Csv(path) => {
-            let mut source = CsvSource::open(&path, arguments.rate)?;
-            let mut rhythm = Rhythm::default();
-            let mut frame = Frame::missing(0.0, source.taxels().len());
-            while source.next_frame(&mut frame)? {
-                rhythm.see(frame.t_s);
-                bar.show(source.progress().unwrap_or(0.0));
-            }
-            rhythm.finish();
-            let losses = source.losses();
-            Known {
-                kind: "CSV",
-                bytes: size(&path),
-                taxels: source.taxels().len(),
-                survey: Survey { rhythm, ..Survey::default() },
-                attached: Vec::new(),
-                has_end: losses.is_empty(),
-                losses,
-            }
+            let mut source = CsvSource::open(&path, options.rate_hz)?;
+            of_frames("CSV", size(&path), &mut source, None, &mut bar)?
+        }
+        SourceSpec::Vendor(path) => {
+            let mut source = VendorSource::open(&path, &options)?;
+            let layout = source.layout().clone();
+            of_frames(source.format().title(), size(&path), &mut source, Some(layout), &mut bar)?
         }
         _ => unreachable!("it is of one of these kinds"),
     };
@@ -96,6 +90,41 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     Ok(if known.losses.is_empty() { DONE } else { LOST })
 }
 
+/// What a recording of nothing but frames has, which is read to its end.
+fn of_frames(
+    kind: &'static str,
+    bytes: u64,
+    source: &mut dyn Source,
+    layout: Option<Layout>,
+    bar: &mut Bar,
+) -> Result<Known> {
+    let mut rhythm = Rhythm::default();
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    while source.next_frame(&mut frame)? {
+        rhythm.see(frame.t_s);
+        bar.show(source.progress().unwrap_or(0.0));
+    }
+    rhythm.finish();
+    let losses = source.losses();
+    Ok(Known {
+        kind,
+        bytes,
+        taxels: source.taxels().len(),
+        survey: Survey { rhythm, ..Survey::default() },
+        attached: Vec::new(),
+        has_end: losses.is_empty(),
+        losses,
+        layout,
+    })
+}
+
+/// The panels of an export, in words.
+fn panels(layout: &Layout) -> String {
+    let words = layout.panels.iter().map(|panel| format!("{} {}", panel.name, panel.cells.len()));
+    let placed = if layout.is_placed() { "" } else { "; the file does not say where they are" };
+    format!(": {}{placed}", words.collect::<Vec<_>>().join(", "))
+}
+
 fn size(path: &std::path::Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
@@ -105,7 +134,7 @@ fn duration_s(rhythm: &Rhythm) -> Option<f64> {
 }
 
 fn as_json(known: &Known) -> Value {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout } = known;
     let rhythm = &survey.rhythm;
     let topics: Vec<Value> = survey
         .topics
@@ -120,11 +149,16 @@ fn as_json(known: &Known) -> Value {
         "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({"seconds": gap[0], "after": gap[1]})),
         "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
         "ended": has_end, "losses": losses,
+        "unit": layout.as_ref().map(|layout| layout.unit.symbol()),
+        "panels": layout.as_ref().map(|layout| layout.panels.iter().map(|panel| json!({
+            "name": panel.name, "taxels": panel.cells.len(), "placed": panel.is_placed,
+            "area": panel.cells.iter().map(|cell| cell.area_m2).sum::<f64>(),
+        })).collect::<Vec<_>>()),
     })
 }
 
 fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", style(name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
@@ -135,7 +169,10 @@ fn text(name: &str, known: &Known) -> String {
     if let (Some(duration), Some([start, _])) = (duration_s(rhythm), rhythm.span_s) {
         line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
     }
-    line("taxels", taxels.to_string());
+    line("taxels", format!("{taxels}{}", layout.as_ref().map_or(String::new(), panels)));
+    if let Some(layout) = layout {
+        line("unit", layout.unit.to_string());
+    }
     line(
         "gaps",
         match rhythm.longest_gap_s {

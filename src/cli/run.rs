@@ -168,6 +168,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let session = Session {
         names,
         all_fields: asked.all_fields,
+        header: asked.header,
         taxels: source.taxels(),
         body: Some(&body),
         attached: if records { attachments(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },

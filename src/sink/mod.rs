@@ -2,6 +2,7 @@
 //!
 //! A sink gets the fields' names once; only recordings use bodies and frames.
 
+mod header;
 mod line;
 mod ndjson;
 #[cfg(feature = "page")]
@@ -136,6 +137,8 @@ pub struct Session<'a> {
     pub names: Vec<FieldNames>,
     /// Whether fields without contact are listed.
     pub all_fields: bool,
+    /// Whether NDJSON begins with a line that says units and body.
+    pub header: bool,
     /// The ids of a frame's values, in their order.
     pub taxels: &'a [u32],
     /// The robot.
