@@ -1,12 +1,16 @@
 //! `somatic info`: what is in a recording.
 
+mod contacts;
+
 use clap::Args;
 use console::style;
 use serde_json::{Value, json};
 use somatic::recording::{Attached, Reader, Rhythm, Survey};
 use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
-use somatic::{Error, Frame, Result};
+use somatic::{Body, Calibration, Error, Frame, Result};
 
+use self::contacts::Contacts;
+use super::attached;
 use super::bar::Bar;
 use super::exports::{ExportFlags, source_of};
 use super::stdio::{DONE, LOST, print, say};
@@ -47,6 +51,8 @@ struct Known {
     losses: Vec<String>,
     /// Of a pressure system's export.
     layout: Option<Layout>,
+    /// Of a recording that has its body.
+    contacts: Option<Contacts>,
 }
 
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
@@ -68,17 +74,22 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 has_end: reader.has_end(),
                 losses: reader.losses(),
                 layout: None,
+                contacts: recorded(&path)?,
                 survey,
             }
         }
         SourceSpec::Csv(path) => {
             let mut source = CsvSource::open(&path, options.rate_hz)?;
-            of_frames("CSV", size(&path), &mut source, None, &mut bar)?
+            of_frames("CSV", size(&path), &mut source, None, None, &mut bar)?
         }
         SourceSpec::Vendor(path) => {
             let mut source = VendorSource::open(&path, &options)?;
             let layout = source.layout().clone();
-            of_frames(source.format().title(), size(&path), &mut source, Some(layout), &mut bar)?
+            let body = Body::from_bytes(&source.body_name(), &source.body()?)?;
+            let ids = source.taxels().to_vec();
+            let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
+            let contacts = Contacts::new(&body, calibration, &source)?;
+            of_frames(source.format().title(), size(&path), &mut source, Some(layout), Some(contacts), &mut bar)?
         }
         _ => unreachable!("it is of one of these kinds"),
     };
@@ -96,15 +107,22 @@ fn of_frames(
     bytes: u64,
     source: &mut dyn Source,
     layout: Option<Layout>,
+    mut contacts: Option<Contacts>,
     bar: &mut Bar,
 ) -> Result<Known> {
     let mut rhythm = Rhythm::default();
     let mut frame = Frame::missing(0.0, source.taxels().len());
     while source.next_frame(&mut frame)? {
         rhythm.see(frame.t_s);
+        if let Some(contacts) = &mut contacts {
+            contacts.see(&frame)?;
+        }
         bar.show(source.progress().unwrap_or(0.0));
     }
     rhythm.finish();
+    if let Some(contacts) = &mut contacts {
+        contacts.finish()?;
+    }
     let losses = source.losses();
     Ok(Known {
         kind,
@@ -115,7 +133,27 @@ fn of_frames(
         has_end: losses.is_empty(),
         losses,
         layout,
+        contacts,
     })
+}
+
+/// The contacts in the recording at `path`, if it has its body.
+fn recorded(path: &std::path::Path) -> Result<Option<Contacts>> {
+    let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
+    let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = attached::calibration(path)?.map(|text| Calibration::parse(&text, &ids)).transpose();
+    let mut reader = Reader::open(path)?;
+    // What cannot be run is described all the same.
+    let Ok(Ok(mut contacts)) = calibration.map(|calibration| Contacts::new(&body, calibration, &reader)) else {
+        return Ok(None);
+    };
+    let mut frame = Frame::missing(0.0, reader.taxels().len());
+    while reader.next_frame(&mut frame)? {
+        contacts.see(&frame)?;
+    }
+    contacts.finish()?;
+    Ok(Some(contacts))
 }
 
 /// The panels of an export, in words.
@@ -134,7 +172,7 @@ fn duration_s(rhythm: &Rhythm) -> Option<f64> {
 }
 
 fn as_json(known: &Known) -> Value {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
     let rhythm = &survey.rhythm;
     let topics: Vec<Value> = survey
         .topics
@@ -149,6 +187,7 @@ fn as_json(known: &Known) -> Value {
         "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({"seconds": gap[0], "after": gap[1]})),
         "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
         "ended": has_end, "losses": losses,
+        "fields": contacts.as_ref().map(Contacts::as_json),
         "unit": layout.as_ref().map(|layout| layout.unit.symbol()),
         "panels": layout.as_ref().map(|layout| layout.panels.iter().map(|panel| json!({
             "name": panel.name, "taxels": panel.cells.len(), "placed": panel.is_placed,
@@ -158,7 +197,7 @@ fn as_json(known: &Known) -> Value {
 }
 
 fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", style(name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
@@ -191,6 +230,7 @@ fn text(name: &str, known: &Known) -> String {
     for file in attached {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
+    text += &contacts.as_ref().map_or(String::new(), Contacts::text);
     if !survey.topics.is_empty() {
         let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {

@@ -370,3 +370,20 @@ fn the_steady_state_does_not_allocate() {
     // The counter does count.
     assert!(allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8]))).count_total > 0);
 }
+
+#[test]
+fn a_page_is_told_what_pressure_is_measured_in() {
+    let welcome = |calibration: &str| -> Value {
+        let bench = Bench::new(Outputs::TOTAL | Outputs::FORCE, &ALL_LETTERS[..1], calibration);
+        serde_json::from_str(&bench.scene.welcome("00ff", bench.scene.scale)).unwrap()
+    };
+    let units = |welcome: &Value| -> Vec<Value> {
+        welcome["columns"].as_array().unwrap().iter().map(|column| column["unit"].clone()).collect()
+    };
+    let kilopascal = welcome("[all]\nunit = \"kPa\"\np_max = 50\n");
+    assert_eq!((&kilopascal["quantity"], &kilopascal["scale"]["max"]), (&json!("Pa"), &json!(50_000.0)));
+    assert_eq!(units(&kilopascal), ["Pa", "N"]);
+    let count = welcome("[all]\np_max = 50\n");
+    assert_eq!((&count["quantity"], &count["scale"]["max"]), (&json!("count"), &json!(50.0)));
+    assert_eq!(units(&count), ["count", "N"]);
+}

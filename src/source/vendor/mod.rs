@@ -7,6 +7,8 @@ mod layout;
 mod lines;
 mod matrix;
 mod novel_asc;
+mod novel_places;
+mod options;
 mod parser;
 mod tekscan;
 mod text;
@@ -18,84 +20,21 @@ use std::path::{Path, PathBuf};
 
 pub use format::VendorFormat;
 pub use layout::{Cell, Layout, Panel};
+pub use options::VendorOptions;
 
 use self::emed::Emed;
 use self::layout::Grid;
 use self::lines::Lines;
 use self::matrix::Matrix;
-use self::novel_asc::{NovelAsc, Places};
+use self::novel_asc::NovelAsc;
+use self::novel_places::Places;
 use self::parser::{Parser, Rate};
 use self::tekscan::Tekscan;
 use self::text::Separator;
 use self::xsensor::Xsensor;
 use super::Source;
 use crate::error::{Error, Result, failed};
-use crate::length::Length;
-use crate::signal::{Frame, Quantity, RawValue, UnitOfP};
-
-/// What is said of a recording beside what its file says.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct VendorOptions {
-    /// Its format, if its content is not to tell.
-    pub format: Option<VendorFormat>,
-    /// Frames per second, where the file has no times.
-    pub rate_hz: Option<f64>,
-    /// Rows and columns of plain matrices.
-    pub grid: Option<[u32; 2]>,
-    /// From one row to the next and from one column to the next, m.
-    pub pitch_m: Option<[f64; 2]>,
-    /// The unit of the values, where the file does not say it.
-    pub unit: Option<UnitOfP>,
-}
-
-impl VendorOptions {
-    /// Rows and columns as people write them: `31x11`.
-    ///
-    /// # Errors
-    /// A usage error.
-    pub fn grid_of(text: &str) -> Result<[u32; 2]> {
-        let counts: Option<Vec<u32>> = text.split(['x', 'X', '×']).map(|word| word.trim().parse().ok()).collect();
-        match counts.as_deref() {
-            Some(&[rows, columns]) if rows > 0 && columns > 0 => Ok([rows, columns]),
-            _ => Err(Error::usage(format!("--grid {text} is not rows and columns; write them as 31x11"))),
-        }
-    }
-
-    /// The pitch of rows and columns as people write it: `8.6mm`, or `8.6mm,5mm`.
-    ///
-    /// # Errors
-    /// A usage error.
-    pub fn pitch_of(text: &str) -> Result<[f64; 2]> {
-        let metres = |word: &str| {
-            let length = Length::parse(word.trim()).ok()??;
-            Some(length.number * length.unit_m?).filter(|pitch| pitch.is_finite() && *pitch > 0.0)
-        };
-        let lengths: Option<Vec<f64>> = text.split(',').map(metres).collect();
-        match lengths.as_deref() {
-            Some(&[pitch]) => Ok([pitch; 2]),
-            Some(&[rows, columns]) => Ok([rows, columns]),
-            _ => {
-                Err(Error::usage(format!("--pitch {text} is no length; write it with its unit, as 8.6mm or 8.6mm,5mm")))
-            }
-        }
-    }
-
-    /// Refuses what is only for exports.
-    pub(super) fn check_unused(&self) -> Result<()> {
-        let given = [
-            ("--format", self.format.is_some()),
-            ("--grid", self.grid.is_some()),
-            ("--pitch", self.pitch_m.is_some()),
-            ("--unit", self.unit.is_some()),
-        ];
-        match given.into_iter().find(|(_, given)| *given) {
-            Some((flag, _)) => {
-                Err(Error::usage(format!("{flag} is for recordings that pressure systems export; leave it out here")))
-            }
-            None => Ok(()),
-        }
-    }
-}
+use crate::signal::{Frame, Quantity, RawValue};
 
 /// A recording that a pressure system exported.
 pub struct VendorSource {
@@ -229,7 +168,7 @@ impl VendorSource {
 
     /// Notes that the last frame is cut short.
     fn cut(&mut self, error: &Error) -> bool {
-        self.losses.push(format!("{}: line {}: the last frame is cut short: {error}", self.name, self.lines.number()));
+        self.losses.push(format!("line {}: the last frame is cut short: {error}", self.lines.number()));
         false
     }
 
@@ -359,6 +298,6 @@ impl Source for VendorSource {
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        self.losses.iter().map(|loss| format!("{}: {loss}", self.name)).collect()
     }
 }

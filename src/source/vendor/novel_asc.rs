@@ -1,15 +1,15 @@
 //! novel's `.asc`: pedar's insoles and pliance's mats and gloves. A header, the numbers of the sensors, and a row for each
 //! frame: its time, then the pressures.
 //!
-//! Of pliance the places of the sensors stand after the rows, so that such a file is read twice; of pedar they stand nowhere.
+//! Of pliance the places of the sensors stand after the rows ([`Places`]), so that such a file is read twice; of pedar they stand
+//! nowhere.
 
 use super::layout::{Cell, Layout, MAX_CELLS, Panel, value};
+use super::novel_places::Places;
 use super::parser::{Parser, Rate};
 use super::text::{Separator, decoded};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue, UnitOfP};
-
-const CM: f64 = 0.01;
 
 /// Reads frames from lines.
 pub(super) struct NovelAsc {
@@ -121,16 +121,16 @@ impl Parser for NovelAsc {
     }
 
     fn layout(&self) -> Layout {
-        let (mut panels, mut start, mut shift) = (Vec::new(), 0, 0);
+        let (mut panels, mut start, mut shift) = (Vec::new(), 0, 0_u32);
         let ends = self.ends();
         for (name, &end) in self.names(ends.len()).into_iter().zip(&ends) {
             let numbers = &self.sensors[start..end];
             let cell = |(index, &number): (usize, &u32)| {
                 let placed = self.places.as_ref().map(|places| places.cell(start + index));
-                Cell { id: shift + number, ..placed.unwrap_or_default() }
+                Cell { id: shift.saturating_add(number), ..placed.unwrap_or_default() }
             };
             let cells: Vec<Cell> = numbers.iter().enumerate().map(cell).collect();
-            shift += numbers.iter().copied().max().unwrap_or(0);
+            shift = shift.saturating_add(numbers.iter().copied().max().unwrap_or(0));
             panels.push(Panel { name, cells, is_placed: self.places.is_some(), ..Panel::default() });
             start = end;
         }
@@ -139,70 +139,5 @@ impl Parser for NovelAsc {
             layout.side_by_side();
         }
         layout
-    }
-}
-
-/// Where a file says its sensors are: for each its number, its corners, its middle and its area.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Places {
-    sensors: Vec<u32>,
-    /// x[0], y[0], …, y[3], x[c], y[c], area, as far as they were found.
-    rows: [Vec<f64>; 11],
-}
-
-/// What the rows are headed.
-const HEADS: [&[u8]; 11] =
-    [b"x[0]", b"y[0]", b"x[1]", b"y[1]", b"x[2]", b"y[2]", b"x[3]", b"y[3]", b"x[c]", b"y[c]", b"area"];
-
-impl Places {
-    /// Takes a line of the file, whichever it is.
-    pub(super) fn line(&mut self, line: &[u8]) -> Result<()> {
-        // Nearly every line is a row of pressures, which begins with a digit.
-        let line = line.trim_ascii_start();
-        if !line.first().is_some_and(|first| matches!(first, b's' | b'x' | b'y' | b'a')) {
-            return Ok(());
-        }
-        let mut words = Separator::Blanks.cells(line);
-        words.next();
-        if line.starts_with(b"sensor") {
-            let sensors: Option<Vec<u32>> = words.map(|word| word.whole()).collect();
-            // `sensor type:` is a line of the header.
-            self.sensors = sensors.unwrap_or_default();
-        } else if let Some(row) = HEADS.iter().position(|head| line.starts_with(head)) {
-            let wrong = |word| failed!("`{word}` is no number");
-            self.rows[row] = words
-                .map(|word| word.number().filter(|x| x.is_finite()).ok_or_else(|| wrong(word)))
-                .collect::<Result<_>>()?;
-        }
-        Ok(())
-    }
-
-    /// These, if the file had any.
-    pub(super) fn found(self) -> Option<Self> {
-        (!self.sensors.is_empty() && self.rows.iter().any(|row| !row.is_empty())).then_some(self)
-    }
-
-    /// Refuses places that are not those of `sensors`.
-    fn check(&self, sensors: &[u32]) -> Result<()> {
-        if self.sensors != sensors {
-            return Err(Error::failed("the places at the end of the file are not those of the sensors in its table"));
-        }
-        for (head, row) in HEADS.iter().zip(&self.rows) {
-            if row.len() != sensors.len() {
-                let head = String::from_utf8_lossy(head);
-                return Err(failed!("row `{head}` of the places has {} of {} numbers", row.len(), sensors.len()));
-            }
-        }
-        Ok(())
-    }
-
-    fn cell(&self, index: usize) -> Cell {
-        let point = |x: usize| [self.rows[x][index] * CM, self.rows[x + 1][index] * CM];
-        Cell {
-            id: 0,
-            centre_m: point(8),
-            corners_m: [point(0), point(2), point(4), point(6)],
-            area_m2: (self.rows[10][index] * CM * CM).max(0.0),
-        }
     }
 }

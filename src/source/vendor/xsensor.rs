@@ -193,6 +193,9 @@ impl Xsensor {
         if !frame.seen.contains(&true) {
             return Err(failed!("frame {} has no sensor", frame.number.map_or("?".to_owned(), |n| n.to_string())));
         }
+        if let Some(sensor) = self.sensors.iter().find(|sensor| sensor.first.is_none()) {
+            return Err(failed!("sensor `{}` has no table SENSELS in the first frame", sensor.name));
+        }
         self.is_known = true;
         to.clear();
         to.t_s = self.rate.time_of(frame.t_s, frame.number)?;
