@@ -544,7 +544,7 @@ mod tests {
              1 not compared, as motion hangs on a centroid before that was too close to call"
         );
         assert!(first(loose, |_, c| c[Component::Total][0] = 9.0).starts_with(
-            "DISAGREES with the reference: of 21 values in 1 percept, 18 agreeing, 1 different, 1 too close to call, 1 not"
+            "DISAGREES with the reference: of 22 values in 1 percept, 19 agreeing, 1 different, 1 too close to call, 1 not"
         ));
         let nothing = Agreement::default().to_string();
         assert!(
