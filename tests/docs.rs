@@ -30,9 +30,13 @@ const RUN_ELSEWHERE: [&str; 16] = [
 ];
 
 /// Commands that take long, and the shorter form that is run for them.
-const SHORTENED: [(&str, &str); 9] = [
+const SHORTENED: [(&str, &str); 10] = [
     // A port of its own, as other tests serve pages, too.
     ("somatic view --for 2s", "somatic view --for 1s --listen 127.0.0.1:0"),
+    (
+        "somatic view examples/exports/insoles.csv --for 2s",
+        "somatic view examples/exports/insoles.csv --for 1s --listen 127.0.0.1:0",
+    ),
     ("somatic tradeoff", "somatic tradeoff --seconds 0.1 --frames 60"),
     (
         "somatic tradeoff --source sim:examples/simulations/rod.toml --fields hand/back --plot rod.svg",

@@ -10,7 +10,9 @@ use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
-use crate::stage::{GivenLimit, Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches};
+use crate::stage::{
+    GivenLimit, Pressed, U, axis, centroid, contact, filter, force, hysteresis, motion, orientation, touches,
+};
 
 /// How far a single-precision percept may be off in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +66,7 @@ const INPUT: Flags = Flags::SATURATED
     .union(Flags::FAULTY_INPUT)
     .union(Flags::OUT_OF_RANGE)
     .union(Flags::INCOMPLETE)
+    .union(Flags::NO_UNIT)
     .union(Flags::NO_CHART);
 
 /// What a field's next bound hangs on, beside what its next percept does.
@@ -173,11 +176,14 @@ impl BoundedReference {
         let sums = contact::bound(&pressed, how);
         let mut bound = CellBound { in_doubt: flags, ..CellBound::default() };
         bound.set(sums.limits());
+        bound.set([(Outputs::FORCE, Limit::Within(force::bound(field.quantity, &pressed)))]);
         let total = contact::reference(&pressed).total;
         if hysteresis::in_doubt(total, sums.total, field.thresholds, cell.before.contact) {
             // Whether there is a touch at all is in doubt, and with it all that a touch has; the sums are not.
             let mut unsure = CellBound::of_contact(flags);
-            unsure.set(Outputs::of_stage("contact").iter().map(|output| (output, bound.limit(output))));
+            unsure.set(
+                (Outputs::of_stage("contact") | Outputs::FORCE).iter().map(|output| (output, bound.limit(output))),
+            );
             return unsure;
         }
         let before = std::mem::replace(&mut doubt.place, 0.0);

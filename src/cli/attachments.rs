@@ -16,7 +16,10 @@ pub(super) fn attachments(
 ) -> Result<Vec<(String, String, Vec<u8>)>> {
     let text = |path: &Path| std::fs::read(path).map_err(|e| Error::io(path, &e));
     let recording = asked.recording()?;
-    let inherited = recording.as_deref().map(attached::body).transpose()?.flatten();
+    let inherited = match recording.as_deref() {
+        Some(recording) => attached::body(recording)?,
+        None => asked.export_body()?,
+    };
     let (name, bytes) = match inherited {
         Some(body) => body,
         None => (file_name(&body.name), body_bytes(&body.name)?),

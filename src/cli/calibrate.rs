@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
-use somatic::source::{Lines, Source, SourceSpec};
+use somatic::source::{Lines, Source, SourceSpec, VendorOptions};
 use somatic::{Body, Calibration, Error, Result};
 
 use super::bodies::load_body;
@@ -101,7 +101,11 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;
     let (source, lines): (Box<dyn Source + Send>, _) = if ports.is_empty() {
-        (first_of(&arguments.sources)?.open(&ids, arguments.rate)?, None)
+        (
+            first_of(&arguments.sources)?
+                .open(&ids, &VendorOptions { rate_hz: arguments.rate, ..VendorOptions::default() })?,
+            None,
+        )
     } else if arguments.rate.is_some() {
         return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
     } else {

@@ -6,11 +6,12 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
-use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec};
+use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
 
 use super::attached::{body_bytes, file_name};
 use super::bar::Bar;
+use super::exports::{ExportFlags, source_of};
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::stdio::{say, tell_losses};
@@ -20,6 +21,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic convert touch.csv touch.mcap --body robot.glb --calibration robot.toml
   somatic convert touch.mcap touch.csv
+  somatic convert insoles.lst insoles.mcap    a pressure system's export, with its sensors and unit
   somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
 
 Frames come through bit for bit. A CSV has no place for poses, body and calibration, an MCAP gets
@@ -29,7 +31,7 @@ no percepts: make them with `somatic run`.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv or .mcap.
+    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export.
     #[arg(value_name = "IN")]
     from: String,
 
@@ -45,9 +47,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[command(flatten)]
+    export: ExportFlags,
 
     /// Replace OUT if it is there.
     #[arg(long)]
@@ -64,7 +65,8 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
             .at(&arguments.from));
     }
-    let from = SourceSpec::one_of(&arguments.from, &["csv", "mcap", "sim"]);
+    let options = arguments.export.options()?;
+    let from = source_of(&arguments.from, Some(&["csv", "mcap", "export", "sim"]), &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
     let to = SourceSpec::one_of(&arguments.to, &["csv", "mcap"]);
     let to = to.map_err(|e| e.at(format!("output `{}`", arguments.to)))?;
@@ -73,9 +75,9 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     };
     let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
-    let mut source = from.open(&[], arguments.rate)?;
+    let mut source = from.open(&[], &options)?;
     source.report_stale();
-    let attached = files(arguments, &from)?;
+    let attached = files(arguments, &from, &options)?;
     let mut target = match &to {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
             return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
@@ -132,7 +134,7 @@ fn copy(source: &mut dyn Source, target: &mut Target) -> Result<(u64, u64)> {
 
 /// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the
 /// simulation has.
-fn files(arguments: &Arguments, from: &SourceSpec) -> Result<Vec<(String, String, Vec<u8>)>> {
+fn files(arguments: &Arguments, from: &SourceSpec, options: &VendorOptions) -> Result<Vec<(String, String, Vec<u8>)>> {
     let mut files = Vec::new();
     if let Some(body) = &arguments.body {
         files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
@@ -150,6 +152,15 @@ fn files(arguments: &Arguments, from: &SourceSpec) -> Result<Vec<(String, String
         if arguments.calibration.is_none() {
             let bytes = simulation.calibration().into_bytes();
             files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
+        }
+    }
+    if let SourceSpec::Vendor(path) = from {
+        let export = VendorSource::open(path, options)?;
+        if arguments.body.is_none() {
+            files.push((export.body_name(), BODY.to_owned(), export.body()?));
+        }
+        if let Some(text) = export.calibration().filter(|_| arguments.calibration.is_none()) {
+            files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), text.into_bytes()));
         }
     }
     if let SourceSpec::Mcap(path) = from {

@@ -31,7 +31,7 @@ impl FilesRead {
     /// The files of `sources`; an invalid source is reported when it is opened.
     pub(super) fn sources(self, sources: &[String]) -> Self {
         sources.iter().filter_map(|source| source.parse().ok()).fold(self, |files, source| match source {
-            SourceSpec::Csv(path) | SourceSpec::Mcap(path) => files.files([path]),
+            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
             SourceSpec::Stdin | SourceSpec::CsvStdin => files.files(["/dev/stdin"]),
             _ => files,

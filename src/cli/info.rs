@@ -1,13 +1,18 @@
 //! `somatic info`: what is in a recording.
 
+mod contacts;
+
 use clap::Args;
 use console::style;
 use serde_json::{Value, json};
 use somatic::recording::{Attached, Reader, Rhythm, Survey};
-use somatic::source::{CsvSource, Source as _, SourceSpec};
-use somatic::{Error, Frame, Result};
+use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
+use somatic::{Body, Calibration, Error, Frame, Result};
 
+use self::contacts::Contacts;
+use super::attached;
 use super::bar::Bar;
+use super::exports::{ExportFlags, source_of};
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
 use super::words::{number, span};
@@ -16,6 +21,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic info touch.mcap
   somatic info touch.csv --json | jq .rate_hz
+  somatic info insoles.csv                    a pressure system's export, by its content
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
 
@@ -23,13 +29,12 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording co
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: mcap:FILE or csv:FILE, or just the file.
+    /// The recording: mcap:FILE, csv:FILE or a pressure system's export, or just the file.
     #[arg(value_name = "FILE")]
     recording: String,
 
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[command(flatten)]
+    export: ExportFlags,
 
     /// Print JSON: times in seconds, sizes in bytes.
     #[arg(long)]
@@ -44,14 +49,19 @@ struct Known {
     attached: Vec<Attached>,
     has_end: bool,
     losses: Vec<String>,
+    /// Of a pressure system's export.
+    layout: Option<Layout>,
+    /// Of a recording that has its body.
+    contacts: Option<Contacts>,
 }
 
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
-    let recording = SourceSpec::one_of(&arguments.recording, &["csv", "mcap"]);
+    let options = arguments.export.options()?;
+    let recording = source_of(&arguments.recording, Some(&["csv", "mcap", "export"]), &options);
     let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
-            if arguments.rate.is_some() {
+            if arguments.export.rate.is_some() {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
             }
             let mut reader = Reader::open(&path)?;
@@ -63,28 +73,23 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 attached: reader.attached().to_vec(),
                 has_end: reader.has_end(),
                 losses: reader.losses(),
+                layout: None,
+                contacts: recorded(&path)?,
                 survey,
             }
         }
         SourceSpec::Csv(path) => {
-            let mut source = CsvSource::open(&path, arguments.rate)?;
-            let mut rhythm = Rhythm::default();
-            let mut frame = Frame::missing(0.0, source.taxels().len());
-            while source.next_frame(&mut frame)? {
-                rhythm.see(frame.t_s);
-                bar.show(source.progress().unwrap_or(0.0));
-            }
-            rhythm.finish();
-            let losses = source.losses();
-            Known {
-                kind: "CSV",
-                bytes: size(&path),
-                taxels: source.taxels().len(),
-                survey: Survey { rhythm, ..Survey::default() },
-                attached: Vec::new(),
-                has_end: losses.is_empty(),
-                losses,
-            }
+            let mut source = CsvSource::open(&path, options.rate_hz)?;
+            of_frames("CSV", size(&path), &mut source, None, None, &mut bar)?
+        }
+        SourceSpec::Vendor(path) => {
+            let mut source = VendorSource::open(&path, &options)?;
+            let layout = source.layout().clone();
+            let body = Body::from_bytes(&source.body_name(), &source.body()?)?;
+            let ids = source.taxels().to_vec();
+            let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
+            let contacts = Contacts::new(&body, calibration, &source)?;
+            of_frames(source.format().title(), size(&path), &mut source, Some(layout), Some(contacts), &mut bar)?
         }
         _ => unreachable!("it is of one of these kinds"),
     };
@@ -96,6 +101,68 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     Ok(if known.losses.is_empty() { DONE } else { LOST })
 }
 
+/// What a recording of nothing but frames has, which is read to its end.
+fn of_frames(
+    kind: &'static str,
+    bytes: u64,
+    source: &mut dyn Source,
+    layout: Option<Layout>,
+    mut contacts: Option<Contacts>,
+    bar: &mut Bar,
+) -> Result<Known> {
+    let mut rhythm = Rhythm::default();
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    while source.next_frame(&mut frame)? {
+        rhythm.see(frame.t_s);
+        if let Some(contacts) = &mut contacts {
+            contacts.see(&frame)?;
+        }
+        bar.show(source.progress().unwrap_or(0.0));
+    }
+    rhythm.finish();
+    if let Some(contacts) = &mut contacts {
+        contacts.finish()?;
+    }
+    let losses = source.losses();
+    Ok(Known {
+        kind,
+        bytes,
+        taxels: source.taxels().len(),
+        survey: Survey { rhythm, ..Survey::default() },
+        attached: Vec::new(),
+        has_end: losses.is_empty(),
+        losses,
+        layout,
+        contacts,
+    })
+}
+
+/// The contacts in the recording at `path`, if it has its body.
+fn recorded(path: &std::path::Path) -> Result<Option<Contacts>> {
+    let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
+    let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = attached::calibration(path)?.map(|text| Calibration::parse(&text, &ids)).transpose();
+    let mut reader = Reader::open(path)?;
+    // What cannot be run is described all the same.
+    let Ok(Ok(mut contacts)) = calibration.map(|calibration| Contacts::new(&body, calibration, &reader)) else {
+        return Ok(None);
+    };
+    let mut frame = Frame::missing(0.0, reader.taxels().len());
+    while reader.next_frame(&mut frame)? {
+        contacts.see(&frame)?;
+    }
+    contacts.finish()?;
+    Ok(Some(contacts))
+}
+
+/// The panels of an export, in words.
+fn panels(layout: &Layout) -> String {
+    let words = layout.panels.iter().map(|panel| format!("{} {}", panel.name, panel.cells.len()));
+    let placed = if layout.is_placed() { "" } else { "; the file does not say where they are" };
+    format!(": {}{placed}", words.collect::<Vec<_>>().join(", "))
+}
+
 fn size(path: &std::path::Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
@@ -105,7 +172,7 @@ fn duration_s(rhythm: &Rhythm) -> Option<f64> {
 }
 
 fn as_json(known: &Known) -> Value {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
     let rhythm = &survey.rhythm;
     let topics: Vec<Value> = survey
         .topics
@@ -120,11 +187,17 @@ fn as_json(known: &Known) -> Value {
         "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({"seconds": gap[0], "after": gap[1]})),
         "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
         "ended": has_end, "losses": losses,
+        "fields": contacts.as_ref().map(Contacts::as_json),
+        "unit": layout.as_ref().map(|layout| layout.unit.symbol()),
+        "panels": layout.as_ref().map(|layout| layout.panels.iter().map(|panel| json!({
+            "name": panel.name, "taxels": panel.cells.len(), "placed": panel.is_placed,
+            "area": panel.cells.iter().map(|cell| cell.area_m2).sum::<f64>(),
+        })).collect::<Vec<_>>()),
     })
 }
 
 fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", style(name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
@@ -135,7 +208,10 @@ fn text(name: &str, known: &Known) -> String {
     if let (Some(duration), Some([start, _])) = (duration_s(rhythm), rhythm.span_s) {
         line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
     }
-    line("taxels", taxels.to_string());
+    line("taxels", format!("{taxels}{}", layout.as_ref().map_or(String::new(), panels)));
+    if let Some(layout) = layout {
+        line("unit", layout.unit.to_string());
+    }
     line(
         "gaps",
         match rhythm.longest_gap_s {
@@ -154,6 +230,7 @@ fn text(name: &str, known: &Known) -> String {
     for file in attached {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
+    text += &contacts.as_ref().map_or(String::new(), Contacts::text);
     if !survey.topics.is_empty() {
         let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {

@@ -5,6 +5,7 @@ use somatic::{Body, Error, Result, bundled};
 
 use super::attached;
 use super::bodies::{check_body_name, load_body};
+use super::exports::source_of;
 use super::scene::RunOptions;
 
 /// Frames a call for recordings, unless told otherwise.
@@ -39,9 +40,9 @@ impl Input {
                 }
             };
         };
-        let spec: SourceSpec = text.parse()?;
+        let spec = source_of(text, None, &asked.export_options()?)?;
         let name = match &spec {
-            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path) => path.display().to_string(),
+            file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
@@ -72,6 +73,10 @@ impl Input {
                 Some((name, bytes)) => Body::from_bytes(&name, &bytes),
                 None => load_body("hand"),
             },
+            (None, Some(SourceSpec::Vendor(_))) => match asked.export_body()? {
+                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
+                None => load_body("hand"),
+            },
             (None, _) => load_body("hand"),
         }
     }
@@ -96,8 +101,8 @@ impl Input {
     /// Identifies the recording: path, length and modification time. `None` for live input.
     pub(super) fn recording(&self) -> Option<String> {
         let Some(spec) = &self.spec else { return Some(self.name.clone()) };
-        let (SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Sim(path)) = spec else { return None };
-        let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+        let path = spec.file()?;
+        let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let file = std::fs::metadata(path).ok();
         Some(format!(
             "{place:?} {:?} {:?}",
@@ -118,13 +123,14 @@ impl Input {
             times: asked.repeat.unwrap_or(Cut::WHOLE.times),
         };
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
+        let options = asked.export_options()?;
         let strict = asked.strict;
         let open = move || -> Result<Box<dyn Source + Send>> {
             match &spec {
                 Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {
                     Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict()))
                 }
-                Some(spec) => spec.open(&ids, rate_hz),
+                Some(spec) => spec.open(&ids, &options),
                 None => {
                     let length = Some(bundled::TOUCH.len() as u64);
                     Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))

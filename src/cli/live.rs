@@ -10,7 +10,7 @@ use super::words::{clipped, count, fitted, number, span};
 
 mod columns;
 
-use columns::Scale;
+use columns::{PrintedUnit, Scale};
 
 /// Between two drawings: as fast as reading needs, slow enough not to flicker.
 const REDRAW_INTERVAL: Duration = Duration::from_millis(66);
@@ -208,6 +208,7 @@ struct Table {
     all_fields: bool,
     rows: Vec<FieldRow>,
     largest_total: f64,
+    unit: PrintedUnit,
     in_world: bool,
     /// Rows shown at most so far: the table grows and does not shrink, or what is below would jump.
     tallest: usize,
@@ -232,6 +233,7 @@ impl Table {
             all_fields: about.all_fields,
             rows: (0..plan.fields().len()).map(row).collect(),
             largest_total: 0.0,
+            unit: plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of),
             in_world: false,
             tallest: 0,
         }
@@ -281,13 +283,13 @@ impl Table {
         let shown = |row: &&FieldRow| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE_TIME);
         let visible: Vec<&FieldRow> = self.rows.iter().filter(shown).collect();
         let longest = self.rows.iter().map(|row| wide(&row.name)).max().unwrap_or(0);
-        let layout = columns::Layout::new(longest, self.outputs, self.in_world, columns.saturating_sub(2));
+        let layout = columns::Layout::new(longest, self.outputs, self.in_world, columns.saturating_sub(2), self.unit);
         lines.push(format!("  {}", style(layout.headings()).dim()));
 
         let room = rows.saturating_sub(lines.len());
         let fits = if visible.len() > room { room.saturating_sub(1) } else { visible.len() };
         for row in visible.iter().take(fits) {
-            let scale = Scale { largest_total: self.largest_total, touches: row.touches };
+            let scale = Scale { largest_total: self.largest_total, unit: self.unit, touches: row.touches };
             lines.push(format!("  {}", layout.row(&row.name, row.latest.as_ref(), scale)));
         }
         if fits < visible.len() {
@@ -317,14 +319,16 @@ impl Table {
         }
         let columns = usize::from(Term::stdout().size().1).saturating_sub(1);
         let longest = touched.iter().map(|row| console::measure_text_width(&row.name)).max().unwrap_or(0);
-        let width = longest.max(5).min(columns.saturating_sub(42)).max(8);
-        let head = format!("{}  frames touched  largest total      at", fitted("field", width, false));
+        let width = longest.max(5).min(columns.saturating_sub(46)).max(8);
+        let largest = self.unit.heads("largest total");
+        let wide = largest.len();
+        let head = format!("{}  frames touched  {largest}      at", fitted("field", width, false));
         text += &format!("\n{}\n", style(clipped(&head, columns)).dim());
         for row in touched.iter().take(MAX_SUMMARY_ROWS) {
             let share = 100.0 * row.frames_touched as f64 / pace.frames as f64;
             text += &format!("{}  {:>8} {share:>3.0} %", fitted(&row.name, width, false), row.frames_touched);
             if let Some((total, at)) = row.largest {
-                text += &format!("  {:>13}  {:>6}", number(total), format!("{at:.2} s"));
+                text += &format!("  {:>wide$}  {:>6}", number(total * self.unit.factor), format!("{at:.2} s"));
             }
             text += "\n";
         }

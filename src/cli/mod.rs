@@ -18,6 +18,7 @@ mod devices;
 mod doubts;
 #[cfg(feature = "page")]
 mod explanation;
+mod exports;
 mod feed;
 mod files;
 mod info;

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use somatic::signal::Quantity;
 use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
 use somatic::source::Source;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Outputs, Percepts, Precision, Result};
@@ -175,7 +176,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         all_fields: asked.all_fields,
         outputs: engine.percepts().outputs(),
         is_double: engine.percepts().precision() == Precision::F64,
-        p_unit: "",
+        p_unit: engine.plan().common_quantity().map_or("", Quantity::symbol),
+        header: asked.header,
         taxels: source.taxels(),
         body: Some(&body),
         attached: if records { attachments(&asked, &body, arguments.scene.as_deref())? } else { Vec::new() },

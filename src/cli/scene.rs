@@ -1,6 +1,7 @@
 //! Options of a run: the flags of `somatic run` and `somatic plan`, and the same keys in scene files.
 
 mod accuracy;
+mod calibrated;
 mod check;
 mod deserialize;
 mod flags;
@@ -14,15 +15,14 @@ use somatic::error::parse_toml;
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{RecordPart, SinkSpec};
-use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{BackendKind, Body, Calibration, Error, Options, Outputs, Result, Scene, bundled};
+use somatic::source::{SourceSpec, VendorFormat};
+use somatic::{BackendKind, Body, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
 pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
-use super::attached;
 use super::ports::LineFlags;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
@@ -36,8 +36,8 @@ pub(super) struct RunOptions {
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, one or more serial:PORT[@BAUD], or from
-    /// standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
+    /// .asc, .txt), one or more serial:PORT[@BAUD], or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -56,7 +56,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches and filtered_*].
+    /// Compute only these quantities [default: all but touches and filtered_*; force only where P has a unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
     #[schemars(with = "Vec<String>", transform = output_names)]
@@ -155,10 +155,30 @@ pub(super) struct RunOptions {
     #[serde(rename = "loop")]
     pub(super) repeat: Option<u64>,
 
-    /// Frames per second of a CSV recording without a column t, in Hz.
+    /// Frames per second of a recording that has no times, in Hz.
     #[arg(long, help_heading = RECORDINGS, value_name = "HZ")]
     #[serde(rename = "rate_hz")]
     pub(super) rate: Option<f64>,
+
+    /// Read the source as a pressure system's export: xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers
+    /// [default: as its content says].
+    #[arg(long, help_heading = RECORDINGS, value_name = "FORMAT",
+        value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = VendorFormat::WORDS))]
+    pub(super) format: Option<VendorFormat>,
+
+    /// Rows and columns of a frame of plain numbers, such as 31x11.
+    #[arg(long, help_heading = RECORDINGS, value_name = "ROWSxCOLUMNS")]
+    pub(super) grid: Option<String>,
+
+    /// From one row and column of them to the next, such as 8.6mm, or 8.6mm,5mm for rows and columns.
+    #[arg(long, help_heading = RECORDINGS, value_name = "LENGTH")]
+    pub(super) pitch: Option<String>,
+
+    /// The unit of an export's values where it does not say it: kPa, mmHg, N/cm2, psi, N, and others.
+    #[arg(long, help_heading = RECORDINGS, value_name = "UNIT")]
+    pub(super) unit: Option<String>,
 
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
     #[arg(long, help_heading = RECORDINGS, value_name = "PART,...", value_delimiter = ',',
@@ -212,6 +232,10 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) allow_hosts: Vec<String>,
 
+    /// Begin NDJSON with a line that says units and body.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(super) header: bool,
+
     /// Write fields without contact too.
     #[arg(long, help_heading = OUTPUT)]
     pub(super) all_fields: bool,
@@ -229,7 +253,10 @@ fn output_names(schema: &mut schemars::Schema) {
 
 pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
-    format!("Compute only these quantities: {} [default: all but touches and filtered_*]", names.join(", "))
+    format!(
+        "Compute only these quantities: {} [default: all but touches and filtered_*; force only where P has a unit]",
+        names.join(", ")
+    )
 }
 
 /// All of `named`, or the default outputs where none are.
@@ -256,6 +283,7 @@ impl RunOptions {
             match source.parse()? {
                 SourceSpec::Csv(file) => *source = format!("csv:{}", there(&file)),
                 SourceSpec::Mcap(file) => *source = format!("mcap:{}", there(&file)),
+                SourceSpec::Vendor(file) => *source = there(&file),
                 SourceSpec::Sim(file) => *source = format!("sim:{}", there(&file)),
                 _ => {}
             }
@@ -286,10 +314,10 @@ impl RunOptions {
             };
         }
         let asked = merged! {
-            values: body backend calibration rate wiring live_rate board_rate batch speed from to repeat max_age max_gap
+            values: body backend calibration rate wiring format grid pitch unit live_rate board_rate batch speed from to repeat max_age max_gap
                 coordinates filter_window filter_by filter_time,
             lists: sources sinks allow_hosts outputs fields letters signal record,
-            switches: all_fields tare strict force verify quiet
+            switches: all_fields header tare strict force verify quiet
         };
         asked.check().map_err(|e| scene.map_or(e.clone(), |path| e.at(path.display())))?;
         Ok(asked)
@@ -311,25 +339,14 @@ impl RunOptions {
 
     /// The recording whose body and calibration are used, which is so where no body is named.
     pub(super) fn recording(&self) -> Result<Option<PathBuf>> {
-        let spec = self.sources.first().filter(|_| self.body.is_none()).map(|text| text.parse()).transpose()?;
+        let spec = self.first_source()?.filter(|_| self.body.is_none());
         Ok(if let Some(SourceSpec::Mcap(path)) = spec { Some(path) } else { None })
-    }
-
-    /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation has one,
-    /// and a recording may, which is used with its body.
-    pub(super) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
-        let spec = self.sources.first().map(|text| text.parse()).transpose()?;
-        if let Some(SourceSpec::Sim(path)) = spec {
-            let text = SimulatedSource::open(&path)?.calibration();
-            return Ok(Some((path, text)));
-        }
-        let Some(recording) = self.recording()? else { return Ok(None) };
-        Ok(attached::calibration(&recording)?.map(|text| (recording, text)))
     }
 
     /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
     pub(super) fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
-        let outputs = self.outputs();
+        let calibration = self.calibration_for(body, ids)?;
+        let outputs = self.outputs_with(calibration.as_ref())?;
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
         let live = self.sources.iter().any(|source| source.starts_with("serial:"));
@@ -344,27 +361,6 @@ impl RunOptions {
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
-        let load = |path: &PathBuf| {
-            let calibration = Calibration::load(path, ids)?;
-            calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
-            Ok(calibration)
-        };
-        let parse = |(path, text): (PathBuf, String)| {
-            Calibration::parse(&text, ids).map_err(|e| e.at("its own calibration").at(path.display()))
-        };
-        let calibration = match &self.calibration {
-            Some(path) => Some(load(path)?),
-            None => self.own_calibration()?.map(parse).transpose()?,
-        };
-        if let (Some(calibration), [source]) = (&calibration, &self.sources[..])
-            && source.starts_with("sim:")
-        {
-            calibration.check_body(&body.name).map_err(|_| {
-                let what =
-                    format!("it is on another body than `{}`; leave --body out, or change its key `body`", body.name);
-                Error::usage(what).at(source)
-            })?;
-        }
         Ok(Options::default()
             .scene(scene)
             .calibration(calibration)

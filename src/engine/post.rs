@@ -5,11 +5,11 @@ use glam::{DAffine3, DVec3};
 use super::cadence::{self, OnChange};
 use super::place::{self, Links};
 use crate::backend::{RawBatch, Step};
-use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
+use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
-use crate::signal::Frame;
+use crate::signal::{Frame, Quantity, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{filter, motion, touches};
+use crate::stage::{filter, force, motion, touches};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.touches || stages.filter || self.cadence.is_some()) {
+        if !(stages.pressures || stages.filter || self.cadence.is_some()) {
             return;
         }
         for (number, field) in self.plan.fields.iter().enumerate() {
@@ -92,6 +92,9 @@ impl Post<'_> {
                         continue;
                     }
                 }
+            }
+            if stages.force {
+                self.force(field, index, cell, percepts);
             }
             let contact = percepts.in_contact(index, number);
             let before = &mut state.fields[number];
@@ -152,6 +155,25 @@ impl Post<'_> {
         percepts.present[cell] |= found.present & self.plan.outputs;
         for (host, components) in found.outputs() {
             percepts.set_host(host, cell, &components[..host.column().components]);
+        }
+    }
+
+    /// Adds up a cell's force.
+    fn force(&self, field: &PlanField, frame: usize, cell: usize, percepts: &mut Percepts) {
+        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
+        let of = |member: &Member| {
+            let slot = member.slot as usize;
+            (pressures[slot], self.plan.areas[self.plan.channel_of(slot)])
+        };
+        // Of a change there is none.
+        let is_change = self.plan.letters()[field.letter].receptor == Receptor::Change;
+        let quantity = if is_change { Quantity::Count } else { field.quantity };
+        match force::reference(quantity, self.plan.members_of(field).iter().map(of)) {
+            Some(newtons) => {
+                percepts.present[cell] |= Outputs::FORCE;
+                percepts.set_host(Host::Force, cell, &[newtons]);
+            }
+            None => percepts.flags[cell] |= Flags::NO_UNIT,
         }
     }
 

@@ -14,10 +14,7 @@ use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
 use crate::percept::{Column, Flags, Unit};
 use crate::scene::{Plan, PlanField};
-use crate::signal::Wiring;
-
-/// The quantity of P where no calibration names another.
-const QUANTITY: &str = "count";
+use crate::signal::{Quantity, Wiring};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,13 +94,14 @@ impl PageScene {
             "body": body.name,
             "source": info.source,
             "backend": {"name": backend, "device": device, "why": why},
-            "quantity": QUANTITY,
+            // Of fields that measure different things no one unit is that of P.
+            "quantity": plan.common_quantity().map_or("P", Quantity::symbol),
             "time": time,
             "origin": origin.to_array(),
             "links": body.links.iter().map(|link| json!({"name": link.name, "parent": link.parent})).collect::<Vec<_>>(),
             "channels": info.wiring.map(|wiring| channels(body, wiring)),
             "fields": fields(body, plan),
-            "columns": columns.iter().map(|column| column_json(column)).collect::<Vec<_>>(),
+            "columns": columns.iter().map(|column| column_json(column, plan)).collect::<Vec<_>>(),
             "flags": flag_names(),
             "colours": pressure_colours().to_vec(),
         });
@@ -142,8 +140,9 @@ fn channels(body: &Body, wiring: &Wiring) -> Vec<Option<[usize; 2]>> {
     body.taxels.iter().map(|taxel| of_id.get(&taxel.id).copied()).collect()
 }
 
-fn column_json(column: &Column) -> Value {
-    let unit = if column.unit == Unit::P { QUANTITY } else { column.unit.symbol() };
+fn column_json(column: &Column, plan: &Plan) -> Value {
+    let of_p = plan.common_quantity().map_or("P", Quantity::symbol);
+    let unit = if column.unit == Unit::P { of_p } else { column.unit.symbol() };
     json!({"name": column.name, "unit": unit, "components": column.components, "help": column.help})
 }
 

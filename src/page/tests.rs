@@ -383,3 +383,20 @@ fn a_viewer_owes_what_it_has_not_drawn() {
     viewer.drawn(u32::from_le_bytes(message[4..8].try_into().unwrap()), bench.arrived);
     assert_eq!(viewer.owes_since(), None);
 }
+
+#[test]
+fn a_page_is_told_what_pressure_is_measured_in() {
+    let welcome = |calibration: &str| -> Value {
+        let bench = Bench::new(Outputs::TOTAL | Outputs::FORCE, &ALL_LETTERS[..1], calibration);
+        serde_json::from_str(&bench.scene.welcome("00ff", bench.scene.scale)).unwrap()
+    };
+    let units = |welcome: &Value| -> Vec<Value> {
+        welcome["columns"].as_array().unwrap().iter().map(|column| column["unit"].clone()).collect()
+    };
+    let kilopascal = welcome("[all]\nunit = \"kPa\"\np_max = 50\n");
+    assert_eq!((&kilopascal["quantity"], &kilopascal["scale"]["max"]), (&json!("Pa"), &json!(50_000.0)));
+    assert_eq!(units(&kilopascal), ["Pa", "N"]);
+    let count = welcome("[all]\np_max = 50\n");
+    assert_eq!((&count["quantity"], &count["scale"]["max"]), (&json!("count"), &json!(50.0)));
+    assert_eq!(units(&count), ["count", "N"]);
+}

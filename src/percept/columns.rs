@@ -48,6 +48,8 @@ pub enum Unit {
     Radian,
     /// m/s.
     MetrePerSecond,
+    /// N.
+    Newton,
 }
 
 impl Unit {
@@ -61,6 +63,7 @@ impl Unit {
             Self::SquareMetre => "m²",
             Self::Radian => "rad",
             Self::MetrePerSecond => "m/s",
+            Self::Newton => "N",
         }
     }
 }
@@ -92,12 +95,12 @@ pub(crate) enum Store {
 }
 
 /// The type of a percept's quantity, made of its components.
-pub(super) trait Quantity {
+pub(super) trait Typed {
     fn of(components: [f64; 3]) -> Self;
     fn components(self) -> [f64; 3];
 }
 
-impl Quantity for f64 {
+impl Typed for f64 {
     fn of([value, ..]: [f64; 3]) -> Self {
         value
     }
@@ -107,7 +110,7 @@ impl Quantity for f64 {
     }
 }
 
-impl Quantity for u32 {
+impl Typed for u32 {
     fn of([value, ..]: [f64; 3]) -> Self {
         value as Self
     }
@@ -118,7 +121,7 @@ impl Quantity for u32 {
 }
 
 /// Two or three.
-impl<const N: usize> Quantity for [f64; N] {
+impl<const N: usize> Typed for [f64; N] {
     fn of(components: [f64; 3]) -> Self {
         std::array::from_fn(|index| components[index])
     }
@@ -181,7 +184,7 @@ macro_rules! columns {
                     field,
                     letter,
                     contact: !flags.contains(Flags::NO_CONTACT),
-                    $($name: next().map(Quantity::of),)*
+                    $($name: next().map(Typed::of),)*
                     flags,
                     in_world,
                 }
@@ -191,7 +194,7 @@ macro_rules! columns {
             #[must_use]
             pub fn value(&self, column: &Column) -> Option<[f64; 3]> {
                 match column.output {
-                    $(Outputs::$output => self.$name.map(Quantity::components),)*
+                    $(Outputs::$output => self.$name.map(Typed::components),)*
                     _ => None,
                 }
             }
@@ -302,11 +305,14 @@ columns! {
     FILTERED_DIRECTION 18 filtered_direction: f64, Radian, Direction, filter, parts [] host [FilteredDirection];
     #[doc = "The length of such a step over the time that it took, m/s."]
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
+    #[doc = "Force in newtons, unweighted: Σ PᵢAᵢ where P is in Pa, Σ Pᵢ where it is in N; given by default where the calibration has a unit."]
+    FORCE 20 force: f64, Newton, Number, force, parts [] host [Force];
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`] and [`Outputs::FILTERED`].
-    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED);
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
+    /// [`Outputs::FORCE`], which hangs on the calibration.
+    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED).difference(Self::FORCE);
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");

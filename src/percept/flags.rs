@@ -49,6 +49,8 @@ bitflags! {
         /// A taxel has been touched for long while too few others were untouched to tell its drift: its baseline is that of
         /// the onset.
         const DRIFT_UNKNOWN = 1 << 18;
+        /// P has no unit, or a taxel no area: the force is absent.
+        const NO_UNIT = 1 << 19;
     }
 }
 

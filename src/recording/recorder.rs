@@ -34,6 +34,8 @@ pub struct Recorder {
     /// By topic, in the order in which they came up.
     channels: Vec<(String, u16, u32)>,
     taxels: String,
+    /// What the outputs of percepts are measured in: metadata of their channel.
+    units: BTreeMap<String, String>,
     message: Vec<u8>,
     flushed: Instant,
     /// Whether anything waits to be flushed.
@@ -69,6 +71,7 @@ impl Recorder {
             writer: Some(writer),
             channels: Vec::new(),
             taxels: words_of(ids),
+            units: BTreeMap::new(),
             message: Vec::new(),
             flushed: Instant::now(),
             pending: false,
@@ -79,6 +82,12 @@ impl Recorder {
         let metadata = preface.map(|(key, value)| (key.to_owned(), value)).into();
         recorder.with(|writer| writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata }))?;
         Ok(recorder)
+    }
+
+    /// Says what the percepts' outputs are measured in, each as the JSON of its unit, before the first of them.
+    pub(crate) fn set_units(&mut self, units: impl IntoIterator<Item = (&'static str, serde_json::Value)>) {
+        let word = |unit: serde_json::Value| unit.as_str().map_or_else(|| unit.to_string(), str::to_owned);
+        self.units = units.into_iter().map(|(output, unit)| (format!("unit_{output}"), word(unit))).collect();
     }
 
     /// Puts a file beside the frames.
@@ -141,6 +150,7 @@ impl Recorder {
         };
         let metadata = match topic {
             FRAMES => BTreeMap::from([(TAXEL_IDS.to_owned(), self.taxels.clone())]),
+            PERCEPTS => self.units.clone(),
             _ => BTreeMap::new(),
         };
         self.with(|writer| {

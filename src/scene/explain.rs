@@ -110,6 +110,7 @@ impl Plan {
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
             ("touches", stages.touches, of(&all), ""),
+            ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
@@ -124,7 +125,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "filter"].contains(&name),
+                on_host: ["position", "touches", "force", "filter"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },
@@ -167,7 +168,8 @@ impl Plan {
         let own = numbers().filter(|(by, wanted_for)| *by == stage && self.outputs().intersects(*wanted_for));
         let numbers = own.count();
         let status = usize::from(stage == "contact");
-        let kept = if stage == "touches" { self.kept_pressures() } else { 0 };
+        let keeps = if self.stages().touches { "touches" } else { "force" };
+        let kept = if stage == keeps { self.kept_pressures() } else { 0 };
         (self.fields.len() * (status + numbers) + kept) * size_of::<f32>()
     }
 }

@@ -1,8 +1,9 @@
 //! What a plan makes of a field: its members' weights and neighbours, its thresholds, its unit.
 
-use crate::body::Nearest;
+use crate::body::{Body, Nearest};
+use crate::error::{Result, failed};
 use crate::field::{Field, Lift};
-use crate::signal::{Calibration, ContactThresholds, Receptor};
+use crate::signal::{Calibration, ContactThresholds, Quantity, Receptor};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
 
@@ -26,6 +27,22 @@ pub(super) fn thresholds(calibration: &Calibration, field: &str, receptor: Recep
         Receptor::Change => calibration.change.contact,
     };
     Thresholds { on: contact.on, off: contact.off }
+}
+
+/// What P is in `field`.
+pub(super) fn quantity_of(body: &Body, field: &Field, calibration: &Calibration) -> Result<Quantity> {
+    let used = field.members.iter().map(|member| member.taxel).filter(|&taxel| !calibration.taxels[taxel].mask);
+    let mut quantities = used.map(|taxel| (body.taxels[taxel].id, calibration.taxels[taxel].quantity));
+    let Some((first, quantity)) = quantities.next() else { return Ok(Quantity::Count) };
+    match quantities.find(|(_, other)| *other != quantity) {
+        None => Ok(quantity),
+        Some((id, other)) => Err(failed!(
+            "field `{}` mixes quantities: taxel {first} measures in {quantity} and taxel {id} in {other}; calibrate both \
+             in one, or give them fields of their own",
+            field.name
+        )
+        .at(&body.name)),
+    }
 }
 
 /// The least power of two that is at least `radius_m`, within what single precision can square.

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::curves::Curves;
-use super::members::{beside, surface, thresholds, unit_of, weights};
+use super::members::{beside, quantity_of, surface, thresholds, unit_of, weights};
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
 use crate::percept::Outputs;
-use crate::signal::{Calibration, Letter, Mark, Receptor, Response, TaxelCalibration};
+use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
 use crate::stage::calibrate::Table;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
@@ -28,6 +28,9 @@ pub(crate) struct Stages {
     pub(crate) motion: bool,
     pub(crate) position: bool,
     pub(crate) touches: bool,
+    pub(crate) force: bool,
+    /// Whether percepts keep the taxels' pressures, for stages on the host.
+    pub(crate) pressures: bool,
     pub(crate) filter: bool,
 }
 
@@ -37,9 +40,11 @@ impl Stages {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let touches = outputs.contains(Outputs::TOUCHES);
         let position = wants("position") || touches;
-        let [orientation, axis, motion, filter] = ["orientation", "axis", "motion", "filter"].map(wants);
+        let [orientation, axis, motion, filter, force] =
+            ["orientation", "axis", "motion", "filter", "force"].map(wants);
         let centroid = wants("centroid") || position || orientation || axis || motion || filter;
-        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter }
+        let pressures = touches || force;
+        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, force, pressures, filter }
     }
 }
 
@@ -91,6 +96,8 @@ pub(crate) struct PlanField {
     /// Whether another field of the plan has it as its parent.
     pub(crate) divided: bool,
     pub(crate) area_known: bool,
+    /// What its taxels' P is.
+    pub(crate) quantity: Quantity,
     /// Whether every member's weight is 1.
     pub(crate) unweighted: bool,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
@@ -140,7 +147,7 @@ impl Plan {
     ///
     /// # Errors
     /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; the scene asks for a signal that no sensor has, for no letter, for one
+    /// or has a curve that cannot be computed with; a field mixes quantities; the scene asks for a signal that no sensor has, for no letter, for one
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         if body.taxels.is_empty() {
@@ -212,6 +219,7 @@ impl Plan {
                 count,
                 charted: field.chart.is_ok(),
                 divided: parents.contains(&index),
+                quantity: quantity_of(body, field, calibration)?,
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 weights: weights(field),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
@@ -360,6 +368,19 @@ impl Plan {
         letter.map_or(Mark::default(), |letter| letter.mark(&self.letters))
     }
 
+    /// What P is in field `field` of the percepts; of letter `change` P stands for its change per second.
+    #[must_use]
+    pub fn quantity(&self, field: usize) -> Quantity {
+        self.fields.get(field).map_or(Quantity::Count, |field| field.quantity)
+    }
+
+    /// What P is in all fields, if it is the same in all.
+    #[must_use]
+    pub fn common_quantity(&self) -> Option<Quantity> {
+        let first = self.quantity(0);
+        self.fields.iter().all(|field| field.quantity == first).then_some(first)
+    }
+
     /// What people call field `field` of the percepts: its name, and what is to be said of its letter.
     #[must_use]
     pub fn label(&self, field: usize) -> String {
@@ -382,7 +403,7 @@ impl Plan {
 
     /// How many taxels' pressures percepts keep.
     pub(crate) fn kept_pressures(&self) -> usize {
-        if self.stages().touches { self.slots() } else { 0 }
+        if self.stages().pressures { self.slots() } else { 0 }
     }
 
     /// What is traded for what.

@@ -15,6 +15,7 @@ pub use self::thresholds::{ChangeCalibration, ContactThresholds};
 use super::curve::Curve;
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, Response};
+use super::unit::Quantity;
 use super::upkeep::UpkeepKeys;
 use crate::error::{Result, failed};
 
@@ -36,6 +37,8 @@ pub struct TaxelCalibration {
     pub mask: bool,
     /// The conversion from raw value to pressure.
     pub response: Response,
+    /// What P is. Gain, dead band and P_max are in its SI unit, whatever unit the file is in.
+    pub quantity: Quantity,
 }
 
 impl Default for TaxelCalibration {
@@ -48,6 +51,7 @@ impl Default for TaxelCalibration {
             raw_range: [-f32::MAX, f32::MAX],
             mask: false,
             response: Response::Linear,
+            quantity: Quantity::Count,
         }
     }
 }

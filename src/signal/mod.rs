@@ -8,6 +8,7 @@ mod fsr;
 mod intake;
 mod letter;
 mod response;
+mod unit;
 mod upkeep;
 mod wiring;
 
@@ -20,6 +21,7 @@ pub use fsr::FsrCircuit;
 pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub use response::{FsrResponse, FsrSignal, Response};
+pub use unit::{Quantity, UnitOfP};
 pub(crate) use upkeep::{Kept, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};
 pub use wiring::{WiredBoard, Wiring};

@@ -2,6 +2,7 @@
 //!
 //! A sink gets the fields' names once; only recordings use bodies and frames.
 
+mod header;
 mod line;
 mod ndjson;
 #[cfg(feature = "page")]
@@ -148,6 +149,8 @@ pub struct Session<'a> {
     pub is_double: bool,
     /// What pressures are measured in; empty where nobody said it.
     pub p_unit: &'a str,
+    /// Whether NDJSON begins with a line that says units and body.
+    pub header: bool,
     /// The ids of a frame's values, in their order.
     pub taxels: &'a [u32],
     /// The robot.

@@ -73,6 +73,19 @@ impl NdjsonSink {
         }
     }
 
+    /// The same, beginning with `header` as its first line.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn with_header(mut self, header: Option<&str>) -> Result<Self> {
+        if let Some(header) = header {
+            let written = writeln!(self.writer, "{header}");
+            // A reader that has gone is noticed again with the first frame.
+            let _ = self.flow(written)?;
+        }
+        Ok(self)
+    }
+
     fn flow(&mut self, written: io::Result<()>) -> Result<Flow> {
         match written {
             Ok(()) => Ok(Flow::Open),

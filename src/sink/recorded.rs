@@ -1,5 +1,6 @@
 //! A sink that records frames, percepts and what viewers show.
 
+use super::header;
 use super::line::LineWriter;
 use super::view::ViewWriter;
 use super::{Flow, InputFrames, RecordPart, Session, Sink};
@@ -24,6 +25,9 @@ impl RecordingSink {
     /// It cannot be written.
     pub fn create(output: OutputPath, session: &Session<'_>) -> Result<Self> {
         let mut recorder = Recorder::create(output, session.taxels)?;
+        if let Some(plan) = session.plan {
+            recorder.set_units(header::units(plan));
+        }
         for (name, media_type, bytes) in &session.attached {
             recorder.attach(name, media_type, bytes)?;
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::table::touches_path;
-use super::{CsvSink, NdjsonSink, Session, Sink};
+use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
 use crate::output::{OutputPath, OutputPaths};
 
@@ -156,10 +156,14 @@ impl SinkTarget {
     /// It cannot be opened.
     pub fn open(self, session: &Session<'_>) -> Result<Box<dyn Sink + Send>> {
         let (names, all_fields) = (&session.names, session.all_fields);
+        let header = session.plan.filter(|_| session.header).map(|plan| header::line(plan, session.body));
         match self {
-            Self::Ndjson(output) => Ok(Box::new(NdjsonSink::to_file(output, names, all_fields)?)),
+            Self::Ndjson(output) => {
+                Ok(Box::new(NdjsonSink::to_file(output, names, all_fields)?.with_header(header.as_deref())?))
+            }
             Self::Stdout => {
-                Ok(Box::new(NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)))
+                let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields);
+                Ok(Box::new(sink.with_header(header.as_deref())?))
             }
             Self::Csv { percepts, touches, wide } => Ok(Box::new(CsvSink::create(percepts, touches, wide, session)?)),
             #[cfg(feature = "parquet")]

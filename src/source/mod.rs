@@ -15,6 +15,7 @@ mod serial;
 mod simulated;
 mod spec;
 mod unknown_taxels;
+mod vendor;
 
 pub use self::csv::CsvSource;
 pub use csv_file::CsvFile;
@@ -26,6 +27,7 @@ pub use replay::{Cut, Replay};
 pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, Notice, SerialOptions, SerialSource, TapTrouble};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
+pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};
 
 use std::time::Instant;
 

@@ -3,18 +3,22 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{CsvSource, NdjsonSource, SimulatedSource, Source};
+use super::{CsvSource, NdjsonSource, SimulatedSource, Source, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 6] = [
+const FORMS: [(&str, &str); 7] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("mcap", "mcap:FILE"),
+    ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
     ("-", "- for NDJSON on standard input"),
     ("csv:-", "csv:- for CSV on standard input"),
 ];
+
+/// Endings of pressure systems' exports; `.csv` is one of many things.
+const EXPORTS: [&str; 5] = ["asf", "lst", "asc", "txt", "tsv"];
 
 /// A source as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +35,9 @@ pub enum SourceSpec {
     },
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
+    /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
+    /// export.
+    Vendor(PathBuf),
     /// `sim:FILE.toml`: simulated touches.
     Sim(PathBuf),
     /// `-`: NDJSON frames on standard input.
@@ -72,10 +79,13 @@ impl SourceSpec {
         }
         let (kind, rest) = match text.split_once(':') {
             Some(("csv", "-")) => ("csv:-", text),
-            Some((kind, rest)) if kind != "-" && FORMS.iter().any(|(known, _)| *known == kind) => (kind, rest),
+            Some((kind, rest)) if !["-", "export"].contains(&kind) && FORMS.iter().any(|(known, _)| *known == kind) => {
+                (kind, rest)
+            }
             _ if text == "-" => ("-", text),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
+            _ if EXPORTS.iter().any(|wanted| ending(wanted)) => ("export", text),
             Some((kind, _)) => {
                 return match nearest(kind, kinds.iter().copied().filter(|kind| !kind.ends_with('-'))) {
                     Some(near) => bad(format!("there is no source `{kind}:`; did you mean `{near}:`?")),
@@ -93,6 +103,7 @@ impl SourceSpec {
         Ok(match kind {
             "csv" => Self::Csv(rest.into()),
             "mcap" => Self::Mcap(rest.into()),
+            "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
@@ -114,12 +125,36 @@ impl SourceSpec {
         matches!(self, Self::Stdin | Self::CsvStdin)
     }
 
-    /// Opens the source. `taxels` are the ids that the body has, `rate_hz` the rate of a CSV without a column `t`.
+    /// What it is by the content of its file, and by what is said of that: a `.csv` may be an export.
+    #[must_use]
+    pub fn with_content(self, options: &VendorOptions) -> Self {
+        match self {
+            Self::Csv(path) if options.format.or_else(|| VendorSource::detect(&path)).is_some() => Self::Vendor(path),
+            Self::Csv(path) if options.grid.is_some() => Self::Vendor(path),
+            other => other,
+        }
+    }
+
+    /// The file that is read, if it is one.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
+            Self::Serial { .. } | Self::Stdin | Self::CsvStdin => None,
+        }
+    }
+
+    /// Opens the source. `taxels` are the ids that the body has; `options` say what its file does not, such as the rate of a
+    /// CSV without a column `t`.
     ///
     /// # Errors
     /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
-    pub fn open(&self, taxels: &[u32], rate_hz: Option<f64>) -> Result<Box<dyn Source + Send>> {
-        if rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin) {
+    pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
+        if !matches!(self, Self::Vendor(_)) {
+            options.check_unused()?;
+        }
+        let rate_hz = options.rate_hz;
+        if rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin | Self::Vendor(_)) {
             return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
         }
         match self {
@@ -132,6 +167,7 @@ impl SourceSpec {
             Self::Mcap(path) => {
                 Err(Error::failed("this build reads no MCAP; build with feature `mcap`").at(path.display()))
             }
+            Self::Vendor(path) => Ok(Box::new(VendorSource::open(path, options)?)),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
             #[cfg(feature = "serial")]
             Self::Serial { port, baud } => {
@@ -173,8 +209,9 @@ mod tests {
         };
         assert!(why("csv:").contains("nothing follows"));
         assert!(why("seril:a").contains("did you mean `serial:`"));
-        assert!(why("a.txt").contains(
-            "csv:FILE, serial:PORT[@BAUD], mcap:FILE, sim:FILE.toml, - for NDJSON on standard input or csv:- for CSV"
+        assert!(why("a.pdf").contains(
+            "csv:FILE, serial:PORT[@BAUD], mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+             - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();
         for text in ["a.ndjson", "-", "csv:-", "sim:a.toml", "serial:a", "csv:", "seril:a"] {
@@ -189,14 +226,24 @@ mod tests {
             let written = format!("source `{port}`: a serial port is written serial:{port}");
             assert_eq!(why(port), written);
         }
-        assert!(why("COM3.txt").contains("csv:FILE"));
+        assert!(why("COM3.pdf").contains("csv:FILE"));
     }
 
     #[test]
     fn what_is_not_there_says_so() {
-        assert!(SourceSpec::Mcap("no/such.mcap".into()).open(&[1], None).is_err());
-        assert!(SourceSpec::Sim("no/such.toml".into()).open(&[1], None).err().unwrap().is_not_found());
-        assert!(SourceSpec::Stdin.open(&[1], Some(3.0)).err().unwrap().is_usage());
-        assert!(SourceSpec::Csv("no/such.csv".into()).open(&[1], None).err().unwrap().is_not_found());
+        assert!(SourceSpec::Mcap("no/such.mcap".into()).open(&[1], &VendorOptions::default()).is_err());
+        assert!(
+            SourceSpec::Sim("no/such.toml".into()).open(&[1], &VendorOptions::default()).err().unwrap().is_not_found()
+        );
+        assert!(
+            SourceSpec::Stdin
+                .open(&[1], &VendorOptions { rate_hz: Some(3.0), ..VendorOptions::default() })
+                .err()
+                .unwrap()
+                .is_usage()
+        );
+        assert!(
+            SourceSpec::Csv("no/such.csv".into()).open(&[1], &VendorOptions::default()).err().unwrap().is_not_found()
+        );
     }
 }

@@ -9,6 +9,7 @@ mod browser;
 mod calibrate;
 mod devices;
 mod doubts;
+mod exports;
 mod fields;
 mod inspect;
 mod live;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use somatic::signal::FsrCircuit;
-use somatic::source::{CsvSource, SimulatedSource, Source as _, SourceSpec, write_recording};
+use somatic::source::{CsvSource, SimulatedSource, Source as _, SourceSpec, VendorOptions, write_recording};
 use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, OutputPath, Percept};
 
 use crate::common::{Flat, engine};
@@ -116,7 +116,7 @@ fn a_recording_reads_back_as_the_source_delivers_it() {
     assert_eq!(write_recording(&mut simulation, new(&frames), new(&truth)).unwrap(), 200);
     let mut read = CsvSource::open(&frames, None).unwrap();
     let spec: SourceSpec = format!("sim:{}", example("rod.toml").display()).parse().unwrap();
-    let mut direct = spec.open(read.taxels(), None).unwrap();
+    let mut direct = spec.open(read.taxels(), &VendorOptions::default()).unwrap();
     assert_eq!(read.taxels(), direct.taxels());
     let (mut a, mut b) = (Frame::missing(0.0, 40), Frame::missing(0.0, 40));
     while direct.next_frame(&mut b).unwrap() {

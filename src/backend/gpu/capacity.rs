@@ -44,7 +44,7 @@ pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) 
     let enough = in_blocks(ENOUGH / (plan.channels() * 4)).clamp(FRAMES_A_BLOCK, MOST);
     let held = in_blocks(limit / quad.max(of_parts) * 4);
     // What comes back, in one buffer.
-    let back = cells + if plan.stages().touches { 2 * quad } else { 0 };
+    let back = cells + if plan.stages().pressures { 2 * quad } else { 0 };
     let most = held.min(limit / cells).min(limits.max_buffer_size as usize / back).max(1);
     Ok(batch.clamp(1, enough.min(most)))
 }

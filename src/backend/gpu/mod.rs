@@ -111,7 +111,7 @@ impl Gpu {
         let steps = working("steps", frames * STEP);
         let row = layout::padded_channels(plan.channels()) as u64 * 4;
         let plain = is_plain(plan);
-        let direct = plain && !plan.has_changes() && !plan.stages().touches && plan.calibrated() == plan.channels();
+        let direct = plain && !plan.has_changes() && !plan.stages().pressures && plan.calibrated() == plan.channels();
         let form = match (direct, capacity) {
             (false, _) => Form::Rows,
             (true, 1) => Form::One,
@@ -193,7 +193,7 @@ impl Gpu {
         }
 
         let back = frames * fields * 4 * columns.read().len() as u64;
-        let back = back + if wanted.touches { quads * slots * 16 } else { 0 };
+        let back = back + if wanted.pressures { quads * slots * 16 } else { 0 };
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
@@ -214,7 +214,7 @@ impl Gpu {
             packer: Packer::new(form, plan.channels(), capacity),
             columns,
             results,
-            pressures: wanted.touches.then_some(pressures),
+            pressures: wanted.pressures.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             memory: [touched, last],
         })

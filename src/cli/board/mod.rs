@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use somatic::output::OutputLink;
 use somatic::signal::Wiring;
-use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec};
+use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec, VendorOptions};
 use somatic::wire::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
 use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
@@ -216,7 +216,7 @@ impl Play {
         match spec {
             // Lines of unknown taxels are errors: a board has no way to report them.
             Some(SourceSpec::Stdin) => Ok(Box::new(NdjsonSource::stdin(ids.to_vec()).strict())),
-            Some(spec) => spec.open(ids, None),
+            Some(spec) => spec.open(ids, &VendorOptions::default()),
             None => Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?)),
         }
     }

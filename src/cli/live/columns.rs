@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use console::style;
+use somatic::signal::Quantity;
 use somatic::{Outputs, Percept};
 
 use crate::cli::words::{clipped, fitted, millimetres, number};
@@ -18,11 +19,44 @@ const BAR_WIDTH: usize = 8;
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     pub(super) largest_total: f64,
+    /// The unit of P.
+    pub(super) unit: PrintedUnit,
     /// Number of separate touches of the field.
     pub(super) touches: usize,
 }
 
+/// A unit of P as people read it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::cli) struct PrintedUnit {
+    /// How many of it one of P is.
+    pub(in crate::cli) factor: f64,
+    pub(in crate::cli) name: &'static str,
+}
+
+impl PrintedUnit {
+    /// Of fields that measure different things.
+    pub(in crate::cli) const SI: Self = Self { factor: 1.0, name: "SI" };
+
+    pub(in crate::cli) fn of(quantity: Quantity) -> Self {
+        match quantity {
+            Quantity::Count => Self { factor: 1.0, name: "" },
+            Quantity::Pascal => Self { factor: 1e-3, name: "kPa" },
+            Quantity::Newton => Self { factor: 1.0, name: "N" },
+        }
+    }
+
+    /// `heading` with the unit, which counts do not have.
+    pub(in crate::cli) fn heads(self, heading: &str) -> String {
+        if self.name.is_empty() { heading.to_owned() } else { format!("{heading} {}", self.name) }
+    }
+}
+
 impl Scale {
+    /// `value` in the unit of P.
+    fn of_p(self, value: f64) -> String {
+        Self { largest_total: self.largest_total * self.unit.factor, ..self }.number(value * self.unit.factor)
+    }
+
     /// `value` with the decimals that give the largest total five digits, so that decimal points align.
     fn number(self, value: f64) -> String {
         if !(1e-3..1e7).contains(&self.largest_total) {
@@ -50,10 +84,11 @@ const fn column(heading: &'static str, width: usize, outputs: Outputs, gives_way
     Column { heading, width, outputs, gives_way, text }
 }
 
-const COLUMNS: [Column; 11] = [
-    column("total", 8, Outputs::TOTAL, 0, |p, scale| p.total.map(|total| scale.number(total))),
+const COLUMNS: [Column; 12] = [
+    column("total", 9, Outputs::TOTAL, 0, |p, scale| p.total.map(|total| scale.of_p(total))),
     column("", BAR_WIDTH, Outputs::TOTAL, 3, bar),
-    column("peak", 8, Outputs::PEAK, 6, |p, scale| p.peak.map(|peak| scale.number(peak))),
+    column("peak", 8, Outputs::PEAK, 6, |p, scale| p.peak.map(|peak| scale.of_p(peak))),
+    column("force N", 8, Outputs::FORCE, 1, |p, _| p.force.map(number)),
     column("active", 6, Outputs::ACTIVE, 4, |p, _| p.active.map(|active| active.to_string())),
     column("area mm²", 8, Outputs::AREA, 8, |p, _| p.area.map(|area| format!("{:.1}", area * 1e6))),
     column("touches", 7, Outputs::TOUCHES, 3, |_, beside| Some(beside.touches.to_string())),
@@ -70,11 +105,12 @@ pub(super) struct Layout {
     columns: Vec<&'static Column>,
     flags: usize,
     in_world: bool,
+    unit: PrintedUnit,
 }
 
 impl Layout {
-    /// For names up to `longest` and the quantities `outputs`, in `width` columns.
-    pub(super) fn new(longest: usize, outputs: Outputs, in_world: bool, width: usize) -> Self {
+    /// For names up to `longest` and the quantities `outputs`, those of P in `unit`, in `width` columns.
+    pub(super) fn new(longest: usize, outputs: Outputs, in_world: bool, width: usize, unit: PrintedUnit) -> Self {
         let mut columns: Vec<&Column> = COLUMNS.iter().filter(|column| outputs.intersects(column.outputs)).collect();
         let taken = |columns: &[&Column]| columns.iter().map(|column| column.width + GAP).sum::<usize>();
         let least_name = longest.clamp(5, MIN_NAME_WIDTH);
@@ -90,7 +126,7 @@ impl Layout {
         let gap = if flags > 0 { GAP } else { 0 };
         let name = longest.max(5).min(width.saturating_sub(taken(&columns) + gap + flags));
         let flags = if flags > 0 { width.saturating_sub(name + taken(&columns) + gap) } else { 0 };
-        Self { name, columns, flags, in_world }
+        Self { name, columns, flags, in_world, unit }
     }
 
     pub(super) fn headings(&self) -> String {
@@ -98,7 +134,12 @@ impl Layout {
         for column in &self.columns {
             text += &" ".repeat(GAP);
             let world = self.in_world && column.outputs == Outputs::POSITION;
-            text += &fitted(if world { "x    y    z mm world" } else { column.heading }, column.width, true);
+            let heading = match column.outputs {
+                _ if world => "x    y    z mm world".to_owned(),
+                Outputs::TOTAL | Outputs::PEAK if !column.heading.is_empty() => self.unit.heads(column.heading),
+                _ => column.heading.to_owned(),
+            };
+            text += &fitted(&heading, column.width, true);
         }
         if self.flags > 0 { text + "  flags" } else { text }
     }
@@ -175,7 +216,7 @@ mod tests {
     fn every_row_fits_whatever_the_width() {
         for width in 0..200 {
             for longest in [1, 8, 30] {
-                let layout = Layout::new(longest, Outputs::all(), true, width);
+                let layout = Layout::new(longest, Outputs::all(), true, width, PrintedUnit::of(Quantity::Pascal));
                 let headings = console::measure_text_width(&layout.headings());
                 assert!(headings <= width.max(5) || layout.columns.is_empty(), "{width}: {headings}");
             }
@@ -184,9 +225,12 @@ mod tests {
 
     #[test]
     fn what_was_not_asked_for_has_no_column_and_a_wide_terminal_has_all() {
-        let headings = |outputs, width| Layout::new(10, outputs, false, width).headings();
+        let headings =
+            |outputs, width| Layout::new(10, outputs, false, width, PrintedUnit::of(Quantity::Pascal)).headings();
         assert!(!headings(Outputs::TOTAL, 200).contains("angle"));
-        assert!(headings(Outputs::all(), 200).contains("peak"));
+        assert!(
+            headings(Outputs::all(), 200).contains("peak kPa") && headings(Outputs::all(), 200).contains("force N")
+        );
         let narrow = headings(Outputs::all(), 58);
         assert!(narrow.contains("total") && narrow.contains("angle") && !narrow.contains("peak"), "{narrow}");
     }

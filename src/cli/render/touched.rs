@@ -6,6 +6,7 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::picture::{Moment, Options, TouchPicture, View};
 use somatic::scene::Coordinates;
+use somatic::signal::Quantity;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Percept, Result, Scene};
 
 use super::super::bar::Bar;
@@ -87,7 +88,9 @@ impl Flags {
             calibration: self.calibration.clone(),
             ..RunOptions::default()
         };
-        let (shown, max_pressure) = self.shown(&asked, body, fields)?;
+        let (shown, max_pressure, quantity) = self.shown(&asked, body, fields)?;
+        let (factor, unit) = quantity.readable(max_pressure);
+        let max_pressure = max_pressure * factor;
         if options.views.is_empty() {
             let pressed = |taxel: &usize| shown.iter().any(|shown| shown.pressures[*taxel] > Some(0.0));
             let normals = (0..body.taxels.len()).filter(pressed).map(|taxel| {
@@ -101,16 +104,17 @@ impl Flags {
         let mut bar = Bar::new("drawing");
         let mut pictures = Vec::with_capacity(shown.len());
         for (index, Shown { t_s, pressures, percepts }) in shown.iter().enumerate() {
+            let pressures: Vec<Option<f64>> = pressures.iter().map(|p| p.map(|p| p * factor)).collect();
             let moment =
-                Moment { pressures, max_pressure: Some(max_pressure), unit: "counts", percepts, t_s: Some(*t_s) };
+                Moment { pressures: &pressures, max_pressure: Some(max_pressure), unit, percepts, t_s: Some(*t_s) };
             pictures.push(picture.draw(&moment)?);
             bar.show_with_time_left((index + 1) as f64 / shown.len() as f64);
         }
         picture.png(&pictures, 1.0 / self.rate)
     }
 
-    /// The frames to show, and the largest pressure of the whole recording.
-    fn shown(&self, asked: &RunOptions, body: &Body, fields: &[Field]) -> Result<(Vec<Shown>, f64)> {
+    /// The frames to show, the largest pressure of the whole recording, and what it is.
+    fn shown(&self, asked: &RunOptions, body: &Body, fields: &[Field]) -> Result<(Vec<Shown>, f64, Quantity)> {
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let input = Input::named(asked)?;
         if !input.is_recording() {
@@ -167,7 +171,8 @@ impl Flags {
         if shown.is_empty() {
             return Err(Error::usage("the recording has no frames at that time").at(&input.name));
         }
-        Ok((shown, if max_pressure > 0.0 { max_pressure } else { 1.0 }))
+        let quantity = engine.plan().common_quantity().unwrap_or_default();
+        Ok((shown, if max_pressure > 0.0 { max_pressure } else { 1.0 }, quantity))
     }
 }
 

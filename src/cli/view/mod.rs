@@ -53,8 +53,8 @@ token, may look and play; nobody can change a file.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES, mut_args(shown))]
 pub(super) struct Arguments {
-    /// What to show: a body (.glb, .gltf, hand, mat or humanoid), a recording (.mcap, .csv), or a scene or simulation
-    /// (.toml) [default: the bundled touch].
+    /// What to show: a body (.glb, .gltf, hand, mat or humanoid), a recording (.mcap, .csv, or a pressure system's
+    /// .asf, .lst, .asc or .txt), or a scene or simulation (.toml) [default: the bundled touch].
     #[arg(value_name = "WHAT")]
     what: Option<String>,
 
@@ -82,8 +82,8 @@ fn shown(arg: clap::Arg) -> clap::Arg {
 }
 
 /// Flags of `run` that a page has no use for.
-const HIDDEN: [&str; 10] =
-    ["sink", "verify", "force", "all-fields", "record", "loop", "batch", "strict", "live-rate", "board-rate"];
+const HIDDEN: [&str; 11] =
+    ["sink", "header", "verify", "force", "all-fields", "record", "loop", "batch", "strict", "live-rate", "board-rate"];
 
 /// How a page is served and opened.
 struct Opening<'a> {

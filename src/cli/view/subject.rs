@@ -28,16 +28,17 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
             return Err(Error::usage(format!("`{what}` and --source {other}: give one of them")));
         }
         let mut asked = asked.with(None)?;
-        asked.sources = vec![format!("{kind}:{what}")];
+        asked.sources = vec![if kind.is_empty() { what.to_owned() } else { format!("{kind}:{what}") }];
         Ok(Subject::Recording(Box::new(asked)))
     };
     match ending.as_deref() {
         Some("mcap") => as_source("mcap"),
         Some("csv") => as_source("csv"),
+        Some("asf" | "lst" | "asc" | "txt" | "tsv") => as_source(""),
         Some("toml") if SimulatedSource::is_named(what) => as_source("sim"),
         Some("toml") => Ok(Subject::Recording(Box::new(asked.with(Some(Path::new(what)))?))),
         _ if ending.is_none() && bundled::body(what).is_none() && !Path::new(what).exists() => Err(Error::usage(
-            "give a body (.glb, .gltf or a bundled one), a recording (.mcap, .csv), a scene or a simulation (.toml)",
+            "give a body (.glb, .gltf or a bundled one), a recording (.mcap, .csv, or a pressure system's .asf, .lst, .asc), a scene or a simulation (.toml)",
         )
         .at(what)),
         _ => body(what, asked),

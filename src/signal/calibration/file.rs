@@ -76,8 +76,12 @@ impl Calibration {
         let taxels = drafts.into_iter().map(|draft| draft.finish(&curves, text)).collect::<Result<_>>()?;
         check_checks(&file.checks)?;
         file.upkeep.check()?;
+        // Sums and changes have the unit that holds for all.
+        let factor = all.unit().factor;
         let (contact, fields) = file.contact.read(text)?;
-        let change = file.change.read(text)?;
+        let contact = contact.times(factor);
+        let fields = fields.into_iter().map(|(name, thresholds)| (name, thresholds.times(factor))).collect();
+        let change = file.change.read(text)?.times(factor);
         let File { body, checks, upkeep, .. } = file;
         Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
     }

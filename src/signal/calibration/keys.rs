@@ -9,10 +9,12 @@ use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
 use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
+use crate::signal::unit::UnitOfP;
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Keys {
+    unit: Option<Spanned<String>>,
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
     invert: Option<bool>,
@@ -52,6 +54,8 @@ impl CurveKeys {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Draft {
     taxel: TaxelCalibration,
+    /// Of gain, dead band and P_max.
+    unit: UnitOfP,
     kind: Kind,
     fsr: FsrResponse,
     /// Where keys are that are checked together with others at the end.
@@ -72,6 +76,9 @@ impl Draft {
     /// Applies `keys`; `curves` are the names of the file's curves.
     pub(super) fn apply(&mut self, keys: &Keys, curves: &[&str], text: Text<'_>) -> Result<()> {
         self.apply_response(keys, curves, text)?;
+        if let Some(unit) = &keys.unit {
+            self.unit = unit.get_ref().parse().map_err(|e: Error| text.wrong(unit.span(), e.to_string()))?;
+        }
         let taxel = &mut self.taxel;
         let number =
             |key: &str, value: &Option<Spanned<f64>>, fits: &dyn Fn(f64) -> bool, must: &str| -> Result<Option<f64>> {
@@ -172,6 +179,11 @@ impl Draft {
         Ok(())
     }
 
+    /// The unit of what it measures.
+    pub(super) fn unit(&self) -> UnitOfP {
+        self.unit
+    }
+
     pub(super) fn is_fsr(&self) -> bool {
         self.kind == Kind::Fsr
     }
@@ -184,7 +196,7 @@ impl Draft {
             Kind::Curve(index) => {
                 taxel.response = Response::Curve(index);
                 let at = self.gain_at.unwrap_or(0);
-                curves[index].scaled(taxel.gain).map_err(|e| text.put(at..at, e))?;
+                curves[index].scaled(taxel.gain * self.unit.factor).map_err(|e| text.put(at..at, e))?;
             }
             Kind::Fsr => {
                 taxel.response = Response::Fsr(self.fsr);
@@ -192,6 +204,12 @@ impl Draft {
                     taxel.raw_range = [0.0, FsrCircuit::OPEN_COUNTS.into()];
                 }
             }
+        }
+        taxel.quantity = self.unit.quantity;
+        taxel.gain *= self.unit.factor;
+        taxel.dead_band *= self.unit.factor;
+        if taxel.p_max < f64::from(f32::MAX) {
+            taxel.p_max *= self.unit.factor;
         }
         Ok(taxel)
     }

@@ -18,6 +18,13 @@ pub struct ContactThresholds {
     pub off: f64,
 }
 
+impl ContactThresholds {
+    /// The same in another unit, of which `factor` are one of these.
+    pub(super) fn times(self, factor: f64) -> Self {
+        Self { on: self.on * factor, off: self.off * factor }
+    }
+}
+
 /// The thresholds of the letter [`crate::signal::Receptor::Change`] for all taxels and fields, P per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChangeCalibration {
@@ -25,6 +32,13 @@ pub struct ChangeCalibration {
     pub dead_band: f64,
     /// Contact thresholds of the change.
     pub contact: ContactThresholds,
+}
+
+impl ChangeCalibration {
+    /// The same in another unit, of which `factor` are one of these.
+    pub(super) fn times(self, factor: f64) -> Self {
+        Self { dead_band: self.dead_band * factor, contact: self.contact.times(factor) }
+    }
 }
 
 #[derive(Default, Deserialize)]

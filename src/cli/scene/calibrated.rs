@@ -1,0 +1,69 @@
+//! The calibration of a run, and the outputs that it can give.
+
+use std::path::PathBuf;
+
+use somatic::signal::Quantity;
+use somatic::source::{SimulatedSource, SourceSpec};
+use somatic::{Body, Calibration, Error, Outputs, Result};
+
+use super::RunOptions;
+use crate::cli::attached;
+
+impl RunOptions {
+    /// The outputs that are asked for; if none are, those that `calibration` and what is read can give.
+    pub(super) fn outputs_with(&self, calibration: Option<&Calibration>) -> Result<Outputs> {
+        if !self.outputs.is_empty() {
+            return Ok(self.outputs());
+        }
+        let has_unit =
+            |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
+        let is_placed = self.body.is_some() || self.export()?.is_none_or(|export| export.layout().is_placed());
+        Ok(match (is_placed, calibration.is_some_and(has_unit)) {
+            // Of sensors of which nobody says where they are.
+            (false, _) => Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE,
+            (true, true) => self.outputs() | Outputs::FORCE,
+            (true, false) => self.outputs(),
+        })
+    }
+
+    /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export
+    /// have one, and a recording may, which is used with its body.
+    pub(in crate::cli) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
+        match self.first_source()? {
+            Some(SourceSpec::Sim(path)) => {
+                let text = SimulatedSource::open(&path)?.calibration();
+                return Ok(Some((path, text)));
+            }
+            Some(SourceSpec::Vendor(_)) => return self.export_calibration(),
+            _ => {}
+        }
+        let Some(recording) = self.recording()? else { return Ok(None) };
+        Ok(attached::calibration(&recording)?.map(|text| (recording, text)))
+    }
+
+    /// The calibration that is named, or that comes with what is read, for `body`, whose taxels have `ids`.
+    pub(super) fn calibration_for(&self, body: &Body, ids: &[u32]) -> Result<Option<Calibration>> {
+        let load = |path: &PathBuf| {
+            let calibration = Calibration::load(path, ids)?;
+            calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
+            Ok(calibration)
+        };
+        let parse = |(path, text): (PathBuf, String)| {
+            Calibration::parse(&text, ids).map_err(|e| e.at("its own calibration").at(path.display()))
+        };
+        let calibration = match &self.calibration {
+            Some(path) => Some(load(path)?),
+            None => self.own_calibration()?.map(parse).transpose()?,
+        };
+        if let (Some(calibration), [source]) = (&calibration, &self.sources[..])
+            && source.starts_with("sim:")
+        {
+            calibration.check_body(&body.name).map_err(|_| {
+                let what =
+                    format!("it is on another body than `{}`; leave --body out, or change its key `body`", body.name);
+                Error::usage(what).at(source)
+            })?;
+        }
+        Ok(calibration)
+    }
+}

@@ -1,0 +1,37 @@
+//! The first line of NDJSON, where it is asked for: what numbers are measured in, and of which body they are.
+
+use serde_json::{Map, Value, json};
+
+use crate::body::Body;
+use crate::percept::{Column, Unit};
+use crate::scene::Plan;
+
+/// Version of the percepts' schema, with the header as its first line.
+const VERSION: u32 = 2;
+
+/// The units of all outputs of `plan`, in their order. Where fields measure different quantities, a unit of P is an object by
+/// field.
+pub(super) fn units(plan: &Plan) -> Vec<(&'static str, Value)> {
+    plan.outputs().columns().map(|column| (column.name, unit(plan, column))).collect()
+}
+
+fn unit(plan: &Plan, column: &Column) -> Value {
+    match (column.unit, plan.common_quantity()) {
+        (Unit::P, Some(quantity)) => quantity.symbol().into(),
+        (Unit::P, None) => {
+            let of_field = |index: usize| (plan.label(index), plan.quantity(index).symbol().into());
+            Value::Object((0..plan.fields().len()).map(of_field).collect())
+        }
+        (unit, _) => unit.symbol().into(),
+    }
+}
+
+/// The line, without its end.
+pub(super) fn line(plan: &Plan, body: Option<&Body>) -> String {
+    let units: Map<String, Value> = units(plan).into_iter().map(|(name, unit)| (name.to_owned(), unit)).collect();
+    let body = body.map(|body| {
+        let fields: Vec<String> = (0..plan.fields().len()).map(|index| plan.label(index)).collect();
+        json!({"name": body.name, "taxels": body.taxels.len(), "fields": fields})
+    });
+    json!({"somatic": VERSION, "units": units, "body": body}).to_string()
+}

@@ -1,0 +1,88 @@
+//! The formats, and how they are told from each other.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::text::decoded;
+use crate::error::{Error, Result, suggestion};
+
+/// A format of recordings that pressure systems export.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum VendorFormat {
+    /// XSENSOR's `.csv`.
+    Xsensor,
+    /// Tekscan's ASCII, `.asf` or `.csv`.
+    Tekscan,
+    /// novel's emed, `.lst`.
+    Emed,
+    /// novel's pliance, `.asc`.
+    Pliance,
+    /// novel's pedar, `.asc`.
+    Pedar,
+    /// Plain matrices, a line or a block of rows for each frame.
+    Matrix,
+}
+
+impl VendorFormat {
+    const NAMES: [(&str, Self); 6] = [
+        ("xsensor", Self::Xsensor),
+        ("tekscan", Self::Tekscan),
+        ("emed", Self::Emed),
+        ("pliance", Self::Pliance),
+        ("pedar", Self::Pedar),
+        ("matrix", Self::Matrix),
+    ];
+
+    /// The names of all formats.
+    pub const WORDS: &[&str] = &["xsensor", "tekscan", "emed", "pliance", "pedar", "matrix"];
+
+    /// What people call it.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Xsensor => "XSENSOR",
+            Self::Tekscan => "Tekscan",
+            Self::Emed => "emed",
+            Self::Pliance => "pliance",
+            Self::Pedar => "pedar",
+            Self::Matrix => "matrix",
+        }
+    }
+
+    /// The format of a text that begins with `head`; plain matrices look like nothing in particular.
+    pub(super) fn of(head: &[u8]) -> Option<Self> {
+        let text = decoded(head);
+        let begins = |start: &str| text.lines().any(|line| line.trim_start().starts_with(start));
+        let has = |words: &[&str]| words.iter().all(|word| text.contains(word));
+        if begins("FRAME") && begins("SENSELS") {
+            Some(Self::Xsensor)
+        } else if begins("ASCII_DATA") || (begins("Frame ") && (begins("ROWS") || begins("DATA_TYPE"))) {
+            Some(Self::Tekscan)
+        } else if has(&["Pict-No"]) || has(&["Sensor size:", "Matrix:"]) {
+            Some(Self::Emed)
+        } else if begins("time[") {
+            let is_pedar = has(&["insole"]) || has(&["sensor type:"]);
+            Some(if is_pedar { Self::Pedar } else { Self::Pliance })
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for VendorFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = Self::NAMES.iter().find(|(_, format)| format == self);
+        f.write_str(found.map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for VendorFormat {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Self::NAMES.into_iter().find(|(known, _)| *known == name);
+        let names = || suggestion(name, Self::WORDS.iter().copied());
+        found.map(|(_, format)| format).ok_or_else(|| Error::usage(format!("there is no format `{name}`; {}", names())))
+    }
+}

@@ -1,0 +1,303 @@
+//! Recordings that pressure systems export, read as they are: sensors, units, times and values come from the file.
+
+mod body;
+mod emed;
+mod format;
+mod layout;
+mod lines;
+mod matrix;
+mod novel_asc;
+mod novel_places;
+mod options;
+mod parser;
+mod tekscan;
+mod text;
+mod time;
+mod xsensor;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+pub use format::VendorFormat;
+pub use layout::{Cell, Layout, Panel};
+pub use options::VendorOptions;
+
+use self::emed::Emed;
+use self::layout::Grid;
+use self::lines::Lines;
+use self::matrix::Matrix;
+use self::novel_asc::NovelAsc;
+use self::novel_places::Places;
+use self::parser::{Parser, Rate};
+use self::tekscan::Tekscan;
+use self::text::Separator;
+use self::xsensor::Xsensor;
+use super::Source;
+use crate::error::{Error, Result, failed};
+use crate::signal::{Frame, Quantity, RawValue};
+
+/// A recording that a pressure system exported.
+pub struct VendorSource {
+    path: PathBuf,
+    name: String,
+    format: VendorFormat,
+    lines: Lines,
+    parser: Box<dyn Parser>,
+    layout: Layout,
+    ids: Vec<u32>,
+    /// By place in a frame, the place of the value in the parser's.
+    order: Vec<usize>,
+    /// The first frame, which tells the layout, until it is taken.
+    first: Option<Frame>,
+    scratch: Frame,
+    ended: bool,
+    losses: Vec<String>,
+}
+
+impl VendorSource {
+    /// The format that the content of the file at `path` has, if it is one of these.
+    #[must_use]
+    pub fn detect(path: impl AsRef<Path>) -> Option<VendorFormat> {
+        let path = path.as_ref();
+        // A pipe can be read only once.
+        if !path.is_file() {
+            return None;
+        }
+        VendorFormat::of(Lines::open(path).ok()?.head().ok()?)
+    }
+
+    /// Opens the recording at `path`.
+    ///
+    /// # Errors
+    /// It cannot be read, is of no known format, or its first frame is not what it should be; a usage error if something is
+    /// missing that the file does not say, or given that it does.
+    pub fn open(path: impl AsRef<Path>, options: &VendorOptions) -> Result<Self> {
+        let path = path.as_ref();
+        Self::begin(path, options).map_err(|e| e.at(path.display()))
+    }
+
+    fn begin(path: &Path, options: &VendorOptions) -> Result<Self> {
+        let mut lines = Lines::open(path)?;
+        let head = lines.head()?;
+        if head.is_empty() {
+            return Err(Error::failed("the file is empty"));
+        }
+        let by_grid = options.grid.map(|_| VendorFormat::Matrix);
+        let format = options.format.or_else(|| VendorFormat::of(head)).or(by_grid);
+        let format = format.ok_or_else(|| {
+            Error::failed(
+                "this is no recording that is known; say what it is with --format, or, if it is of plain numbers, give \
+                 the rows and columns of a frame with --grid",
+            )
+        })?;
+        let separator = Separator::of(head);
+        let parser = parser(format, separator, path, options)?;
+        let mut source = Self {
+            path: path.to_owned(),
+            name: path.display().to_string(),
+            format,
+            lines,
+            parser,
+            layout: Layout::default(),
+            ids: Vec::new(),
+            order: Vec::new(),
+            first: None,
+            scratch: Frame::missing(0.0, 0),
+            ended: false,
+            losses: Vec::new(),
+        };
+        let mut first = Frame::missing(0.0, 0);
+        if !source.read(&mut first)? {
+            let why = source
+                .losses
+                .pop()
+                .map_or("it has no frames".to_owned(), |loss| format!("it has no whole frame: {loss}"));
+            return Err(Error::failed(why));
+        }
+        source.layout = source.parser.layout();
+        if let Some(unit) = options.unit {
+            source.layout.unit = unit;
+        }
+        source.set_order()?;
+        source.first = Some(first);
+        Ok(source)
+    }
+
+    /// Frames have their values in the order of the panels, which is that of the parser unless ids say otherwise.
+    fn set_order(&mut self) -> Result<()> {
+        self.ids = self.layout.ids();
+        let mut order: Vec<usize> = (0..self.ids.len()).collect();
+        order.sort_by_key(|&place| self.ids[place]);
+        if let Some(pair) = order.windows(2).find(|pair| self.ids[pair[0]] == self.ids[pair[1]]) {
+            return Err(failed!("sensor {} is there twice", self.ids[pair[0]]));
+        }
+        if !order.is_sorted() {
+            self.ids.sort_unstable();
+            self.order = order;
+        }
+        Ok(())
+    }
+
+    /// Reads the next frame, with its values in the parser's order.
+    fn read(&mut self, frame: &mut Frame) -> Result<bool> {
+        while !self.ended {
+            let Some(line) = self.lines.next()? else {
+                self.ended = true;
+                return match self.parser.end(frame) {
+                    Ok(complete) => Ok(complete),
+                    Err(error) => Ok(self.cut(&error)),
+                };
+            };
+            match self.parser.line(line, frame) {
+                Ok(false) => {}
+                Ok(true) => return Ok(true),
+                Err(error) if error.is_usage() => return Err(error),
+                // Only the last line may be cut short: the export was stopped, or the file was cut.
+                Err(error) if !self.lines.is_whole() || self.lines.is_at_end()? => {
+                    self.ended = true;
+                    return Ok(self.cut(&error));
+                }
+                Err(error) => {
+                    self.ended = true;
+                    return Err(error.at(format!("line {}", self.lines.number())));
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// Notes that the last frame is cut short.
+    fn cut(&mut self, error: &Error) -> bool {
+        self.losses.push(format!("line {}: the last frame is cut short: {error}", self.lines.number()));
+        false
+    }
+
+    /// Its file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its format.
+    #[must_use]
+    pub fn format(&self) -> VendorFormat {
+        self.format
+    }
+
+    /// Its sensors.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The name of its body: the file's, without what follows the last point.
+    #[must_use]
+    pub fn body_name(&self) -> String {
+        let stem =
+            self.path.file_stem().map_or_else(|| "recording".to_owned(), |stem| stem.to_string_lossy().into_owned());
+        format!("{stem}.glb")
+    }
+
+    /// Its sensors as a body, a `.glb`: each panel a link, with a field of all its cells.
+    ///
+    /// # Errors
+    /// It has more sensors than a body can hold.
+    pub fn body(&self) -> Result<Vec<u8>> {
+        body::glb(&self.layout).map_err(|e| e.at(&self.name))
+    }
+
+    /// The calibration that turns its values into pressures, TOML; `None` where they are counts.
+    #[must_use]
+    pub fn calibration(&self) -> Option<String> {
+        let unit = self.layout.unit;
+        (unit.quantity != Quantity::Count).then(|| {
+            let mut text = "# The unit that the recording itself states.\n\n".to_owned();
+            let _ = write!(text, "body = {}\n\n[all]\nunit = \"{unit}\"\n", toml::Value::from(self.body_name()));
+            text
+        })
+    }
+}
+
+/// The reader of `format`.
+fn parser(format: VendorFormat, separator: Separator, path: &Path, options: &VendorOptions) -> Result<Box<dyn Parser>> {
+    let VendorOptions { grid, pitch_m, unit, .. } = *options;
+    let rate = Rate::new(options.rate_hz)?;
+    if format != VendorFormat::Matrix && (grid.is_some() || pitch_m.is_some()) {
+        return Err(Error::usage(format!(
+            "--grid and --pitch are for plain matrices; {} says itself where its sensors are",
+            format.title()
+        )));
+    }
+    Ok(match format {
+        VendorFormat::Xsensor => Box::new(Xsensor::new(separator, rate, unit)),
+        VendorFormat::Tekscan => Box::new(Tekscan::new(separator, rate, unit)),
+        VendorFormat::Emed => Box::new(Emed::new(rate, unit)),
+        VendorFormat::Pedar => Box::new(NovelAsc::new(rate, unit, None)),
+        VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, places(path)?)),
+        VendorFormat::Matrix => {
+            let [rows, columns] = grid.ok_or_else(|| {
+                Error::usage("a plain matrix does not say how many rows and columns a frame has; give them with --grid, such as --grid 31x11")
+            })?;
+            // The pitch of rows is their height.
+            let pitch_m = pitch_m.map(|[rows, columns]| [columns, rows]);
+            let grid = Grid { rows, columns, pitch_m, area_m2: None };
+            Box::new(Matrix::new(separator, grid, rate, unit.unwrap_or_default())?)
+        }
+    })
+}
+
+/// Reads the file at `path` for the places of its sensors, which stand at its end.
+fn places(path: &Path) -> Result<Option<Places>> {
+    if !path.is_file() {
+        return Err(Error::failed(
+            "pliance's places of sensors stand after the pressures, so that the file is read twice, which a pipe cannot be: \
+             save it first",
+        ));
+    }
+    let (mut lines, mut places) = (Lines::open(path)?, Places::default());
+    while let Some(line) = lines.next()? {
+        if let Err(error) = places.line(line) {
+            return Err(error.at(format!("line {}", lines.number())));
+        }
+    }
+    Ok(places.found())
+}
+
+impl Source for VendorSource {
+    fn taxels(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        let mut scratch = std::mem::replace(&mut self.scratch, Frame::missing(0.0, 0));
+        let read = match self.first.take() {
+            Some(first) => {
+                scratch = first;
+                Ok(true)
+            }
+            None => self.read(&mut scratch),
+        };
+        if let Ok(true) = read {
+            frame.clear();
+            frame.t_s = scratch.t_s;
+            if self.order.is_empty() {
+                frame.values.clone_from(&scratch.values);
+            } else {
+                frame.values.resize(self.order.len(), RawValue::MISSING);
+                for (slot, &place) in frame.values.iter_mut().zip(&self.order) {
+                    *slot = scratch.values[place];
+                }
+            }
+        }
+        self.scratch = scratch;
+        read.map_err(|e| e.at(&self.name))
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.lines.progress()
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.losses.iter().map(|loss| format!("{}: {loss}", self.name)).collect()
+    }
+}

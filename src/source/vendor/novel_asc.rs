@@ -1,0 +1,143 @@
+//! novel's `.asc`: pedar's insoles and pliance's mats and gloves. A header, the numbers of the sensors, and a row for each
+//! frame: its time, then the pressures.
+//!
+//! Of pliance the places of the sensors stand after the rows ([`Places`]), so that such a file is read twice; of pedar they stand
+//! nowhere.
+
+use super::layout::{Cell, Layout, MAX_CELLS, Panel, value};
+use super::novel_places::Places;
+use super::parser::{Parser, Rate};
+use super::text::{Separator, decoded};
+use crate::error::{Error, Result, failed};
+use crate::signal::{Frame, RawValue, UnitOfP};
+
+/// Reads frames from lines.
+pub(super) struct NovelAsc {
+    rate: Rate,
+    unit: Option<UnitOfP>,
+    /// What the first pass found.
+    places: Option<Places>,
+    /// The sides that the header names.
+    sides: [bool; 2],
+    /// The sensors' numbers as the table is headed.
+    sensors: Vec<u32>,
+    place: Place,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Header,
+    Table,
+    After,
+}
+
+impl NovelAsc {
+    pub(super) fn new(rate: Rate, unit: Option<UnitOfP>, places: Option<Places>) -> Self {
+        Self { rate, unit, places, sides: [false; 2], sensors: Vec::new(), place: Place::Header }
+    }
+
+    fn header(&mut self, line: &[u8]) -> Result<()> {
+        let text = decoded(line);
+        let text = text.trim();
+        if let Some((_, unit)) = text.split_once("pressure values in").filter(|_| self.unit.is_none()) {
+            self.unit = Some(unit.parse()?);
+        }
+        for (side, name) in self.sides.iter_mut().zip(["left insole:", "right insole:"]) {
+            *side |= text.strip_prefix(name).is_some_and(|sensors| sensors.contains(|c: char| c.is_ascii_digit()));
+        }
+        if text.starts_with("time[") {
+            let words = Separator::Blanks.cells(line).skip(1);
+            let sensors: Option<Vec<u32>> = words.map(|word| word.whole()).collect();
+            self.sensors = sensors.filter(|sensors| !sensors.is_empty()).ok_or_else(|| {
+                Error::failed("the table's header is not `time[secs]` and the numbers of the sensors")
+            })?;
+            if self.sensors.len() as u64 > MAX_CELLS || self.sensors.iter().any(|&number| u64::from(number) > MAX_CELLS)
+            {
+                return Err(failed!("a sensor has a number over {MAX_CELLS}"));
+            }
+            if let Some(places) = &self.places {
+                places.check(&self.sensors)?;
+            }
+            self.place = Place::Table;
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
+        let mut words = Separator::Blanks.cells(line);
+        let Some(time) = words.next() else { return Ok(false) };
+        if ["MPP", "MVP"].iter().any(|name| time.is(name)) {
+            // The largest and the mean of each sensor.
+            return Ok(false);
+        }
+        let begins = |start: &str| time.text().starts_with(start);
+        if begins("time[") || begins("sensor") || begins("corner") {
+            self.place = Place::After;
+            return Ok(false);
+        }
+        let t_s = time.number().ok_or_else(|| failed!("`{time}` is not a time in seconds"))?;
+        to.clear();
+        to.values.resize(self.sensors.len(), RawValue::MISSING);
+        let count = self.sensors.len();
+        for (index, slot) in to.values.iter_mut().enumerate() {
+            let word = words.next().ok_or_else(|| failed!("it has {index} of {count} pressures"))?;
+            *slot = value(word).map_err(|e| e.at(format!("sensor {}", self.sensors[index])))?;
+        }
+        if let Some(more) = words.next() {
+            return Err(failed!("`{more}` stands after the last of {count} pressures"));
+        }
+        to.t_s = self.rate.time_of(Some(t_s), None)?;
+        Ok(true)
+    }
+
+    /// Where each panel's sensors end: their numbers begin anew.
+    fn ends(&self) -> Vec<usize> {
+        let anew = (1..self.sensors.len()).filter(|&index| self.sensors[index] <= self.sensors[index - 1]);
+        anew.chain([self.sensors.len()]).collect()
+    }
+
+    fn names(&self, panels: usize) -> Vec<String> {
+        match (panels, self.sides) {
+            (1, [true, false]) => vec!["left".to_owned()],
+            (1, [false, true]) => vec!["right".to_owned()],
+            (1, _) => vec!["sensor".to_owned()],
+            (2, _) => vec!["left".to_owned(), "right".to_owned()],
+            _ => (1..=panels).map(|number| format!("panel_{number}")).collect(),
+        }
+    }
+}
+
+impl Parser for NovelAsc {
+    fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
+        match self.place {
+            Place::Header => self.header(line).map(|()| false),
+            Place::Table => self.row(line, to),
+            Place::After => Ok(false),
+        }
+    }
+
+    fn end(&mut self, _: &mut Frame) -> Result<bool> {
+        Ok(false)
+    }
+
+    fn layout(&self) -> Layout {
+        let (mut panels, mut start, mut shift) = (Vec::new(), 0, 0_u32);
+        let ends = self.ends();
+        for (name, &end) in self.names(ends.len()).into_iter().zip(&ends) {
+            let numbers = &self.sensors[start..end];
+            let cell = |(index, &number): (usize, &u32)| {
+                let placed = self.places.as_ref().map(|places| places.cell(start + index));
+                Cell { id: shift.saturating_add(number), ..placed.unwrap_or_default() }
+            };
+            let cells: Vec<Cell> = numbers.iter().enumerate().map(cell).collect();
+            shift = shift.saturating_add(numbers.iter().copied().max().unwrap_or(0));
+            panels.push(Panel { name, cells, is_placed: self.places.is_some(), ..Panel::default() });
+            start = end;
+        }
+        let mut layout = Layout { panels, unit: self.unit.unwrap_or(UnitOfP::KILOPASCAL) };
+        if layout.panels.len() > 1 && layout.is_placed() {
+            layout.side_by_side();
+        }
+        layout
+    }
+}

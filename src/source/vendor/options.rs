@@ -1,0 +1,89 @@
+//! What is said of a recording beside what its file says.
+
+use super::format::VendorFormat;
+use crate::error::{Error, Result};
+use crate::length::Length;
+use crate::signal::UnitOfP;
+
+/// What is said of a recording beside what its file says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VendorOptions {
+    /// Its format, if its content is not to tell.
+    pub format: Option<VendorFormat>,
+    /// Frames per second, where the file has no times.
+    pub rate_hz: Option<f64>,
+    /// Rows and columns of plain matrices.
+    pub grid: Option<[u32; 2]>,
+    /// From one row to the next and from one column to the next, m.
+    pub pitch_m: Option<[f64; 2]>,
+    /// The unit of the values, where the file does not say it.
+    pub unit: Option<UnitOfP>,
+}
+
+impl VendorOptions {
+    /// Rows and columns as people write them: `31x11`.
+    ///
+    /// # Errors
+    /// A usage error.
+    pub fn grid_of(text: &str) -> Result<[u32; 2]> {
+        let counts: Option<Vec<u32>> = text.split(['x', 'X', '×']).map(|word| word.trim().parse().ok()).collect();
+        match counts.as_deref() {
+            Some(&[rows, columns]) if rows > 0 && columns > 0 => Ok([rows, columns]),
+            _ => Err(Error::usage(format!("--grid {text} is not rows and columns; write them as 31x11"))),
+        }
+    }
+
+    /// The pitch of rows and columns as people write it: `8.6mm`, or `8.6mm,5mm`.
+    ///
+    /// # Errors
+    /// A usage error.
+    pub fn pitch_of(text: &str) -> Result<[f64; 2]> {
+        let metres = |word: &str| {
+            let length = Length::parse(word.trim()).ok()??;
+            Some(length.number * length.unit_m?).filter(|pitch| pitch.is_finite() && *pitch > 0.0)
+        };
+        let lengths: Option<Vec<f64>> = text.split(',').map(metres).collect();
+        match lengths.as_deref() {
+            Some(&[pitch]) => Ok([pitch; 2]),
+            Some(&[rows, columns]) => Ok([rows, columns]),
+            _ => {
+                Err(Error::usage(format!("--pitch {text} is no length; write it with its unit, as 8.6mm or 8.6mm,5mm")))
+            }
+        }
+    }
+
+    /// Refuses what is only for exports.
+    pub(in crate::source) fn check_unused(&self) -> Result<()> {
+        let given = [
+            ("--format", self.format.is_some()),
+            ("--grid", self.grid.is_some()),
+            ("--pitch", self.pitch_m.is_some()),
+            ("--unit", self.unit.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((flag, _)) => {
+                Err(Error::usage(format!("{flag} is for recordings that pressure systems export; leave it out here")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grids_and_pitches_are_as_people_write_them() {
+        assert_eq!(VendorOptions::grid_of("31x11").unwrap(), [31, 11]);
+        assert_eq!(VendorOptions::grid_of("31 × 11").unwrap(), [31, 11]);
+        assert_eq!(VendorOptions::pitch_of("8.6mm").unwrap(), [0.0086, 0.0086]);
+        assert_eq!(VendorOptions::pitch_of("1 cm, 5mm").unwrap(), [0.01, 0.005]);
+        for wrong in ["31", "31x", "0x3", "axb", "1x2x3"] {
+            assert!(VendorOptions::grid_of(wrong).unwrap_err().is_usage(), "{wrong}");
+        }
+        for wrong in ["", "8.6", "-1mm", "0mm", "1mm,2mm,3mm", "mm"] {
+            assert!(VendorOptions::pitch_of(wrong).unwrap_err().is_usage(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! What every format's reader is: lines in, frames out, without input or output.
+
+use super::layout::Layout;
+use crate::error::{Error, Result, failed};
+use crate::signal::Frame;
+
+/// Reads frames from lines. An error has no line number; whoever reads the lines adds it.
+pub(super) trait Parser: Send {
+    /// Takes the next line. `true` if it completes a frame, which is in `to` then.
+    ///
+    /// # Errors
+    /// The line is not what it should be.
+    fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool>;
+
+    /// Takes the end. `true` if it completes a frame, which is in `to` then.
+    ///
+    /// # Errors
+    /// The last frame is incomplete.
+    fn end(&mut self, to: &mut Frame) -> Result<bool>;
+
+    /// The sensors, known from the first frame on.
+    fn layout(&self) -> Layout;
+}
+
+/// Where frames without times get theirs: a rate that is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Rate {
+    hz: Option<f64>,
+    first: Option<u32>,
+    frames: u64,
+}
+
+impl Rate {
+    pub(super) fn new(hz: Option<f64>) -> Result<Self> {
+        match hz {
+            Some(hz) if !(hz.is_finite() && hz > 0.0) => {
+                Err(Error::usage(format!("--rate {hz} is not a frame rate; give a positive number of Hz")))
+            }
+            _ => Ok(Self { hz, first: None, frames: 0 }),
+        }
+    }
+
+    /// The time of the next frame, which the recording says is at `t_s`, or says to have the number `number`.
+    pub(super) fn time_of(&mut self, t_s: Option<f64>, number: Option<u32>) -> Result<f64> {
+        let index = match number {
+            Some(number) => f64::from(number) - f64::from(*self.first.get_or_insert(number)),
+            None => self.frames as f64,
+        };
+        self.frames += 1;
+        match (t_s, self.hz) {
+            (Some(_), Some(_)) => Err(Error::usage("the recording has its own times; leave out --rate")),
+            (Some(t_s), None) if t_s.is_finite() => Ok(t_s),
+            (Some(t_s), None) => Err(failed!("a frame is at {t_s} s; times are finite")),
+            (None, Some(hz)) => Ok(index / hz),
+            (None, None) => Err(Error::usage("the recording has no times; give its frame rate with --rate HZ")),
+        }
+    }
+}
