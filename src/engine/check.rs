@@ -76,7 +76,7 @@ impl Check {
 
     /// Ends a call, whose bounds begin at `first`.
     pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) {
-        post.finish(raw, &self.right, &mut self.post);
+        post.finish(raw, &mut self.right, &mut self.post);
         if let Some(cadence) = post.cadence {
             cadence.bounds(&mut self.bounds[first..], raw.steps, &mut self.last_bounds);
         }

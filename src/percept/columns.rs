@@ -7,7 +7,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 use serde::Serialize;
 
-use super::Flags;
+use super::{ContactKind, Flags};
 
 /// An output as data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,8 @@ pub enum Unit {
     Radian,
     /// m/s.
     MetrePerSecond,
+    /// None: a [`ContactKind`], which data files name.
+    Kind,
 }
 
 impl Unit {
@@ -56,7 +58,7 @@ impl Unit {
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::P => "P",
-            Self::One => "1",
+            Self::One | Self::Kind => "1",
             Self::Metre => "m",
             Self::SquareMetre => "m²",
             Self::Radian => "rad",
@@ -114,6 +116,16 @@ impl Quantity for u32 {
 
     fn components(self) -> [f64; 3] {
         [self.into(), 0.0, 0.0]
+    }
+}
+
+impl Quantity for ContactKind {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        Self::ALL[(value as usize).min(Self::ALL.len() - 1)]
+    }
+
+    fn components(self) -> [f64; 3] {
+        [f64::from(self as u8), 0.0, 0.0]
     }
 }
 
@@ -302,14 +314,37 @@ columns! {
     FILTERED_DIRECTION 18 filtered_direction: f64, Radian, Direction, filter, parts [] host [FilteredDirection];
     #[doc = "The length of such a step over the time that it took, m/s."]
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
+    #[doc = "What kind of contact presses: point, line, segment or blob; only on request, as is all of the footprint."]
+    FOOTPRINT_KIND 20 footprint_kind: ContactKind, Kind, Number, footprint, parts [] host [FootprintKind];
+    #[doc = "Where it presses, (u, v) in the field's chart, m; of a line its point nearest to the touch's mean."]
+    FOOTPRINT_PLACE 21 footprint_place: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlace];
+    #[doc = "The standard deviation of that, m; of a line only what it is off across."]
+    FOOTPRINT_PLACE_SIGMA 22 footprint_place_sigma: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlaceSigma];
+    #[doc = "How hard it presses in all, taxels or not, in the unit of P; absent where it goes on beyond the sensors."]
+    FOOTPRINT_FORCE 23 footprint_force: f64, P, Number, footprint, parts [] host [FootprintForce];
+    #[doc = "The standard deviation of that, in the unit of P."]
+    FOOTPRINT_FORCE_SIGMA 24 footprint_force_sigma: f64, P, Number, footprint, parts [] host [FootprintForceSigma];
+    #[doc = "Its direction along, rad in [0, π); absent for a point."]
+    FOOTPRINT_ANGLE 25 footprint_angle: f64, Radian, Line, footprint, parts [] host [FootprintAngle];
+    #[doc = "The standard deviation of that, rad."]
+    FOOTPRINT_ANGLE_SIGMA 26 footprint_angle_sigma: f64, Radian, Number, footprint, parts [] host [FootprintAngleSigma];
+    #[doc = "The standard deviation of its pressure across, at the sensors, m."]
+    FOOTPRINT_WIDTH 27 footprint_width: f64, Metre, Number, footprint, parts [] host [FootprintWidth];
+    #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
+    FOOTPRINT_LENGTH 28 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`] and [`Outputs::FILTERED`].
-    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED);
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
+    /// [`Outputs::FOOTPRINT`].
+    pub const USUAL: Self =
+        Self::all().difference(Self::TOUCHES).difference(Self::FILTERED).difference(Self::FOOTPRINT);
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");
+
+    /// What presses, fitted under the skin's own response.
+    pub const FOOTPRINT: Self = Self::of_stage("footprint");
 
     /// What the stage *motion* gives.
     pub const MOTION: Self = Self::of_stage("motion");

@@ -49,6 +49,17 @@ bitflags! {
         /// A taxel has been touched for long while too few others were untouched to tell its drift: its baseline is that of
         /// the onset.
         const DRIFT_UNKNOWN = 1 << 18;
+        /// Too few taxels are pressed to tell what presses: no more than a contact has parameters.
+        const FEW_TAXELS = 1 << 19;
+        /// What presses goes on beyond the sensors: its force and length are not known, or even its place.
+        const OFF_FIELD = 1 << 20;
+        /// No kind of contact explains what the taxels feel.
+        const POOR_FIT = 1 << 21;
+        /// The field's chart is too far from flat to fit a contact in it.
+        const CURVED = 1 << 22;
+        /// What the skin makes of a contact is not known: the calibration has no `[skin]`, a taxel has no area, or the letter
+        /// is no pressure.
+        const NO_SKIN = 1 << 23;
     }
 }
 

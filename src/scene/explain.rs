@@ -111,6 +111,7 @@ impl Plan {
             ("position", stages.position, found, ""),
             ("touches", stages.touches, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
+            ("footprint", stages.footprint, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
@@ -124,7 +125,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "filter"].contains(&name),
+                on_host: ["position", "touches", "filter", "footprint"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },
@@ -145,6 +146,7 @@ impl Plan {
             "hysteresis" => "the calibration has thresholds",
             "centroid" => "later stages need it",
             "position" => "touches need it",
+            "touches" => "a footprint is one touch's",
             _ => "others need it",
         }
     }

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
+use super::skin::SkinKeys;
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
 use crate::error::{Error, Result, failed};
@@ -31,6 +32,7 @@ struct File {
     checks: Checks,
     #[serde(default)]
     upkeep: UpkeepKeys,
+    skin: Option<SkinKeys>,
 }
 
 impl Calibration {
@@ -78,8 +80,9 @@ impl Calibration {
         file.upkeep.check()?;
         let (contact, fields) = file.contact.read(text)?;
         let change = file.change.read(text)?;
+        let skin = file.skin.map(|keys| keys.read(text)).transpose()?;
         let File { body, checks, upkeep, .. } = file;
-        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
+        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep, skin })
     }
 }
 
@@ -132,6 +135,9 @@ mod tests {
         assert_eq!(why("[change]\ndead_band = -1"), "line 2: `dead_band` is -1; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = nan"), "line 2: `on` is NaN; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert_eq!(why("[skin]\nsigma_m = 0"), "line 2: `sigma_m` is 0; it must be over 0, and at most 1");
+        assert!(why("[skin]\nsigma_m = 0.004\ngain_spread = 1.5").contains("line 3: `gain_spread` is 1.5"));
+        assert!(why("[skin]\ngain_spread = 0.1").contains("sigma_m"));
         assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
         assert!(why("[change]\nfield = 3").starts_with("line 2"));
     }

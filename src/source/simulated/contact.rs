@@ -61,6 +61,11 @@ impl Skin {
         self.spread * self.thickness_m
     }
 
+    /// The calibration's table of the layer; empty where taxels lie bare.
+    pub(super) fn calibration(&self) -> String {
+        if self.thickness_m > 0.0 { format!("\n[skin]\nsigma_m = {}\n", self.sigma_m()) } else { String::new() }
+    }
+
     /// Compliance 1/E* with an indenter whose own is `other`; a bare taxel does not give.
     fn compliance(&self, other: f64) -> f64 {
         if self.thickness_m > 0.0 { 1.0 / self.stiffness_pa + other } else { other }

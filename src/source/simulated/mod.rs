@@ -195,11 +195,12 @@ impl SimulatedSource {
     }
 
     /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
-    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked.
+    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked. It knows the layer.
     #[must_use]
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
-        self.sensor.calibration(&body.to_string_lossy(), &self.ids)
+        let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids);
+        text + &self.skin.calibration()
     }
 
     /// Goes back to the first frame, with the noise of another seed.
