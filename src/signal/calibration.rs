@@ -32,6 +32,8 @@ pub struct TaxelCalibration {
     pub p_max: f64,
     /// The range of raw values, in single precision as these are; others are kept but flagged `out_of_range`.
     pub raw_range: [f32; 2],
+    /// Standard deviation of a raw value, quantisation included, raw units; `None` where it is not known.
+    pub noise: Option<f64>,
     /// Ignore this taxel.
     pub mask: bool,
     /// The conversion from raw value to pressure.
@@ -46,6 +48,7 @@ impl Default for TaxelCalibration {
             dead_band: 0.0,
             p_max: f32::MAX.into(),
             raw_range: [-f32::MAX, f32::MAX],
+            noise: None,
             mask: false,
             response: Response::Linear,
         }
