@@ -108,12 +108,14 @@ mod tests {
 
     #[test]
     fn a_taxel_overrides_what_holds_for_all() {
-        let text =
-            "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\n[taxel.7]\nbaseline = 200\nmask = true\n";
+        let text = "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\nnoise = 1.5\n[taxel.7]\nbaseline = 200\nmask = true\n\
+             noise = 0\n";
         let calibration = Calibration::parse(text, &[3, 7]).unwrap();
         assert_eq!(calibration.taxels[0].gain, -2.0);
         assert_eq!(calibration.taxels[0].baseline, 240.0);
         assert_eq!(calibration.taxels[1].baseline, 200.0);
+        assert_eq!([0, 1].map(|taxel| calibration.taxels[taxel].noise), [Some(1.5), Some(0.0)]);
+        assert_eq!(Calibration::parse("", &[3]).unwrap().taxels[0].noise, None);
         assert!(calibration.taxels[1].mask && !calibration.taxels[0].mask);
     }
 
@@ -128,6 +130,7 @@ mod tests {
         assert!(why("[taxel.5]\ngain = 1").contains("[taxel.5] names a taxel"));
         assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
         assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
+        assert_eq!(why("[all]\nnoise = -1"), "line 2: `noise` is -1; it must be 0 or more raw units");
         assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
         assert!(why("all = 3").contains("line 1"));
         assert_eq!(why("[contact]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");

@@ -5,7 +5,9 @@
 mod calibration;
 mod contact;
 mod file;
+mod layer;
 mod noise;
+mod patch;
 mod path;
 mod profile;
 mod record;
@@ -135,7 +137,7 @@ impl SimulatedSource {
         let fields = FieldSet::new(&body)?;
         let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
         let skin = setup.skin(file.skin.as_ref())?;
-        let sensor = sensors::sensors(text, &file.sensor, file.seed, &ids)?;
+        let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let mut touches = Vec::with_capacity(file.touch.len());
         for (index, keys) in file.touch.iter().enumerate() {
             let touch = setup.touch(index, keys.get_ref())?;
@@ -201,6 +203,13 @@ impl SimulatedSource {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
         let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids);
         text + &self.skin.calibration()
+    }
+
+    /// By how much the gain of each taxel differs from what the calibration says, in the order of [`Source::taxels`]: the
+    /// factors on their forces.
+    #[must_use]
+    pub fn gains(&self) -> &[f64] {
+        &self.sensor.gains
     }
 
     /// Goes back to the first frame, with the noise of another seed.
