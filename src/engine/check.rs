@@ -244,7 +244,9 @@ mod tests {
                 let of = agreement.quantities[name];
                 assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
             };
-            for column in COLUMNS.iter().filter(|column| column.store != Store::Active) {
+            // A footprint has no bound: tests/it/footprint.rs holds it to its bits.
+            let has_bound = |column: &&Column| column.store != Store::Active && column.stage != "footprint";
+            for column in COLUMNS.iter().filter(has_bound) {
                 for component in 0..column.components {
                     let limit = |bound: &CellBound| match (column.measure, bound.centroid) {
                         (Measure::Place, Limit::Within(bounds)) => Limit::Within(bounds[component]),

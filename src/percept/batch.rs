@@ -260,8 +260,11 @@ impl Percepts {
         &self.touches[start as usize..end as usize]
     }
 
-    /// Adds the touches of the next cell; cells are filled in their order.
+    /// Adds the touches of the next cell, if they are asked for; cells are filled in their order.
     pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = Touch>) {
+        if !self.outputs.contains(Outputs::TOUCHES) {
+            return;
+        }
         self.touches.extend(touches);
         self.touch_ends.push(self.touches.len() as u32);
     }
