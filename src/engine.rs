@@ -3,6 +3,7 @@
 mod advance;
 mod cadence;
 mod check;
+mod fit;
 mod ids;
 mod place;
 mod post;

@@ -29,14 +29,17 @@ pub(crate) use index_by_component;
 mod batch;
 mod cells;
 mod columns;
+mod contact_kind;
 mod flags;
 mod keep;
+mod presence;
 
 pub use batch::Percepts;
 pub(crate) use batch::{Components, Values};
 pub(crate) use cells::{CellsMut, PlaceCells};
 pub use columns::{COLUMNS, Column, Measure, Outputs, Percept, Unit};
 pub(crate) use columns::{Component, Host, Store};
+pub use contact_kind::ContactKind;
 pub use flags::Flags;
 
 /// The arithmetic that made the numbers, and so the digits worth printing.

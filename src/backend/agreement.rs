@@ -420,7 +420,7 @@ mod tests {
     fn percepts(change: impl Fn(&mut Percepts, &mut Components<f64>)) -> Percepts {
         let mut percepts = Percepts::new(Outputs::all(), 1, Precision::F64);
         percepts.reset(1);
-        percepts.present[0] = Outputs::all();
+        percepts.set_present(0, Outputs::all());
         percepts.active[0] = 3;
         let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
         (columns[Component::Total][0], columns[Component::Peak][0], columns[Component::Area][0]) = (10.0, 5.0, 1.0);
@@ -471,9 +471,9 @@ mod tests {
         let changes: [(&str, Change); 6] = [
             ("area", |_, c| c[Component::Area][0] = f64::NAN),
             ("speed", |_, c| c[Component::Speed][0] = f64::INFINITY),
-            ("filtered_speed", |p, _| p.present[0] -= Outputs::FILTERED_SPEED),
-            ("direction", |p, _| p.present[0] -= Outputs::DIRECTION),
-            ("axis", |p, _| p.present[0] -= Outputs::AXIS),
+            ("filtered_speed", |p, _| p.remove_present(0, Outputs::FILTERED_SPEED)),
+            ("direction", |p, _| p.remove_present(0, Outputs::DIRECTION)),
+            ("axis", |p, _| p.remove_present(0, Outputs::AXIS)),
             ("flags", |p, _| p.flags[0] |= Flags::TIE),
         ];
         for (name, change) in changes {
@@ -514,7 +514,13 @@ mod tests {
         for limit in [Limit::Within(0.01), Limit::TooClose, Limit::Unread] {
             // One side has it, the other, both, neither.
             for (right, got) in [(true, true), (true, false), (false, true), (false, false)] {
-                let with = |has: bool| percepts(|p, _| p.present[0].set(Outputs::SPEED, has));
+                let with = |has: bool| {
+                    percepts(|p, _| {
+                        if !has {
+                            p.remove_present(0, Outputs::SPEED);
+                        }
+                    })
+                };
                 let mut bound = bound();
                 bound.set([(Outputs::SPEED, limit)]);
                 let agreement = compare(&with(right), &[bound], &with(got), &NAMES);

@@ -116,7 +116,7 @@ impl Reference {
             self.before[index] = self.cell(index, &pressures, step, &mut made);
             let Cell { active, flags, present: has, .. } = made;
             percepts.flags[cell] = flags;
-            percepts.present[cell] = has & self.plan.outputs;
+            percepts.set_present(cell, has & self.plan.outputs);
             if let Some(to) = percepts.active.get_mut(cell) {
                 *to = active;
             }

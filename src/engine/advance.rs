@@ -100,7 +100,7 @@ impl Engine {
                 check.frame(&post, (offset, frame), &raw, &left, &self.post);
             }
         }
-        post.finish(&raw, &self.percepts, &mut self.post);
+        post.finish(&raw, &mut self.percepts, &mut self.post);
         if let Some(check) = &mut check {
             check.finish(&post, &raw, first_bound);
         }

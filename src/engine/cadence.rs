@@ -125,9 +125,9 @@ fn times(step: &Step, since: &Step) -> Option<f64> {
 
 /// Makes a cell's rates those over the time `since` its field's last change, where they are over `step`.
 pub(super) fn rates(percepts: &mut Percepts, cell: usize, step: &Step, since: &Step) {
-    let moved = percepts.present[cell].intersects(Outputs::MOTION);
+    let moved = percepts.present(cell).intersects(Outputs::MOTION);
     if moved && step.flags.is_empty() && !since.flags.is_empty() {
-        percepts.present[cell] -= Outputs::MOTION;
+        percepts.remove_present(cell, Outputs::MOTION);
         percepts.flags[cell] = (percepts.flags[cell] - Flags::STILL) | since.flags;
     } else if let Some(times) = times(step, since).filter(|_| moved) {
         percepts.scale_speeds(cell, times);

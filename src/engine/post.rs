@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
+use super::fit;
 use super::place::{self, Links};
 use crate::backend::{RawBatch, Step};
 use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
@@ -17,6 +18,8 @@ pub(super) struct PostState {
     pub(super) fields: Vec<PostFieldState>,
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
+    /// Touches of the frames at hand that are still to be fitted.
+    pub(super) waiting: Vec<fit::Waiting>,
 }
 
 /// The same of one field.
@@ -32,7 +35,7 @@ pub(super) struct PostFieldState {
 impl PostState {
     /// The state before the first frame.
     pub(super) fn initial(fields: usize) -> Self {
-        Self { fields: vec![PostFieldState::default(); fields], last: None }
+        Self { fields: vec![PostFieldState::default(); fields], last: None, waiting: Vec::new() }
     }
 }
 
@@ -108,16 +111,29 @@ impl Post<'_> {
             before.contact = contact;
             if stages.touches {
                 let world = self.links.world_from_anchor(field, frame);
-                self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
+                let found = self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
+                match &field.layer {
+                    _ if !stages.footprint || found.is_empty() => {}
+                    Ok(layer) => {
+                        let touch = fit::strongest(self.plan, (field, layer), (raw, offset), found);
+                        state.waiting.extend(touch.map(|touch| (cell, touch)));
+                    }
+                    Err(reason) => percepts.flags[cell] |= *reason,
+                }
             }
             if stages.filter && field.charted {
                 self.filter(field, step, cell, percepts, &mut before.filter);
             }
         }
+        if self.cadence.is_some() {
+            // The next frame may keep this one's.
+            fit::all(self.plan, &mut state.waiting, percepts);
+        }
     }
 
-    /// Keeps the last percepts of a call, where the next call may need them.
-    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &Percepts, state: &mut PostState) {
+    /// Completes the frames of `raw`, and keeps the last percepts of a call, where the next call may need them.
+    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &mut Percepts, state: &mut PostState) {
+        fit::all(self.plan, &mut state.waiting, percepts);
         if self.cadence.is_some() && raw.frames > 0 {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);
@@ -152,7 +168,7 @@ impl Post<'_> {
         let touched = motion::Centroid { place: centroid(percepts, cell).truncate(), pressed: percepts.active[cell] };
         let found = memory.follow(&field.filter, clock, touched);
         percepts.flags[cell] |= found.flags;
-        percepts.present[cell] |= found.present & self.plan.outputs;
+        percepts.add_present(cell, found.present & self.plan.outputs);
         for (host, components) in found.outputs() {
             percepts.set_host(host, cell, &components[..host.column().components]);
         }
@@ -170,7 +186,7 @@ impl Post<'_> {
         let quantity = if is_change { Quantity::Count } else { field.quantity };
         match force::reference(quantity, self.plan.members_of(field).iter().map(of)) {
             Some(newtons) => {
-                percepts.present[cell] |= Outputs::FORCE;
+                percepts.add_present(cell, Outputs::FORCE);
                 percepts.set_host(Host::Force, cell, &[newtons]);
             }
             None => percepts.flags[cell] |= Flags::NO_UNIT,
@@ -178,19 +194,19 @@ impl Post<'_> {
     }
 
     /// Finds a cell's separate touches.
-    fn touches(
+    fn touches<'m>(
         &self,
         field: &PlanField,
         world: Option<&DAffine3>,
         frame: usize,
         cell: usize,
         percepts: &mut Percepts,
-        memory: &mut touches::Memory,
-    ) {
+        memory: &'m mut touches::Memory,
+    ) -> &'m [touches::Found] {
         if percepts.flags[cell].contains(Flags::NO_CONTACT) {
             memory.release();
             percepts.push_touches([]);
-            return;
+            return &[];
         }
         let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
         let members = self.plan.members_of(field);
@@ -217,10 +233,11 @@ impl Post<'_> {
                 position: on_skin(place).to_array(),
             }
         }));
-        percepts.present[cell] |= Outputs::TOUCHES;
+        percepts.add_present(cell, Outputs::TOUCHES & self.plan.outputs);
         if several {
             percepts.flags[cell] |= Flags::SEVERAL;
         }
+        found
     }
 }
 

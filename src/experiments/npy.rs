@@ -24,7 +24,7 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(u32: "<u4", f32: "<f4", f64: "<f8");
+numbers!(u32: "<u4", u64: "<u8", f32: "<f4", f64: "<f8");
 
 /// Writes `numbers`, the product of `shape`, last index fastest, as an array to `output`, atomically.
 pub(super) fn write<N: Number>(output: OutputPath, shape: &[usize], numbers: impl Iterator<Item = N>) -> Result<()> {

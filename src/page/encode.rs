@@ -5,6 +5,8 @@ use super::series::Trail;
 
 /// Bit of a percept's present columns: its position, normal and touches are in the world.
 pub(super) const IN_WORLD: u32 = 1 << 31;
+/// Columns that have a bit beside it: a page shows the first of these.
+pub(super) const MAX_COLUMNS: usize = 31;
 
 /// Bits of a frame's sections.
 pub(super) mod section {

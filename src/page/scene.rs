@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::encode::{Writer, no_link};
+use super::encode::{MAX_COLUMNS, Writer, no_link};
 use super::mesh::{Mesh, disc_radii_m};
 use super::message::{Counts, VERSION};
 use super::poses::Poses;
@@ -78,7 +78,7 @@ impl PageScene {
         let poses = Poses::new(body, origin);
         let value_of_id: HashMap<u32, usize> = info.taxels.iter().enumerate().map(|(at, &id)| (id, at)).collect();
         let of_channel = |&taxel: &usize| value_of_id.get(&body.taxels[taxel].id).copied();
-        let columns: Vec<&'static Column> = plan.outputs().columns().collect();
+        let columns: Vec<&'static Column> = plan.outputs().columns().take(MAX_COLUMNS).collect();
         let time = match info.mode {
             Mode::Live => Value::Null,
             Mode::Recording { start_s, end_s, frames } => {

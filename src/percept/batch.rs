@@ -58,7 +58,9 @@ pub struct Percepts {
     pub(crate) t_s: Vec<f64>,
     pub(crate) in_world: Vec<bool>,
     pub(crate) flags: Vec<Flags>,
-    pub(crate) present: Vec<Outputs>,
+    /// By cell, the low bits of the outputs that it holds; and the others, where any is asked for.
+    pub(crate) present: Vec<u32>,
+    pub(super) present_high: Vec<u32>,
     pub(crate) active: Vec<u32>,
     pub(crate) values: Values,
     /// By [`Host`], each cell's components side by side.
@@ -86,6 +88,7 @@ impl Percepts {
             in_world: Vec::new(),
             flags: Vec::new(),
             present: Vec::new(),
+            present_high: Vec::new(),
             active: Vec::new(),
             values: match precision {
                 Precision::F32 => Values::F32(Components::default()),
@@ -127,7 +130,7 @@ impl Percepts {
         refill(&mut self.t_s, frames, 0.0);
         self.in_world.resize(cells, false);
         self.flags.resize(cells, Flags::empty());
-        self.present.resize(cells, Outputs::empty());
+        self.reset_presence(cells);
         self.active.resize(if self.columns.contains(Outputs::ACTIVE) { cells } else { 0 }, 0);
         for (host, column) in Host::ALL.iter().zip(&mut self.host) {
             let of = host.column();
@@ -202,7 +205,7 @@ impl Percepts {
     pub fn get(&self, frame: usize, field: usize) -> Percept {
         let cell = frame * self.fields + field;
         Percept::with((field, field % self.letters), self.flags[cell], self.in_world[cell], |column| {
-            self.present[cell].contains(column.output).then(|| self.components(column, cell))
+            self.present(cell).contains(column.output).then(|| self.components(column, cell))
         })
     }
 
@@ -210,7 +213,7 @@ impl Percepts {
     #[must_use]
     pub fn value(&self, frame: usize, field: usize, column: &Column) -> Option<[f64; 3]> {
         let cell = frame * self.fields + field;
-        self.present[cell].contains(column.output).then(|| self.components(column, cell))
+        self.present(cell).contains(column.output).then(|| self.components(column, cell))
     }
 
     /// The components of `column` in a cell, then zeros.
@@ -260,8 +263,11 @@ impl Percepts {
         &self.touches[start as usize..end as usize]
     }
 
-    /// Adds the touches of the next cell; cells are filled in their order.
+    /// Adds the touches of the next cell, if they are asked for; cells are filled in their order.
     pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = Touch>) {
+        if !self.outputs.contains(Outputs::TOUCHES) {
+            return;
+        }
         self.touches.extend(touches);
         self.touch_ends.push(self.touches.len() as u32);
     }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::batch::Values;
 use super::columns::{Component, Host};
-use super::{Flags, Outputs, Percepts};
+use super::{Flags, Percepts};
 
 /// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
 pub(crate) struct CellsMut<'a> {
@@ -15,7 +15,7 @@ pub(crate) struct CellsMut<'a> {
     /// Per frame and taxel, not per cell.
     pub(crate) pressures: &'a mut [f64],
     pub(crate) flags: &'a mut [Flags],
-    pub(crate) present: &'a mut [Outputs],
+    pub(crate) present: &'a mut [u32],
     pub(crate) active: &'a mut [u32],
     pub(crate) parts: [&'a mut [f32]; Component::COUNT],
 }
@@ -78,7 +78,7 @@ impl CellsMut<'_> {
     #[cfg(feature = "gpu")]
     pub(crate) fn set_status(&mut self, cell: usize, flags: u32, present: u32) {
         self.flags[cell] = Flags::from_bits_truncate(flags);
-        self.present[cell] = Outputs::from_bits_truncate(present);
+        self.present[cell] = present;
     }
 }
 

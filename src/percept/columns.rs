@@ -7,7 +7,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 use serde::Serialize;
 
-use super::Flags;
+use super::{ContactKind, Flags};
 
 /// An output as data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +50,8 @@ pub enum Unit {
     MetrePerSecond,
     /// N.
     Newton,
+    /// None: a [`ContactKind`], which data files name.
+    Kind,
 }
 
 impl Unit {
@@ -58,7 +60,7 @@ impl Unit {
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::P => "P",
-            Self::One => "1",
+            Self::One | Self::Kind => "1",
             Self::Metre => "m",
             Self::SquareMetre => "m²",
             Self::Radian => "rad",
@@ -120,6 +122,16 @@ impl Typed for u32 {
     }
 }
 
+impl Typed for ContactKind {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        Self::ALL[(value as usize).min(Self::ALL.len() - 1)]
+    }
+
+    fn components(self) -> [f64; 3] {
+        [f64::from(self as u8), 0.0, 0.0]
+    }
+}
+
 /// Two or three.
 impl<const N: usize> Typed for [f64; N] {
     fn of(components: [f64; 3]) -> Self {
@@ -142,7 +154,7 @@ macro_rules! columns {
             /// Quantities a percept can hold: what is asked for, and what is present.
             #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
             #[repr(transparent)]
-            pub struct Outputs: u32 {
+            pub struct Outputs: u64 {
                 $(#[doc = $help] const $output = 1 << $bit;)*
                 /// The separate touches of the field, each with an identity; only on request.
                 const TOUCHES = 1 << 16;
@@ -307,15 +319,40 @@ columns! {
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
     #[doc = "Force in newtons, unweighted: Σ PᵢAᵢ where P is in Pa, Σ Pᵢ where it is in N; given by default where the calibration has a unit."]
     FORCE 20 force: f64, Newton, Number, force, parts [] host [Force];
+    #[doc = "What kind of contact presses: point, line, segment or blob; only on request, as is all of the footprint."]
+    FOOTPRINT_KIND 21 footprint_kind: ContactKind, Kind, Number, footprint, parts [] host [FootprintKind];
+    #[doc = "Where it presses, (u, v) in the field's chart, m; of a line its point nearest to the touch's mean."]
+    FOOTPRINT_PLACE 22 footprint_place: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlace];
+    #[doc = "The standard deviation of that, m; of a line only what it is off across."]
+    FOOTPRINT_PLACE_SIGMA 23 footprint_place_sigma: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlaceSigma];
+    #[doc = "How hard it presses in all, taxels or not, in the unit of P; absent where it goes on beyond the sensors."]
+    FOOTPRINT_FORCE 24 footprint_force: f64, P, Number, footprint, parts [] host [FootprintForce];
+    #[doc = "The standard deviation of that, in the unit of P."]
+    FOOTPRINT_FORCE_SIGMA 25 footprint_force_sigma: f64, P, Number, footprint, parts [] host [FootprintForceSigma];
+    #[doc = "Its direction along, rad in [0, π); absent for a point."]
+    FOOTPRINT_ANGLE 26 footprint_angle: f64, Radian, Line, footprint, parts [] host [FootprintAngle];
+    #[doc = "The standard deviation of that, rad."]
+    FOOTPRINT_ANGLE_SIGMA 27 footprint_angle_sigma: f64, Radian, Number, footprint, parts [] host [FootprintAngleSigma];
+    #[doc = "The standard deviation of its pressure across, at the sensors, m."]
+    FOOTPRINT_WIDTH 28 footprint_width: f64, Metre, Number, footprint, parts [] host [FootprintWidth];
+    #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
+    FOOTPRINT_LENGTH 29 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
 }
 
 impl Outputs {
     /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
-    /// [`Outputs::FORCE`], which hangs on the calibration.
-    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED).difference(Self::FORCE);
+    /// [`Outputs::FORCE`], which hangs on the calibration, and [`Outputs::FOOTPRINT`].
+    pub const USUAL: Self = Self::all()
+        .difference(Self::TOUCHES)
+        .difference(Self::FILTERED)
+        .difference(Self::FORCE)
+        .difference(Self::FOOTPRINT);
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");
+
+    /// What presses, fitted under the skin's own response.
+    pub const FOOTPRINT: Self = Self::of_stage("footprint");
 
     /// What the stage *motion* gives.
     pub const MOTION: Self = Self::of_stage("motion");

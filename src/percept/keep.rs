@@ -17,7 +17,7 @@ impl Percepts {
                 })*
             };
         }
-        keep!(in_world, flags, present, active);
+        keep!(in_world, flags, present, present_high, active);
         for &host in Host::ALL {
             let components = host.column().components;
             if self.has_host(host) {

@@ -112,6 +112,7 @@ impl Plan {
             ("touches", stages.touches, of(&all), ""),
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
+            ("footprint", stages.footprint, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
@@ -125,7 +126,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "force", "filter"].contains(&name),
+                on_host: ["position", "touches", "force", "filter", "footprint"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },
@@ -146,6 +147,7 @@ impl Plan {
             "hysteresis" => "the calibration has thresholds",
             "centroid" => "later stages need it",
             "position" => "touches need it",
+            "touches" => "a footprint is one touch's",
             _ => "others need it",
         }
     }

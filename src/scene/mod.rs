@@ -7,6 +7,7 @@ mod filter;
 mod knobs;
 mod members;
 mod plan;
+mod skin;
 mod slots;
 
 pub use choose_fields::choose_fields;

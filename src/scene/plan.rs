@@ -7,13 +7,15 @@ use glam::DVec3;
 
 use super::curves::Curves;
 use super::members::{beside, quantity_of, surface, thresholds, unit_of, weights};
+use super::skin::layer;
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
-use crate::percept::Outputs;
+use crate::percept::{Flags, Outputs};
 use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
 use crate::stage::calibrate::Table;
+use crate::stage::footprint::Layer;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
 use crate::stage::{Sums, filter, layout, touches};
@@ -32,19 +34,33 @@ pub(crate) struct Stages {
     /// Whether percepts keep the taxels' pressures, for stages on the host.
     pub(crate) pressures: bool,
     pub(crate) filter: bool,
+    pub(crate) footprint: bool,
 }
 
 impl Stages {
     /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
     fn of(outputs: Outputs) -> Self {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
-        let touches = outputs.contains(Outputs::TOUCHES);
+        let footprint = wants("footprint");
+        let touches = outputs.contains(Outputs::TOUCHES) || footprint;
         let position = wants("position") || touches;
         let [orientation, axis, motion, filter, force] =
             ["orientation", "axis", "motion", "filter", "force"].map(wants);
         let centroid = wants("centroid") || position || orientation || axis || motion || filter;
         let pressures = touches || force;
-        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, force, pressures, filter }
+        Self {
+            centroid,
+            orientation,
+            axis,
+            hysteresis: false,
+            motion,
+            position,
+            touches,
+            force,
+            pressures,
+            filter,
+            footprint,
+        }
     }
 }
 
@@ -74,6 +90,8 @@ pub struct Plan {
     pub(crate) taxels: Vec<layout::Taxel>,
     /// What their responses refer to.
     pub(crate) curves: Curves,
+    /// Per slot, the P up to which its taxel reads 0, where contacts are fitted.
+    pub(crate) feels_from: Vec<f64>,
     /// Shared by the engine and its backend: of a large skin these are most of what a plan takes.
     pub(crate) fields: Arc<[PlanField]>,
     /// All fields' members, one field after the other, each by ascending id.
@@ -109,6 +127,8 @@ pub(crate) struct PlanField {
     pub(crate) filter: filter::Settings,
     /// Per member, the members beside it, where separate touches are wanted.
     pub(crate) beside: Vec<Vec<u32>>,
+    /// What contacts are fitted under, or why none are.
+    pub(crate) layer: Result<Layer, Flags>,
     /// About how far members lie apart, in the unit.
     pub(crate) spacing: f64,
     /// Members' weights as the layout has them; empty where single precision holds each.
@@ -196,11 +216,13 @@ impl Plan {
             calibrated: 0,
             taxels: Vec::new(),
             curves: Curves::default(),
+            feels_from: Vec::new(),
             fields: Arc::default(),
             members: Arc::default(),
             body_taxels: Vec::new(),
         };
         let first_slots = plan.lay_out_slots(calibration)?;
+        plan.note_what_is_felt();
         let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
@@ -232,6 +254,7 @@ impl Plan {
                 chart: field.chart.as_ref().ok().cloned(),
                 no_chart: field.chart.as_ref().err().cloned(),
                 surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
+                layer: Err(Flags::NO_SKIN),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
@@ -244,6 +267,7 @@ impl Plan {
                 let in_letter = &mut plan_fields[first + letter];
                 in_letter.first = members.len();
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
+                in_letter.layer = layer(calibration.skin, in_letter, plan.letters[letter].receptor);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),
                     weight: member.weight as f32,

@@ -4,6 +4,7 @@
 
 mod file;
 mod keys;
+mod skin;
 mod thresholds;
 
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use self::skin::SkinResponse;
 pub use self::thresholds::{ChangeCalibration, ContactThresholds};
 use super::curve::Curve;
 use super::fsr::FsrCircuit;
@@ -33,6 +35,8 @@ pub struct TaxelCalibration {
     pub p_max: f64,
     /// The range of raw values, in single precision as these are; others are kept but flagged `out_of_range`.
     pub raw_range: [f32; 2],
+    /// Standard deviation of a raw value, quantisation included, raw units; `None` where it is not known.
+    pub noise: Option<f64>,
     /// Ignore this taxel.
     pub mask: bool,
     /// The conversion from raw value to pressure.
@@ -49,6 +53,7 @@ impl Default for TaxelCalibration {
             dead_band: 0.0,
             p_max: f32::MAX.into(),
             raw_range: [-f32::MAX, f32::MAX],
+            noise: None,
             mask: false,
             response: Response::Linear,
             quantity: Quantity::Count,
@@ -89,6 +94,8 @@ pub struct Calibration {
     pub checks: Checks,
     /// How baselines follow drift and defective taxels are detected.
     pub upkeep: UpkeepKeys,
+    /// What the layer over the taxels makes of a contact, where that is known.
+    pub skin: Option<SkinResponse>,
 }
 
 impl Calibration {

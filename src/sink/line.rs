@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch};
+use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -96,6 +96,7 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         key(line, column.name);
         match column.store {
             Store::Active => print(line, &(components[0] as u32)),
+            _ if column.unit == Unit::Kind => print(line, &percept.footprint_kind),
             // In double precision whatever the backend.
             Store::Host(_) if column.components == 1 => print(line, &components[0]),
             Store::Host(_) => print(line, &&components[..column.components]),

@@ -155,12 +155,13 @@ mod tests {
         percepts.t_s = vec![0.05, 0.1];
         percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
-        percepts.present = vec![
+        let present = [
             (Outputs::USUAL - Outputs::MOTION) | Outputs::DISPLACEMENT,
             Outputs::TOTAL,
             Outputs::TOTAL | Outputs::POSITION,
             Outputs::empty(),
         ];
+        present.into_iter().enumerate().for_each(|(cell, present)| percepts.set_present(cell, present));
         percepts.active[0] = 3;
         for cell in 0..4 {
             percepts.set_host(Host::Position, cell, &[0.1, -0.2, 1e-9]);

@@ -16,6 +16,7 @@ pub(crate) mod centroid;
 pub(crate) mod change;
 pub(crate) mod contact;
 pub(crate) mod filter;
+pub(crate) mod footprint;
 pub(crate) mod force;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;

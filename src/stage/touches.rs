@@ -105,6 +105,13 @@ pub(crate) struct Found {
     members: Vec<(u32, f64)>,
 }
 
+impl Found {
+    /// Its members, by index, ascending.
+    pub(crate) fn members(&self) -> impl Iterator<Item = u32> {
+        self.members.iter().map(|&(member, _)| member)
+    }
+}
+
 /// What identities hang on, field by field.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {

@@ -102,6 +102,7 @@ mod tests {
             id,
             baseline: Some(250.0),
             noise: 1.0,
+            sigma: None,
             dead_band: 2.0,
             travel,
             full: None,

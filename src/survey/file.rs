@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::{Findings, Found};
+use super::{Findings, Found, median};
 
 impl Findings {
     /// The calibration, as `docs/calibration.md` describes it, for the body called `body`. What most sensors share stands
@@ -14,6 +14,8 @@ impl Findings {
         let baseline = commonest(sound().filter_map(|found| found.baseline));
         let dead_band = commonest(sound().map(|found| found.dead_band));
         let p_max = commonest(sound().filter_map(p_max));
+        let mut sigmas: Vec<f64> = sound().filter_map(|found| found.sigma).map(number).collect();
+        let sigma = median(&mut sigmas);
         let mut text = format!(
             "# From a survey of {} sensors: baselines are medians at rest, dead bands 1.5 times what one value in a\n\
              # thousand strays from them.\n\n[all]\nbaseline = {baseline}\ndead_band = {dead_band}\ninvert = {}\n",
@@ -26,6 +28,9 @@ impl Findings {
         };
         if sound().any(|found| found.full.is_some()) {
             line("p_max", p_max.to_string());
+        }
+        if let Some(sigma) = sigma {
+            line("noise", sigma.to_string());
         }
         if let Some([low, high]) = self.raw_range {
             line("raw_range", format!("[{low}, {high}]"));
@@ -41,7 +46,11 @@ impl Findings {
                     ("dead_band", found.dead_band * found.gain, dead_band),
                     ("p_max", self::p_max(found).unwrap_or(p_max), p_max),
                 ];
-                own.extend(all.iter().filter(|(_, own, all)| own != all).map(|(name, own, _)| (*name, number(*own))));
+                let differs = all.iter().filter(|(_, own, all)| own != all);
+                own.extend(differs.map(|(name, own, _)| (*name, number(*own).to_string())));
+                if let Some(noise) = found.sigma.map(number).filter(|own| Some(*own) != sigma) {
+                    own.push(("noise", noise.to_string()));
+                }
             }
             if !own.is_empty() {
                 let _ = write!(text, "\n[taxel.{}]\n", found.id);
@@ -60,9 +69,8 @@ fn p_max(found: &Found) -> Option<f64> {
 }
 
 /// With six significant digits: more than a converter has.
-fn number(value: f64) -> String {
-    let value: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    value.to_string()
+fn number(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 fn quoted(text: &str) -> String {
@@ -86,13 +94,14 @@ mod tests {
 
     fn found(id: u32, baseline: Option<f64>) -> Found {
         let full = baseline.map(|baseline| baseline - 0.5);
-        Found { id, baseline, noise: 1.0, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0, moved: false }
+        let sigma = Some(0.5);
+        Found { id, baseline, noise: 1.0, sigma, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0, moved: false }
     }
 
     #[test]
     fn what_is_written_is_read_as_what_was_found() {
         let mut sensors = vec![found(4, Some(250.0)), found(5, Some(250.0)), found(6, Some(243.0)), found(7, None)];
-        (sensors[2].gain, sensors[2].dead_band) = (1.25, 5.0);
+        (sensors[2].gain, sensors[2].dead_band, sensors[2].sigma) = (1.25, 5.0, Some(0.75));
         let findings = Findings { sensors, invert: true, raw_range: Some([0.0, 255.0]) };
         let text = findings.calibration("the \"left\" hand");
         let read = Calibration::parse(&text, &[4, 5, 6, 7]).unwrap();
@@ -101,6 +110,7 @@ mod tests {
         assert_eq!((a.baseline, a.gain, a.dead_band, a.p_max), (250.0, -1.0, 2.0, 249.5));
         assert_eq!((a, a.raw_range), (b, [0.0, 255.0]));
         assert_eq!((c.baseline, c.gain, c.dead_band, c.p_max), (243.0, -1.25, 6.25, 303.125));
+        assert_eq!([a, b, c].map(|taxel| taxel.noise), [Some(0.5), Some(0.5), Some(0.75)]);
         assert!(d.mask && !a.mask && !c.mask);
     }
 }

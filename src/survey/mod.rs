@@ -20,6 +20,8 @@ use somatic::signal::RawValue;
 const MAX_REST_VALUES: usize = 4096;
 /// Share of rest values that may exceed the noise.
 const EXCEEDING_SHARE: f64 = 1e-3;
+/// Minimum number of values at rest that tell a standard deviation to a quarter of itself.
+const MIN_SIGMA_VALUES: usize = 32;
 /// Dead band over noise.
 const DEAD_BAND_MARGIN: f64 = 1.5;
 /// Minimum travel of a press, in dead bands.
@@ -88,6 +90,8 @@ pub struct Found {
     pub baseline: Option<f64>,
     /// How far it strays from that untouched, in raw units.
     pub noise: f64,
+    /// Standard deviation of a raw value at rest, with that of rounding; `None` where it delivered too little to tell.
+    pub sigma: Option<f64>,
     /// Pressures up to this one count as 0, in raw units.
     pub dead_band: f64,
     /// How far it went when it was pressed, in raw units; `None` where it was not.
@@ -237,6 +241,7 @@ impl Survey {
                 id: self.ids[sensor],
                 baseline: rest.map(|(baseline, _)| baseline),
                 noise,
+                sigma: (self.rest[sensor].len() >= MIN_SIGMA_VALUES).then(|| sigma_of(&self.rest[sensor], step)),
                 dead_band: dead_band(noise),
                 travel: pressed[sensor],
                 // At the end itself it is already full.
@@ -303,6 +308,21 @@ fn chance_of(kept: &[f32], unit: f64) -> f64 {
     const MEDIAN_STEP: f64 = 0.953_87;
     let mut steps: Vec<f64> = kept.windows(2).map(|pair| (f64::from(pair[1]) - f64::from(pair[0])).abs()).collect();
     (median(&mut steps).unwrap_or(0.0) / MEDIAN_STEP).max(unit / 12.0_f64.sqrt())
+}
+
+/// The standard deviation of a raw value, from the differences of values in succession, so that a slow drift adds nothing,
+/// and without the farthest hundredth of them, so that single wrong values add nothing. At least that of rounding to whole
+/// multiples of `unit`: a value that never changes may lie anywhere within its step.
+fn sigma_of(kept: &[f32], unit: f64) -> f64 {
+    /// The mean square of normal values without the farthest hundredth, over that of all.
+    const KEPT_SHARE: f64 = 0.924_76;
+    let mut squares: Vec<f64> = kept.windows(2).map(|pair| (f64::from(pair[1]) - f64::from(pair[0])).powi(2)).collect();
+    squares.sort_by(f64::total_cmp);
+    let left_out = squares.len() / 100;
+    squares.truncate(squares.len() - left_out);
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    let share = if left_out > 0 { KEPT_SHARE } else { 1.0 };
+    (mean / (2.0 * share)).sqrt().max(unit / 12.0_f64.sqrt())
 }
 
 /// How far a sensor went down and up from its baseline.
@@ -486,6 +506,28 @@ mod tests {
                 assert!(found.is_ok_and(|found| !found.sensors[0].moved), "{kind}");
             }
         }
+    }
+
+    #[test]
+    fn sigma_is_that_of_the_noise_and_its_rounding() {
+        // Of twelve uniform numbers each: normal enough.
+        let noise = |n: usize| -> f64 {
+            let mixed = |k: usize| (n * 12 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+            let unit = |k: usize| (mixed(k).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 11) as f64 / 9_007_199_254_740_992.0;
+            (0..12).map(unit).sum::<f64>() - 6.0
+        };
+        let of = |value: &dyn Fn(usize) -> f64, unit: f64| {
+            let kept: Vec<f32> = (0..4000).map(|n| value(n) as f32).collect();
+            sigma_of(&kept, unit)
+        };
+        // Its own standard deviation is about σ/√(4000/1.5).
+        let near = |found: f64, right: f64| (found / right - 1.0).abs() < 0.08;
+        assert!(near(of(&|n| 3.0 * noise(n), 0.0), 3.0));
+        assert!(near(of(&|n| (0.7 * noise(n)).round(), 1.0), (0.49_f64 + 1.0 / 12.0).sqrt()));
+        assert!(near(of(&|n| 3.0 * noise(n) + 0.01 * n as f64, 0.0), 3.0), "drift adds nothing");
+        assert!(near(of(&|n| if n % 500 == 9 { 900.0 } else { 3.0 * noise(n) }, 0.0), 3.0), "nor do wrong values");
+        assert_eq!(of(&|_| 700.0, 1.0), 1.0 / 12.0_f64.sqrt());
+        assert_eq!(hand().finish(Wishes::default()).unwrap().sensors[0].sigma.is_some(), hand().rest[0].len() >= 32);
     }
 
     #[test]

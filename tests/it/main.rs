@@ -13,6 +13,7 @@ mod endurance;
 mod extremes;
 mod filter;
 mod firmware;
+mod footprint;
 mod gate;
 mod geodesic;
 mod grouping;

@@ -184,6 +184,98 @@ fn all_of_the_force_arrives_on_a_flat_skin() {
     assert!(aliasing(SIGMA, PITCH) < 1e-6 && aliasing(SIGMA, 2.5 * PITCH) > 0.1, "the bound knows a coarse skin");
 }
 
+/// The dense skin with another `skin` over it.
+fn under(skin: &str, touch: &str) -> SimulatedSource {
+    let text = format!(
+        "rate_hz = 10\nduration_s = 1\n[skin]\nthickness_m = 0.007\n{skin}\n[sensor]\narea_m2 = 1.6e-5\n\
+         [[touch]]\non = \"all\"\n{touch}\npath = [[0.0013, -0.0007]]\nhold = {{ newton = 7.5 }}\n"
+    );
+    SimulatedSource::on_body("dense", &text, dense()).unwrap()
+}
+
+#[test]
+fn another_layer_changes_what_is_felt_and_not_the_truth() {
+    for touch in TOUCHES {
+        let mut plain = under("", touch);
+        let felt = numbers(&first(&mut plain));
+        // What lies beyond the skin's edge, from the touch's own end: nothing of a Gaussian, z³/r³ at most of Boussinesq's.
+        let edge = (f64::from(HALF) + 0.5) * PITCH - 0.022;
+        for (skin, tail) in [("contact = \"hertz\"", 0.0), ("kernel = \"boussinesq\"", (7e-3_f64 / edge).powi(3))] {
+            let mut other = under(skin, touch);
+            let values = numbers(&first(&mut other));
+            let sum: f64 = values.iter().sum();
+            assert!((sum - 7.5).abs() <= 7.5 * (tail + aliasing(SIGMA, PITCH) + U + 1e-8), "{touch}, {skin}: {sum} N");
+            assert!(tail == 0.0 || sum < 7.5 * (1.0 - 1e-4), "{touch}: the tail is not there: {sum} N");
+            let apart = values.iter().zip(&felt).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // An edge has no width, and a disc's is exact in either.
+            let is_exact = skin.starts_with("contact") && (touch.contains("edge") || touch.contains("flat"));
+            assert!(is_exact != (apart > 1e-4 * 7.5 / 100.0), "{touch}, {skin}: {apart:e} N");
+            let [mine, its] = [&plain, &other].map(|simulation| simulation.truth().to_vec());
+            assert_eq!(mine, its, "the truth is the indenter's");
+        }
+    }
+}
+
+#[test]
+fn gains_and_thresholds_differ_from_the_calibration() {
+    let touch = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0, 0]]\nhold = { newton = 20 }";
+    let mut plain = on_dense("", touch);
+    let even = numbers(&first(&mut plain));
+    let mut spread = on_dense("gain_spread = 0.2", touch);
+    let uneven = numbers(&first(&mut spread));
+    assert!(plain.gains().iter().all(|&gain| gain == 1.0));
+    for ((even, uneven), gain) in even.iter().zip(&uneven).zip(spread.gains()) {
+        assert!((uneven - even * gain).abs() <= 2.0 * U * uneven.abs(), "{even} {uneven} {gain}");
+    }
+    // Logarithms of the gains, to five standard deviations of each estimate.
+    let n = spread.gains().len() as f64;
+    let logs: Vec<f64> = spread.gains().iter().map(|gain| gain.ln()).collect();
+    let mean = logs.iter().sum::<f64>() / n;
+    let variance = logs.iter().map(|log| log * log).sum::<f64>() / n;
+    assert!(mean.abs() < 5.0 * 0.2 / n.sqrt() && (variance / 0.04 - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
+    let gains = |sensor: &str| on_dense(sensor, touch).gains().to_vec();
+    assert_eq!(gains("gain_spread = 0.2\nnoise_sigma = 3"), spread.gains());
+    assert_ne!(gains("gain_spread = 0.2\ngain_seed = 1"), spread.gains());
+    assert_eq!(spread.truth(), plain.truth());
+    assert_eq!(spread.calibration(), plain.calibration(), "the calibration knows nothing of it");
+
+    let hidden = numbers(&first(&mut on_dense("threshold_newton = 0.1", touch)));
+    for (even, hidden) in even.iter().zip(&hidden) {
+        assert_eq!(*hidden, if *even > 0.1 { *even } else { 0.0 });
+    }
+    assert!(hidden.contains(&0.0) && hidden.iter().any(|&value| value > 0.1));
+    let text = format!("{SOUND}[calibration]\ndead_band = 4.5\n");
+    let other = SimulatedSource::from_text("a.toml", &text, Path::new("")).unwrap().calibration();
+    assert_eq!(other.matches("dead_band").count(), 1);
+    assert!(other.contains("dead_band = 4.5\n"), "{other}");
+}
+
+#[test]
+fn the_calibrations_noise_is_that_of_raw_values() {
+    let touch = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0, 0]]\nhold = { newton = 0 }";
+    for sensor in [
+        "noise_sigma = 0.02",
+        "kind = \"linear\"\noffset = 500.3\ngain = 20\nnoise_sigma = 3",
+        "kind = \"linear\"\noffset = 500.3\ngain = 20\nbits = 10\nnoise_sigma = 0.6",
+    ] {
+        let mut simulation = on_dense(sensor, touch);
+        let calibration = Calibration::parse(&simulation.calibration(), simulation.taxels()).unwrap();
+        let noise = calibration.taxels[0].noise.unwrap();
+        let mut frame = Frame::missing(0.0, simulation.taxels().len());
+        let (mut values, mut squares, mut count) = (0.0, 0.0, 0.0);
+        while simulation.next_frame(&mut frame).unwrap() {
+            for value in numbers(&frame) {
+                (values, squares, count) = (values + value, squares + value * value, count + 1.0);
+            }
+        }
+        let sigma = (squares / count - (values / count) * (values / count)).sqrt();
+        // Five standard deviations of the estimate.
+        assert!((sigma / noise - 1.0).abs() < 5.0 / (2.0_f64 * count).sqrt(), "{sensor}: {sigma} {noise}");
+    }
+    let unknown = on_dense("kind = \"fsr\"\noutput = \"linearised\"\nnoise_sigma = 2", touch).calibration();
+    assert!(!unknown.contains("noise"), "it depends on the force: {unknown}");
+}
+
 #[test]
 fn the_centroid_of_a_symmetrical_touch_is_its_truth() {
     for touch in TOUCHES {
@@ -445,6 +537,22 @@ fn what_is_wrong_is_said_in_one_line() {
         ("body = \"hand\"\n", "", "`body` is missing"),
         ("thickness_m = 0.007", "thickness_m = -1", "a.toml: line 5: `thickness_m` is -1; it must be 0 or more"),
         ("thickness_m = 0.007", "thickness_m = 1\nstiffness_pa = 0", "a.toml: line 6: `stiffness_pa` is 0"),
+        ("0.007", "0.007\nkernel = \"flat\"", "a.toml: line 6: there is no choice `flat`"),
+        ("0.007", "0\nkernel = \"boussinesq\"", "a.toml: line 5: `thickness_m` is 0; it must be over 0"),
+        ("0.007", "0\ncontact = \"hertz\"", "a.toml: line 5: `thickness_m` is 0; it must be over 0"),
+        (
+            "0.007",
+            "0.007\nkernel = \"boussinesq\"\nspread = 0.5",
+            "a.toml: line 7: `spread` has no effect beside `kernel = \"boussinesq\"`",
+        ),
+        (
+            "0.007",
+            "0.007\nkernel = \"boussinesq\"\ncontact = \"gaussian\"",
+            "a.toml: line 7: `contact` is gaussian; beside `kernel = \"boussinesq\"` it must be hertz",
+        ),
+        ("tap = 38", "gain_spread = -0.1", "a.toml: line 8: `gain_spread` is -0.1; it must be 0 or more"),
+        ("tap = 38", "threshold_newton = -1", "a.toml: line 8: `threshold_newton` is -1; it must be 0 or more"),
+        ("[sensor]", "[calibration]\ndead_band = -1\n[sensor]", "a.toml: line 7: `dead_band` is -1; it must be 0"),
         ("kind = \"fsr\"", "kind = \"fsrr\"", "a.toml: line 7: there is no choice `fsrr`; did you mean `fsr`?"),
         ("tap = 38", "tap = 256", "a.toml: line 8: `tap` is 256; it must be between 0 and 255"),
         ("tap = 38", "gain = 2", "a.toml: line 8: `gain` has no effect for this kind of sensor"),

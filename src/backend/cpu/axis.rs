@@ -66,6 +66,6 @@ pub(super) fn finish<S: Simd>(simd: S, touch: &Touch<S>, [a, b, d]: [F<S>; 3], a
     let flags = bits_where(simd, single, Flags::ONE_TAXEL.bits())
         | bits_where(simd, coincident, Flags::COINCIDENT.bits())
         | bits_where(simd, isotropic, Flags::ISOTROPIC.bits());
-    let present = bits_where(simd, spread, Outputs::ANISOTROPY.bits()) | bits_where(simd, found, Outputs::AXIS.bits());
+    let present = bits_where(simd, spread, Outputs::ANISOTROPY.low()) | bits_where(simd, found, Outputs::AXIS.low());
     answers.add_status(simd, (flags, present), at);
 }

@@ -26,7 +26,7 @@ pub(super) fn scan(plan: &Plan, frames: usize, cells: &mut CellsMut<'_>, touched
             *touched = total > on || (*touched && total > off);
             if !*touched {
                 cells.flags[cell] = (cells.flags[cell] & KEPT) | Flags::NO_CONTACT;
-                cells.present[cell] &= SUMS;
+                cells.present[cell] &= SUMS.low();
             }
         }
     }

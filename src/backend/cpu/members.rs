@@ -164,8 +164,8 @@ impl OneKind {
         Self {
             charted: field.charted,
             flags: if field.charted { Flags::empty() } else { Flags::NO_CHART }.bits(),
-            sums: if field.area_known { sums | Outputs::AREA } else { sums }.bits(),
-            found: if field.charted { in_chart } else { Outputs::POSITION }.bits(),
+            sums: if field.area_known { sums | Outputs::AREA } else { sums }.low(),
+            found: if field.charted { in_chart } else { Outputs::POSITION }.low(),
             unit_m: field.unit_m,
         }
     }

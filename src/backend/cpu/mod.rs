@@ -8,6 +8,7 @@ mod axis;
 mod calibrate;
 mod change;
 mod contact;
+pub(crate) mod footprint;
 mod gate;
 mod hysteresis;
 mod lanes;

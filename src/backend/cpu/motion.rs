@@ -160,7 +160,7 @@ fn run_of_frames(
 ) {
     let count = cells.fields();
     let CellsMut { flags, present, active, parts, .. } = cells;
-    let (flags, present) = (cast_slice_mut::<Flags, u32>(flags), cast_slice_mut::<Outputs, u32>(present));
+    let flags = cast_slice_mut::<Flags, u32>(flags);
     let mut written = PARTS.map(|part| std::mem::take(&mut parts[part as usize]));
     let (u, v) = (&parts[Component::CentroidU as usize], &parts[Component::CentroidV as usize]);
     with_widest!(level, simd => {
@@ -269,7 +269,7 @@ fn sixteen_fields<S: Simd>(
         store_u(simd, flags, &mut found.flags, at);
         let motion = (Outputs::MOTION - Outputs::DIRECTION) & outputs;
         let present =
-            bits_where(simd, moved, motion.bits()) | bits_where(simd, directed, (Outputs::DIRECTION & outputs).bits());
+            bits_where(simd, moved, motion.low()) | bits_where(simd, directed, (Outputs::DIRECTION & outputs).low());
         store_u(simd, present, &mut found.present, at);
         at += width::<S>();
     }

@@ -112,7 +112,7 @@ fn line<S: Simd>(simd: S, touch: &Touch<S>, &Farthest { r, x, y }: &Farthest<S>)
     (
         found.select(of_line(simd, x, y), none),
         single | coincident | bits_where(simd, tie, Flags::TIE.bits()),
-        bits_where(simd, found, Outputs::ORIENTATION.bits()),
+        bits_where(simd, found, Outputs::ORIENTATION.low()),
     )
 }
 

@@ -272,7 +272,7 @@ fn find_centroid<S: Simd, P: Sweep<S>>(
     answers.put(simd, Component::CentroidU, u * unit_m, at);
     answers.put(simd, Component::CentroidV, v * unit_m, at);
     let depth = if kind.any_uncharted() {
-        let charted = (found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
+        let charted = (found & Outputs::CENTROID.low()).simd_gt(splat_u(simd, 0));
         let sum = match compensated {
             true => members.depth::<Compensated<S>>(simd, at),
             false => members.depth::<OnePass<S>>(simd, at),
@@ -301,7 +301,7 @@ fn charted_touch<S: Simd, const LEAST: u32>(
     if !(enough.any_true() && kind.any_charted()) {
         return None;
     }
-    let charted = (kind.lanes(simd, at).found & Outputs::CENTROID.bits()).simd_gt(splat_u(simd, 0));
+    let charted = (kind.lanes(simd, at).found & Outputs::CENTROID.low()).simd_gt(splat_u(simd, 0));
     Some(Touch {
         active,
         touched: touched & charted,

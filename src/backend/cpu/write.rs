@@ -78,7 +78,7 @@ impl FilledColumns {
         }
         let column = cast_slice_mut::<Flags, u32>(cells.flags);
         transpose(simd, |field| &answers[field].flags, &mut Target { column, place, mask: u32::MAX });
-        let (column, mask) = (cast_slice_mut::<Outputs, u32>(cells.present), self.outputs.bits());
+        let (column, mask) = (&mut *cells.present, self.outputs.low());
         transpose(simd, |field| &answers[field].present, &mut Target { column, place, mask });
     }
 
@@ -87,11 +87,11 @@ impl FilledColumns {
         let (mut flags, mut present) = ([0; LANES], [0; LANES]);
         for (field, (flags, present)) in fields.iter().zip(flags.iter_mut().zip(&mut present)) {
             (*flags, *present) = OneKind::new(field).untouched();
-            *present &= self.outputs.bits();
+            *present &= self.outputs.low();
         }
         for frame in 0..place.frames {
             place.of_frame(cast_slice_mut(cells.flags), frame).copy_from_slice(&flags[..place.count]);
-            place.of_frame(cast_slice_mut(cells.present), frame).copy_from_slice(&present[..place.count]);
+            place.of_frame(cells.present, frame).copy_from_slice(&present[..place.count]);
             if self.counts {
                 place.of_frame(cells.active, frame).fill(0);
             }
@@ -110,8 +110,8 @@ impl FilledColumns {
             lanes.put(&answer.active, cells.active);
         }
         lanes.put(&answer.flags, cast_slice_mut::<Flags, u32>(cells.flags));
-        let present = answer.present.map(|present| present & self.outputs.bits());
-        lanes.put(&present, cast_slice_mut::<Outputs, u32>(cells.present));
+        let present = answer.present.map(|present| present & self.outputs.low());
+        lanes.put(&present, cells.present);
     }
 }
 

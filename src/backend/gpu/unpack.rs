@@ -26,7 +26,7 @@ impl Gpu {
         let statuses: &[u32] = cast_slice(bytes);
         match column {
             Column::Status => {
-                let outputs = self.plan.outputs.bits();
+                let outputs = self.plan.outputs.low();
                 for (cell, status) in statuses.iter().enumerate() {
                     cells.set_status(cell, status & FLAG_BITS, (status >> PRESENT) & outputs);
                 }
@@ -34,7 +34,7 @@ impl Gpu {
             Column::Motion => {
                 for ((flags, present), status) in cells.flags.iter_mut().zip(&mut *cells.present).zip(statuses) {
                     *flags |= Flags::from_bits_truncate(status & FLAG_BITS);
-                    *present |= motion_outputs(status >> PRESENT) & self.plan.outputs;
+                    *present |= (motion_outputs(status >> PRESENT) & self.plan.outputs).low();
                 }
             }
             Column::Active => cells.active.copy_from_slice(statuses),
@@ -67,7 +67,7 @@ impl Gpu {
 
 /// What the bits of a motion's status stand for: the device has one for each thing that can be absent by itself.
 fn motion_outputs(bits: u32) -> Outputs {
-    let mut outputs = Outputs::from_bits_truncate(bits) & (Outputs::DISPLACEMENT | Outputs::DIRECTION);
+    let mut outputs = Outputs::from_bits_truncate(bits.into()) & (Outputs::DISPLACEMENT | Outputs::DIRECTION);
     if outputs.contains(Outputs::DISPLACEMENT) {
         outputs |= Outputs::MOTION - Outputs::DIRECTION;
     }

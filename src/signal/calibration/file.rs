@@ -7,6 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
+use super::skin::SkinKeys;
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
 use crate::error::{Error, Result, failed};
@@ -31,6 +32,7 @@ struct File {
     checks: Checks,
     #[serde(default)]
     upkeep: UpkeepKeys,
+    skin: Option<SkinKeys>,
 }
 
 impl Calibration {
@@ -82,8 +84,9 @@ impl Calibration {
         let contact = contact.times(factor);
         let fields = fields.into_iter().map(|(name, thresholds)| (name, thresholds.times(factor))).collect();
         let change = file.change.read(text)?.times(factor);
+        let skin = file.skin.map(|keys| keys.read(text)).transpose()?;
         let File { body, checks, upkeep, .. } = file;
-        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep })
+        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep, skin })
     }
 }
 
@@ -109,12 +112,14 @@ mod tests {
 
     #[test]
     fn a_taxel_overrides_what_holds_for_all() {
-        let text =
-            "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\n[taxel.7]\nbaseline = 200\nmask = true\n";
+        let text = "[all]\nbaseline = 240\ngain = 2\ninvert = true\np_max = 255\nnoise = 1.5\n[taxel.7]\nbaseline = 200\nmask = true\n\
+             noise = 0\n";
         let calibration = Calibration::parse(text, &[3, 7]).unwrap();
         assert_eq!(calibration.taxels[0].gain, -2.0);
         assert_eq!(calibration.taxels[0].baseline, 240.0);
         assert_eq!(calibration.taxels[1].baseline, 200.0);
+        assert_eq!([0, 1].map(|taxel| calibration.taxels[taxel].noise), [Some(1.5), Some(0.0)]);
+        assert_eq!(Calibration::parse("", &[3]).unwrap().taxels[0].noise, None);
         assert!(calibration.taxels[1].mask && !calibration.taxels[0].mask);
     }
 
@@ -129,6 +134,7 @@ mod tests {
         assert!(why("[taxel.5]\ngain = 1").contains("[taxel.5] names a taxel"));
         assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
         assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
+        assert_eq!(why("[all]\nnoise = -1"), "line 2: `noise` is -1; it must be 0 or more raw units");
         assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
         assert!(why("all = 3").contains("line 1"));
         assert_eq!(why("[contact]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
@@ -136,6 +142,9 @@ mod tests {
         assert_eq!(why("[change]\ndead_band = -1"), "line 2: `dead_band` is -1; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = nan"), "line 2: `on` is NaN; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
+        assert_eq!(why("[skin]\nsigma_m = 0"), "line 2: `sigma_m` is 0; it must be over 0, and at most 1");
+        assert!(why("[skin]\nsigma_m = 0.004\ngain_spread = 1.5").contains("line 3: `gain_spread` is 1.5"));
+        assert!(why("[skin]\ngain_spread = 0.1").contains("sigma_m"));
         assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
         assert!(why("[change]\nfield = 3").starts_with("line 2"));
     }

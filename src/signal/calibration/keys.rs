@@ -21,6 +21,7 @@ pub(super) struct Keys {
     dead_band: Option<Spanned<f64>>,
     p_max: Option<Spanned<f64>>,
     raw_range: Option<Spanned<[f64; 2]>>,
+    noise: Option<Spanned<f64>>,
     mask: Option<bool>,
     curve: Option<Spanned<String>>,
     sensor: Option<Spanned<String>>,
@@ -114,6 +115,9 @@ impl Draft {
         }
         if let Some(x) = number("p_max", &keys.p_max, &|x| x > 0.0 && x <= MAX_MAGNITUDE, "over 0, in the unit of P")? {
             taxel.p_max = x;
+        }
+        if let Some(x) = number("noise", &keys.noise, &|x| (0.0..=MAX_MAGNITUDE).contains(&x), "0 or more raw units")? {
+            taxel.noise = Some(x);
         }
         if let Some(range) = &keys.raw_range {
             let [low, high] = *range.get_ref();

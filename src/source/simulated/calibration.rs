@@ -1,4 +1,4 @@
-//! The exact calibration of simulated sensors; faulty ones are masked.
+//! The calibration of simulated sensors, exact but for what the file wants otherwise; faulty ones are masked.
 
 use std::fmt::Write as _;
 
@@ -13,13 +13,32 @@ impl Sensor {
     pub(super) fn calibration(&self, body: &str, ids: &[u32]) -> String {
         let mut text = String::from("# The sensors of a simulation as they are; docs/simulation.md says more.\n\n");
         let _ = writeln!(text, "body = {}\n\n[all]", toml::Value::from(body));
-        for (key, value) in self.keys() {
+        let mut keys = self.keys();
+        if let Some(noise) = self.noise() {
+            keys.push(("noise", noise.to_string()));
+        }
+        if let Some(dead_band) = self.dead_band {
+            keys.retain(|(key, _)| *key != "dead_band");
+            keys.push(("dead_band", dead_band.to_string()));
+        }
+        for (key, value) in keys {
             let _ = writeln!(text, "{key} = {value}");
         }
         for (id, _) in ids.iter().zip(&self.faults).filter(|(_, fault)| fault.is_some()) {
             let _ = write!(text, "\n[taxel.{id}]\nmask = true\n");
         }
         text
+    }
+
+    /// Standard deviation of a raw value, with that of rounding to whole counts; `None` where it depends on the force.
+    fn noise(&self) -> Option<f64> {
+        let counts = match self.kind {
+            Kind::Fsr { output: FsrOutput::Counts, .. } | Kind::Linear { bits: Some(_), .. } => true,
+            Kind::Ideal | Kind::Linear { bits: None, .. } => false,
+            Kind::Fsr { .. } => return None,
+        };
+        let rounding = if counts { 1.0 / 12.0 } else { 0.0 };
+        Some((self.noise_sigma * self.noise_sigma + rounding).sqrt())
     }
 
     fn keys(&self) -> Vec<(&'static str, String)> {

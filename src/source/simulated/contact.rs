@@ -1,8 +1,11 @@
 //! How an indenter's force spreads over the taxels under a compliant skin.
 //!
-//! `docs/simulation.md` has the model: a contact patch after Hertz, spread by a Gaussian for the depth of the layer.
+//! `docs/simulation.md` has the model: a contact patch after Hertz, spread by the layer over the taxels.
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use std::f64::consts::PI;
+
+use super::layer::{Blur, Kernel};
+use super::patch::{self, Load, Pressure};
 
 /// The touching object. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +50,9 @@ pub(super) struct Skin {
     pub(super) spread: f64,
     /// Reduced modulus E* = E/(1 − ν²).
     pub(super) stiffness_pa: f64,
+    pub(super) kernel: Kernel,
+    /// The contact's pressure.
+    pub(super) contact: Pressure,
 }
 
 impl Skin {
@@ -55,10 +61,21 @@ impl Skin {
     /// A soft silicone rubber.
     pub(super) const STIFFNESS_PA: f64 = 400e3;
     /// Taxels that lie bare.
-    pub(super) const NONE: Self = Self { thickness_m: 0.0, spread: Self::SPREAD, stiffness_pa: Self::STIFFNESS_PA };
+    pub(super) const NONE: Self = Self {
+        thickness_m: 0.0,
+        spread: Self::SPREAD,
+        stiffness_pa: Self::STIFFNESS_PA,
+        kernel: Kernel::Gaussian,
+        contact: Pressure::Gaussian,
+    };
 
     fn sigma_m(&self) -> f64 {
         self.spread * self.thickness_m
+    }
+
+    /// The calibration's table of the layer; empty where taxels lie bare.
+    pub(super) fn calibration(&self) -> String {
+        if self.thickness_m > 0.0 { format!("\n[skin]\nsigma_m = {}\n", self.sigma_m()) } else { String::new() }
     }
 
     /// Compliance 1/E* with an indenter whose own is `other`; a bare taxel does not give.
@@ -71,26 +88,19 @@ impl Skin {
 const FINGERTIP_STIFFNESS_PA: f64 = 50e3;
 /// Minimum standard deviation of a footprint, which avoids division by zero.
 const MIN_SIGMA_M: f64 = 1e-6;
-/// Pressure farther out than this many standard deviations is ignored: a share of 10⁻¹⁵.
-const CUTOFF_SIGMAS: f64 = 8.0;
 /// Maximum distance of a taxel from the contact's tangent plane, beside the footprint's size.
 const MAX_DEPTH_M: f64 = 5e-3;
 
-/// A line load along the indenter.
-#[derive(Clone, Copy, Debug)]
-struct Strip {
-    across_m: f64,
-    /// Half its length; 0 for a point.
-    half_m: f64,
-    part: f64,
-}
+/// The layer counts as at least this share of a Hertzian patch deep, so that a number of loads can stand for it.
+const MIN_DEPTH_SHARE: f64 = 1.0 / 8.0;
+/// Half as many standard deviations as count beside a footprint: how deep below the contact a taxel still feels it.
+const DEPTH_SIGMAS: f64 = 4.0;
 
 /// The pressure under an indenter, per newton, along and across it.
 #[derive(Clone, Debug)]
 pub(super) struct Footprint {
-    strips: Vec<Strip>,
-    sigma_across_m: f64,
-    sigma_along_m: f64,
+    loads: Vec<Load>,
+    blur: Blur,
     half_across_m: f64,
     half_along_m: f64,
 }
@@ -98,41 +108,45 @@ pub(super) struct Footprint {
 impl Footprint {
     /// The footprint of `indenter` pressed with `force_newton` on `skin`.
     pub(super) fn new(indenter: &Indenter, skin: &Skin, force_newton: f64) -> Self {
-        let layer = skin.sigma_m().max(MIN_SIGMA_M);
-        let widened = |variance: f64| (layer * layer + variance).sqrt();
-        let point = |half_m: f64| vec![Strip { across_m: 0.0, half_m, part: 1.0 }];
-        let line = |half_m: f64, sigma_across_m: f64| Self {
-            strips: point(half_m),
-            sigma_across_m,
-            sigma_along_m: layer,
-            half_across_m: 0.0,
-            half_along_m: half_m,
+        let compliance = match indenter {
+            Indenter::Fingertip { .. } => skin.compliance(1.0 / FINGERTIP_STIFFNESS_PA),
+            _ => skin.compliance(0.0),
         };
-        match *indenter {
+        // Hertz: b² = 4(F/L)R/πE* across a rod, a³ = 3FR/4E* around a ball.
+        let (patch_m, half_along_m) = match *indenter {
             Indenter::Rod { radius_m, length_m } => {
                 let load = force_newton / length_m;
-                let half_width = (4.0 * load * radius_m * skin.compliance(0.0) / PI).sqrt().min(radius_m);
-                line(length_m / 2.0, widened(half_width * half_width / 4.0))
+                ((4.0 * load * radius_m * compliance / PI).sqrt().min(radius_m), length_m / 2.0)
             }
-            Indenter::Edge { length_m } => line(length_m / 2.0, layer),
-            Indenter::Ball { radius_m } => Self::round(&widened, radius_m, force_newton * skin.compliance(0.0)),
-            Indenter::Fingertip { radius_m } => {
-                Self::round(&widened, radius_m, force_newton * skin.compliance(1.0 / FINGERTIP_STIFFNESS_PA))
+            Indenter::Edge { length_m } => (0.0, length_m / 2.0),
+            Indenter::Ball { radius_m } | Indenter::Fingertip { radius_m } => {
+                (libm::cbrt(0.75 * radius_m * (force_newton * compliance)).min(radius_m), 0.0)
             }
-            Indenter::Flat { radius_m } => Self::disc(radius_m, layer),
+            Indenter::Flat { radius_m } => (radius_m, 0.0),
+        };
+        if (skin.kernel, skin.contact) == (Kernel::Gaussian, Pressure::Gaussian) {
+            return Self::blurred(indenter, skin.sigma_m().max(MIN_SIGMA_M), patch_m, half_along_m);
         }
+        Self::exact(indenter, skin, patch_m, half_along_m)
     }
 
-    /// A ball's: Hertz's disc has a³ = 3FR/4E*, and a variance of a²/5 in each direction.
-    fn round(widened: &dyn Fn(f64) -> f64, radius_m: f64, force_over_modulus: f64) -> Self {
-        let patch = libm::cbrt(0.75 * radius_m * force_over_modulus).min(radius_m);
-        let sigma = widened(patch * patch / 5.0);
-        Self {
-            strips: vec![Strip { across_m: 0.0, half_m: 0.0, part: 1.0 }],
-            sigma_across_m: sigma,
-            sigma_along_m: sigma,
+    /// With only the variance of Hertz's patch, and a Gaussian of σ = `layer`.
+    fn blurred(indenter: &Indenter, layer: f64, patch_m: f64, half_along_m: f64) -> Self {
+        let widened = |variance: f64| (layer * layer + variance).sqrt();
+        let line = |sigma_across_m: f64, sigma_along_m: f64| Self {
+            loads: Load::line(half_along_m),
+            blur: Blur::Gaussian { sigma_across_m, sigma_along_m },
             half_across_m: 0.0,
-            half_along_m: 0.0,
+            half_along_m,
+        };
+        match indenter {
+            Indenter::Rod { .. } => line(widened(patch_m * patch_m / 4.0), layer),
+            Indenter::Edge { .. } => line(layer, layer),
+            Indenter::Ball { .. } | Indenter::Fingertip { .. } => {
+                let sigma = widened(patch_m * patch_m / 5.0);
+                line(sigma, sigma)
+            }
+            Indenter::Flat { radius_m } => Self::disc(*radius_m, layer),
         }
     }
 
@@ -144,72 +158,63 @@ impl Footprint {
         let strips = (1..=count).map(|k| {
             let angle = PI * f64::from(k) / f64::from(count + 1);
             let sin = libm::sin(angle);
-            Strip {
+            Load {
                 across_m: radius_m * libm::cos(angle),
+                along_m: 0.0,
                 half_m: radius_m * sin,
                 part: 2.0 * sin * sin / f64::from(count + 1),
             }
         });
         Self {
-            strips: strips.collect(),
-            sigma_across_m: layer,
-            sigma_along_m: layer,
+            loads: strips.collect(),
+            blur: Blur::Gaussian { sigma_across_m: layer, sigma_along_m: layer },
             half_across_m: radius_m,
             half_along_m: radius_m,
         }
     }
 
+    /// With Hertz's profile as it is, and the layer's own kernel.
+    fn exact(indenter: &Indenter, skin: &Skin, patch_m: f64, half_along_m: f64) -> Self {
+        let least = MIN_DEPTH_SHARE * patch_m;
+        let blur = match skin.kernel {
+            Kernel::Gaussian => {
+                let sigma = skin.sigma_m().max(least);
+                Blur::Gaussian { sigma_across_m: sigma, sigma_along_m: sigma }
+            }
+            Kernel::Boussinesq => Blur::Boussinesq { depth_m: skin.thickness_m.max(least) },
+        };
+        let scale_m = patch::scale_m(blur);
+        let loads = match indenter {
+            Indenter::Rod { .. } => patch::rod(patch_m, half_along_m, scale_m),
+            Indenter::Edge { .. } => Load::line(half_along_m),
+            Indenter::Ball { .. } | Indenter::Fingertip { .. } => patch::dome(patch_m, scale_m),
+            Indenter::Flat { .. } => patch::disc(patch_m, scale_m),
+        };
+        let loads = if skin.kernel == Kernel::Boussinesq { patch::points(loads, scale_m) } else { loads };
+        Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m) }
+    }
+
     /// Maximum distance from the tangent plane at which a taxel is touched, m.
     pub(super) fn depth_m(&self) -> f64 {
-        MAX_DEPTH_M + self.half_across_m + CUTOFF_SIGMAS / 2.0 * self.sigma_across_m
+        MAX_DEPTH_M + self.half_across_m + DEPTH_SIGMAS * self.blur.sigma_m()
     }
 
     /// The share of the force on a square taxel with sides of `side_m` whose middle lies `across_m` and `along_m` from the
     /// middle of the indenter: the integral of the pressure over it.
     pub(super) fn share_on(&self, across_m: f64, along_m: f64, side_m: f64) -> f64 {
         let margin = side_m / 2.0;
-        if across_m.abs() > self.half_across_m + margin + CUTOFF_SIGMAS * self.sigma_across_m
-            || along_m.abs() > self.half_along_m + margin + CUTOFF_SIGMAS * self.sigma_along_m
+        let [reach_across, reach_along] = self.blur.reach_m();
+        if across_m.abs() > self.half_across_m + margin + reach_across
+            || along_m.abs() > self.half_along_m + margin + reach_along
         {
             return 0.0;
         }
-        let parts = self.strips.iter().map(|strip| {
-            strip.part
-                * mass_of_point(across_m - strip.across_m, margin, self.sigma_across_m)
-                * mass_of_line(along_m, strip.half_m, margin, self.sigma_along_m)
-        });
-        parts.sum::<f64>().max(0.0)
+        let share = |load: &Load| {
+            let (across_m, along_m) = (across_m - load.across_m, along_m - load.along_m);
+            self.blur.share(load.part, across_m, along_m, load.half_m, margin)
+        };
+        self.loads.iter().map(share).sum::<f64>().max(0.0)
     }
-}
-
-/// Φ, the standard normal distribution.
-fn normal(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
-}
-
-/// ∫Φ: z·Φ(z) + φ(z).
-fn normal_integral(z: f64) -> f64 {
-    /// 1/√2π.
-    const PEAK: f64 = 0.398_942_280_401_432_7;
-    z * normal(z) + PEAK * libm::exp(-0.5 * z * z)
-}
-
-/// The mass of a Gaussian about 0 in x ± `margin`.
-fn mass_of_point(x: f64, margin: f64, sigma: f64) -> f64 {
-    // On the side where both tails are small, their difference is exact.
-    let x = -x.abs();
-    normal((x + margin) / sigma) - normal((x - margin) / sigma)
-}
-
-/// The mass in x ± `margin` of an even line from −`half` to `half`, blurred by a Gaussian.
-fn mass_of_line(x: f64, half: f64, margin: f64, sigma: f64) -> f64 {
-    if half < 1e-3 * sigma {
-        return mass_of_point(x, margin, sigma);
-    }
-    let x = -x.abs();
-    let at = |edge: f64| normal_integral(edge / sigma);
-    let ends = (at(x + half + margin) - at(x + half - margin)) - (at(x - half + margin) - at(x - half - margin));
-    sigma * ends / (2.0 * half)
 }
 
 #[cfg(test)]
@@ -290,6 +295,85 @@ mod tests {
         let peak = Footprint::new(&ball, &SKIN, 1.0).share_on(0.0, 0.0, side) / (side * side);
         let right = 3.0 / (2.0 * PI * z * z);
         assert!((peak / right - 1.0).abs() < 1e-6, "{peak} {right}");
+    }
+
+    /// Skins of every model but the plain one.
+    fn exact_skins() -> [Skin; 3] {
+        let hertz = Skin { contact: Pressure::Hertz, ..SKIN };
+        let deep = Skin { kernel: Kernel::Boussinesq, ..hertz };
+        [hertz, deep, Skin { thickness_m: 3e-3, ..deep }]
+    }
+
+    #[test]
+    fn exact_footprints_conserve_the_force_and_its_middle() {
+        for (indenter, skin) in ALL.iter().flat_map(|indenter| exact_skins().map(|skin| (indenter, skin))) {
+            let footprint = Footprint::new(indenter, &skin, 5.0);
+            let (pitch, steps) = (4e-3, 40);
+            let (mut sum, mut moment) = (0.0, 0.0);
+            for (i, j) in (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (f64::from(i), f64::from(j)))) {
+                let share = footprint.share_on(i * pitch, j * pitch, pitch);
+                sum += share;
+                moment += share * (i + j) * pitch;
+            }
+            // Boussinesq's pressure has a tail: what lies beyond r of a point is z³/(r² + z²)^(3/2).
+            let edge = (f64::from(steps) + 0.5) * pitch - footprint.half_along_m;
+            let tail = match skin.kernel {
+                Kernel::Gaussian => 0.0,
+                Kernel::Boussinesq => (skin.thickness_m / edge).powi(3),
+            };
+            assert!((sum - 1.0).abs() <= tail + 1e-10, "{indenter:?} {skin:?}: {:e}", sum - 1.0);
+            assert!(skin.kernel == Kernel::Gaussian || 1.0 - sum > 1e-6, "the tail is there: {:e}", 1.0 - sum);
+            assert!(moment.abs() < 1e-12, "{indenter:?}: {moment:e}");
+        }
+    }
+
+    #[test]
+    fn more_loads_change_nothing() {
+        for (indenter, skin) in ALL.iter().flat_map(|indenter| exact_skins().map(|skin| (indenter, skin))) {
+            let footprint = Footprint::new(indenter, &skin, 5.0);
+            let scale = patch::scale_m(footprint.blur);
+            let peak = footprint.share_on(0.0, 0.0, 4e-3);
+            let with = |scale: f64| {
+                let (patch, half) = (footprint.half_across_m, footprint.half_along_m);
+                let loads = match indenter {
+                    Indenter::Rod { .. } => patch::rod(patch, half, scale),
+                    Indenter::Edge { .. } => Load::line(half),
+                    Indenter::Flat { .. } => patch::disc(patch, scale),
+                    _ => patch::dome(patch, scale),
+                };
+                let loads = if skin.kernel == Kernel::Boussinesq { patch::points(loads, scale) } else { loads };
+                Footprint { loads, ..footprint.clone() }
+            };
+            let off = |other: &Footprint| {
+                let at = |k: i32| f64::from(k) * 3e-3;
+                let places = (0..6).flat_map(|i| (-3..6).map(move |j| (at(i), at(j))));
+                places
+                    .map(|(x, y)| (other.share_on(x, y, 4e-3) - footprint.share_on(x, y, 4e-3)).abs())
+                    .fold(0.0, f64::max)
+            };
+            assert_eq!(off(&with(scale)), 0.0);
+            let finer = off(&with(scale / 3.0));
+            assert!(finer < 1e-5 * peak, "{indenter:?} {skin:?}: {:e}", finer / peak);
+        }
+    }
+
+    #[test]
+    fn the_exact_models_differ_from_the_plain_one() {
+        let ball = Indenter::Ball { radius_m: 0.01 };
+        let peak = |skin: &Skin| Footprint::new(&ball, skin, 5.0).share_on(0.0, 0.0, 1e-3);
+        let [hertz, deep, _] = exact_skins();
+        // Under a thick layer Hertz's profile is as good as its variance; Boussinesq's tails are not a Gaussian's.
+        let ratio = peak(&hertz) / peak(&SKIN);
+        assert!((ratio - 1.0).abs() < 0.05 && ratio != 1.0, "{ratio}");
+        let far = |skin: &Skin| Footprint::new(&ball, skin, 5.0).share_on(20e-3, 0.0, 1e-3);
+        assert!(far(&deep) > 100.0 * far(&SKIN), "{:e} {:e}", far(&deep), far(&SKIN));
+        // Bare of any layer's blur a dome stays a dome: zero pressure beyond the patch, 1.5 times the mean in its middle.
+        let thin = Skin { thickness_m: 1e-4, contact: Pressure::Hertz, ..Skin::NONE };
+        let footprint = Footprint::new(&ball, &thin, 5.0);
+        let (patch, side) = (footprint.half_across_m, 1e-4);
+        let mean = side * side / (PI * patch * patch);
+        assert!((footprint.share_on(0.0, 0.0, side) / mean - 1.5).abs() < 0.03);
+        assert!(footprint.share_on(2.1 * patch, 0.0, side) < 1e-6 * mean);
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) sensor: SensorKeys,
     #[serde(default)]
+    pub(super) calibration: CalibrationKeys,
+    #[serde(default)]
     pub(super) touch: Vec<Spanned<TouchKeys>>,
 }
 
@@ -24,6 +26,31 @@ pub(super) struct SkinKeys {
     pub(super) thickness_m: Spanned<f64>,
     pub(super) spread: Option<Spanned<f64>>,
     pub(super) stiffness_pa: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub(super) kernel: KernelName,
+    pub(super) contact: Option<Spanned<ContactName>>,
+}
+
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum KernelName {
+    #[default]
+    Gaussian,
+    Boussinesq,
+}
+
+#[derive(Clone, Copy, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum ContactName {
+    Gaussian,
+    Hertz,
+}
+
+/// What the calibration says of these sensors that is not so.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CalibrationKeys {
+    pub(super) dead_band: Option<Spanned<f64>>,
 }
 
 #[derive(Clone, Copy, Default, Deserialize, PartialEq)]
@@ -57,6 +84,10 @@ pub(super) struct SensorKeys {
     pub(super) invert: Option<Spanned<bool>>,
     pub(super) area_m2: Option<Spanned<f64>>,
     pub(super) noise_sigma: Option<Spanned<f64>>,
+    pub(super) gain_spread: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub(super) gain_seed: u64,
+    pub(super) threshold_newton: Option<Spanned<f64>>,
     pub(super) drift_per_minute: Option<Spanned<f64>>,
     #[serde(default)]
     pub(super) dead: Vec<Spanned<i64>>,

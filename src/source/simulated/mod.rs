@@ -5,7 +5,9 @@
 mod calibration;
 mod contact;
 mod file;
+mod layer;
 mod noise;
+mod patch;
 mod path;
 mod profile;
 mod record;
@@ -135,7 +137,7 @@ impl SimulatedSource {
         let fields = FieldSet::new(&body)?;
         let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
         let skin = setup.skin(file.skin.as_ref())?;
-        let sensor = sensors::sensors(text, &file.sensor, file.seed, &ids)?;
+        let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let mut touches = Vec::with_capacity(file.touch.len());
         for (index, keys) in file.touch.iter().enumerate() {
             let touch = setup.touch(index, keys.get_ref())?;
@@ -195,11 +197,19 @@ impl SimulatedSource {
     }
 
     /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
-    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked.
+    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked. It knows the layer.
     #[must_use]
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
-        self.sensor.calibration(&body.to_string_lossy(), &self.ids)
+        let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids);
+        text + &self.skin.calibration()
+    }
+
+    /// By how much the gain of each taxel differs from what the calibration says, in the order of [`Source::taxels`]: the
+    /// factors on their forces.
+    #[must_use]
+    pub fn gains(&self) -> &[f64] {
+        &self.sensor.gains
     }
 
     /// Goes back to the first frame, with the noise of another seed.

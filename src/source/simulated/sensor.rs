@@ -35,7 +35,7 @@ pub(super) enum Fault {
     Noisy(f64),
 }
 
-/// The sensors of a simulation, equal except for faults.
+/// The sensors of a simulation, equal except for gains and faults.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sensor {
     pub(super) kind: Kind,
@@ -44,6 +44,12 @@ pub(super) struct Sensor {
     pub(super) noise_sigma: f64,
     /// Drift of all readings per minute, in the same unit.
     pub(super) drift_per_minute: f64,
+    /// By taxel, the factor on its force.
+    pub(super) gains: Vec<f64>,
+    /// Forces up to this one, after the gain, are not felt.
+    pub(super) threshold_newton: f64,
+    /// A dead band of the calibration in place of the one that fits.
+    pub(super) dead_band: Option<f64>,
     pub(super) faults: Vec<Option<Fault>>,
 }
 
@@ -67,7 +73,9 @@ impl Sensor {
             None => self.noise_sigma,
         };
         let noise = if sigma > 0.0 { sigma * noise::normal(self.seed, reading.frame, reading.id) } else { 0.0 };
-        self.kind.value(reading.force_newton, noise + self.drift_per_minute * (reading.t_s / 60.0))
+        let force_newton = self.gains[reading.index] * reading.force_newton;
+        let felt = if force_newton > self.threshold_newton { force_newton } else { 0.0 };
+        self.kind.value(felt, noise + self.drift_per_minute * (reading.t_s / 60.0))
     }
 }
 
@@ -101,7 +109,16 @@ mod tests {
     use super::*;
 
     fn sensor(kind: Kind, faults: Vec<Option<Fault>>) -> Sensor {
-        Sensor { kind, seed: 1, noise_sigma: 0.0, drift_per_minute: 0.0, faults }
+        Sensor {
+            kind,
+            seed: 1,
+            noise_sigma: 0.0,
+            drift_per_minute: 0.0,
+            gains: vec![1.0; faults.len()],
+            threshold_newton: 0.0,
+            dead_band: None,
+            faults,
+        }
     }
 
     fn reading(index: usize, force_newton: f64) -> Reading {
@@ -115,6 +132,13 @@ mod tests {
         assert_eq!([0.0, 1.02, 1.03, 100.0].map(|f| sensor.read(&reading(0, f))), [240.0, 220.0, 219.0, 0.0]);
         let drifting = Sensor { drift_per_minute: 60.0, ..sensor };
         assert_eq!([0.0, 1.0].map(|f| drifting.read(&reading(0, f))), [255.0, 250.0]);
+    }
+
+    #[test]
+    fn a_gain_scales_the_force_and_a_threshold_hides_it() {
+        let sensor = Sensor { gains: vec![1.0, 1.5], threshold_newton: 2.0, ..sensor(Kind::Ideal, vec![None; 2]) };
+        assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(0, f))), [0.0, 0.0, 2.5]);
+        assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(1, f))), [0.0, 3.0, 3.75]);
     }
 
     #[test]

@@ -2,18 +2,36 @@
 
 use toml::Spanned;
 
-use super::file::{OutputName, SensorKeys, SensorName};
+use super::file::{CalibrationKeys, OutputName, SensorKeys, SensorName};
+use super::noise;
 use super::sensor::{Fault, FsrOutput, Kind, Sensor};
 use crate::error::Result;
 use crate::keys::Text;
 use crate::signal::FsrCircuit;
 
-/// The sensors that `keys` describe, for the taxels `ids`, ascending.
-pub(super) fn sensors(text: Text<'_>, keys: &SensorKeys, seed: u64, ids: &[u32]) -> Result<Sensor> {
+/// No frame has this number, so that gains are independent of all noise.
+const GAINS_FRAME: u64 = u64::MAX;
+
+/// The sensors that `keys` describe, for the taxels `ids`, ascending; `calibration` is what their calibration says instead.
+pub(super) fn sensors(
+    text: Text<'_>,
+    keys: &SensorKeys,
+    calibration: &CalibrationKeys,
+    seed: u64,
+    ids: &[u32],
+) -> Result<Sensor> {
     let kind = kind(text, keys)?;
     let noise_sigma = keys.noise_sigma.as_ref().map_or(Ok(0.0), |sigma| text.not_negative("noise_sigma", sigma))?;
     let drift_per_minute =
         keys.drift_per_minute.as_ref().map_or(Ok(0.0), |drift| text.finite("drift_per_minute", drift))?;
+    let gain_spread = keys.gain_spread.as_ref().map_or(Ok(0.0), |spread| text.not_negative("gain_spread", spread))?;
+    let gain = |&id: &u32| match gain_spread > 0.0 {
+        true => libm::exp(gain_spread * noise::normal(keys.gain_seed, GAINS_FRAME, id)),
+        false => 1.0,
+    };
+    let threshold_newton =
+        keys.threshold_newton.as_ref().map_or(Ok(0.0), |force| text.not_negative("threshold_newton", force))?;
+    let dead_band = calibration.dead_band.as_ref().map(|band| text.not_negative("dead_band", band)).transpose()?;
     let mut faults = vec![None; ids.len()];
     let mut broken = |taxel: &Spanned<i64>, fault: Fault| {
         let id = *taxel.get_ref();
@@ -35,7 +53,8 @@ pub(super) fn sensors(text: Text<'_>, keys: &SensorKeys, seed: u64, ids: &[u32])
     for noisy in &keys.noisy {
         broken(&noisy.taxel, Fault::Noisy(text.not_negative("sigma", &noisy.sigma)?))?;
     }
-    Ok(Sensor { kind, seed, noise_sigma, drift_per_minute, faults })
+    let gains = ids.iter().map(gain).collect();
+    Ok(Sensor { kind, seed, noise_sigma, drift_per_minute, gains, threshold_newton, dead_band, faults })
 }
 
 fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {

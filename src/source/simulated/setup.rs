@@ -7,7 +7,9 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::contact::{Indenter, Skin};
-use super::file::{AngleKeys, IndenterName, SkinKeys, TouchKeys};
+use super::file::{AngleKeys, ContactName, IndenterName, KernelName, SkinKeys, TouchKeys};
+use super::layer::Kernel;
+use super::patch::Pressure;
 use super::path::{Path, PathFrame};
 use super::profile::Profile;
 use crate::body::{Body, ChartKind, SurfaceIndex};
@@ -61,10 +63,34 @@ impl Setup<'_> {
         let or = |key: &str, value: &Option<Spanned<f64>>, default: f64| {
             value.as_ref().map_or(Ok(default), |value| self.text.positive(key, value))
         };
+        let kernel = match keys.kernel {
+            KernelName::Gaussian => Kernel::Gaussian,
+            KernelName::Boussinesq => {
+                self.text.refuse("spread", keys.spread.as_ref(), "beside `kernel = \"boussinesq\"`")?;
+                Kernel::Boussinesq
+            }
+        };
+        let contact = match keys.contact.as_ref().map(|contact| (*contact.get_ref(), contact.span())) {
+            Some((ContactName::Gaussian, at)) if kernel == Kernel::Boussinesq => {
+                let what = "`contact` is gaussian; beside `kernel = \"boussinesq\"` it must be hertz";
+                return Err(self.text.wrong(at, what));
+            }
+            None if kernel == Kernel::Gaussian => Pressure::Gaussian,
+            Some((ContactName::Gaussian, _)) => Pressure::Gaussian,
+            None | Some((ContactName::Hertz, _)) => Pressure::Hertz,
+        };
+        let is_plain = kernel == Kernel::Gaussian && contact == Pressure::Gaussian;
+        let thickness_m = if is_plain {
+            self.text.not_negative("thickness_m", &keys.thickness_m)?
+        } else {
+            self.text.positive("thickness_m", &keys.thickness_m)?
+        };
         Ok(Skin {
-            thickness_m: self.text.not_negative("thickness_m", &keys.thickness_m)?,
+            thickness_m,
             spread: or("spread", &keys.spread, Skin::SPREAD)?,
             stiffness_pa: or("stiffness_pa", &keys.stiffness_pa, Skin::STIFFNESS_PA)?,
+            kernel,
+            contact,
         })
     }
 

@@ -1,0 +1,22 @@
+//! The kinds of contact that are told apart.
+
+use serde::Serialize;
+
+/// What kind of contact presses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactKind {
+    /// Something round: a fingertip, a ball.
+    Point,
+    /// Something straight that goes on beyond the sensors.
+    Line,
+    /// Something straight with both ends on the sensors.
+    Segment,
+    /// Something that is wider one way than the other.
+    Blob,
+}
+
+impl ContactKind {
+    /// All of them, in the order of their numbers in columns.
+    pub const ALL: [Self; 4] = [Self::Point, Self::Line, Self::Segment, Self::Blob];
+}

@@ -1,0 +1,197 @@
+//! All kinds fitted, and one of them chosen: the contact that a user is told of.
+
+use glam::DVec2;
+
+use super::descent::{Fitted, descend};
+use super::kinds::{Blob, Line, Point, Segment};
+use super::objective::Sensor;
+use super::real::Real;
+use super::shape::{Parameter, Shape};
+use super::touch::{Start, Touch};
+use crate::percept::{ContactKind, Flags};
+use crate::stage::angle;
+
+/// What a parameter costs: two more lower χ² by over twice as much in one touch of a hundred by chance, e^−PENALTY.
+pub(super) const PENALTY: f64 = 4.6;
+/// χ² a pressed taxel more than parameters over which a contact does not explain a touch: residuals of 2σ on average.
+const MISFIT: f64 = 4.0;
+/// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
+const AT_REST: f64 = 0.01;
+
+/// The fits of a touch, or of several in lanes. Those with more parameters are made for touches with enough taxels.
+#[derive(Clone, Copy)]
+pub(crate) struct Fits<R> {
+    point: Fitted<R, 4>,
+    line: Fitted<R, 4>,
+    long: Option<[Fitted<R, 6>; 2]>,
+}
+
+/// Fits all kinds to `sensors`, from `start`.
+#[inline(always)]
+pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
+    let gains = start.gain_variance;
+    let point = descend::<R, Point, 4>(sensors, gains, start.point);
+    let line = descend::<R, Line, 4>(sensors, gains, start.line);
+    let long = start.is_long.then(|| {
+        // As much force as the line has on the segment's length.
+        let force = line.shape.force + start.half_length + std::f64::consts::LN_2;
+        let segment = Shape { force, length: start.half_length, ..line.shape };
+        [descend::<R, Segment, 6>(sensors, gains, segment), descend::<R, Blob, 6>(sensors, gains, start.blob)]
+    });
+    Fits { point, line, long }
+}
+
+impl<R: Copy> Fits<R> {
+    /// Each number by `of`, as a lane's.
+    pub(crate) fn map<T>(&self, of: impl Fn(R) -> T + Copy) -> Fits<T> {
+        Fits {
+            point: mapped(&self.point, of),
+            line: mapped(&self.line, of),
+            long: self.long.as_ref().map(|long| long.each_ref().map(|long| mapped(long, of))),
+        }
+    }
+}
+
+fn mapped<R: Copy, T, const K: usize>(fitted: &Fitted<R, K>, of: impl Fn(R) -> T + Copy) -> Fitted<T, K> {
+    let Fitted { shape: Shape { place, along, force, width, length }, cost, chi_squared, ahead, covariance } = *fitted;
+    Fitted {
+        shape: Shape {
+            place: place.map(of),
+            along: along.map(of),
+            force: of(force),
+            width: of(width),
+            length: of(length),
+        },
+        cost: of(cost),
+        chi_squared: of(chi_squared),
+        ahead: of(ahead),
+        covariance: covariance.map(|row| row.map(of)),
+    }
+}
+
+/// A contact in the field's chart, in metres and the unit of P.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Footprint {
+    pub(crate) kind: ContactKind,
+    pub(crate) place: DVec2,
+    /// Absent where it goes on beyond the sensors.
+    pub(crate) force: Option<f64>,
+    pub(crate) angle: Option<f64>,
+    /// The standard deviation of its pressure across, at the sensors.
+    pub(crate) width: f64,
+    /// Of a segment; of a blob the standard deviation along.
+    pub(crate) length: Option<f64>,
+    /// Standard deviations, where the noise of the sensors is known.
+    pub(crate) sigma: Option<Sigma>,
+}
+
+/// Standard deviations of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sigma {
+    pub(crate) place: DVec2,
+    pub(crate) force: f64,
+    pub(crate) angle: f64,
+}
+
+/// What is told of one kind's fit.
+struct Candidate {
+    kind: ContactKind,
+    parameters: usize,
+    shape: Shape<f64>,
+    cost: f64,
+    chi_squared: f64,
+    ahead: f64,
+    /// By [`Parameter`]; 0 for what the kind does not have.
+    variances: [f64; 6],
+    /// Of across and along.
+    shared: f64,
+}
+
+impl Candidate {
+    fn of<const K: usize>(kind: ContactKind, free: [Parameter; K], fitted: &Fitted<f64, K>) -> Self {
+        let mut variances = [0.0; 6];
+        for (k, parameter) in free.into_iter().enumerate() {
+            variances[parameter as usize] = fitted.covariance[k][k];
+        }
+        let shared = if free[1] == Parameter::Along { fitted.covariance[1][0] } else { 0.0 };
+        let &Fitted { shape, cost, chi_squared, ahead, .. } = fitted;
+        Self { kind, parameters: K, shape, cost, chi_squared, ahead, variances, shared }
+    }
+
+    fn variance(&self, parameter: Parameter) -> f64 {
+        self.variances[parameter as usize]
+    }
+
+    fn all(fits: &Fits<f64>) -> Vec<Self> {
+        use super::kinds::Kind as _;
+        let mut all = vec![
+            Self::of(ContactKind::Point, Point::FREE, &fits.point),
+            Self::of(ContactKind::Line, Line::FREE, &fits.line),
+        ];
+        if let Some([segment, blob]) = &fits.long {
+            all.push(Self::of(ContactKind::Segment, Segment::FREE, segment));
+            all.push(Self::of(ContactKind::Blob, Blob::FREE, blob));
+        }
+        all
+    }
+}
+
+impl Touch {
+    /// What is told of the touch that `fits` were made for, if it has taxels enough, and why what is absent is.
+    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Footprint>, Flags) {
+        let mut candidates = fits.map_or(Vec::new(), Candidate::all);
+        candidates.retain(|candidate| self.pressed > candidate.parameters);
+        let told = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
+        let Some(best) = candidates.iter().min_by(|a, b| told(a).total_cmp(&told(b))) else {
+            return (None, Flags::FEW_TAXELS);
+        };
+        let spare = (self.pressed - best.parameters) as f64;
+        // Not a number is not within either.
+        let explains = best.chi_squared <= MISFIT * spare && best.ahead <= AT_REST;
+        if !explains {
+            return (None, Flags::POOR_FIT);
+        }
+        self.told(best)
+    }
+
+    fn told(&self, best: &Candidate) -> (Option<Footprint>, Flags) {
+        let Shape { place, along, force, width, length } = best.shape;
+        let (mut place, along) = (DVec2::from_array(place), DVec2::from_array(along));
+        let (half, is_line) = (libm::exp(length), best.kind == ContactKind::Line);
+        if is_line {
+            // The point of the line that is nearest to the touch's mean, which is the origin.
+            place -= along * place.dot(along);
+        }
+        if !self.reaches(place) {
+            return (None, Flags::OFF_FIELD);
+        }
+        let ends =
+            if best.kind == ContactKind::Segment { [place - along * half, place + along * half] } else { [place; 2] };
+        let is_whole = !is_line && ends.into_iter().all(|end| self.reaches(end));
+        let force = libm::exp(force) * self.peak;
+        let [across, lengthwise] = [Parameter::Across, Parameter::Along].map(|parameter| best.variance(parameter));
+        let sides = DVec2::new(-along.y, along.x);
+        // Of a line only what it is off across.
+        let place_variance = sides * sides * across + along * along * lengthwise + 2.0 * sides * along * best.shared;
+        let sigma = Sigma {
+            place: place_variance.max(DVec2::ZERO).map(f64::sqrt) * self.unit_m,
+            force: force * best.variance(Parameter::Force).sqrt(),
+            angle: best.variance(Parameter::Turn).sqrt(),
+        };
+        let length = match best.kind {
+            ContactKind::Point | ContactKind::Line => None,
+            ContactKind::Segment => is_whole.then_some(2.0 * half * self.unit_m),
+            ContactKind::Blob => Some(half * self.unit_m),
+        };
+        let footprint = Footprint {
+            kind: best.kind,
+            place: place * self.unit_m + self.origin,
+            force: is_whole.then_some(force),
+            angle: (best.kind != ContactKind::Point).then(|| angle::of_line(along.x, along.y)),
+            width: libm::exp(width) * self.unit_m,
+            length,
+            sigma: self.has_noise.then_some(sigma),
+        };
+        (Some(footprint), if is_whole { Flags::empty() } else { Flags::OFF_FIELD })
+    }
+}

@@ -1,0 +1,126 @@
+//! Levenberg and Marquardt's descent, for a fixed number of steps.
+
+use super::kinds::Kind;
+use super::objective::{Objective, Sensor};
+use super::real::Real;
+use super::shape::Shape;
+
+/// How many steps are tried.
+pub(crate) const STEPS: usize = 6;
+/// The damping of the first step, and by how much it falls after a step that helps and rises after one that does not.
+const DAMPING: f64 = 0.01;
+const DAMPING_CHANGES: f64 = 10.0;
+/// Nothing on A's diagonal counts as less: what no sensor tells of stays where it is.
+const LEAST: f64 = 1e-12;
+
+/// Where a descent ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fitted<R, const K: usize> {
+    pub(crate) shape: Shape<R>,
+    /// χ² and the prior.
+    pub(crate) cost: R,
+    pub(crate) chi_squared: R,
+    /// How much cost a full step would still take away, to first order.
+    pub(crate) ahead: R,
+    /// (JᵀJ)⁻¹ there, its lower half.
+    pub(crate) covariance: [[R; K]; K],
+}
+
+/// Descends from `start` for kind M.
+#[inline(always)]
+pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
+    sensors: &[Sensor<R>],
+    gain_variance: R,
+    start: Shape<R>,
+) -> Fitted<R, K> {
+    let (mut shape, mut now) = (start, Objective::at::<M>(sensors, gain_variance, &start));
+    let mut damping = now.cost.all(DAMPING);
+    for _ in 0..STEPS {
+        let step = Factor::of(&now.a, damping).solve(now.g);
+        let tried = shape.moved(M::FREE, step.map(|step| -step));
+        let then = Objective::at::<M>(sensors, gain_variance, &tried);
+        let better = then.cost.is_below(now.cost);
+        shape = Shape::choose(better, &tried, &shape);
+        now = Objective::choose(better, &then, &now);
+        damping = R::choose(better, damping * (1.0 / DAMPING_CHANGES), damping * DAMPING_CHANGES);
+    }
+    let factor = Factor::of(&now.a, damping.all(0.0));
+    let step = factor.solve(now.g);
+    let ahead = (1..K).fold(step[0] * now.g[0], |sum, k| sum + step[k] * now.g[k]);
+    Fitted { shape, cost: now.cost, chi_squared: now.chi_squared, ahead, covariance: factor.inverse() }
+}
+
+/// Cholesky's lower factor of A + damping · diag A, with the inverses of its diagonal there.
+struct Factor<R, const K: usize>([[R; K]; K]);
+
+impl<R: Real, const K: usize> Factor<R, K> {
+    #[inline(always)]
+    fn of(a: &[[R; K]; K], damping: R) -> Self {
+        let mut l = *a;
+        for i in 0..K {
+            for j in 0..i {
+                let rest = (0..j).fold(a[i][j], |rest, k| rest - l[i][k] * l[j][k]);
+                l[i][j] = rest * l[j][j];
+            }
+            let rest = (0..i).fold(a[i][i] * (damping + 1.0), |rest, k| rest - l[i][k] * l[i][k]);
+            l[i][i] = rest.all(1.0) / rest.at_least(LEAST).sqrt();
+        }
+        Self(l)
+    }
+
+    /// A⁻¹g.
+    #[inline(always)]
+    fn solve(&self, g: [R; K]) -> [R; K] {
+        let (l, mut x) = (&self.0, g);
+        for i in 0..K {
+            x[i] = (0..i).fold(x[i], |rest, k| rest - l[i][k] * x[k]) * l[i][i];
+        }
+        for i in (0..K).rev() {
+            x[i] = (i + 1..K).fold(x[i], |rest, k| rest - l[k][i] * x[k]) * l[i][i];
+        }
+        x
+    }
+
+    /// A⁻¹, its lower half.
+    #[inline(always)]
+    fn inverse(&self) -> [[R; K]; K] {
+        let mut l = self.0;
+        // First the factor's own inverse, in its place.
+        for i in 0..K {
+            for j in 0..i {
+                let sum = (j + 1..i).fold(l[i][j] * l[j][j], |sum, k| sum + l[i][k] * l[k][j]);
+                l[i][j] = -(sum * l[i][i]);
+            }
+        }
+        let mut inverse = l;
+        for i in 0..K {
+            for j in 0..=i {
+                inverse[i][j] = (i + 1..K).fold(l[i][i] * l[i][j], |sum, k| sum + l[k][i] * l[k][j]);
+            }
+        }
+        inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_solves_and_inverts() {
+        let a = [[4.0, 0.0, 0.0], [1.0, 5.0, 0.0], [-2.0, 0.5, 6.0]];
+        let whole = |i: usize, j: usize| if i < j { a[j][i] } else { a[i][j] };
+        let factor = Factor::of(&a, 0.0);
+        let x = factor.solve([1.0, -2.0, 0.5]);
+        let inverse = factor.inverse();
+        for i in 0..3 {
+            let g: f64 = (0..3).map(|k| whole(i, k) * x[k]).sum();
+            assert!((g - [1.0, -2.0, 0.5][i]).abs() < 1e-14, "{g}");
+            for j in 0..3 {
+                let product: f64 =
+                    (0..3).map(|k| whole(i, k) * if k < j { inverse[j][k] } else { inverse[k][j] }).sum();
+                assert!((product - if i == j { 1.0 } else { 0.0 }).abs() < 1e-14, "{i} {j}: {product}");
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! How much of a contact's pressure falls on a taxel, along one direction: the integral of a blurred point or line over it.
+
+use super::real::Real;
+
+/// A mass, and how it changes with place, with the logarithm of the spread, and with that of half the line's length.
+#[derive(Clone, Copy)]
+pub(crate) struct Mass<R> {
+    pub(crate) value: R,
+    pub(crate) by_place: R,
+    pub(crate) by_spread: R,
+    pub(crate) by_half: R,
+}
+
+/// Of a point, blurred by a Gaussian of `spread` w, in `place` x ± `margin` a: Φ((x + a)/w) − Φ((x − a)/w).
+#[inline(always)]
+pub(crate) fn of_point<R: Real>(place: R, margin: R, spread: R) -> Mass<R> {
+    let per = spread.all(1.0) / spread;
+    let (far, near) = ((place + margin) * per, (place - margin) * per);
+    let ((up_to_far, at_far), (up_to_near, at_near)) = (far.normal(), near.normal());
+    Mass {
+        value: up_to_far - up_to_near,
+        by_place: (at_far - at_near) * per,
+        by_spread: near * at_near - far * at_far,
+        by_half: place.all(0.0),
+    }
+}
+
+/// The same of an even line of length 2h: (w/2h) [K((x+h+a)/w) − K((x+h−a)/w) − K((x−h+a)/w) + K((x−h−a)/w)], where
+/// K(z) = z·Φ(z) + φ(z) is Φ's integral.
+#[inline(always)]
+pub(crate) fn of_line<R: Real>(place: R, margin: R, half: R, spread: R) -> Mass<R> {
+    let (per, share) = (spread.all(1.0) / spread, spread.all(0.5) / half);
+    let [a, b, c, d] = [place + half + margin, place + half - margin, place - half + margin, place - half - margin]
+        .map(|edge| {
+            let z = edge * per;
+            let (up_to, at) = z.normal();
+            (up_to, at, z * up_to + at)
+        });
+    let value = share * spread * ((a.2 - b.2) - (c.2 - d.2));
+    Mass {
+        value,
+        by_place: share * ((a.0 - b.0) - (c.0 - d.0)),
+        by_spread: share * spread * ((a.1 - b.1) - (c.1 - d.1)),
+        by_half: ((a.0 - b.0) + (c.0 - d.0)) * 0.5 - value,
+    }
+}

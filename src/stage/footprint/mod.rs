@@ -1,0 +1,41 @@
+//! **footprint**: what presses, as the contact under the skin's own response that explains a touch's taxels best.
+//!
+//! The layer over the sensors blurs a contact's pressure by a Gaussian of σ; a taxel feels the integral over its area, as
+//! `docs/simulation.md` has it. Four kinds of contact are tried: a `point`, a `line` without ends, a `segment` with ends, and
+//! a `blob` with two spreads ([`kinds`]). Each is fitted to the touch's pressed taxels Pᵢ and to their neighbours by least
+//! squares of
+//!
+//! rᵢ = (mᵢ − Pᵢ) / √(σᵢ² + (g·mᵢ)²)
+//!
+//! where m is what the contact would make a taxel feel, σᵢ the noise of P and g the spread of the sensors' gains, which
+//! stands for the model's own faults too ([`objective`]). A taxel at 0 says only that m is not over its threshold: it counts
+//! where it is. A prior holds the contact's spread near what touches have.
+//!
+//! **Descent.** Levenberg and Marquardt's, from the touch's moments, for a fixed number of steps; a step that does not help
+//! is not taken ([`descent`]). A segment starts from the line. Nothing is kept from frame to frame, so that a recording that
+//! is cut anywhere has the same fits.
+//!
+//! **Kind.** Of the kinds the one with the least χ² + prior + 2·[`choice::PENALTY`] a parameter ([`choice`]). The errors' covariance is
+//! (JᵀJ)⁻¹ where the descent ends.
+//!
+//! **Absent** is a fit whose touch has too few pressed taxels to tell (`few_taxels`: no more than parameters), whose place no
+//! sensor is near (`off_field`), that does not explain the taxels or has not come to rest (`poor_fit`), of a field whose chart
+//! is too far from flat (`curved`), or without the layer's σ (`no_skin`). A contact whose ends lie beyond the sensors, as a
+//! line's do, has a place and an angle, but no force and no length: `off_field` too.
+//!
+//! This stage is the host's, in f64, and starts from raw values: it has the same bits on every backend. [`Real`] lets it fit
+//! several touches side by side.
+
+mod choice;
+mod descent;
+mod kinds;
+mod mass;
+mod objective;
+mod real;
+mod shape;
+mod touch;
+
+pub(crate) use choice::{Fits, Footprint, fit};
+pub(crate) use objective::Sensor;
+pub(crate) use real::Real;
+pub(crate) use touch::{Layer, Start, Taxel, Touch};

@@ -1,0 +1,161 @@
+//! A touch as the fit takes it: its sensors in units of the layer and of its largest pressure, and where descents start.
+
+use glam::DVec2;
+
+use super::kinds::{Blob, Contact, Kind, Line, Point};
+use super::objective::Sensor;
+use super::real::Real;
+use super::shape::Shape;
+
+/// The layer over the sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Layer {
+    /// Standard deviation of a point force's pressure at the sensors.
+    pub(crate) sigma_m: f64,
+    /// Relative standard deviation of the sensors' gains, and of what the model is off by.
+    pub(crate) gain_spread: f64,
+    /// A place farther than this from every sensor is beyond them: over half of the way from a sensor to those beside it, so that
+    /// none between sensors is.
+    pub(crate) reach_m: f64,
+}
+
+/// A taxel of a touch, or beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Taxel {
+    /// In the field's chart.
+    pub(crate) place_m: DVec2,
+    pub(crate) area_m2: f64,
+    /// P; 0 if it is not pressed.
+    pub(crate) pressure: f64,
+    /// The P up to which one reads 0.
+    pub(crate) threshold: f64,
+    /// Standard deviation of P for noise, if that is known.
+    pub(crate) sigma: Option<f64>,
+}
+
+/// A touch to be fitted.
+#[derive(Clone, Debug)]
+pub(crate) struct Touch {
+    sensors: Vec<Sensor<f64>>,
+    /// What lengths and pressures are counted in, and from where.
+    pub(super) unit_m: f64,
+    pub(super) peak: f64,
+    pub(super) origin: DVec2,
+    pub(super) pressed: usize,
+    /// Whether the noise of all of its taxels is known.
+    pub(super) has_noise: bool,
+    gain_spread: f64,
+    reach: f64,
+}
+
+/// Where the descents of a touch start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Start<R> {
+    pub(crate) point: Shape<R>,
+    pub(crate) line: Shape<R>,
+    pub(crate) blob: Shape<R>,
+    /// The logarithm of half a segment's length.
+    pub(crate) half_length: R,
+    pub(crate) gain_variance: R,
+    /// Whether there are taxels enough for segments and blobs.
+    pub(crate) is_long: bool,
+}
+
+impl<R: Real> Start<R> {
+    /// Several side by side, of numbers that `lanes` puts side by side.
+    #[inline(always)]
+    pub(crate) fn abreast<const N: usize>(starts: [&Start<f64>; N], lanes: impl Fn([f64; N]) -> R + Copy) -> Self {
+        Self {
+            point: Shape::abreast(starts.map(|start| &start.point), lanes),
+            line: Shape::abreast(starts.map(|start| &start.line), lanes),
+            blob: Shape::abreast(starts.map(|start| &start.blob), lanes),
+            half_length: lanes(starts.map(|start| start.half_length)),
+            gain_variance: lanes(starts.map(|start| start.gain_variance)),
+            is_long: starts.iter().any(|start| start.is_long),
+        }
+    }
+}
+
+/// A taxel's noise counts as at least this part of the touch's largest pressure: what it is taken for where it is not known.
+const LEAST_NOISE: f64 = 1e-3;
+const UNKNOWN_NOISE: f64 = 1e-2;
+/// Half of a segment's length starts at least here, in σ.
+const SHORTEST_HALF: f64 = 0.5;
+
+impl Touch {
+    /// The touch of `taxels`, some of which are pressed.
+    pub(crate) fn new(taxels: &[Taxel], layer: &Layer) -> Self {
+        let (unit_m, peak) = (layer.sigma_m, taxels.iter().map(|taxel| taxel.pressure).fold(0.0, f64::max));
+        let total: f64 = taxels.iter().map(|taxel| taxel.pressure).sum();
+        let origin = taxels.iter().map(|taxel| taxel.pressure * taxel.place_m).sum::<DVec2>() / total;
+        let sensor = |taxel: &Taxel| {
+            let is_pressed = taxel.pressure > 0.0;
+            let sigma = taxel.sigma.map_or(UNKNOWN_NOISE, |sigma| sigma / peak).max(LEAST_NOISE);
+            Sensor {
+                at: ((taxel.place_m - origin) / unit_m).to_array(),
+                margin: 0.5 * taxel.area_m2.sqrt() / unit_m,
+                pressure: if is_pressed { taxel.pressure } else { taxel.threshold } / peak,
+                variance: sigma * sigma,
+                pressed: if is_pressed { 1.0 } else { 0.0 },
+            }
+        };
+        Self {
+            sensors: taxels.iter().map(sensor).collect(),
+            unit_m,
+            peak,
+            origin,
+            pressed: taxels.iter().filter(|taxel| taxel.pressure > 0.0).count(),
+            has_noise: taxels.iter().all(|taxel| taxel.sigma.is_some()),
+            gain_spread: layer.gain_spread,
+            reach: layer.reach_m / unit_m,
+        }
+    }
+
+    pub(crate) fn sensors(&self) -> &[Sensor<f64>] {
+        &self.sensors
+    }
+
+    /// Whether a sensor is near `place`.
+    pub(super) fn reaches(&self, place: DVec2) -> bool {
+        self.sensors.iter().any(|sensor| DVec2::from_array(sensor.at).distance(place) <= self.reach)
+    }
+
+    /// Where its descents start: from its second moments. None where taxels are too few for any kind.
+    pub(crate) fn start(&self) -> Option<Start<f64>> {
+        let pressed = self.sensors.iter().filter(|sensor| sensor.pressed > 0.0);
+        let (mut total, mut moments, mut cell) = (0.0, [0.0; 3], 0.0);
+        for &Sensor { at: [u, v], margin, pressure, .. } in pressed {
+            total += pressure;
+            cell += pressure * margin * margin / 3.0;
+            moments = [moments[0] + pressure * u * u, moments[1] + pressure * u * v, moments[2] + pressure * v * v];
+        }
+        let [a, b, d] = moments.map(|moment| moment / total);
+        let (mean, apart) = (0.5 * (a + d), libm::hypot(0.5 * (a - d), b));
+        let turn = 0.5 * libm::atan2(2.0 * b, a - d);
+        // The logarithm of the spread whose variance, with that of a taxel, is a moment; none is sharper than the layer.
+        let spread = |moment: f64| 0.5 * libm::log((moment - cell / total).max(1.0));
+        let shape = |along, width: f64, length: f64| Shape { place: [0.0; 2], along, force: 0.0, width, length };
+        let axis = [libm::cos(turn), libm::sin(turn)];
+        (self.pressed > Point::FREE.len()).then(|| Start {
+            point: self.with_force::<Point, 4>(shape([1.0, 0.0], spread(mean), 0.0)),
+            line: self.with_force::<Line, 4>(shape(axis, spread(mean - apart), 0.0)),
+            blob: self.with_force::<Blob, 6>(shape(axis, spread(mean - apart), spread(mean + apart))),
+            // An even line has a variance of h²/3.
+            half_length: libm::log((6.0 * apart).sqrt().max(SHORTEST_HALF)),
+            gain_variance: self.gain_spread * self.gain_spread,
+            is_long: self.pressed > Blob::FREE.len(),
+        })
+    }
+
+    /// `shape` with the force that explains the pressed taxels best.
+    fn with_force<M: Kind<K>, const K: usize>(&self, shape: Shape<f64>) -> Shape<f64> {
+        let contact = Contact::of(&shape);
+        let (mut both, mut own) = (0.0, f64::MIN_POSITIVE);
+        for sensor in self.sensors.iter().filter(|sensor| sensor.pressed > 0.0) {
+            let (felt, _) = M::felt(&contact, sensor.at, sensor.margin);
+            both += felt * sensor.pressure;
+            own += felt * felt;
+        }
+        Shape { force: libm::log((both / own).max(f64::MIN_POSITIVE)), ..shape }
+    }
+}
