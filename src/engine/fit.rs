@@ -44,7 +44,7 @@ fn taxel(plan: &Plan, field: &PlanField, raw: &RawBatch<'_>, frame: usize, membe
     if pressure.status & UNUSABLE != 0 {
         return None;
     }
-    let number = f64::from(value.number()?);
+    let number = value.number()?;
     Some(Taxel {
         place_m: field.places[member].truncate() * f64::from(field.unit_m),
         area_m2: plan.areas[channel],

@@ -148,8 +148,8 @@ mod tests {
         percept.filtered_direction = percept.direction;
         percept.filtered_speed = percept.speed;
         assert_eq!(outputs.columns().count(), outputs.iter().count());
-        // Nor are they contacts.
-        for column in (outputs - Outputs::FOOTPRINT).columns() {
+        // Nor are they contacts, or have a unit.
+        for column in (outputs - Outputs::FOOTPRINT - Outputs::FORCE).columns() {
             let numbers = percept.value(column).unwrap_or_else(|| panic!("{}", column.name));
             assert_eq!(numbers[column.components..].iter().sum::<f64>(), 0.0, "{} has more", column.name);
         }

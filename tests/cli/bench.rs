@@ -28,6 +28,7 @@ fn array(folder: &Path, index: &Value, name: &str) -> (Vec<usize>, String, Vec<f
     let dtype = header.split_once("'descr': '").unwrap().1.split_once('\'').unwrap().0.to_owned();
     assert_eq!((serde_json::json!(shape), serde_json::json!(dtype)), (about["shape"].clone(), about["dtype"].clone()));
     let numbers: Vec<f64> = match dtype.as_str() {
+        "<u8" => bytes[end..].chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap()) as f64).collect(),
         "<u4" => bytes[end..].chunks(4).map(|b| f64::from(u32::from_le_bytes(b.try_into().unwrap()))).collect(),
         "<f4" => bytes[end..].chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect(),
         "<f8" => bytes[end..].chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect(),

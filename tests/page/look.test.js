@@ -268,3 +268,51 @@ test("a browser without WebGL 2 says what to do", async () => {
   await page.close();
   await server.stop();
 });
+
+test("ten thousand taxels are drawn, each in its colour", async () => {
+  const sheet = join(folder, "sheet.glb");
+  execFileSync(SOMATIC, ["author", "--grid", "100x100", "--pitch", "5mm", "-o", sheet]);
+  const ids = taxelIds(sheet);
+  assert.equal(ids.length, 10000);
+  const row = (n) => ids.map((id) => Math.max(0, Math.round(400 * Math.sin(id / 333 + n / 60))));
+  const server = await view(writeRecording("sheet.csv", ids, 500, 1 / 250, row), "--body", sheet);
+  const { page, problems } = await open(server.url);
+  const rate = await page.evaluate(async () => {
+    const [drawn, since] = [window.somatic.framesDrawn, performance.now()];
+    await new Promise((done) => setTimeout(done, 4000));
+    return (1000 * (window.somatic.framesDrawn - drawn)) / (performance.now() - since);
+  });
+  console.log(`${ids.length} taxels at 250 Hz: ${rate.toFixed(1)} frames/s`);
+  // Other tests run beside.
+  assert.ok(rate > 0.3, `${rate} frames/s`);
+  (await page.evaluate(() => window.somatic.model.status.playing)) && (await page.keyboard.press(" "));
+  await seek(page, 1);
+  for (const key of ["5", "n", "m", "m", "m"]) await page.keyboard.press(key);
+  await page.waitForTimeout(2000);
+  await picture(page, "sheet.png");
+  const expected = await page.evaluate(() => {
+    const { model, pixelOfTaxel } = window.somatic;
+    const taxels = Array.from({ length: 40 }, (_, i) => 1111 + 200 * i);
+    return taxels.map((taxel) => ({
+      at: pixelOfTaxel(taxel),
+      colour:
+        model.welcome.colours[
+          Math.round(Math.min(1, Math.max(0, model.pressure[taxel] / model.scaleMax)) * 255)
+        ],
+      pressed: model.pressure[taxel] > 0,
+    }));
+  });
+  const pressed = expected.filter((taxel) => taxel.at && taxel.pressed);
+  assert.ok(pressed.length > 10, `${pressed.length} pressed taxels in sight`);
+  const seen = await coloursAt(
+    page,
+    pressed.map((taxel) => taxel.at),
+  );
+  const off = pressed.map(({ colour }, i) =>
+    Math.max(...colour.map((part, k) => Math.abs(part - seen[i][k]))),
+  );
+  assert.ok(Math.max(...off) <= 2, `off by ${off}`);
+  assert.deepEqual(problems, []);
+  await page.close();
+  await server.stop();
+});

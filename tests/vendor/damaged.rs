@@ -51,7 +51,7 @@ fn what_is_cut_short_keeps_what_was_read() {
             if !text.is_char_boundary(length) {
                 continue;
             }
-            match try_read(format, text[..length].as_bytes()) {
+            match try_read(format, &text.as_bytes()[..length]) {
                 Ok(part) => {
                     kept[part.frames.len()] += 1;
                     cut_within += usize::from(!part.losses.is_empty());

@@ -136,7 +136,7 @@ impl Emed {
         let mut words = Separator::Blanks.cells(line);
         let (Some(word), Some(picture)) = (words.next(), &mut self.picture) else { return Ok(()) };
         if word.is("Force") {
-            let total = words.last().and_then(|word| word.number());
+            let total = words.last().and_then(super::text::Word::number);
             picture.force_newton = total.map(|total| total + picture.force_newton.unwrap_or(0.0));
             self.place = Place::Header;
             return Ok(());

@@ -47,7 +47,7 @@ impl NovelAsc {
         }
         if text.starts_with("time[") {
             let words = Separator::Blanks.cells(line).skip(1);
-            let sensors: Option<Vec<u32>> = words.map(|word| word.whole()).collect();
+            let sensors: Option<Vec<u32>> = words.map(super::text::Word::whole).collect();
             self.sensors = sensors.filter(|sensors| !sensors.is_empty()).ok_or_else(|| {
                 Error::failed("the table's header is not `time[secs]` and the numbers of the sensors")
             })?;

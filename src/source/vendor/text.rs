@@ -185,7 +185,7 @@ fn in_general(word: &[u8], decimal: u8) -> Option<f64> {
 pub(super) fn leading_number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     let end = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | ',' | '-' | '+'))).unwrap_or(text.len());
-    let number = number(text[..end].as_bytes(), b',')?;
+    let number = number(&text.as_bytes()[..end], b',')?;
     number.is_finite().then(|| (number, text[end..].trim()))
 }
 
