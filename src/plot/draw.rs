@@ -77,8 +77,9 @@ struct Plot<'a> {
 }
 
 /// A quantity as people read it: times this, in this unit.
-fn for_people(column: &Column) -> (f64, &'static str) {
+fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
     match column.unit {
+        Unit::P => p_for_people(p_unit),
         Unit::Metre => (1e3, "mm"),
         Unit::SquareMetre => (1e4, "cm²"),
         Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
@@ -86,6 +87,11 @@ fn for_people(column: &Column) -> (f64, &'static str) {
         Unit::One => (1.0, ""),
         unit => (1.0, unit.symbol()),
     }
+}
+
+/// The same of a pressure in `unit`.
+fn p_for_people(unit: &str) -> (f64, &str) {
+    if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
 }
 
 impl<'a> Plot<'a> {
@@ -144,8 +150,9 @@ impl<'a> Plot<'a> {
     /// By output, the range of all recordings, so that they can be compared.
     fn ranges(&self) -> BTreeMap<&'static str, [f64; 2]> {
         let mut ranges: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
-        for panel in self.all.iter().flat_map(|gathered| &gathered.panels) {
-            let factor = for_people(panel.column).0;
+        let panels = self.all.iter().flat_map(|gathered| gathered.panels.iter().map(move |panel| (gathered, panel)));
+        for (gathered, panel) in panels {
+            let factor = for_people(panel.column, &gathered.p_unit).0;
             for [low, high] in panel.lines.iter().flatten().filter_map(Series::range) {
                 let [low, high] = [low * factor, high * factor];
                 let known = ranges.entry(panel.column.name).or_insert([low, high]);
@@ -187,7 +194,7 @@ impl<'a> Plot<'a> {
         range: [f64; 2],
         is_last: bool,
     ) -> Result<()> {
-        let (factor, unit) = for_people(panel.column);
+        let (factor, unit) = for_people(panel.column, &gathered.p_unit);
         let [first_s, last_s] = gathered.span_s;
         // A time since 1970 would fill the axis with digits.
         let start_s = if first_s.abs() > 10.0 * (last_s - first_s) + 1.0 { first_s } else { 0.0 };
@@ -252,7 +259,7 @@ impl<'a> Plot<'a> {
             let first = self.page.map(column, quantity * count, 2 * count);
             let last = self.page.map(column, quantity * count + count - 1, 2 * count);
             let area = Area { width: last.right() - first.left, ..first };
-            self.draw_key(pen, quantity, area)?;
+            self.draw_key(pen, quantity, &gathered.p_unit, area)?;
         }
         let last = self.page.map(column, 2 * count - 1, 2 * count);
         self.draw_length(pen, (last.right(), last.bottom()))
@@ -320,8 +327,10 @@ impl<'a> Plot<'a> {
     }
 
     /// The scale of a map's colours, and above the maps what they show.
-    fn draw_key<B: DrawingBackend>(&self, pen: &Pen<'_, B>, quantity: usize, area: Area) -> Result<()> {
-        let (what, unit) = [("highest pressure, path of its centre", "P"), ("pressure–time integral", "P·s")][quantity];
+    fn draw_key<B: DrawingBackend>(&self, pen: &Pen<'_, B>, quantity: usize, p_unit: &str, area: Area) -> Result<()> {
+        let (factor, p_unit) = p_for_people(p_unit);
+        let what = ["highest pressure, path of its centre", "pressure–time integral"][quantity];
+        let unit = [p_unit.to_owned(), format!("{p_unit}·s")][quantity].clone();
         pen.fitted_centred(what, 13, INK, (area.left + area.width / 2, area.top - 29), area.width)?;
         let width = area.width.min(220);
         let left = area.left + (area.width - width) / 2;
@@ -331,7 +340,7 @@ impl<'a> Plot<'a> {
             let x = SCALE * left + step;
             pen.rectangle([(x, SCALE * top), (x + 1, SCALE * (top + 9))], colour)?;
         }
-        let most = self.most[quantity];
+        let most = self.most[quantity] * factor;
         let range = [0.0, most.max(f64::MIN_POSITIVE)];
         let marks = ticks(range, 4);
         let step = if marks.len() > 1 { marks[1] - marks[0] } else { most };
@@ -340,7 +349,7 @@ impl<'a> Plot<'a> {
             pen.line(&[(at, top + 9), (at, top + 13)], GREY, 1.0)?;
             pen.text(&shown(mark, step), 11, GREY, HPos::Center, (at, top + 21))?;
         }
-        pen.text(unit, 11, GREY, HPos::Left, (left + width + 8, top + 4))?;
+        pen.text(&unit, 11, GREY, HPos::Left, (left + width + 8, top + 4))?;
         Ok(())
     }
 }

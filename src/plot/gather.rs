@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::field::FieldSet;
-use crate::percept::{COLUMNS, Column, Outputs, Percepts};
+use crate::percept::{COLUMNS, Column, Outputs, Percepts, Unit};
 use crate::signal::Frame;
 
 /// Most fields that are gathered, and most that are shown.
@@ -45,6 +45,8 @@ pub struct Gathered {
     /// Quantities over time.
     pub(super) panels: Vec<Panel>,
     pub(super) maps: Vec<PressureMap>,
+    /// What pressures are measured in.
+    pub(super) p_unit: String,
 }
 
 /// A quantity over time.
@@ -72,6 +74,7 @@ pub struct Gatherer {
     areas: Vec<f64>,
     index_of: HashMap<u32, usize>,
     pressures: Vec<(u32, f64)>,
+    p_unit: String,
 }
 
 /// A field that is followed over time.
@@ -128,7 +131,14 @@ impl Gatherer {
             areas: body.taxels.iter().map(|taxel| taxel.area).collect(),
             index_of: body.taxels.iter().enumerate().map(|(index, taxel)| (taxel.id, index)).collect(),
             pressures: Vec::new(),
+            p_unit: Unit::P.symbol().to_owned(),
         })
+    }
+
+    /// The same, with pressures in `unit`, such as `Pa`.
+    #[must_use]
+    pub fn with_p_unit(self, unit: &str) -> Self {
+        Self { p_unit: unit.to_owned(), ..self }
     }
 
     /// Takes `frames`, of which `engine` has just made percepts.
@@ -212,6 +222,7 @@ impl Gatherer {
             maps: maps.collect(),
             lines: lines.iter().map(|&line| self.set.fields[self.fields[line].in_body].name.clone()).collect(),
             panels,
+            p_unit: self.p_unit,
             name: self.name,
             frames: self.frames,
             span_s: self.span_s.unwrap_or([0.0; 2]),
