@@ -250,3 +250,32 @@ fn the_example_is_what_its_recipe_makes() {
     let all = plainly("insoles.csv", &text).unwrap();
     assert_eq!((all.frames.len(), all.layout.panels.len(), &all.losses[..]), (60, 2, &[][..]));
 }
+
+/// Centres of pressure may be counted from another corner of the mat than the sensors' corners are.
+#[test]
+fn places_are_counted_as_centres_of_pressure_are() {
+    let dialect = Dialect { unit: "kPa", ..PLAIN };
+    let plain = make::novel(&dialect, &[12], Some(4), &[1, 2]);
+    let centre = |frame: usize| -> [f64; 2] {
+        let cells = (0..12).map(|cell| (value(frame, 0, 0, cell), cell));
+        let sum: f64 = cells.clone().map(|(p, _)| p).sum();
+        let x: f64 = cells.clone().map(|(p, cell)| p * ((cell % 4) as f64 + 0.5)).sum();
+        let y: f64 = cells.map(|(p, cell)| p * 2.0 * (9.5 - (cell / 4) as f64)).sum();
+        [x / sum, y / sum]
+    };
+    let with = |of: &dyn Fn([f64; 2]) -> [f64; 2]| {
+        let row = |frame: usize| {
+            let [x, y] = of(centre(frame));
+            format!("    {:.5}  1.0  {x:.3}  {y:.3}", 0.01 * frame as f64)
+        };
+        let text = plain.replace("    0.5  1.0  -  -", &format!("{}\n{}", row(1), row(2)));
+        assert_ne!(text, plain);
+        plainly("a.asc", &text).unwrap().layout.panels[0].cells[0].centre_m.map(|x| (x * 1e6).round() / 1e4)
+    };
+    // The first cell is at the top left, of four columns of 1 cm and three rows of 2 cm from 14 to 20 cm.
+    assert_eq!(with(&|centre| centre), [0.5, 19.0]);
+    assert_eq!(with(&|[x, y]| [4.0 - x, 34.0 - y]), [3.5, 15.0]);
+    assert_eq!(with(&|[x, y]| [4.0 - x, y]), [3.5, 19.0]);
+    // What fits neither way is as the corners have it.
+    assert_eq!(with(&|[x, y]| [x + 0.3, y - 0.7]), [0.5, 19.0]);
+}

@@ -73,11 +73,10 @@ impl VendorSource {
     /// missing that the file does not say, or given that it does.
     pub fn open(path: impl AsRef<Path>, options: &VendorOptions) -> Result<Self> {
         let path = path.as_ref();
-        Self::begin(path, options).map_err(|e| e.at(path.display()))
+        Self::begin(path, Lines::open(path)?, options).map_err(|e| e.at(path.display()))
     }
 
-    fn begin(path: &Path, options: &VendorOptions) -> Result<Self> {
-        let mut lines = Lines::open(path)?;
+    fn begin(path: &Path, mut lines: Lines, options: &VendorOptions) -> Result<Self> {
         let head = lines.head()?;
         if head.is_empty() {
             return Err(Error::failed("the file is empty"));
@@ -236,7 +235,9 @@ fn parser(format: VendorFormat, separator: Separator, path: &Path, options: &Ven
         VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, places(path)?)),
         VendorFormat::Matrix => {
             let [rows, columns] = grid.ok_or_else(|| {
-                Error::usage("a plain matrix does not say how many rows and columns a frame has; give them with --grid, such as --grid 31x11")
+                Error::usage(
+                    "a plain matrix does not say how many rows and columns a frame has; give them, as with --grid 31x11",
+                )
             })?;
             // The pitch of rows is their height.
             let pitch_m = pitch_m.map(|[rows, columns]| [columns, rows]);
