@@ -7,6 +7,7 @@ use crate::body::{Body, ChartKind};
 use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::Outputs;
+use crate::stage::footprint;
 
 /// What is traded for what; the default is as accurate as single precision is without pains, and as fast as it is.
 ///
@@ -72,6 +73,13 @@ words! {"way to orientation",
         TwoPoints = "two-points",
         /// The principal axis of the second moments: output `axis`.
         SecondMoments = "second-moments",
+        /// The contact fitted to the touch in one step: outputs `footprint_place` and `footprint_angle`, beside the axis for touches
+        /// without a fit. It is not tested whether it explains the taxels.
+        FootprintInOne = "footprint-1",
+        /// The same in two steps.
+        FootprintInTwo = "footprint-2",
+        /// The same in all steps.
+        Footprint = "footprint",
     }
 }
 
@@ -157,7 +165,22 @@ impl OrientationBy {
         match self {
             Self::TwoPoints if outputs.intersects(either) => (outputs - Outputs::AXIS) | Outputs::ORIENTATION,
             Self::SecondMoments if outputs.intersects(either) => (outputs - Outputs::ORIENTATION) | Outputs::AXIS,
+            _ if self.steps().is_some() && outputs.intersects(either) => {
+                let fitted = Outputs::FOOTPRINT_PLACE | Outputs::FOOTPRINT_ANGLE;
+                (outputs - Outputs::ORIENTATION) | Outputs::AXIS | fitted
+            }
             _ => outputs,
+        }
+    }
+
+    /// In how many steps contacts are fitted for it, if they are.
+    #[must_use]
+    pub fn steps(self) -> Option<usize> {
+        match self {
+            Self::FootprintInOne => Some(1),
+            Self::FootprintInTwo => Some(2),
+            Self::Footprint => Some(footprint::STEPS),
+            Self::AsAsked | Self::TwoPoints | Self::SecondMoments => None,
         }
     }
 }
@@ -187,5 +210,8 @@ mod tests {
         assert_eq!(OrientationBy::TwoPoints.applied(both), Outputs::ORIENTATION | Outputs::TOTAL);
         assert_eq!(OrientationBy::SecondMoments.applied(Outputs::ORIENTATION), Outputs::AXIS);
         assert_eq!(OrientationBy::SecondMoments.applied(Outputs::TOTAL), Outputs::TOTAL);
+        let fitted = Outputs::AXIS | Outputs::FOOTPRINT_PLACE | Outputs::FOOTPRINT_ANGLE;
+        assert_eq!(OrientationBy::FootprintInTwo.applied(Outputs::ORIENTATION), fitted);
+        assert_eq!(OrientationBy::Footprint.applied(Outputs::TOTAL), Outputs::TOTAL);
     }
 }

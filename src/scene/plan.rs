@@ -267,7 +267,8 @@ impl Plan {
                 let in_letter = &mut plan_fields[first + letter];
                 in_letter.first = members.len();
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
-                in_letter.layer = layer(calibration.skin, in_letter, plan.letters[letter].receptor);
+                in_letter.layer =
+                    layer(calibration.skin, in_letter, plan.letters[letter].receptor, scene.knobs.orientation_by);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),
                     weight: member.weight as f32,

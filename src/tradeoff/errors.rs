@@ -8,7 +8,7 @@ use crate::engine::Options;
 use crate::error::Result;
 use crate::field::Recharted;
 use crate::percept::{Flags, Outputs, Percept};
-use crate::scene::{Charts, Knobs, Plan, PlanField, Scene};
+use crate::scene::{Charts, Knobs, OrientationBy, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Letter};
 use crate::source::Truth;
 use crate::stage::angle;
@@ -119,9 +119,19 @@ pub(super) struct ErrorSamples {
     pub(super) true_orientation: Vec<f64>,
 }
 
-/// The orientation of a percept, by second moments if `by_moments`.
-fn orientation(percept: &Percept, by_moments: bool) -> Option<f64> {
-    if by_moments { percept.axis } else { percept.orientation }
+/// The orientation of a percept `by` a method; where no contact could be fitted, by second moments.
+fn orientation(percept: &Percept, by: OrientationBy) -> Option<f64> {
+    match by {
+        OrientationBy::AsAsked | OrientationBy::TwoPoints => percept.orientation,
+        OrientationBy::SecondMoments => percept.axis,
+        _ => percept.footprint_angle.or(percept.axis),
+    }
+}
+
+/// Its place, likewise.
+fn place(percept: &Percept, by: OrientationBy) -> Option<DVec2> {
+    let fitted = percept.footprint_place.filter(|_| by.steps().is_some());
+    fitted.or(percept.centroid).map(DVec2::from_array)
 }
 
 /// The angle between two lines, degrees.
@@ -137,11 +147,10 @@ impl ErrorSamples {
         authored: &ChartGeometry,
         got: &Percept,
         right: &Percept,
-        by_moments: bool,
+        by: OrientationBy,
     ) {
         let field = got.field;
-        let (Some(at), Some(right_at)) = (got.centroid, right.centroid) else { return };
-        let (at, right_at) = (DVec2::from_array(at), DVec2::from_array(right_at));
+        let (Some(at), Some(right_at)) = (place(got, by), place(right, by)) else { return };
         let same = geometry.has_same_chart(authored, field);
         let off = if same {
             Some(at.distance(right_at))
@@ -149,8 +158,9 @@ impl ErrorSamples {
             geometry.point(field, at).zip(authored.point(field, right_at)).map(|(a, b)| a.distance(b))
         };
         self.centroid.extend(off.map(|metres| metres * 1e3));
-        let tied = !by_moments && (got.flags | right.flags).contains(Flags::TIE);
-        let (Some(a), Some(b)) = (orientation(got, by_moments), orientation(right, by_moments)) else { return };
+        let by_points = matches!(by, OrientationBy::AsAsked | OrientationBy::TwoPoints);
+        let tied = by_points && (got.flags | right.flags).contains(Flags::TIE);
+        let (Some(a), Some(b)) = (orientation(got, by), orientation(right, by)) else { return };
         let turned = if same {
             Some(angle::between_lines(a, b).to_degrees())
         } else {
@@ -167,15 +177,15 @@ impl ErrorSamples {
         authored: &ChartGeometry,
         got: &Percept,
         truth: &Truth,
-        by_moments: bool,
+        by: OrientationBy,
     ) {
         let field = got.field;
-        let Some(at) = got.centroid.map(DVec2::from_array) else { return };
+        let Some(at) = place(got, by) else { return };
         let off = geometry.point(field, at).map(|point| point.distance(truth.position_in_link));
         self.true_centroid.extend(off.map(|metres| metres * 1e3));
         let right = truth.angle.zip(truth.uv);
         let right = right.and_then(|(angle, uv)| authored.direction(field, DVec2::from_array(uv), angle));
-        let got = orientation(got, by_moments).and_then(|angle| geometry.direction(field, at, angle));
+        let got = orientation(got, by).and_then(|angle| geometry.direction(field, at, angle));
         self.true_orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
     }
 }

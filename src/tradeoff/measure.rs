@@ -123,7 +123,9 @@ pub fn measure(
         .ways
         .iter()
         .flat_map(|&way| {
-            Combination::all(&options.scene, way, &measure_options.backends).into_iter().map(move |one| (way, one))
+            Combination::all(&options.scene, way, &measure_options.backends, has_skin(options))
+                .into_iter()
+                .map(move |one| (way, one))
         })
         .filter(|(_, combination)| another(combination.knobs.charts))
         .collect();
@@ -184,6 +186,11 @@ pub fn measure(
     Ok(report)
 }
 
+/// Whether contacts can be fitted.
+fn has_skin(options: &Options) -> bool {
+    options.calibration.as_ref().is_some_and(|calibration| calibration.skin.is_some())
+}
+
 /// The method of orientation that `scene` requests.
 fn asked_by(scene: &Scene) -> OrientationBy {
     match scene.knobs.orientation_by {
@@ -223,7 +230,8 @@ struct ReferencePercepts {
 
 impl ReferencePercepts {
     fn new(body: &Body, options: &Options, played: &TestFrames, authored: &ChartGeometry) -> Result<Self> {
-        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
+        let fitted = if has_skin(options) { Outputs::FOOTPRINT } else { Outputs::empty() };
+        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | fitted;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
         let mut engine = Engine::new(body, options)?;
@@ -274,10 +282,6 @@ impl Trial {
         Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors })
     }
 
-    fn by_moments(&self) -> bool {
-        self.combination.knobs.orientation_by == OrientationBy::SecondMoments
-    }
-
     /// Processes all frames once, and collects errors.
     fn compare(
         &mut self,
@@ -286,7 +290,7 @@ impl Trial {
         authored: &ChartGeometry,
         right: &ReferencePercepts,
     ) -> Result<()> {
-        let by_moments = self.by_moments();
+        let by = self.combination.knobs.orientation_by;
         let letters = self.engine.plan().letters().len();
         let mut frame = 0;
         for call in 0..calls.calls.len() {
@@ -295,10 +299,10 @@ impl Trial {
                 for field in (0..percepts.fields()).step_by(letters) {
                     let mut got = percepts.get(index, field);
                     got.field = field / letters;
-                    self.errors.add(geometry, authored, &got, &right.percepts.get(frame, field), by_moments);
+                    self.errors.add(geometry, authored, &got, &right.percepts.get(frame, field), by);
                     let truths = right.truth.get(frame).into_iter().flatten();
                     for (_, truth) in truths.filter(|(of, _)| *of == field && got.contact) {
-                        self.errors.add_truth(geometry, authored, &got, truth, by_moments);
+                        self.errors.add_truth(geometry, authored, &got, truth, by);
                     }
                 }
                 frame += 1;
@@ -378,7 +382,7 @@ mod tests {
         assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
         // The hand's own charts are planes.
         let of_way = |&way: &CallMode| {
-            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu]);
+            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu], has_skin(&options));
             all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
         };
         let expected: usize = CallMode::ALL.iter().map(of_way).sum();

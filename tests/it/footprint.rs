@@ -1,7 +1,7 @@
 //! Fitted contacts against the truth of simulated touches, and why some are absent.
 
 use glam::DVec2;
-use somatic::scene::Scene;
+use somatic::scene::{Knobs, OrientationBy, Scene};
 use somatic::source::{SimulatedSource, Source};
 use somatic::{BackendKind, Body, Calibration, ContactKind, Engine, Flags, Frame, Options, Outputs, Percept, RawValue};
 
@@ -14,8 +14,13 @@ struct Fitted {
     truths: Vec<(DVec2, Option<f64>, f64)>,
 }
 
-/// Runs the simulation in `text` with its own calibration, with `[skin]` as `skin` says it, if it does.
+/// Runs the simulation in `text` with its own calibration, with `[skin]` as `skin` says it, if it does, in all steps.
 fn fitted(body: &Body, text: &str, field: &str, skin: Option<&str>) -> Fitted {
+    fitted_by(OrientationBy::Footprint, body, text, field, skin)
+}
+
+/// The same in as many steps as `by` has.
+fn fitted_by(by: OrientationBy, body: &Body, text: &str, field: &str, skin: Option<&str>) -> Fitted {
     let mut source = SimulatedSource::on_body("simulation", text, body.clone()).unwrap();
     let mut calibration = source.calibration();
     if let Some(skin) = skin {
@@ -24,7 +29,7 @@ fn fitted(body: &Body, text: &str, field: &str, skin: Option<&str>) -> Fitted {
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&calibration, &ids).unwrap();
-    let scene = Scene::default().outputs(Outputs::all()).fields([field]);
+    let scene = Scene::default().outputs(Outputs::all()).fields([field]).knobs(Knobs::default().orientation_by(by));
     let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(256);
     let mut engine = Engine::new(body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();
@@ -78,13 +83,17 @@ fn turning_rod(off: f64, radius_m: f64, length_m: f64, skin: &str) -> String {
     )
 }
 
-/// Per rod that was fitted with an angle: the errors of the axis and of the fit, degrees, and of both across it, mm.
 fn rods(length_m: f64, layer: &str, skin: Option<&str>) -> Vec<[f64; 4]> {
+    rods_by(OrientationBy::Footprint, length_m, layer, skin)
+}
+
+/// Per rod that was fitted with an angle: the errors of the axis and of the fit, degrees, and of both across it, mm.
+fn rods_by(by: OrientationBy, length_m: f64, layer: &str, skin: Option<&str>) -> Vec<[f64; 4]> {
     let body = hand();
     let mut errors = Vec::new();
     for (off, radius_m) in [(-0.005, 0.0127), (-0.002, 0.008), (0.0, 0.0127), (0.003, 0.018), (0.006, 0.01)] {
         let Fitted { percepts, truths } =
-            fitted(&body, &turning_rod(off, radius_m, length_m, layer), "hand/back", skin);
+            fitted_by(by, &body, &turning_rod(off, radius_m, length_m, layer), "hand/back", skin);
         for (percept, (middle, angle, _)) in percepts.iter().zip(truths) {
             let (Some(axis), Some(angle)) = (percept.axis, angle) else { continue };
             let (Some(fit), Some(place)) = (percept.footprint_angle, percept.footprint_place) else { continue };
@@ -192,10 +201,14 @@ struct Points {
 
 impl Points {
     fn on(pitch: f64, sigma_m: f64, layer: &str) -> Self {
+        Self::by(OrientationBy::Footprint, pitch, sigma_m, layer)
+    }
+
+    fn by(by: OrientationBy, pitch: f64, sigma_m: f64, layer: &str) -> Self {
         let mut points = Self::default();
         for indenter in INDENTERS {
             let text = presses(sigma_m, [0.0; 2], indenter, layer);
-            let Fitted { percepts, truths } = fitted(&grid(pitch, 6), &text, "grid", None);
+            let Fitted { percepts, truths } = fitted_by(by, &grid(pitch, 6), &text, "grid", None);
             for (percept, (place, _, force)) in percepts.iter().zip(truths) {
                 let Some(fit) = percept.footprint_place else { continue };
                 let off = DVec2::from_array(fit) - place;
@@ -254,6 +267,29 @@ fn a_point_is_truer_than_the_centroid_under_a_layer_that_the_fit_does_not_know()
         assert!(points.places.len() > 120 && rms(&points.places) <= 0.9 * rms(&points.centroids), "{told}");
         assert!(points.force()[1] < 0.06, "{told}");
     }
+}
+
+#[test]
+fn more_steps_are_truer() {
+    let steps = [OrientationBy::FootprintInOne, OrientationBy::FootprintInTwo, OrientationBy::Footprint];
+    let of_rods = steps.map(|by| rods_by(by, 0.05, "", None));
+    let turned = of_rods.each_ref().map(|errors| rms(&column(errors, 1)));
+    let axis = rms(&column(&of_rods[2], 0));
+    println!("rods: axis {axis:.2}°; one step {:.2}°, two {:.2}°, all {:.2}°", turned[0], turned[1], turned[2]);
+    // Each by a fifth and more.
+    assert!(
+        [axis, turned[0], turned[1], turned[2]].windows(2).all(|pair| pair[1] < 0.8 * pair[0]),
+        "{axis} {turned:?}"
+    );
+    let points = steps.map(|by| Points::by(by, 5e-3, 2.3e-3, ""));
+    let off = points.each_ref().map(|points| rms(&points.places));
+    let centroid = rms(&points[2].centroids);
+    println!(
+        "points: centroid {centroid:.3} mm; one step {:.3} mm, two {:.3} mm, all {:.3} mm",
+        off[0], off[1], off[2]
+    );
+    // After two there is nothing to gain.
+    assert!(off[0] < 0.8 * centroid && off[1] < 0.8 * off[0] && off[2] < 1.05 * off[1], "{centroid} {off:?}");
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub(crate) fn fit_all(touches: &[&Touch]) -> Vec<Option<Fits<f64>>> {
     fit_all_with(Level::new(), touches)
 }
 
-pub(super) fn fit_all_with(level: Level, touches: &[&Touch]) -> Vec<Option<Fits<f64>>> {
+pub(crate) fn fit_all_with(level: Level, touches: &[&Touch]) -> Vec<Option<Fits<f64>>> {
     let mut started: Vec<(usize, &Touch, Start<f64>)> =
         touches.iter().enumerate().filter_map(|(index, touch)| Some((index, *touch, touch.start()?))).collect();
     let mut fits: Vec<Option<Fits<f64>>> = touches.iter().map(|_| None).collect();
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::stage::footprint::{Footprint, Layer, Taxel};
 
-    const LAYER: Layer = Layer { sigma_m: 2e-3, gain_spread: 0.05, reach_m: 4e-3 };
+    const LAYER: Layer = Layer { sigma_m: 2e-3, gain_spread: 0.05, reach_m: 4e-3, steps: 6 };
 
     /// Touches of all sizes, round and long, on a grid of 5 mm.
     fn touches(layer: Layer) -> Vec<Touch> {

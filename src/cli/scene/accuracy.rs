@@ -61,8 +61,9 @@ pub(in crate::cli) struct Accuracy {
     #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
     pub(in crate::cli) charts: Option<Charts>,
 
-    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), or axis
-    /// alone (second-moments) [default: as-asked].
+    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), axis alone
+    /// (second-moments), or with it that of the contact fitted in one step (footprint-1), two (footprint-2) or all
+    /// (footprint), and its place [default: as-asked].
     #[arg(long, help_heading = ACCURACY, value_name = "WAY",
         value_parser = one_of::<OrientationBy>(OrientationBy::WORDS))]
     #[serde(deserialize_with = "word")]

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::descent::{Fitted, descend};
+use super::descent::{Fitted, STEPS, descend};
 use super::kinds::{Blob, Line, Point, Segment};
 use super::objective::Sensor;
 use super::real::Real;
@@ -29,15 +29,19 @@ pub(crate) struct Fits<R> {
 /// Fits all kinds to `sensors`, from `start`.
 #[inline(always)]
 pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
-    let gains = start.gain_variance;
-    let point = descend::<R, Point, 4>(sensors, gains, start.point);
-    let line = descend::<R, Line, 4>(sensors, gains, start.line);
-    let long = start.is_long.then(|| {
+    let (gains, steps) = (start.gain_variance, start.steps);
+    let point = descend::<R, Point, 4>(sensors, gains, start.point, steps);
+    let line = descend::<R, Line, 4>(sensors, gains, start.line, steps);
+    let mut long = None;
+    if start.is_long {
         // As much force as the line has on the segment's length.
         let force = line.shape.force + start.half_length + std::f64::consts::LN_2;
         let segment = Shape { force, length: start.half_length, ..line.shape };
-        [descend::<R, Segment, 6>(sensors, gains, segment), descend::<R, Blob, 6>(sensors, gains, start.blob)]
-    });
+        long = Some([
+            descend::<R, Segment, 6>(sensors, gains, segment, steps),
+            descend::<R, Blob, 6>(sensors, gains, start.blob, steps),
+        ]);
+    }
     Fits { point, line, long }
 }
 
@@ -146,9 +150,10 @@ impl Touch {
             return (None, Flags::FEW_TAXELS);
         };
         let spare = (self.pressed - best.parameters) as f64;
-        // Not a number is not within either.
-        let explains = best.chi_squared <= MISFIT * spare && best.ahead <= AT_REST;
-        if !explains {
+        // Not a number is not within either. Of a descent that is cut short there is less to ask.
+        let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare;
+        let rests = self.steps < STEPS || best.ahead <= AT_REST;
+        if !(explains && rests) {
             return (None, Flags::POOR_FIT);
         }
         self.told(best)

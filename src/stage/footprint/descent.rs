@@ -5,7 +5,7 @@ use super::objective::{Objective, Sensor};
 use super::real::Real;
 use super::shape::Shape;
 
-/// How many steps are tried.
+/// How many steps a whole descent tries.
 pub(crate) const STEPS: usize = 6;
 /// The damping of the first step, and by how much it falls after a step that helps and rises after one that does not.
 const DAMPING: f64 = 0.01;
@@ -26,18 +26,18 @@ pub(crate) struct Fitted<R, const K: usize> {
     pub(crate) covariance: [[R; K]; K],
 }
 
-/// Descends from `start` for kind M.
+/// Descends from `start` for kind M in `steps` steps.
 #[inline(always)]
 pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
     sensors: &[Sensor<R>],
     gain_variance: R,
     start: Shape<R>,
+    steps: usize,
 ) -> Fitted<R, K> {
     let (mut shape, mut now) = (start, Objective::at::<M>(sensors, gain_variance, &start));
     let mut damping = now.cost.all(DAMPING);
-    for _ in 0..STEPS {
-        let step = Factor::of(&now.a, damping).solve(now.g);
-        let tried = shape.moved(M::FREE, step.map(|step| -step));
+    for _ in 0..steps {
+        let tried = shape.moved(M::FREE, Factor::of(&now.a, damping).solve(now.g));
         let then = Objective::at::<M>(sensors, gain_variance, &tried);
         let better = then.cost.is_below(now.cost);
         shape = Shape::choose(better, &tried, &shape);
@@ -46,7 +46,10 @@ pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
     }
     let factor = Factor::of(&now.a, damping.all(0.0));
     let step = factor.solve(now.g);
-    let ahead = (1..K).fold(step[0] * now.g[0], |sum, k| sum + step[k] * now.g[k]);
+    let mut ahead = -(step[0] * now.g[0]);
+    for k in 1..K {
+        ahead = ahead - step[k] * now.g[k];
+    }
     Fitted { shape, cost: now.cost, chi_squared: now.chi_squared, ahead, covariance: factor.inverse() }
 }
 
@@ -59,24 +62,37 @@ impl<R: Real, const K: usize> Factor<R, K> {
         let mut l = *a;
         for i in 0..K {
             for j in 0..i {
-                let rest = (0..j).fold(a[i][j], |rest, k| rest - l[i][k] * l[j][k]);
+                let mut rest = a[i][j];
+                for k in 0..j {
+                    rest = rest - l[i][k] * l[j][k];
+                }
                 l[i][j] = rest * l[j][j];
             }
-            let rest = (0..i).fold(a[i][i] * (damping + 1.0), |rest, k| rest - l[i][k] * l[i][k]);
+            let mut rest = a[i][i] * (damping + 1.0);
+            for k in 0..i {
+                rest = rest - l[i][k] * l[i][k];
+            }
             l[i][i] = rest.all(1.0) / rest.at_least(LEAST).sqrt();
         }
         Self(l)
     }
 
-    /// A⁻¹g.
+    /// −A⁻¹g.
     #[inline(always)]
     fn solve(&self, g: [R; K]) -> [R; K] {
         let (l, mut x) = (&self.0, g);
         for i in 0..K {
-            x[i] = (0..i).fold(x[i], |rest, k| rest - l[i][k] * x[k]) * l[i][i];
+            let mut rest = -g[i];
+            for k in 0..i {
+                rest = rest - l[i][k] * x[k];
+            }
+            x[i] = rest * l[i][i];
         }
         for i in (0..K).rev() {
-            x[i] = (i + 1..K).fold(x[i], |rest, k| rest - l[k][i] * x[k]) * l[i][i];
+            for k in i + 1..K {
+                x[i] = x[i] - l[k][i] * x[k];
+            }
+            x[i] = x[i] * l[i][i];
         }
         x
     }
@@ -88,14 +104,21 @@ impl<R: Real, const K: usize> Factor<R, K> {
         // First the factor's own inverse, in its place.
         for i in 0..K {
             for j in 0..i {
-                let sum = (j + 1..i).fold(l[i][j] * l[j][j], |sum, k| sum + l[i][k] * l[k][j]);
+                let mut sum = l[i][j] * l[j][j];
+                for k in j + 1..i {
+                    sum = sum + l[i][k] * l[k][j];
+                }
                 l[i][j] = -(sum * l[i][i]);
             }
         }
         let mut inverse = l;
         for i in 0..K {
             for j in 0..=i {
-                inverse[i][j] = (i + 1..K).fold(l[i][i] * l[i][j], |sum, k| sum + l[k][i] * l[k][j]);
+                let mut sum = l[i][i] * l[i][j];
+                for k in i + 1..K {
+                    sum = sum + l[k][i] * l[k][j];
+                }
+                inverse[i][j] = sum;
             }
         }
         inverse
@@ -114,7 +137,7 @@ mod tests {
         let x = factor.solve([1.0, -2.0, 0.5]);
         let inverse = factor.inverse();
         for i in 0..3 {
-            let g: f64 = (0..3).map(|k| whole(i, k) * x[k]).sum();
+            let g: f64 = -(0..3).map(|k| whole(i, k) * x[k]).sum::<f64>();
             assert!((g - [1.0, -2.0, 0.5][i]).abs() < 1e-14, "{g}");
             for j in 0..3 {
                 let product: f64 =

@@ -30,12 +30,10 @@ pub(crate) fn of_point<R: Real>(place: R, margin: R, spread: R) -> Mass<R> {
 #[inline(always)]
 pub(crate) fn of_line<R: Real>(place: R, margin: R, half: R, spread: R) -> Mass<R> {
     let (per, share) = (spread.all(1.0) / spread, spread.all(0.5) / half);
-    let [a, b, c, d] = [place + half + margin, place + half - margin, place - half + margin, place - half - margin]
-        .map(|edge| {
-            let z = edge * per;
-            let (up_to, at) = z.normal();
-            (up_to, at, z * up_to + at)
-        });
+    let a = integrated((place + half + margin) * per);
+    let b = integrated((place + half - margin) * per);
+    let c = integrated((place - half + margin) * per);
+    let d = integrated((place - half - margin) * per);
     let value = share * spread * ((a.2 - b.2) - (c.2 - d.2));
     Mass {
         value,
@@ -43,4 +41,11 @@ pub(crate) fn of_line<R: Real>(place: R, margin: R, half: R, spread: R) -> Mass<
         by_spread: share * spread * ((a.1 - b.1) - (c.1 - d.1)),
         by_half: ((a.0 - b.0) + (c.0 - d.0)) * 0.5 - value,
     }
+}
+
+/// Φ(z), φ(z) and K(z).
+#[inline(always)]
+fn integrated<R: Real>(z: R) -> (R, R, R) {
+    let (up_to, at) = z.normal();
+    (up_to, at, z * up_to + at)
 }

@@ -36,6 +36,7 @@ mod shape;
 mod touch;
 
 pub(crate) use choice::{Fits, Footprint, fit};
+pub(crate) use descent::STEPS;
 pub(crate) use objective::Sensor;
 pub(crate) use real::Real;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};

@@ -71,7 +71,7 @@ impl<R: Real, const K: usize> Objective<R, K> {
             let r = counts * off * per;
             let slope = counts * per * (one - r * gain_variance * felt * per);
             sum.chi_squared = sum.chi_squared + r * r;
-            sum.add(by.map(|by| by * slope), r);
+            sum.add(by, slope, r);
         }
         sum.cost = sum.chi_squared;
         for k in 0..K {
@@ -86,8 +86,9 @@ impl<R: Real, const K: usize> Objective<R, K> {
     }
 
     #[inline(always)]
-    fn add(&mut self, by: [R; K], r: R) {
+    fn add(&mut self, mut by: [R; K], slope: R, r: R) {
         for i in 0..K {
+            by[i] = by[i] * slope;
             self.g[i] = self.g[i] + by[i] * r;
             for j in 0..=i {
                 self.a[i][j] = self.a[i][j] + by[i] * by[j];

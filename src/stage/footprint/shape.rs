@@ -45,15 +45,15 @@ impl<R: Real> Shape<R> {
     pub(crate) fn moved<const K: usize>(&self, free: [Parameter; K], steps: [R; K]) -> Self {
         let mut moved = *self;
         let [c, s] = self.along;
-        for (parameter, step) in free.into_iter().zip(steps) {
-            let step = step.at_least(-LONGEST).at_most(LONGEST);
-            match parameter {
+        for k in 0..K {
+            let step = steps[k].at_least(-LONGEST).at_most(LONGEST);
+            match free[k] {
                 Parameter::Across => moved.shift([-s * step, c * step]),
                 Parameter::Along => moved.shift([c * step, s * step]),
                 Parameter::Turn => {
                     let turned = [c - s * step, s + c * step];
                     let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
-                    moved.along = turned.map(|part| part / length);
+                    moved.along = [turned[0] / length, turned[1] / length];
                 }
                 Parameter::Force => moved.force = moved.force + step,
                 Parameter::Width => moved.width = (moved.width + step).at_least(-WIDEST).at_most(WIDEST),

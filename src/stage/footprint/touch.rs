@@ -17,6 +17,8 @@ pub(crate) struct Layer {
     /// A place farther than this from every sensor is beyond them: over half of the way from a sensor to those beside it, so that
     /// none between sensors is.
     pub(crate) reach_m: f64,
+    /// How many steps descents make.
+    pub(crate) steps: usize,
 }
 
 /// A taxel of a touch, or beside it.
@@ -46,6 +48,7 @@ pub(crate) struct Touch {
     pub(super) has_noise: bool,
     gain_spread: f64,
     reach: f64,
+    pub(super) steps: usize,
 }
 
 /// Where the descents of a touch start.
@@ -57,6 +60,7 @@ pub(crate) struct Start<R> {
     /// The logarithm of half a segment's length.
     pub(crate) half_length: R,
     pub(crate) gain_variance: R,
+    pub(crate) steps: usize,
     /// Whether there are taxels enough for segments and blobs.
     pub(crate) is_long: bool,
 }
@@ -71,6 +75,7 @@ impl<R: Real> Start<R> {
             blob: Shape::abreast(starts.map(|start| &start.blob), lanes),
             half_length: lanes(starts.map(|start| start.half_length)),
             gain_variance: lanes(starts.map(|start| start.gain_variance)),
+            steps: starts.iter().map(|start| start.steps).max().unwrap_or(0),
             is_long: starts.iter().any(|start| start.is_long),
         }
     }
@@ -108,6 +113,7 @@ impl Touch {
             has_noise: taxels.iter().all(|taxel| taxel.sigma.is_some()),
             gain_spread: layer.gain_spread,
             reach: layer.reach_m / unit_m,
+            steps: layer.steps,
         }
     }
 
@@ -143,6 +149,7 @@ impl Touch {
             // An even line has a variance of h²/3.
             half_length: libm::log((6.0 * apart).sqrt().max(SHORTEST_HALF)),
             gain_variance: self.gain_spread * self.gain_spread,
+            steps: self.steps,
             is_long: self.pressed > Blob::FREE.len(),
         })
     }
