@@ -1,7 +1,7 @@
 //! `somatic plot`: a recording as a picture.
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
@@ -99,9 +99,10 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
     });
     let mut outputs = read.outputs(arguments.force);
     let file = PlotFile::at(&arguments.output, "-o", &mut outputs)?;
+    let stop = stop_on_signal()?;
     let (mut all, mut losses) = (Vec::new(), Vec::new());
     for asked in &runs {
-        let (gathered, lost) = gather(asked, wanted)?;
+        let (gathered, lost) = gather(asked, wanted, &stop)?;
         all.push(gathered);
         losses.extend(lost);
     }
@@ -127,7 +128,7 @@ fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Run
 }
 
 /// Runs a recording and keeps what is plotted of it; also gives what the source lost.
-fn gather(asked: &RunOptions, wanted: Outputs) -> Result<(Gathered, Vec<String>)> {
+fn gather(asked: &RunOptions, wanted: Outputs, stop: &AtomicBool) -> Result<(Gathered, Vec<String>)> {
     let input = Input::named(asked)?;
     if !input.is_recording() {
         return Err(Error::usage("only recordings are plotted; record what is live with `somatic run`").at(&input.name));
@@ -139,7 +140,6 @@ fn gather(asked: &RunOptions, wanted: Outputs) -> Result<(Gathered, Vec<String>)
     let mut engine = Engine::new(&body, asked.options(&body, &ids, RECORDED_BATCH)?)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     let mut gatherer = Gatherer::new(&input.name, &body, &engine, wanted, !asked.fields.is_empty())?;
-    let stop = stop_on_signal()?;
     let mut bar = Bar::new("reading");
     let width = source.taxels().len();
     let mut frames: Vec<Frame> = Vec::with_capacity(RECORDED_BATCH);

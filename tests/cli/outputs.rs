@@ -471,6 +471,7 @@ const NO_FILES: &[&str] = &[
     "F",
     "FAULTS",
     "FIELD",
+    "FORMAT",
     "FRAME",
     "GLOB",
     "HOW",

@@ -61,7 +61,7 @@ fn a_row_is_a_field_of_a_line_of_ndjson() {
         let (titles, rows) = table(&at("a.csv"));
         assert_eq!(titles[..5], ["t [s]", "frame", "field", "link", "contact"]);
         assert!(
-            titles.contains(&"centroid_u [m]".to_owned()) && titles.contains(&"total [P]".to_owned()),
+            titles.contains(&"centroid_u [m]".to_owned()) && titles.contains(&"total [count]".to_owned()),
             "{titles:?}"
         );
         let (touch_titles, touch_rows) = table(&at("a.touches.csv"));
@@ -99,7 +99,7 @@ fn a_wide_table_has_a_row_for_every_frame() {
         "t [s]",
         "frame",
         "hand/back contact",
-        "hand/back total [P]",
+        "hand/back total [count]",
         "hand/back centroid_u [m]",
         "hand/back centroid_v [m]",
         "hand/back flags",
