@@ -24,7 +24,7 @@ use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::names::field_names;
-use super::scene::{LIVE, OUTPUT, RunOptions, grouped};
+use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, FAILED, print, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
@@ -74,11 +74,11 @@ pub(super) struct Arguments {
     asked: RunOptions,
 
     /// In csv: one row per frame, with columns of their own for each field, instead of a row per field in contact.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(long, help_heading = "Output")]
     wide: bool,
 
     /// Print the columns of csv: or parquet: with their units and types, and run nothing.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(long, help_heading = "Output")]
     describe: bool,
 
     /// Stop after this time, such as 10s.
