@@ -265,9 +265,9 @@ impl<'a> Plot<'a> {
         self.draw_length(pen, (last.right(), last.bottom()))
     }
 
-    /// A length in all maps, its right end at `end`.
+    /// A length, which is the same in all maps.
     fn draw_length<B: DrawingBackend>(&self, pen: &Pen<'_, B>, (right, y): (i32, i32)) -> Result<()> {
-        let steps = ticks([0.0, 90.0 / self.per_m], 1);
+        let steps = ticks([0.0, 90.0 / self.per_m], 3);
         let Some(&length_m) = steps.last().filter(|length| **length > 0.0) else { return Ok(()) };
         let left = right - (length_m * self.per_m).round() as i32;
         pen.line(&[(left, y), (right, y)], INK, 1.6)?;
@@ -275,7 +275,8 @@ impl<'a> Plot<'a> {
             pen.line(&[(x, y - 3), (x, y + 3)], INK, 1.2)?;
         }
         let mm = length_m * 1e3;
-        let text = if mm >= 10.0 { format!("{:.0} cm", mm / 10.0) } else { format!("{mm} mm") };
+        let is_whole_cm = mm >= 10.0 && (mm / 10.0 - (mm / 10.0).round()).abs() < 1e-6;
+        let text = if is_whole_cm { format!("{:.0} cm", mm / 10.0) } else { format!("{} mm", shown(mm, mm.min(1.0))) };
         pen.text(&text, 11, GREY, HPos::Right, (left - 6, y))
     }
 
