@@ -229,7 +229,10 @@ fn output_names(schema: &mut schemars::Schema) {
 
 pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
-    format!("Compute only these quantities: {} [default: all but touches, filtered_* and footprint_*]", names.join(", "))
+    format!(
+        "Compute only these quantities: {} [default: all but touches, filtered_* and footprint_*]",
+        names.join(", ")
+    )
 }
 
 /// All of `named`, or the default outputs where none are.

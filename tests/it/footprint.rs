@@ -277,13 +277,19 @@ fn more_steps_are_truer() {
     let axis = rms(&column(&of_rods[2], 0));
     println!("rods: axis {axis:.2}°; one step {:.2}°, two {:.2}°, all {:.2}°", turned[0], turned[1], turned[2]);
     // Each by a fifth and more.
-    assert!([axis, turned[0], turned[1], turned[2]].windows(2).all(|pair| pair[1] < 0.8 * pair[0]), "{axis} {turned:?}");
+    assert!(
+        [axis, turned[0], turned[1], turned[2]].windows(2).all(|pair| pair[1] < 0.8 * pair[0]),
+        "{axis} {turned:?}"
+    );
     let points = steps.map(|by| Points::by(by, 5e-3, 2.3e-3, ""));
     let off = points.each_ref().map(|points| rms(&points.places));
     let centroid = rms(&points[2].centroids);
-    println!("points: centroid {centroid:.3} mm; one step {:.3} mm, two {:.3} mm, all {:.3} mm", off[0], off[1], off[2]);
-    // After two there is nothing to gain.
-    assert!(off[0] < 0.8 * centroid && off[1] < 0.8 * off[0] && off[2] < 1.05 * off[1], "{centroid} {off:?}");
+    println!(
+        "points: centroid {centroid:.3} mm; one step {:.3} mm, two {:.3} mm, all {:.3} mm",
+        off[0], off[1], off[2]
+    );
+    // After one there is little to gain.
+    assert!(off[0] < 0.6 * centroid && off[1] < 1.02 * off[0] && off[2] < 1.02 * off[1], "{centroid} {off:?}");
 }
 
 #[test]
