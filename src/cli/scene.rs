@@ -56,7 +56,8 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches and filtered_*; force only where P has a unit].
+    /// Compute only these quantities [default: all but touches, filtered_* and footprint_*; force only where P has a
+    /// unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
     #[schemars(with = "Vec<String>", transform = output_names)]
@@ -254,7 +255,8 @@ fn output_names(schema: &mut schemars::Schema) {
 pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {} [default: all but touches and filtered_*; force only where P has a unit]",
+        "Compute only these quantities: {} [default: all but touches, filtered_* and footprint_*; force only where P \
+         has a unit]",
         names.join(", ")
     )
 }
