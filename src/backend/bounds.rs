@@ -3,14 +3,16 @@
 use glam::DVec2;
 
 use super::reference::{Before, Reference};
-use super::{Backend, BackendState, FieldState, RawBatch, Step};
+use super::{Backend, BackendState, FieldState, RawBatch, Step, sigma};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
-use crate::stage::{GivenLimit, Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches};
+use crate::stage::{
+    Given, GivenLimit, Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches,
+};
 
 /// How far a single-precision percept may be off in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,6 +90,8 @@ struct Cell<'a> {
     before: Before,
     /// Whether what the host remembers goes on, as it does unless the percept is kept.
     advances: bool,
+    /// The batch that it is of, and the frame in it.
+    raw: (&'a RawBatch<'a>, usize),
 }
 
 /// The reference, which says of every cell how far single precision may be off.
@@ -117,11 +121,12 @@ impl BoundedReference {
     ) -> Vec<CellBound> {
         let (before, step) = (self.reference.before.clone(), &raw.steps[frame]);
         let (pressures, present) = self.reference.frame(raw, frame, percepts);
+        let raw = (raw, frame);
         let cells = before.into_iter().zip(present).enumerate();
         cells
             .map(|(index, (before, present))| {
                 let advances = advances(index);
-                self.bound(&Cell { index, pressures: &pressures, step, present, before, advances })
+                self.bound(&Cell { index, pressures: &pressures, step, present, before, advances, raw })
             })
             .collect()
     }
@@ -226,6 +231,12 @@ impl BoundedReference {
             bound.in_doubt |= limit.in_doubt;
             bound.set(limit.limits());
             bound.may_remember.filter = limit.may_remember;
+        }
+        if plan.stages().sigma {
+            let sigmas = sigma::of_field(plan, field, cell.raw.0, cell.raw.1);
+            let off = |components: [f64; 2]| sigmas.rounding() * components[0].hypot(components[1]);
+            let limit = |(_, (output, components)): (_, Given)| (output, Limit::Within(components.map_or(0.0, off)));
+            bound.set(sigmas.outputs().map(limit));
         }
         bound
     }

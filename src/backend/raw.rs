@@ -154,6 +154,14 @@ impl<'a> Rows<'a> {
         (0..channels).map(move |channel| values[picks.get(channel).map_or(channel, |&pick| pick as usize)])
     }
 
+    /// The value of `channel` in frame `frame`.
+    pub(crate) fn value(self, frame: usize, channel: usize) -> RawValue {
+        match self {
+            Self::Packed { values, channels } => values[frame * channels + channel],
+            Self::Picked { frames, picks } => frames[frame].values[picks.places[channel] as usize],
+        }
+    }
+
     /// The bits of frame `frame` for the sixteen slots from 16 · `tile` on, where they lie one after the other.
     #[inline(always)]
     pub(crate) fn straight(self, frame: usize, tile: usize) -> Option<&'a [u32; 16]> {

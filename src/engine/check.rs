@@ -124,7 +124,8 @@ mod tests {
         fn on(backend: BackendKind) -> Option<Self> {
             let body = Body::from_bytes("hand", crate::bundled::HAND).unwrap();
             let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-            let calibration = Some(crate::signal::Calibration::parse("[all]\ngain = 0.7\n", &ids).unwrap());
+            let calibration =
+                Some(crate::signal::Calibration::parse("[all]\ngain = 0.7\nnoise = 0.4\n", &ids).unwrap());
             let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
             let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
             let mut engine = match Engine::new(&body, options) {
@@ -139,7 +140,7 @@ mod tests {
             };
             let frames: Vec<Frame> = (0..8).map(frame).collect();
             let (_, agreement) = engine.process_and_compare(&frames).unwrap();
-            assert!(agreement.holds() && agreement.quantities.len() == 25, "{backend:?}: {agreement}");
+            assert!(agreement.holds() && agreement.quantities.len() == 28, "{backend:?}: {agreement}");
             let check = engine.check.take().unwrap();
             Some(Self { engine, check })
         }

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
 use super::place::{self, Links};
-use crate::backend::{RawBatch, Step};
+use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
@@ -79,7 +79,7 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.touches || stages.filter || self.cadence.is_some()) {
+        if !(stages.touches || stages.filter || stages.sigma || self.cadence.is_some()) {
             return;
         }
         for (number, field) in self.plan.fields.iter().enumerate() {
@@ -109,6 +109,9 @@ impl Post<'_> {
             }
             if stages.filter && field.charted {
                 self.filter(field, step, cell, percepts, &mut before.filter);
+            }
+            if stages.sigma && contact {
+                self.sigmas(field, raw, offset, cell, percepts);
             }
         }
     }
@@ -151,6 +154,17 @@ impl Post<'_> {
         percepts.flags[cell] |= found.flags;
         percepts.present[cell] |= found.present & self.plan.outputs;
         for (host, components) in found.outputs() {
+            percepts.set_host(host, cell, &components[..host.column().components]);
+        }
+    }
+
+    /// Says how sure a cell's percept is.
+    fn sigmas(&self, field: &PlanField, raw: &RawBatch<'_>, frame: usize, cell: usize, percepts: &mut Percepts) {
+        let sigmas = sigma::of_field(self.plan, field, raw, frame);
+        percepts.flags[cell] |= sigmas.flags;
+        for (host, (output, components)) in sigmas.outputs() {
+            let Some(components) = components else { continue };
+            percepts.present[cell] |= output & self.plan.outputs;
             percepts.set_host(host, cell, &components[..host.column().components]);
         }
     }

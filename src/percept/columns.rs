@@ -302,11 +302,21 @@ columns! {
     FILTERED_DIRECTION 18 filtered_direction: f64, Radian, Direction, filter, parts [] host [FilteredDirection];
     #[doc = "The length of such a step over the time that it took, m/s."]
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
+    #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
+    TOTAL_SIGMA 29 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
+    #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]
+    CENTROID_SIGMA 30 centroid_sigma: [f64; 2], Metre, Vector, sigma, parts [] host [CentroidSigma];
+    #[doc = "The standard deviation of the axis by the sensors' noise, rad."]
+    AXIS_SIGMA 31 axis_sigma: f64, Radian, Number, sigma, parts [] host [AxisSigma];
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`] and [`Outputs::FILTERED`].
-    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED);
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
+    /// [`Outputs::SIGMAS`].
+    pub const USUAL: Self = Self::all().difference(Self::TOUCHES).difference(Self::FILTERED).difference(Self::SIGMAS);
+
+    /// How sure quantities are.
+    pub const SIGMAS: Self = Self::of_stage("sigma");
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");

@@ -49,6 +49,11 @@ bitflags! {
         /// A taxel has been touched for long while too few others were untouched to tell its drift: its baseline is that of
         /// the onset.
         const DRIFT_UNKNOWN = 1 << 18;
+        // Bits 19 to 23 are kept for the fit of footprints.
+        /// The calibration does not say how noisy a pressed taxel is: there are no sigmas.
+        const NOISE_UNKNOWN = 1 << 24;
+        /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what hangs on it has no sigma.
+        const UNSURE = 1 << 25;
     }
 }
 

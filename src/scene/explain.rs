@@ -111,6 +111,7 @@ impl Plan {
             ("position", stages.position, found, ""),
             ("touches", stages.touches, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
+            ("sigma", stages.sigma, found, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
@@ -124,7 +125,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "filter"].contains(&name),
+                on_host: ["position", "touches", "filter", "sigma"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::curves::Curves;
 use super::members::{beside, surface, thresholds, unit_of, weights};
+use super::onset::{SoftOnset, softened};
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
@@ -29,6 +30,7 @@ pub(crate) struct Stages {
     pub(crate) position: bool,
     pub(crate) touches: bool,
     pub(crate) filter: bool,
+    pub(crate) sigma: bool,
 }
 
 impl Stages {
@@ -37,9 +39,10 @@ impl Stages {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let touches = outputs.contains(Outputs::TOUCHES);
         let position = wants("position") || touches;
-        let [orientation, axis, motion, filter] = ["orientation", "axis", "motion", "filter"].map(wants);
+        let [orientation, axis, motion, filter, sigma] =
+            ["orientation", "axis", "motion", "filter", "sigma"].map(wants);
         let centroid = wants("centroid") || position || orientation || axis || motion || filter;
-        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter }
+        Self { centroid, orientation, axis, hysteresis: false, motion, position, touches, filter, sigma }
     }
 }
 
@@ -58,7 +61,9 @@ pub struct Plan {
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
     pub(crate) calibrations: Vec<TaxelCalibration>,
-    /// Counts the changes of these.
+    /// Per channel, what soft onsets have moved in these; empty where all are hard.
+    pub(crate) onsets: Vec<SoftOnset>,
+    /// Counts the changes of the calibrations.
     pub(crate) calibration_changes: u64,
     /// Per channel, m².
     pub(crate) areas: Vec<f64>,
@@ -176,6 +181,7 @@ impl Plan {
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
+        let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
         let mut plan = Self {
             outputs,
             stages: Stages::of(outputs),
@@ -183,7 +189,8 @@ impl Plan {
             letters: scene.letters.clone(),
             knobs: scene.knobs,
             change_dead_band: calibration.change.dead_band,
-            calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
+            calibrations,
+            onsets,
             calibration_changes: 0,
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -266,9 +273,16 @@ impl Plan {
         self.outputs
     }
 
-    /// Calibrates the taxel at `channel` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how all
+    /// What the soft onset of the taxel at `channel` has moved, if it has one.
+    pub(crate) fn onset(&self, channel: usize) -> SoftOnset {
+        self.onsets.get(channel).copied().unwrap_or_default()
+    }
+
+    /// Calibrates the taxel at `channel` from now on with `baseline`, its raw value at rest, and leaves it out if it is `unfit`; `made` is how all
     /// slots were before any upkeep.
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
+        let shift = self.onset(channel).shift;
+        let baseline = if shift == 0.0 { baseline } else { (f64::from(baseline) + shift) as f32 };
         for slot in (channel..self.calibrated).step_by(self.channels()) {
             let response = if unfit { layout::MASKED } else { made[slot].response };
             self.calibration_changes += 1;

@@ -12,7 +12,7 @@ mod upkeep;
 mod wiring;
 
 pub use board_health::BoardHealth;
-pub use calibration::{Calibration, ChangeCalibration, Checks, ContactThresholds, TaxelCalibration};
+pub use calibration::{Calibration, ChangeCalibration, Checks, ContactThresholds, Onset, TaxelCalibration};
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};

@@ -23,7 +23,7 @@
 use super::layout::Knot;
 use super::{SLACK, U};
 use crate::percept::Flags;
-use crate::signal::{RawValue, TaxelCalibration};
+use crate::signal::{RawValue, Response, TaxelCalibration};
 
 /// Bit of a taxel's status that leaves it out of every sum; the other bits are [`Flags`].
 pub(crate) const UNUSABLE: u32 = 1 << 31;
@@ -74,9 +74,7 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_
     }
     let nothing = value != 0.0 && value.abs() < TINY;
     let value = if nothing { 0.0 } else { value };
-    let above = value - taxel.baseline;
-    let pressure =
-        if curve.written.is_empty() { above * taxel.gain } else { interpolate(curve.written, |&knot| knot, above).0 };
+    let pressure = response(value, taxel, curve);
     let bound = bound(value, taxel, curve.rounded, pressure);
     let near = |threshold: f64| {
         let apart = bound + (f64::from(threshold as f32) - threshold).abs();
@@ -106,6 +104,30 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_
         flags |= Flags::SATURATED;
     }
     Pressure { value: if over { pressure } else { 0.0 }, status: flags.bits(), bound, in_doubt, flags_in_doubt }
+}
+
+/// P at a raw value, whatever the dead band.
+pub(crate) fn response(value: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
+    let above = value - taxel.baseline;
+    if curve.written.is_empty() { above * taxel.gain } else { interpolate(curve.written, |&knot| knot, above).0 }
+}
+
+/// The standard deviation of P at a raw value for that of the raw value, `noise`: on the side that is pressed more, as a
+/// sensor may begin to feel with a step, or else on the other, as it may feel no more than so much.
+pub(crate) fn sigma(value: f64, noise: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
+    let [less, here, more] = [-noise, 0.0, noise].map(|off| response(value + off, taxel, curve));
+    let (up, down) = (less.max(more) - here, here - less.min(more));
+    if up > 0.0 { up } else { down }
+}
+
+/// The P up to which the taxel reads 0: its dead band, or with a curve that begins with a step, that step.
+pub(crate) fn threshold(taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
+    let is_step = matches!(taxel.response, Response::Fsr(_));
+    let steps = curve.written.iter().filter(|_| is_step).map(|knot| knot[1]).filter(|&p| p > 0.0);
+    steps
+        .fold(None, |least: Option<f64>, p| Some(least.map_or(p, |least| least.min(p))))
+        .unwrap_or(0.0)
+        .max(taxel.dead_band)
 }
 
 /// How far single precision's P, from constants that are rounded to it, may be off `pressure`.

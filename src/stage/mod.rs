@@ -22,6 +22,7 @@ pub(crate) mod limit;
 pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
+pub(crate) mod sigma;
 pub(crate) mod touches;
 
 use glam::DVec3;
