@@ -11,7 +11,8 @@ use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
 use crate::stage::{
-    Given, GivenLimit, Pressed, U, axis, centroid, contact, filter, hysteresis, motion, orientation, touches,
+    Given, GivenLimit, Pressed, U, axis, centroid, contact, difference, filter, hysteresis, motion, orientation,
+    touches,
 };
 
 /// How far a single-precision percept may be off in one cell.
@@ -77,6 +78,7 @@ struct Doubt {
     unread: bool,
     touches: touches::Doubt,
     filter: filter::Doubt,
+    difference: difference::Doubt,
 }
 
 /// One field in one frame.
@@ -151,8 +153,9 @@ impl BoundedReference {
     }
 
     /// The same for what the host's filter remembers.
-    pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory) {
+    pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory, trail: &difference::Memory) {
         self.doubts[index].filter = filter::Doubt::after(memory);
+        self.doubts[index].difference = difference::Doubt::after(trail);
     }
 
     /// How far single precision may be off in `cell`.
@@ -191,6 +194,7 @@ impl BoundedReference {
             if cell.advances {
                 doubt.touches.release();
                 doubt.filter.release();
+                doubt.difference.release();
             }
             return bound;
         }
@@ -227,7 +231,11 @@ impl BoundedReference {
         if field.charted && plan.stages().filter && cell.advances {
             let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
             let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
-            let limit = doubt.filter.follow(&field.filter, clock, in_metres, doubt.place * unit);
+            let off = doubt.place * unit;
+            let limit = match field.filter.over_s {
+                Some(over_s) => doubt.difference.follow(&field.filter, over_s, clock, in_metres, off),
+                None => doubt.filter.follow(&field.filter, clock, in_metres, off),
+            };
             bound.in_doubt |= limit.in_doubt;
             bound.set(limit.limits());
             bound.may_remember.filter = limit.may_remember;

@@ -43,7 +43,7 @@ impl Check {
         check.reference.restore(backend)?;
         for (field, state) in post.fields.iter().enumerate() {
             check.reference.restore_touches(field, &state.touches);
-            check.reference.restore_filter(field, &state.filter);
+            check.reference.restore_filter(field, &state.filter, &state.difference);
         }
         Ok(check)
     }
@@ -95,7 +95,8 @@ impl Check {
         }
         if may_remember.filter {
             own.filter = after.filter;
-            self.reference.restore_filter(field, &after.filter);
+            own.difference.clone_from(&after.difference);
+            self.reference.restore_filter(field, &after.filter, &after.difference);
         }
     }
 }

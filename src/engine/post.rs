@@ -9,7 +9,7 @@ use crate::percept::{Flags, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::Frame;
 use crate::stage::layout::Member;
-use crate::stage::{filter, motion, touches};
+use crate::stage::{difference, filter, motion, touches};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub(super) struct PostFieldState {
     /// The separate touches of the last frame.
     pub(super) touches: touches::Memory,
     pub(super) filter: filter::Memory,
+    /// Where the centroid was, where motion is measured over a time.
+    pub(super) difference: difference::Memory,
     /// Whether the last frame was in contact, so that there is something to release.
     pub(super) contact: bool,
 }
@@ -108,7 +110,7 @@ impl Post<'_> {
                 self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
             }
             if stages.filter && field.charted {
-                self.filter(field, step, cell, percepts, &mut before.filter);
+                self.filter(field, step, cell, percepts, before);
             }
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
@@ -142,15 +144,19 @@ impl Post<'_> {
         step: &Step,
         cell: usize,
         percepts: &mut Percepts,
-        memory: &mut filter::Memory,
+        memory: &mut PostFieldState,
     ) {
         if percepts.flags[cell].contains(Flags::NO_CONTACT) {
-            memory.release();
+            memory.filter.release();
+            memory.difference.release();
             return;
         }
         let clock = filter::Clock::new(step.dt_s, step.flags);
         let touched = motion::Centroid { place: centroid(percepts, cell).truncate(), pressed: percepts.active[cell] };
-        let found = memory.follow(&field.filter, clock, touched);
+        let found = match field.filter.over_s {
+            Some(over_s) => memory.difference.follow(&field.filter, over_s, clock, touched),
+            None => memory.filter.follow(&field.filter, clock, touched),
+        };
         percepts.flags[cell] |= found.flags;
         percepts.present[cell] |= found.present & self.plan.outputs;
         for (host, components) in found.outputs() {

@@ -41,7 +41,8 @@ bitflags! {
         const SEVERAL = 1 << 14;
         // From here on the host's alone: a word of the device has no room for them.
         /// The centroid has not come as far as the filter's window from the last one that counted: filtered displacement
-        /// and speed are absent, the filtered direction stays what it was.
+        /// and speed are absent, the filtered direction stays what it was. Or the contact is younger than the time over which
+        /// motion is measured.
         const HELD = 1 << 16;
         /// The centroid went farther at once than the filter's window: it is taken for another touch, and filtered motion
         /// starts anew.

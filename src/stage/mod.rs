@@ -15,6 +15,7 @@ pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod change;
 pub(crate) mod contact;
+pub(crate) mod difference;
 pub(crate) mod filter;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;

@@ -21,7 +21,7 @@
 //! it: few sensors, and the pressure at which they begin to feel, shift a quantity by as much in every frame.
 //!
 //! This stage is the host's, in f64, from the raw values: where there is contact for certain it has the same bits on every
-//! backend. **Bound.** That of its own arithmetic, n + 32 roundings of f64.
+//! backend. **Bound.** That of its own arithmetic, taken as 16(n + 32) roundings of f64: σᵢ is a difference of two pressures.
 
 use glam::DVec2;
 
@@ -88,7 +88,7 @@ impl Sigmas {
 
     /// How far the arithmetic may be off, as a share.
     pub(crate) fn rounding(&self) -> f64 {
-        (self.pressed as f64 + 32.0) * 0.5 * f64::EPSILON
+        16.0 * (self.pressed as f64 + 32.0) * 0.5 * f64::EPSILON
     }
 }
 

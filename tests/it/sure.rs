@@ -422,3 +422,39 @@ fn a_soft_onset_begins_with_nothing() {
     );
     assert!(!saturated("p_max = 110\nonset = \"soft\""));
 }
+
+#[test]
+fn baselines_of_soft_onsets_follow_drift_and_tare() {
+    let body = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let press = |onset: &str, upkeep: &str, tare: bool| {
+        let text = format!("[all]\nbaseline = 100\ngain = 0.5\ndead_band = 4\nonset = \"{onset}\"\n{upkeep}");
+        let calibration = Some(Calibration::parse(&text, &ids).unwrap());
+        let mut scene = Scene::default();
+        scene.outputs = Outputs::PEAK;
+        let options = Options::default().calibration(calibration).backend(BackendKind::Cpu).tare(tare).scene(scene);
+        let mut engine = Engine::new(&body, options).unwrap();
+        let mut peak = None;
+        for index in 0..=400 {
+            let mut frame = engine.frame(0.05 * f64::from(index));
+            // It drifts by 6 in 20 s, or with a tare stands at 106 from the start; then one taxel is pressed by 50.
+            let rest = 100.0 + if tare { 6.0 } else { 6.0 * f64::from(index) / 400.0 };
+            frame.values.fill(RawValue::new(rest));
+            if index == 400 {
+                frame.values[17] = RawValue::new(rest + 50.0);
+            }
+            let percepts = engine.process(&[frame]).unwrap();
+            peak = (0..percepts.fields())
+                .filter_map(|field| percepts.get(0, field).peak)
+                .fold(None, |most: Option<f64>, p| Some(most.map_or(p, |most| most.max(p))));
+        }
+        peak.unwrap()
+    };
+    let upkeep = "[upkeep]\ncadence_s = 0.25\ntime_constant_s = 1\n";
+    for (onset, right) in [("hard", 25.0), ("soft", 21.0)] {
+        assert!((press(onset, upkeep, false) - right).abs() < 0.5, "{onset}: {}", press(onset, upkeep, false));
+        assert!((press(onset, "", true) - right).abs() < 1e-4, "{onset}: {}", press(onset, "", true));
+        // Negative control: without upkeep the drift is felt.
+        assert!((press(onset, "", false) - right - 3.0).abs() < 1e-4, "{onset}: {}", press(onset, "", false));
+    }
+}

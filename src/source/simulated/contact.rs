@@ -361,7 +361,7 @@ mod tests {
         let ratio = peak(&hertz) / peak(&SKIN);
         assert!((ratio - 1.0).abs() < 0.05 && ratio != 1.0, "{ratio}");
         let far = |skin: &Skin| Footprint::new(&ball, skin, 5.0).share_on(20e-3, 0.0, 1e-3);
-        assert!(far(&deep) > 100.0 * far(&SKIN), "{:e} {:e}", far(&deep), far(&SKIN));
+        assert!(far(&deep) > 50.0 * far(&SKIN), "{:e} {:e}", far(&deep), far(&SKIN));
         // Bare of any layer's blur a dome stays a dome: zero pressure beyond the patch, 1.5 times the mean in its middle.
         let thin = Skin { thickness_m: 1e-4, contact: Pressure::Hertz, ..Skin::NONE };
         let footprint = Footprint::new(&ball, &thin, 5.0);
