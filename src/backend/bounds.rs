@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::reference::{Before, Reference};
-use super::{Backend, BackendState, FieldState, RawBatch, Step};
+use super::{Backend, BackendState, FieldState, RawBatch, Step, sigma};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
@@ -11,11 +11,12 @@ use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
 use crate::stage::{
-    GivenLimit, Pressed, U, axis, centroid, contact, filter, force, hysteresis, motion, orientation, touches,
+    Given, GivenLimit, Pressed, U, axis, centroid, contact, difference, filter, force, hysteresis, motion, orientation,
+    touches,
 };
 
 /// How far a single-precision percept may be off in one cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellBound {
     pub(crate) in_doubt: Flags,
     /// By output, as its bit counts; of vectors as distances.
@@ -37,6 +38,18 @@ pub(crate) struct MayRemember {
     pub(crate) touches: bool,
     /// The last centroid that counted.
     pub(crate) filter: bool,
+}
+
+impl Default for CellBound {
+    fn default() -> Self {
+        Self {
+            in_doubt: Flags::empty(),
+            limits: std::array::from_fn(|_| Limit::default()),
+            centroid: Limit::default(),
+            touch: Limit::default(),
+            may_remember: MayRemember::default(),
+        }
+    }
 }
 
 impl CellBound {
@@ -78,6 +91,7 @@ struct Doubt {
     unread: bool,
     touches: touches::Doubt,
     filter: filter::Doubt,
+    difference: difference::Doubt,
 }
 
 /// One field in one frame.
@@ -91,6 +105,8 @@ struct Cell<'a> {
     before: Before,
     /// Whether what the host remembers goes on, as it does unless the percept is kept.
     advances: bool,
+    /// The batch that it is of, and the frame in it.
+    raw: (&'a RawBatch<'a>, usize),
 }
 
 /// The reference, which says of every cell how far single precision may be off.
@@ -120,11 +136,12 @@ impl BoundedReference {
     ) -> Vec<CellBound> {
         let (before, step) = (self.reference.before.clone(), &raw.steps[frame]);
         let (pressures, present) = self.reference.frame(raw, frame, percepts);
+        let raw = (raw, frame);
         let cells = before.into_iter().zip(present).enumerate();
         cells
             .map(|(index, (before, present))| {
                 let advances = advances(index);
-                self.bound(&Cell { index, pressures: &pressures, step, present, before, advances })
+                self.bound(&Cell { index, pressures: &pressures, step, present, before, advances, raw })
             })
             .collect()
     }
@@ -149,8 +166,9 @@ impl BoundedReference {
     }
 
     /// The same for what the host's filter remembers.
-    pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory) {
+    pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory, trail: &difference::Memory) {
         self.doubts[index].filter = filter::Doubt::after(memory);
+        self.doubts[index].difference = difference::Doubt::after(trail);
     }
 
     /// How far single precision may be off in `cell`.
@@ -192,6 +210,7 @@ impl BoundedReference {
             if cell.advances {
                 doubt.touches.release();
                 doubt.filter.release();
+                doubt.difference.release();
             }
             return bound;
         }
@@ -228,10 +247,20 @@ impl BoundedReference {
         if field.charted && plan.stages().filter && cell.advances {
             let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
             let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
-            let limit = doubt.filter.follow(&field.filter, clock, in_metres, doubt.place * unit);
+            let off = doubt.place * unit;
+            let limit = match field.filter.over_s {
+                Some(over_s) => doubt.difference.follow(&field.filter, over_s, clock, in_metres, off),
+                None => doubt.filter.follow(&field.filter, clock, in_metres, off),
+            };
             bound.in_doubt |= limit.in_doubt;
             bound.set(limit.limits());
             bound.may_remember.filter = limit.may_remember;
+        }
+        if plan.stages().sigma {
+            let sigmas = sigma::of_field(plan, field, cell.raw.0, cell.raw.1);
+            let off = |components: [f64; 2]| sigmas.rounding() * components[0].hypot(components[1]);
+            let limit = |(_, (output, components)): (_, Given)| (output, Limit::Within(components.map_or(0.0, off)));
+            bound.set(sigmas.outputs().map(limit));
         }
         bound
     }

@@ -8,6 +8,7 @@ pub(crate) mod cpu;
 pub mod gpu;
 mod raw;
 pub(crate) mod reference;
+pub(crate) mod sigma;
 mod state;
 
 pub(crate) use self::choose::choose;

@@ -140,6 +140,12 @@ pub(super) struct RunOptions {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
+    /// Measure the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
+    /// --filter-window, of which the high end still counts. 0.2 is steady where few sensors feel a touch.
+    #[arg(long, help_heading = COMPUTED, value_name = "S", allow_hyphen_values = true)]
+    #[serde(rename = "filter_over_s")]
+    pub(super) filter_over: Option<f64>,
+
     /// Play a recording from this time after its start, in seconds [default: 0].
     #[arg(long, help_heading = RECORDINGS, value_name = "S")]
     #[serde(rename = "from_s")]
@@ -317,7 +323,7 @@ impl RunOptions {
         }
         let asked = merged! {
             values: body backend calibration rate wiring format grid pitch unit live_rate board_rate batch speed from to repeat max_age max_gap
-                coordinates filter_window filter_by filter_time,
+                coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
         };

@@ -43,7 +43,7 @@ impl Check {
         check.reference.restore(backend)?;
         for (field, state) in post.fields.iter().enumerate() {
             check.reference.restore_touches(field, &state.touches);
-            check.reference.restore_filter(field, &state.filter);
+            check.reference.restore_filter(field, &state.filter, &state.difference);
         }
         Ok(check)
     }
@@ -95,7 +95,8 @@ impl Check {
         }
         if may_remember.filter {
             own.filter = after.filter;
-            self.reference.restore_filter(field, &after.filter);
+            own.difference.clone_from(&after.difference);
+            self.reference.restore_filter(field, &after.filter, &after.difference);
         }
     }
 }
@@ -124,8 +125,9 @@ mod tests {
         fn on(backend: BackendKind) -> Option<Self> {
             let body = Body::from_bytes("hand", crate::bundled::HAND).unwrap();
             let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-            let calibration =
-                Some(crate::signal::Calibration::parse("[all]\ngain = 0.7\nunit = \"mmHg\"\n", &ids).unwrap());
+            let calibration = Some(
+                crate::signal::Calibration::parse("[all]\ngain = 0.7\nunit = \"mmHg\"\nnoise = 0.4\n", &ids).unwrap(),
+            );
             let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
             let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
             let mut engine = match Engine::new(&body, options) {
@@ -140,7 +142,7 @@ mod tests {
             };
             let frames: Vec<Frame> = (0..8).map(frame).collect();
             let (_, agreement) = engine.process_and_compare(&frames).unwrap();
-            assert!(agreement.holds() && agreement.quantities.len() == 26, "{backend:?}: {agreement}");
+            assert!(agreement.holds() && agreement.quantities.len() == 29, "{backend:?}: {agreement}");
             let check = engine.check.take().unwrap();
             Some(Self { engine, check })
         }

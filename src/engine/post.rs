@@ -5,12 +5,12 @@ use glam::{DAffine3, DVec3};
 use super::cadence::{self, OnChange};
 use super::fit;
 use super::place::{self, Links};
-use crate::backend::{RawBatch, Step};
+use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{filter, force, motion, touches};
+use crate::stage::{difference, filter, force, motion, touches};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -28,6 +28,8 @@ pub(super) struct PostFieldState {
     /// The separate touches of the last frame.
     pub(super) touches: touches::Memory,
     pub(super) filter: filter::Memory,
+    /// Where the centroid was, where motion is measured over a time.
+    pub(super) difference: difference::Memory,
     /// Whether the last frame was in contact, so that there is something to release.
     pub(super) contact: bool,
 }
@@ -82,7 +84,7 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.pressures || stages.filter || self.cadence.is_some()) {
+        if !(stages.pressures || stages.filter || stages.sigma || self.cadence.is_some()) {
             return;
         }
         for (number, field) in self.plan.fields.iter().enumerate() {
@@ -122,7 +124,10 @@ impl Post<'_> {
                 }
             }
             if stages.filter && field.charted {
-                self.filter(field, step, cell, percepts, &mut before.filter);
+                self.filter(field, step, cell, percepts, before);
+            }
+            if stages.sigma && contact {
+                self.sigmas(field, raw, offset, cell, percepts);
             }
         }
         if self.cadence.is_some() {
@@ -158,15 +163,19 @@ impl Post<'_> {
         step: &Step,
         cell: usize,
         percepts: &mut Percepts,
-        memory: &mut filter::Memory,
+        memory: &mut PostFieldState,
     ) {
         if percepts.flags[cell].contains(Flags::NO_CONTACT) {
-            memory.release();
+            memory.filter.release();
+            memory.difference.release();
             return;
         }
         let clock = filter::Clock::new(step.dt_s, step.flags);
         let touched = motion::Centroid { place: centroid(percepts, cell).truncate(), pressed: percepts.active[cell] };
-        let found = memory.follow(&field.filter, clock, touched);
+        let found = match field.filter.over_s {
+            Some(over_s) => memory.difference.follow(&field.filter, over_s, clock, touched),
+            None => memory.filter.follow(&field.filter, clock, touched),
+        };
         percepts.flags[cell] |= found.flags;
         percepts.add_present(cell, found.present & self.plan.outputs);
         for (host, components) in found.outputs() {
@@ -190,6 +199,17 @@ impl Post<'_> {
                 percepts.set_host(Host::Force, cell, &[newtons]);
             }
             None => percepts.flags[cell] |= Flags::NO_UNIT,
+        }
+    }
+
+    /// Says how sure a cell's percept is.
+    fn sigmas(&self, field: &PlanField, raw: &RawBatch<'_>, frame: usize, cell: usize, percepts: &mut Percepts) {
+        let sigmas = sigma::of_field(self.plan, field, raw, frame);
+        percepts.flags[cell] |= sigmas.flags;
+        for (host, (output, components)) in sigmas.outputs() {
+            let Some(components) = components else { continue };
+            percepts.add_present(cell, output & self.plan.outputs);
+            percepts.set_host(host, cell, &components[..host.column().components]);
         }
     }
 

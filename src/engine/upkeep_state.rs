@@ -97,13 +97,15 @@ impl UpkeepState {
 
 /// What upkeep is to know of the taxel at `channel`.
 fn kept(plan: &Plan, channel: usize) -> Kept {
-    let taxel = &plan.calibrations[channel];
+    let (taxel, onset) = (&plan.calibrations[channel], plan.onset(channel));
+    let threshold = taxel.dead_band + onset.threshold;
     let (falls, felt) = match plan.curve_of(channel).rounded {
-        [] => (taxel.gain < 0.0, f64::from(taxel.dead_band as f32) / f64::from(taxel.gain.abs() as f32)),
+        [] => (taxel.gain < 0.0, f64::from(threshold as f32) / f64::from(taxel.gain.abs() as f32)),
         [first, .., last] => (last.p < first.p, felt(plan, channel, [first.raw, last.raw].map(f64::from))),
         [_] => (false, 0.0),
     };
-    Kept { baseline: taxel.baseline as f32, raw_range: taxel.raw_range, felt, falls, mask: taxel.mask }
+    let baseline = (taxel.baseline - onset.shift) as f32;
+    Kept { baseline, raw_range: taxel.raw_range, felt, falls, mask: taxel.mask }
 }
 
 /// How far the raw value of a taxel with a curve must go from its baseline for it to be felt, between `ends` of the curve.

@@ -147,6 +147,10 @@ mod tests {
         percept.filtered_displacement = percept.displacement;
         percept.filtered_direction = percept.direction;
         percept.filtered_speed = percept.speed;
+        // Bodies of this kind have no calibration, and so no noise.
+        percept.total_sigma = percept.total;
+        percept.centroid_sigma = percept.centroid;
+        percept.axis_sigma = percept.axis;
         assert_eq!(outputs.columns().count(), outputs.iter().count());
         // Nor are they contacts, or have a unit.
         for column in (outputs - Outputs::FOOTPRINT - Outputs::FORCE).columns() {

@@ -3,7 +3,9 @@
 
 pub mod dump;
 mod figures;
+mod kalman;
 mod metric;
+mod motion;
 mod npy;
 pub mod shape;
 mod table;
@@ -18,8 +20,8 @@ use somatic::error::{Error, Result};
 use somatic::output::OutputFolder;
 
 /// The files that [`write()`] writes.
-pub const FILES: [&str; 8] =
-    ["fig3.svg", "fig3.png", "fig6.svg", "fig6.png", "fig7.svg", "fig7.png", "table.md", "table.json"];
+pub const FILES: [&str; 9] =
+    ["fig3.svg", "fig3.png", "fig6.svg", "fig6.png", "fig7.svg", "fig7.png", "motion.md", "table.md", "table.json"];
 
 /// Writes the paper's figures and the table into `folder`, which has [`FILES`], and returns the files. `quick` omits most of
 /// the table. `progress` gets the share that is done.
@@ -36,7 +38,8 @@ pub fn write(mut folder: OutputFolder, quick: bool, progress: &(dyn Fn(f64) + Sy
         put(&format!("{name}.svg"), figure.svg()?.as_bytes())?;
         put(&format!("{name}.png"), &figure.png()?)?;
     }
-    let table = Table::new(&body, quick, progress)?;
+    put("motion.md", motion::markdown(&body, quick, &|share| progress(0.5 * share))?.as_bytes())?;
+    let table = Table::new(&body, quick, &|share| progress(0.5 + 0.5 * share))?;
     put("table.md", table.markdown().as_bytes())?;
     let json = serde_json::to_string_pretty(&table).map_err(|e| Error::failed(e.to_string()))?;
     put("table.json", (json + "\n").as_bytes())?;

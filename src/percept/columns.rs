@@ -337,16 +337,26 @@ columns! {
     FOOTPRINT_WIDTH 28 footprint_width: f64, Metre, Number, footprint, parts [] host [FootprintWidth];
     #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
     FOOTPRINT_LENGTH 29 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
+    #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
+    TOTAL_SIGMA 30 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
+    #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]
+    CENTROID_SIGMA 31 centroid_sigma: [f64; 2], Metre, Vector, sigma, parts [] host [CentroidSigma];
+    #[doc = "The standard deviation of the axis by the sensors' noise, rad."]
+    AXIS_SIGMA 32 axis_sigma: f64, Radian, Number, sigma, parts [] host [AxisSigma];
 }
 
 impl Outputs {
     /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
-    /// [`Outputs::FORCE`], which hangs on the calibration, and [`Outputs::FOOTPRINT`].
+    /// [`Outputs::SIGMAS`], [`Outputs::FOOTPRINT`] and [`Outputs::FORCE`], which depends on the calibration.
     pub const USUAL: Self = Self::all()
         .difference(Self::TOUCHES)
         .difference(Self::FILTERED)
-        .difference(Self::FORCE)
-        .difference(Self::FOOTPRINT);
+        .difference(Self::SIGMAS)
+        .difference(Self::FOOTPRINT)
+        .difference(Self::FORCE);
+
+    /// How sure quantities are.
+    pub const SIGMAS: Self = Self::of_stage("sigma");
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");

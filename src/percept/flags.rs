@@ -41,7 +41,8 @@ bitflags! {
         const SEVERAL = 1 << 14;
         // From here on the host's alone: a word of the device has no room for them.
         /// The centroid has not come as far as the filter's window from the last one that counted: filtered displacement
-        /// and speed are absent, the filtered direction stays what it was.
+        /// and speed are absent, the filtered direction stays what it was. Or the contact is younger than the time over which
+        /// motion is measured.
         const HELD = 1 << 16;
         /// The centroid went farther at once than the filter's window: it is taken for another touch, and filtered motion
         /// starts anew.
@@ -62,6 +63,10 @@ bitflags! {
         /// What the skin makes of a contact is not known: the calibration has no `[skin]`, a taxel has no area, or the letter
         /// is no pressure.
         const NO_SKIN = 1 << 24;
+        /// The calibration does not say how noisy a pressed taxel is: there are no sigmas.
+        const NOISE_UNKNOWN = 1 << 25;
+        /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.
+        const UNSURE = 1 << 26;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::onset::SoftOnset;
 use crate::error::Result;
 use crate::signal::{Calibration, Curve, FsrSignal, Response, TaxelCalibration, slope};
 use crate::stage::calibrate::Table;
@@ -18,32 +19,33 @@ pub(crate) struct Curves {
 }
 
 /// What makes a taxel's curve: its kind or number, then whatever else there is, as bits.
-type Alike = (usize, u8, u64, u64);
+type Alike = (usize, u8, u64, u64, u64);
 
 impl Curves {
-    /// What [`layout::Taxel::response`] says for `taxel`.
+    /// What [`layout::Taxel::response`] says for `taxel`, whose soft onset, if it has one, is `onset`.
     pub(super) fn response_of(
         &mut self,
         calibration: &Calibration,
         taxel: &TaxelCalibration,
         signal: Option<FsrSignal>,
+        onset: SoftOnset,
     ) -> Result<u32> {
-        let gain = taxel.gain.to_bits();
+        let (gain, threshold) = (taxel.gain.to_bits(), onset.threshold.to_bits());
         let alike = match taxel.response {
             _ if taxel.mask => return Ok(layout::MASKED),
             Response::Linear => return Ok(layout::STRAIGHT),
             Response::Fsr(fsr) => {
                 let kind = usize::from(signal.unwrap_or(fsr.signal) == FsrSignal::Linear);
-                (kind, fsr.tap, fsr.full_scale_newton.to_bits(), gain)
+                (kind, fsr.tap, fsr.full_scale_newton.to_bits(), gain, threshold)
             }
-            Response::Curve(index) => (2 + index, 0, 0, gain),
+            Response::Curve(index) => (2 + index, 0, 0, gain, threshold),
         };
         if let Some(&known) = self.known.get(&alike) {
             return Ok(known);
         }
         let response = layout::FIRST_CURVE + self.curves.len() as u32;
         if let Some(curve) = calibration.curve_of(taxel, signal)? {
-            self.add(&curve);
+            self.add(&if onset.threshold > 0.0 { curve.lowered(onset.threshold) } else { curve });
         }
         self.known.insert(alike, response);
         Ok(response)
@@ -77,15 +79,17 @@ mod tests {
                     [taxel.6]\nsensor = \"linear\"";
         let calibration = Calibration::parse(text, &[0, 1, 2, 3, 4, 5, 6]).unwrap();
         let mut curves = Curves::default();
-        let codes: Vec<u32> =
-            calibration.taxels.iter().map(|taxel| curves.response_of(&calibration, taxel, None).unwrap()).collect();
+        let response = |curves: &mut Curves, taxel: &TaxelCalibration, signal| {
+            curves.response_of(&calibration, taxel, signal, SoftOnset::default()).unwrap()
+        };
+        let codes: Vec<u32> = calibration.taxels.iter().map(|taxel| response(&mut curves, taxel, None)).collect();
         assert_eq!(codes, [2, 3, 4, 5, 3, layout::MASKED, layout::STRAIGHT]);
         assert_eq!((curves.curves.len(), curves.knots.len()), (4, 2 * 1024 + 4));
         assert_eq!(curves.of(4).rounded[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
         assert_eq!(curves.of(5).rounded.iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
         assert!([layout::STRAIGHT, layout::MASKED].iter().all(|&response| curves.of(response).written.is_empty()));
         // The other signal is another curve.
-        assert_eq!(curves.response_of(&calibration, &calibration.taxels[0], Some(FsrSignal::Raw)).unwrap(), 6);
+        assert_eq!(response(&mut curves, &calibration.taxels[0], Some(FsrSignal::Raw)), 6);
         assert_eq!(curves.of(6).rounded[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
     }
 }

@@ -112,6 +112,7 @@ impl Plan {
             ("touches", stages.touches, of(&all), ""),
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
+            ("sigma", stages.sigma, found, ""),
             ("footprint", stages.footprint, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
@@ -126,7 +127,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "force", "filter", "footprint"].contains(&name),
+                on_host: ["position", "touches", "force", "filter", "sigma", "footprint"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },

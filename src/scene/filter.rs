@@ -25,6 +25,9 @@ pub struct MotionFilter {
     pub by: FilterBy,
     /// The time constant τ of the filtered direction, s; with 0 each step that counts stands for itself.
     pub time_constant_s: f64,
+    /// Measure motion over this time, s, from the centroid that long ago, instead of by the window: steadier than frame by
+    /// frame, half of that time late. The window's high end still tells another touch.
+    pub over_s: Option<f64>,
 }
 
 /// Shares of a field's spacing that are its window where none is given. On the bundled hand's back a sixteenth is 0.48 mm:
@@ -36,11 +39,17 @@ const APART: f64 = 3.0;
 
 impl Default for MotionFilter {
     fn default() -> Self {
-        Self { low_m: None, high_m: None, by: FilterBy::Distance, time_constant_s: 0.1 }
+        Self { low_m: None, high_m: None, by: FilterBy::Distance, time_constant_s: 0.1, over_s: None }
     }
 }
 
-setters!(MotionFilter { low_m: impl Into<Option<f64>>, high_m: impl Into<Option<f64>>, by: FilterBy, time_constant_s: f64 });
+setters!(MotionFilter {
+    low_m: impl Into<Option<f64>>,
+    high_m: impl Into<Option<f64>>,
+    by: FilterBy,
+    time_constant_s: f64,
+    over_s: impl Into<Option<f64>>,
+});
 
 impl MotionFilter {
     /// The same with the window that `text` says: `0.5mm..20mm`, where either end may be left out.
@@ -96,7 +105,12 @@ impl MotionFilter {
                 self.time_constant_s
             )));
         }
-        Ok(())
+        match self.over_s {
+            Some(over) if !(over.is_finite() && over > 0.0) => {
+                Err(Error::usage(format!("motion over {over} s is none; give seconds over 0")))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// What that is for a field whose taxels lie about `spacing_m` apart, and which counts as `still` in units of `unit_m`.
@@ -104,7 +118,14 @@ impl MotionFilter {
         self.check()?;
         let high = self.high_m.unwrap_or_else(|| (HIGH * spacing_m).max(APART * self.low_m.unwrap_or(0.0)));
         let low = self.low_m.unwrap_or_else(|| (LOW * spacing_m).min(high / APART));
-        Ok(Settings { window_m: [low, high], by: self.by, time_constant_s: self.time_constant_s, still, unit_m })
+        Ok(Settings {
+            window_m: [low, high],
+            by: self.by,
+            time_constant_s: self.time_constant_s,
+            over_s: self.over_s,
+            still,
+            unit_m,
+        })
     }
 }
 
@@ -186,6 +207,10 @@ mod tests {
 
     #[test]
     fn a_time_that_is_none_is_refused() {
+        for over_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let filter = MotionFilter::default().over_s(over_s);
+            assert!(filter.settings(1.0, Still::default(), 1.0).unwrap_err().to_string().contains("motion over"));
+        }
         for time_constant_s in [-1.0, f64::NAN, f64::INFINITY] {
             let filter = MotionFilter { time_constant_s, ..MotionFilter::default() };
             assert!(filter.settings(1.0, Still::default(), 1.0).unwrap_err().to_string().contains("filter time"));

@@ -6,6 +6,7 @@ mod explain;
 mod filter;
 mod knobs;
 mod members;
+mod onset;
 mod plan;
 mod skin;
 mod slots;

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::curves::Curves;
 use super::members::{beside, quantity_of, surface, thresholds, unit_of, weights};
+use super::onset::{SoftOnset, softened};
 use super::skin::layer;
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
@@ -34,6 +35,7 @@ pub(crate) struct Stages {
     /// Whether percepts keep the taxels' pressures, for stages on the host.
     pub(crate) pressures: bool,
     pub(crate) filter: bool,
+    pub(crate) sigma: bool,
     pub(crate) footprint: bool,
 }
 
@@ -44,8 +46,8 @@ impl Stages {
         let footprint = wants("footprint");
         let touches = outputs.contains(Outputs::TOUCHES) || footprint;
         let position = wants("position") || touches;
-        let [orientation, axis, motion, filter, force] =
-            ["orientation", "axis", "motion", "filter", "force"].map(wants);
+        let [orientation, axis, motion, filter, force, sigma] =
+            ["orientation", "axis", "motion", "filter", "force", "sigma"].map(wants);
         let centroid = wants("centroid") || position || orientation || axis || motion || filter;
         let pressures = touches || force;
         Self {
@@ -59,6 +61,7 @@ impl Stages {
             force,
             pressures,
             filter,
+            sigma,
             footprint,
         }
     }
@@ -79,7 +82,9 @@ pub struct Plan {
     pub(crate) body_taxels: Vec<usize>,
     /// Per channel.
     pub(crate) calibrations: Vec<TaxelCalibration>,
-    /// Counts the changes of these.
+    /// Per channel, what soft onsets have moved in these; empty where all are hard.
+    pub(crate) onsets: Vec<SoftOnset>,
+    /// Counts the changes of the calibrations.
     pub(crate) calibration_changes: u64,
     /// Per channel, m².
     pub(crate) areas: Vec<f64>,
@@ -203,6 +208,7 @@ impl Plan {
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
+        let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
         let mut plan = Self {
             outputs,
             stages: Stages::of(outputs),
@@ -210,7 +216,8 @@ impl Plan {
             letters: scene.letters.clone(),
             knobs: scene.knobs,
             change_dead_band: calibration.change.dead_band,
-            calibrations: body_taxels.iter().map(|&taxel| calibration.taxels[taxel]).collect(),
+            calibrations,
+            onsets,
             calibration_changes: 0,
             areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
             calibrated: 0,
@@ -299,9 +306,16 @@ impl Plan {
         self.outputs
     }
 
-    /// Calibrates the taxel at `channel` from now on with `baseline`, and leaves it out if it is `unfit`; `made` is how all
+    /// What the soft onset of the taxel at `channel` has moved, if it has one.
+    pub(crate) fn onset(&self, channel: usize) -> SoftOnset {
+        self.onsets.get(channel).copied().unwrap_or_default()
+    }
+
+    /// Calibrates the taxel at `channel` from now on with `baseline`, its raw value at rest, and leaves it out if it is `unfit`; `made` is how all
     /// slots were before any upkeep.
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
+        let shift = self.onset(channel).shift;
+        let baseline = if shift == 0.0 { baseline } else { (f64::from(baseline) + shift) as f32 };
         for slot in (channel..self.calibrated).step_by(self.channels()) {
             let response = if unfit { layout::MASKED } else { made[slot].response };
             self.calibration_changes += 1;

@@ -20,8 +20,9 @@ impl Plan {
         for letter in &self.letters {
             if !signals.contains(&letter.signal) {
                 signals.push(letter.signal);
-                for (of_taxel, &area) in self.calibrations.iter().zip(&self.areas) {
-                    let response = self.curves.response_of(calibration, of_taxel, letter.signal)?;
+                for (channel, (of_taxel, &area)) in self.calibrations.iter().zip(&self.areas).enumerate() {
+                    let onset = self.onset(channel);
+                    let response = self.curves.response_of(calibration, of_taxel, letter.signal, onset)?;
                     self.taxels.push(taxel(of_taxel, area, response));
                 }
             }

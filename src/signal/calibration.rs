@@ -21,6 +21,16 @@ use super::unit::Quantity;
 use super::upkeep::UpkeepKeys;
 use crate::error::{Result, failed};
 
+/// What a taxel's pressure is where it leaves its dead band.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Onset {
+    /// It jumps to P.
+    #[default]
+    Hard,
+    /// It is P less the dead band, and so begins with 0.
+    Soft,
+}
+
 /// How one taxel's raw value becomes a pressure: by its [`Response`], then 0 up to the dead band. The constants are those of
 /// the file; the backends `cpu` and `gpu` round each once to single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +41,8 @@ pub struct TaxelCalibration {
     pub gain: f64,
     /// Pressures up to this one, in the unit of P, count as 0.
     pub dead_band: f64,
+    /// What becomes of pressures over it.
+    pub onset: Onset,
     /// The largest pressure of the sensor's range; higher ones are kept but flagged `saturated`.
     pub p_max: f64,
     /// The range of raw values, in single precision as these are; others are kept but flagged `out_of_range`.
@@ -51,6 +63,7 @@ impl Default for TaxelCalibration {
             baseline: 0.0,
             gain: 1.0,
             dead_band: 0.0,
+            onset: Onset::Hard,
             p_max: f32::MAX.into(),
             raw_range: [-f32::MAX, f32::MAX],
             noise: None,

@@ -123,6 +123,11 @@ impl Curve {
         }
     }
 
+    /// The same with P less by `threshold`, and so below 0 for what is not felt.
+    pub(crate) fn lowered(&self, threshold: f64) -> Self {
+        Self::through(self.written.iter().map(|&[raw, p]| [raw, p - threshold]).collect())
+    }
+
     /// (raw, P) of every knot, raw rising, in single precision.
     #[must_use]
     pub fn knots(&self) -> &[[f32; 2]] {

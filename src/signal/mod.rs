@@ -13,7 +13,9 @@ mod upkeep;
 mod wiring;
 
 pub use board_health::BoardHealth;
-pub use calibration::{Calibration, ChangeCalibration, Checks, ContactThresholds, SkinResponse, TaxelCalibration};
+pub use calibration::{
+    Calibration, ChangeCalibration, Checks, ContactThresholds, Onset, SkinResponse, TaxelCalibration,
+};
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{Frame, Pose, RawValue};

@@ -107,7 +107,7 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_
 }
 
 /// P at a raw value, whatever the dead band.
-fn response(value: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
+pub(crate) fn response(value: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
     let above = value - taxel.baseline;
     if curve.written.is_empty() { above * taxel.gain } else { interpolate(curve.written, |&knot| knot, above).0 }
 }

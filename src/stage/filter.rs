@@ -57,6 +57,8 @@ pub(crate) struct Settings {
     pub(crate) by: FilterBy,
     /// τ, s.
     pub(crate) time_constant_s: f64,
+    /// Measure over this time instead, s, as [`super::difference`] does.
+    pub(crate) over_s: Option<f64>,
     /// The step up to which the centroid counts as still, in the field's unit.
     pub(crate) still: Still,
     pub(crate) unit_m: f64,
@@ -71,10 +73,15 @@ enum Choice {
 }
 
 impl Settings {
+    /// The step between two centroids, m, that rounding may feign.
+    pub(crate) fn still_within(&self, from: Centroid, to: Centroid) -> f64 {
+        self.still.within(from.pressed + to.pressed) * self.unit_m
+    }
+
     /// What becomes of a step, and whether one that is off by `bound` (m) might fare otherwise.
     fn judge(&self, from: Centroid, to: Centroid, bound: f64) -> (Choice, bool) {
         let [low, high] = self.window_m;
-        let still_within = self.still.within(from.pressed + to.pressed) * self.unit_m;
+        let still_within = self.still_within(from, to);
         let length = (to.place - from.place).length();
         let measure = match self.by {
             FilterBy::Distance => length,
@@ -324,7 +331,7 @@ mod tests {
 
     fn settings(window_m: [f64; 2], time_constant_s: f64) -> Settings {
         let still = Still { least: 1e-9, ..Still::default() };
-        Settings { window_m, by: FilterBy::Distance, time_constant_s, still, unit_m: 1.0 }
+        Settings { window_m, by: FilterBy::Distance, time_constant_s, over_s: None, still, unit_m: 1.0 }
     }
 
     fn at(place: DVec2) -> Centroid {

@@ -15,6 +15,7 @@ pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod change;
 pub(crate) mod contact;
+pub(crate) mod difference;
 pub(crate) mod filter;
 pub(crate) mod footprint;
 pub(crate) mod force;
@@ -24,6 +25,7 @@ pub(crate) mod limit;
 pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
+pub(crate) mod sigma;
 pub(crate) mod touches;
 
 use glam::DVec3;

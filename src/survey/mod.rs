@@ -512,12 +512,13 @@ mod tests {
     fn sigma_is_that_of_the_noise_and_its_rounding() {
         // Of twelve uniform numbers each: normal enough.
         let noise = |n: usize| -> f64 {
-            let unit = |k: usize| {
-                let mut bits = ((n * 12 + k) as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-                bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-                bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-                ((bits ^ (bits >> 31)) >> 11) as f64 / 9_007_199_254_740_992.0
+            let mixed = |k: usize| {
+                let x = ((n * 12 + k) as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+                let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+                x ^ (x >> 31)
             };
+            let unit = |k: usize| (mixed(k) >> 11) as f64 / 9_007_199_254_740_992.0;
             (0..12).map(unit).sum::<f64>() - 6.0
         };
         let of = |value: &dyn Fn(usize) -> f64, unit: f64| {

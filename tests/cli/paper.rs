@@ -15,8 +15,8 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     let out = folder.path().join("new/paper");
     let printed = done(&["paper", "--quick", "--out", text_of(&out)]);
     let names = ["fig3", "fig6", "fig7"].map(|name| [format!("{name}.png"), format!("{name}.svg")]).concat();
-    assert_eq!(files_in(&out), [names, vec!["table.json".into(), "table.md".into()]].concat());
-    assert!(printed.lines().count() == 8 && printed.lines().all(|line| std::path::Path::new(line).is_file()));
+    assert_eq!(files_in(&out), [names, ["motion.md", "table.json", "table.md"].map(String::from).to_vec()].concat());
+    assert!(printed.lines().count() == 9 && printed.lines().all(|line| std::path::Path::new(line).is_file()));
 
     for (name, words) in [
         ("fig3", &["counts", "logarithmic raw", "linearised", "force on the sensor", "time (s)"][..]),
@@ -42,7 +42,10 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     // Two heads of two lines, a row for each indenter and signal, one for each angle.
     assert_eq!(rows.len(), 4 + 6 + 36);
     let across = table.lines().find(|line| line.starts_with("Two points are over 45° off")).unwrap();
-    for row in rows.into_iter().chain([across]) {
+    let motion = std::fs::read_to_string(out.join("motion.md")).unwrap();
+    let ways: Vec<&str> = motion.lines().filter(|line| line.starts_with('|')).collect();
+    assert_eq!(ways.len(), 2 + 3);
+    for row in rows.into_iter().chain(ways).chain([across]) {
         assert!(docs.contains(row), "docs/paper.md is out of date, see how it is made there: {row}");
     }
     let shown =

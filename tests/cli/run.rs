@@ -196,7 +196,7 @@ fn the_cut_into_batches_changes_nothing() {
 #[test]
 fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--outputs", "centriod"]).contains("did you mean `centroid`?"));
-    assert!(fails(2, &["run", "--outputs", "banana"]).contains("total, touches"));
+    assert!(fails(2, &["run", "--outputs", "banana"]).contains("total, total_sigma, touches"));
     assert!(fails(2, &["run", "--nonsense"]).contains("--nonsense"));
     assert!(fails(2, &["run", "--backend", "gpo"]).contains("'gpu'"));
     assert!(fails(2, &["run", "--body", "mat"]).contains("needs a --source"));
@@ -226,13 +226,15 @@ fn filtered_motion_is_given_where_it_is_asked_for() {
     let wide = counted(&["--filter-window", "2mm.."]);
     assert!(wide.1 > 2 && wide.1 < speeds / 2 && wide.0 > wide.1, "{wide:?}");
     assert!(counted(&["--filter-by", "radial"]).1 > 20);
-    for other in [["--filter-by", "radial"], ["--filter-time", "1"]] {
+    for other in [["--filter-by", "radial"], ["--filter-time", "1"], ["--filter-over", "0.2"]] {
         assert_ne!(done(&run), done(&[&run[..], &other].concat()), "{other:?}");
     }
 
     for (arguments, why) in [
         (&["--filter-time", "nan"][..], "filter time of NaN"),
         (&["--filter-time", "-1"], "filter time of -1"),
+        (&["--filter-over", "0"], "motion over 0 s"),
+        (&["--filter-over", "0.2", "--filter-by", "radial"], "--filter-by has no effect beside --filter-over"),
         (&["--filter-window", "-1mm..2mm"], "from -1 mm"),
         (&["--filter-window", "3mm..2mm"], "the smaller first"),
         (&["--filter-window", "3..4"], "has no unit"),

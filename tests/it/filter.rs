@@ -210,6 +210,32 @@ fn a_choice_too_close_to_call_is_counted_and_the_comparison_goes_on_after_it() {
 }
 
 #[test]
+fn over_a_time_motion_is_the_mean_of_that_time_on_every_backend_however_it_is_cut() {
+    // Steps of 0.01 and 0.05 m in turn, which frame by frame are 0.1 and 0.5 m/s; then nothing, and a touch elsewhere.
+    let mut frames: Vec<Frame> =
+        (0..12).map(|n| at(0.1 * f64::from(n), 0.03 * f64::from(n) - 0.01 * f64::from(n % 2), 0.0)).collect();
+    frames.push(frame(1.2, &[0.0; 5]));
+    frames.extend((13..20).map(|n| at(0.1 * f64::from(n), 0.0, 0.02 * f64::from(n - 13))));
+    let over = MotionFilter::default().high_m(1.0).over_s(0.4);
+    for (run, agreement) in runs(over, "", &frames) {
+        assert!(agreement.quantities["filtered_speed"].compared >= 11, "{agreement}");
+        for (index, percept) in run.iter().enumerate() {
+            match index {
+                0 | 13 => assert_eq!((percept.flags, percept.filtered_speed), (Flags::NO_PREVIOUS, None)),
+                12 => assert!(!percept.contact),
+                1..4 | 14..17 => {
+                    assert_eq!((percept.flags, percept.filtered_direction), (Flags::HELD, None), "{index}");
+                }
+                4..12 => {
+                    assert!(near(percept.filtered_speed, 0.3) && near(percept.filtered_direction, 0.0), "{percept:?}");
+                }
+                _ => assert!(near(percept.filtered_speed, 0.2) && near(percept.filtered_direction, FRAC_PI_2)),
+            }
+        }
+    }
+}
+
+#[test]
 fn doubt_about_contact_is_doubt_about_the_filter_in_that_frame_alone() {
     // 0.1 + 0.2 is over 0.3 in one precision and not in the other; 64 is far above.
     let frames = [

@@ -42,6 +42,7 @@ mod skipped;
 #[path = "../skips/mod.rs"]
 mod skips;
 mod state;
+mod sure;
 mod touch;
 mod upkeep;
 mod validator;

@@ -38,13 +38,19 @@ impl RunOptions {
             ("--filter-window", self.filter_window.is_some()),
             ("--filter-by", self.filter_by.is_some()),
             ("--filter-time", self.filter_time.is_some()),
+            ("--filter-over", self.filter_over.is_some()),
         ];
         if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
             return Err(Error::usage(format!(
                 "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
             )));
         }
+        let by_window = &given[1..3];
+        if let Some((flag, _)) = by_window.iter().find(|(_, given)| *given && self.filter_over.is_some()) {
+            return Err(Error::usage(format!("{flag} has no effect beside --filter-over; leave one of them out")));
+        }
         let filter = usual
+            .over_s(self.filter_over)
             .by(self.filter_by.unwrap_or(usual.by))
             .time_constant_s(self.filter_time.unwrap_or(usual.time_constant_s));
         self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))

@@ -134,6 +134,7 @@ mod tests {
         assert!(why("[taxel.5]\ngain = 1").contains("[taxel.5] names a taxel"));
         assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
         assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
+        assert_eq!(why("[all]\nonset = \"late\""), "line 2: `onset` is `late`; it must be `hard` or `soft`");
         assert_eq!(why("[all]\nnoise = -1"), "line 2: `noise` is -1; it must be 0 or more raw units");
         assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
         assert!(why("all = 3").contains("line 1"));

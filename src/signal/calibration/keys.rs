@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::TaxelCalibration;
+use super::{Onset, TaxelCalibration};
 use crate::error::{Error, Result, nearest};
 use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
@@ -19,6 +19,7 @@ pub(super) struct Keys {
     gain: Option<Spanned<f64>>,
     invert: Option<bool>,
     dead_band: Option<Spanned<f64>>,
+    onset: Option<Spanned<String>>,
     p_max: Option<Spanned<f64>>,
     raw_range: Option<Spanned<[f64; 2]>>,
     noise: Option<Spanned<f64>>,
@@ -112,6 +113,16 @@ impl Draft {
             "0 or more, in the unit of P",
         )? {
             taxel.dead_band = x;
+        }
+        if let Some(onset) = &keys.onset {
+            taxel.onset = match onset.get_ref().as_str() {
+                "hard" => Onset::Hard,
+                "soft" => Onset::Soft,
+                other => {
+                    let what = format!("`onset` is `{other}`; it must be `hard` or `soft`");
+                    return Err(text.wrong(onset.span(), what));
+                }
+            };
         }
         if let Some(x) = number("p_max", &keys.p_max, &|x| x > 0.0 && x <= MAX_MAGNITUDE, "over 0, in the unit of P")? {
             taxel.p_max = x;
