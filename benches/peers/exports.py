@@ -10,7 +10,6 @@ fastest of all rounds counts.
 import argparse
 import json
 import pathlib
-import resource
 import subprocess
 import tempfile
 import time
@@ -103,7 +102,7 @@ def main():
     arguments.add_argument("--rounds", type=int, default=3)
     arguments = arguments.parse_args()
     peers = [("xsensor*.csv", xsensor, 10), ("iscan*.csv", tekscan, 10), ("emed*.lst", emed, 10), ("pedar*.asc", table, 3)]
-    print(f"{'file':<24}{'MB':>6}{'frames':>9}{'Python, s':>11}{'somatic, s':>12}{'times':>7}{'wanted':>8}{'MB held':>9}")
+    print(f"{'file':<24}{'MB':>6}{'frames':>9}{'Python, s':>11}{'somatic, s':>12}{'times':>7}{'wanted':>8}")
     for pattern, peer, wanted in peers:
         for path in arguments.folder.glob(pattern):
             with tempfile.TemporaryDirectory() as folder:
@@ -119,10 +118,9 @@ def main():
                     ours.append(time.perf_counter() - begin)
                     known = json.loads(done.stdout)
                 assert known["frames"] == frames, (path, known["frames"], frames)
-                held = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3
                 size = file.stat().st_size / 1e6
                 times = min(theirs) / min(ours)
-                print(f"{path.name:<24}{size:>6.1f}{frames:>9}{min(theirs):>11.3f}{min(ours):>12.3f}{times:>7.1f}{wanted:>8}{held:>9.0f}")
+                print(f"{path.name:<24}{size:>6.1f}{frames:>9}{min(theirs):>11.3f}{min(ours):>12.3f}{times:>7.1f}{wanted:>8}")
 
 
 main()

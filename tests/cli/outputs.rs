@@ -493,6 +493,7 @@ const NO_FILES: &[&str] = &[
     "PART,...",
     "PIXELS",
     "REST",
+    "ROWSxCOLUMNS",
     "S",
     "SEED",
     "SHELL",

@@ -60,7 +60,8 @@ impl Tally {
         let right = is_printed(value, printed);
         assert!(right, "{what}: {value} is printed as {printed}");
         self.right += usize::from(right);
-        self.right_if_more += usize::from(is_printed(value * 1.005, printed));
+        // Nothing more than 0 is still 0.
+        self.right_if_more += usize::from(value != 0.0 && is_printed(value * 1.005, printed));
     }
 
     /// Everything agrees, and would not if it were wrong: but for zeros and what has two digits.
