@@ -90,9 +90,16 @@ mod tests {
         };
         let files = [at("l.txt", LEFT), at("r.txt", &LEFT.replace("left", "right"))];
         let made = author_icub(&files).unwrap();
-        assert_eq!(made.places.iter().map(|place| place.ids.clone()).collect::<Vec<_>>(), [vec![0, 1], vec![1000, 1001]]);
+        assert_eq!(
+            made.places.iter().map(|place| place.ids.clone()).collect::<Vec<_>>(),
+            [vec![0, 1], vec![1000, 1001]]
+        );
         assert_eq!(made.body.links.len(), 2);
-        assert!(made.body.fields.len() >= 4 && made.notes.iter().any(|note| note.contains("absent")), "{:?}", made.notes);
+        assert!(
+            made.body.fields.len() >= 4 && made.notes.iter().any(|note| note.contains("absent")),
+            "{:?}",
+            made.notes
+        );
         let twice = author_icub(&[files[0].clone(), files[0].clone()]).unwrap_err().to_string();
         assert!(twice.contains("another file is of the part"), "{twice}");
     }

@@ -21,6 +21,7 @@ mod coverage;
 mod grid;
 pub mod group;
 pub mod icub;
+mod icub_body;
 mod lattice;
 mod lint;
 #[cfg(feature = "meshes")]
@@ -44,6 +45,7 @@ mod surface_search;
 mod voronoi;
 
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
+pub use icub_body::author_icub;
 pub use lint::{Finding, FindingKind, lint};
 pub use place::{place_apart, place_by_density, place_evenly, widest_radius};
 pub use placed::{Placed, Progress, SurfacePoint};

@@ -84,8 +84,7 @@ fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
         Unit::SquareMetre => (1e4, "cm²"),
         Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
         Unit::MetrePerSecond => (1e3, "mm/s"),
-        Unit::One => (1.0, ""),
-        unit => (1.0, unit.symbol()),
+        unit => (1.0, if unit == Unit::One { "" } else { unit.symbol() }),
     }
 }
 

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use somatic::author::mesh::{Geometry, MeshOptions, Up, files, open};
-use somatic::author::{Recipe, author};
+use somatic::author::mesh::{Geometry, MeshOptions, Up, author_urdf_skin, files, open};
+use somatic::author::{Recipe, author, author_icub};
 use somatic::body::Body;
 
 /// The corners and sides, counter-clockwise seen from outside, of a box of 20 × 40 × 60 from the origin on.
@@ -289,4 +289,75 @@ fn damaged_meshes_are_one_line_or_a_mesh() {
         }
     }
     assert!(errors > 100, "{errors}");
+}
+
+#[test]
+fn a_robot_with_a_skin_keeps_every_taxel_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("skin.urdf");
+    let text = r#"<?xml version="1.0"?>
+<robot name="hand" xmlns="http://www.ros.org">
+  <link name="palm"/>
+  <link name="tip"><visual><geometry><box size="0.02 0.02 0.02"/></geometry></visual></link>
+  <joint name="j" type="fixed"><parent link="palm"/><child link="tip"/><origin xyz="0 0 0.1"/></joint>
+  <sensor name="array" update_rate="100">
+    <parent link="palm"/>
+    <origin xyz="0 0 0.03" rpy="0 1.5707963267948966 0"/>
+    <tactile channel="palm"><array rows="3" cols="4" order="col-major" size="0.004 0.005" spacing="0.005 -0.006" offset="0.01 0"/></tactile>
+  </sensor>
+  <sensor name="camera"><parent link="palm"/><camera/></sensor>
+  <sensor name="taxels">
+    <parent link="tip"/>
+    <tactile channel="tip">
+      <taxel idx="2" xyz="0 0 0.01" rpy="0 0 0"><geometry><box size="0.003 0.002 0.001"/></geometry></taxel>
+      <taxel idx="0" xyz="0.01 0 0" rpy="0 1.5707963267948966 0"><geometry><mesh filename="no.stl"/></geometry></taxel>
+    </tactile>
+  </sensor>
+</robot>"#;
+    std::fs::write(&path, text).unwrap();
+    let made = author_urdf_skin(&path, &options()).unwrap();
+    assert_eq!(
+        made.places.iter().map(|place| (place.name.as_str(), place.ids.len())).collect::<Vec<_>>(),
+        [("array", 12), ("taxels", 2)]
+    );
+    let ids: Vec<u32> = made.body.taxels.iter().map(|taxel| taxel.id).collect();
+    assert_eq!(ids, (0..12).chain([12, 14]).collect::<Vec<_>>());
+    let taxel = |id: u32| &made.body.taxels[made.body.taxel_index(id).unwrap()];
+    // Row 1, column 2 by columns; the sensor's z is the link's x, its x the link's −z.
+    let seven = taxel(7);
+    assert!(seven.position_in_link.distance(DVec3::new(0.0, -0.012, 0.03 + 0.005)) < 1e-7, "{seven:?}");
+    assert!(seven.normal_in_link.distance(DVec3::X) < 1e-6 && (seven.area - 2e-5).abs() < 1e-10, "{seven:?}");
+    assert!(taxel(14).position_in_link.distance(DVec3::Z * 0.01) < 1e-7 && (taxel(14).area - 6e-6).abs() < 1e-10);
+    assert_eq!(made.body.links[taxel(12).link].name, "tip");
+    let held: std::collections::BTreeSet<u32> =
+        made.body.fields.iter().flat_map(|field| field.members.keys().copied()).collect();
+    assert_eq!(held.len(), 14, "every taxel is in a field");
+    for (part, other, wanted) in [
+        ("idx=\"0\"", "idx=\"2\"", "line 12: sensor `taxels` has a second taxel of index 2"),
+        ("<parent link=\"tip\"/>\n    <tactile", "<parent link=\"tpi\"/>\n    <tactile", "no such link"),
+        ("rows=\"3\"", "rows=\"0\"", "an array of 0 rows"),
+        ("col-major", "diagonal", "row-major or col-major"),
+        ("<tactile", "<visual2", "not valid XML"),
+    ] {
+        std::fs::write(&path, text.replace(part, other)).unwrap();
+        let why = author_urdf_skin(&path, &options()).unwrap_err().to_string();
+        assert!(why.contains(wanted) && !why.contains('\n'), "{part}: {why}");
+    }
+}
+
+#[test]
+fn the_icubs_files_are_a_body_without_a_mesh() {
+    let Some(folder) = crate::common::data("layouts/icub") else { return };
+    let files = ["left_hand_V2_1.txt", "left_forearm_V2.txt", "torso.txt"].map(|name| folder.join(name));
+    let made = author_icub(&files).unwrap();
+    assert_eq!((made.body.links.len(), made.places.len()), (3, 3));
+    let placed: usize = made.places.iter().map(|place| place.ids.len()).sum();
+    assert_eq!(made.body.taxels.len(), placed);
+    for (index, place) in made.places.iter().enumerate() {
+        let text = std::fs::read_to_string(&files[index]).unwrap();
+        let file = somatic::author::icub::IcubFile::read(&text).unwrap();
+        assert_eq!(place.ids.len(), file.taxels().count());
+        assert!(place.ids.iter().all(|id| id / 1000 >= index as u32), "{:?}", place.ids);
+    }
+    assert!(somatic::Engine::new(&made.body, somatic::Options::default()).is_ok());
 }

@@ -8,6 +8,9 @@ mod shapes;
 mod triangles;
 mod urdf;
 mod urdf_file;
+mod urdf_skin;
+
+pub use urdf_skin::author_urdf_skin;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -37,6 +40,8 @@ pub enum Geometry {
     Visual,
     /// What collisions are computed with: coarser, often of simple shapes.
     Collision,
+    /// None: links alone, for taxels that the file has itself.
+    None,
 }
 
 /// How a mesh of another format is read.

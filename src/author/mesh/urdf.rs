@@ -23,6 +23,15 @@ pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, f64)> {
 }
 
 fn build(robot: &Robot, up: Up) -> Result<(Glb, f64)> {
+    let (glb, whole, _) = links(robot, up)?;
+    if whole.triangles.is_empty() {
+        return Err(Error::failed("none of its links has geometry of this kind; try --geometry visual or collision"));
+    }
+    Ok((glb, whole.size_m()))
+}
+
+/// The links of `robot` as nodes, what they look like together, and their nodes by name.
+pub(super) fn links(robot: &Robot, up: Up) -> Result<(Glb, Triangles, BTreeMap<String, usize>)> {
     let order = order(robot)?;
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
@@ -48,10 +57,8 @@ fn build(robot: &Robot, up: Up) -> Result<(Glb, f64)> {
         mesh.transform(&world_from_link);
         whole.extend(&mesh);
     }
-    if whole.triangles.is_empty() {
-        return Err(Error::failed("none of its links has geometry of this kind; try --geometry visual or collision"));
-    }
-    Ok((glb, whole.size_m()))
+    let nodes = nodes.into_iter().map(|(name, (node, _))| (name.to_owned(), node)).collect();
+    Ok((glb, whole, nodes))
 }
 
 /// The links, a parent before its children, each with the joint that it hangs on.

@@ -13,6 +13,8 @@ use crate::error::{Error, Result, failed};
 pub(super) struct Robot {
     pub(super) links: Vec<RobotLink>,
     pub(super) joints: Vec<RobotJoint>,
+    /// Its tactile sensors, by the extension `<sensor><tactile>`.
+    pub(super) sensors: Vec<RobotSensor>,
 }
 
 #[derive(Debug)]
@@ -45,6 +47,30 @@ pub(super) struct RobotJoint {
     pub(super) parent_from_child: DAffine3,
     pub(super) line: u32,
 }
+
+/// A tactile sensor: taxels on a link.
+#[derive(Debug)]
+pub(super) struct RobotSensor {
+    pub(super) name: String,
+    /// Whose data vector its taxels are in.
+    pub(super) channel: String,
+    pub(super) link: String,
+    pub(super) taxels: Vec<SensorTaxel>,
+    pub(super) line: u32,
+}
+
+/// A taxel: z is its normal.
+#[derive(Debug)]
+pub(super) struct SensorTaxel {
+    /// Its place in the data vector.
+    pub(super) index: u32,
+    pub(super) link_from_taxel: DAffine3,
+    /// 0 where it is not known.
+    pub(super) area_m2: f64,
+}
+
+/// Most taxels of an array.
+const MAX_ARRAY_TAXELS: u64 = 1_000_000;
 
 impl Robot {
     /// Reads the URDF at `path`.
@@ -95,7 +121,9 @@ impl Reader<'_> {
         if links.is_empty() {
             return Err(Error::failed("it has no <link>"));
         }
-        Ok(Robot { links, joints })
+        let is_tactile = |node: &Node<'_, '_>| node.children().any(|child| child.has_tag_name("tactile"));
+        let sensors = named("sensor").filter(is_tactile).map(|node| self.sensor(node)).collect::<Result<Vec<_>>>()?;
+        Ok(Robot { links, joints, sensors })
     }
 
     fn line(&self, node: Node<'_, '_>) -> u32 {
@@ -118,10 +146,12 @@ impl Reader<'_> {
 
     fn link(&self, node: Node<'_, '_>) -> Result<RobotLink> {
         let tag = match self.options.geometry {
-            Geometry::Visual => "visual",
-            Geometry::Collision => "collision",
+            Geometry::Visual => Some("visual"),
+            Geometry::Collision => Some("collision"),
+            Geometry::None => None,
         };
-        let shapes = node.children().filter(|child| child.has_tag_name(tag)).map(|child| self.shape(child));
+        let is_wanted = |child: &Node<'_, '_>| tag.is_some_and(|tag| child.has_tag_name(tag));
+        let shapes = node.children().filter(is_wanted).map(|child| self.shape(child));
         Ok(RobotLink { name: self.attribute(node, "name")?.to_owned(), shapes: shapes.collect::<Result<_>>()? })
     }
 
@@ -160,11 +190,85 @@ impl Reader<'_> {
         })
     }
 
+    /// A `<sensor>` with a `<tactile>`, which has an `<array>` or `<taxel>`s.
+    fn sensor(&self, node: Node<'_, '_>) -> Result<RobotSensor> {
+        let name = self.attribute(node, "name")?.to_owned();
+        let link = self.attribute(self.child(node, "parent")?, "link")?.to_owned();
+        let tactile = self.child(node, "tactile")?;
+        let link_from_sensor = self.origin(node)?;
+        let listed: Vec<Node<'_, '_>> = tactile.children().filter(|child| child.has_tag_name("taxel")).collect();
+        let array = tactile.children().find(|child| child.has_tag_name("array"));
+        let taxels = match (array, &listed[..]) {
+            (Some(array), []) => self.array(array, link_from_sensor)?,
+            (None, []) => return Err(self.at(tactile, "<tactile> has neither <taxel> nor <array>")),
+            (Some(array), _) => return Err(self.at(array, "a sensor has <taxel>s or an <array>, not both; remove one")),
+            (None, listed) => listed.iter().map(|&taxel| self.taxel(taxel, link_from_sensor)).collect::<Result<_>>()?,
+        };
+        let channel = tactile.attribute("channel").unwrap_or(&name).to_owned();
+        Ok(RobotSensor { name, channel, link, taxels, line: self.line(node) })
+    }
+
+    fn taxel(&self, node: Node<'_, '_>, link_from_sensor: DAffine3) -> Result<SensorTaxel> {
+        let index = self.whole(node, "idx", self.attribute(node, "idx")?)?;
+        let geometry = node.children().find(|child| child.has_tag_name("geometry"));
+        let own = geometry.and_then(|geometry| geometry.children().find(Node::is_element));
+        let area_m2 = match own {
+            Some(own) if own.has_tag_name("box") => {
+                let size = self.vector(own, "size", self.attribute(own, "size")?)?;
+                (size.x * size.y).abs()
+            }
+            Some(own) if own.has_tag_name("cylinder") => std::f64::consts::PI * self.number(own, "radius")?.powi(2),
+            _ => 0.0,
+        };
+        Ok(SensorTaxel { index, link_from_taxel: link_from_sensor * self.pose(node)?, area_m2 })
+    }
+
+    /// Rows of taxels along x, columns along y, the first one at the origin but for `offset`.
+    fn array(&self, node: Node<'_, '_>, link_from_sensor: DAffine3) -> Result<Vec<SensorTaxel>> {
+        let count = |name: &str| self.attribute(node, name).and_then(|text| self.whole(node, name, text));
+        let (rows, columns) = (count("rows")?, count("cols")?);
+        let all = u64::from(rows) * u64::from(columns);
+        if all == 0 || all > MAX_ARRAY_TAXELS {
+            return Err(self.at(
+                node,
+                format!("an array of {rows} rows and {columns} columns; give it 1 to {MAX_ARRAY_TAXELS} taxels"),
+            ));
+        }
+        let size = self.pair(node, "size", self.attribute(node, "size")?)?;
+        let or = |name: &str, or: [f64; 2]| node.attribute(name).map_or(Ok(or), |text| self.pair(node, name, text));
+        let (spacing, offset) = (or("spacing", size)?, or("offset", [0.0; 2])?);
+        let by_row = match node.attribute("order").unwrap_or("row-major") {
+            "row-major" => true,
+            "col-major" | "column-major" => false,
+            other => return Err(self.at(node, format!("`order` is `{other}`; write row-major or col-major"))),
+        };
+        let taxel = |index: u32| {
+            let (row, column) = if by_row { (index / columns, index % columns) } else { (index % rows, index / rows) };
+            let place = |count: u32, axis: usize| f64::from(count) * spacing[axis] - offset[axis];
+            let at = DVec3::new(place(row, 0), place(column, 1), 0.0);
+            let link_from_taxel = link_from_sensor * DAffine3::from_translation(at);
+            SensorTaxel { index, link_from_taxel, area_m2: (size[0] * size[1]).abs() }
+        };
+        Ok((0..rows * columns).map(taxel).collect())
+    }
+
+    fn whole(&self, node: Node<'_, '_>, name: &str, text: &str) -> Result<u32> {
+        text.trim().parse().map_err(|_| self.at(node, format!("`{name}` is `{text}`; write a whole number")))
+    }
+
+    fn pair(&self, node: Node<'_, '_>, name: &str, text: &str) -> Result<[f64; 2]> {
+        let three = self.vector(node, name, &format!("{text} 0"));
+        three.map(|v| [v.x, v.y]).map_err(|_| self.at(node, format!("`{name}` is `{text}`; write two numbers")))
+    }
+
     /// The `<origin xyz rpy>` below `node`: rolled around x, then pitched around y, then yawed around z, all fixed axes.
     fn origin(&self, node: Node<'_, '_>) -> Result<DAffine3> {
-        let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else {
-            return Ok(DAffine3::IDENTITY);
-        };
+        let origin = node.children().find(|child| child.has_tag_name("origin"));
+        origin.map_or(Ok(DAffine3::IDENTITY), |origin| self.pose(origin))
+    }
+
+    /// The attributes `xyz` and `rpy` of `origin`.
+    fn pose(&self, origin: Node<'_, '_>) -> Result<DAffine3> {
         let vector =
             |name: &str| origin.attribute(name).map_or(Ok(DVec3::ZERO), |text| self.vector(origin, name, text));
         let (xyz, rpy) = (vector("xyz")?, vector("rpy")?);

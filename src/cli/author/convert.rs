@@ -25,7 +25,7 @@ pub(super) struct MeshArguments {
     #[arg(long = "package", value_name = "NAME=FOLDER", help_heading = HEADING)]
     packages: Vec<String>,
 
-    /// The geometry of a .urdf: visual is what people see, collision is coarser [default: visual].
+    /// The geometry of a .urdf: visual is what people see, collision is coarser, none are links alone [default: visual].
     #[arg(long, value_name = "KIND", help_heading = HEADING)]
     geometry: Option<GeometryWord>,
 }
@@ -40,6 +40,7 @@ enum UpWord {
 enum GeometryWord {
     Visual,
     Collision,
+    None,
 }
 
 /// A mesh of another format than glTF, and how it is read.
@@ -64,6 +65,14 @@ impl MeshArguments {
                 None => Ok(None),
             };
         };
+        let options = self.options(recipe.and_then(Recipe::take_unit))?;
+        Ok(Some(MeshFile { path: path.to_owned(), options }))
+    }
+}
+
+impl MeshArguments {
+    /// How a mesh is read whose unit is `unit_m`.
+    pub(super) fn options(&self, unit_m: Option<f64>) -> Result<MeshOptions> {
         let mut packages = BTreeMap::new();
         for text in &self.packages {
             let wrong = || {
@@ -78,12 +87,12 @@ impl MeshArguments {
         });
         let geometry = match self.geometry {
             Some(GeometryWord::Collision) => Geometry::Collision,
+            Some(GeometryWord::None) => Geometry::None,
             _ => Geometry::Visual,
         };
         let mut options = MeshOptions::default();
-        (options.unit_m, options.up, options.packages, options.geometry) =
-            (recipe.and_then(Recipe::take_unit), up, packages, geometry);
-        Ok(Some(MeshFile { path: path.to_owned(), options }))
+        (options.unit_m, options.up, options.packages, options.geometry) = (unit_m, up, packages, geometry);
+        Ok(options)
     }
 }
 

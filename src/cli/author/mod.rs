@@ -3,6 +3,7 @@
 mod convert;
 mod grid;
 mod report;
+mod skin;
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,7 @@ use somatic::{Error, Result, bundled};
 use self::convert::{MeshArguments, MeshFile};
 use self::grid::GridArguments;
 use self::report::{summary, text};
+use self::skin::SkinArguments;
 use super::bar::Bar;
 use super::files::FilesRead;
 use super::stdio::{DONE, print};
@@ -26,6 +28,8 @@ Examples:
   somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
   somatic author --grid 31x11 --pitch 8.6mm -o insole.glb       a flat sheet; it needs no mesh
   somatic author finger.stl --unit mm --spacing 3mm -o finger.glb
+  somatic author --icub left_hand.txt left_forearm.txt -o icub.glb
+  somatic author --urdf-skin robot.urdf --geometry none -o robot.glb
   somatic author robot.urdf --package my_robot=. --taxels 800 -o robot.glb   its links become links
   somatic inspect skin.glb
   somatic run --body skin.glb --source touch.csv
@@ -53,7 +57,7 @@ is brought up to date, as after editing it in Blender:
 pub(super) struct Arguments {
     /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
     /// humanoid.
-    #[arg(value_name = "MESH", required_unless_present = "grid", conflicts_with = "grid")]
+    #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin"], conflicts_with_all = ["grid", "icub", "urdf_skin"])]
     mesh: Option<String>,
 
     /// What to place where, a TOML file.
@@ -86,6 +90,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     sheet: GridArguments,
 
+    #[command(flatten)]
+    skin: SkinArguments,
+
     /// The body to write, .glb or .gltf.
     #[arg(short, long, value_name = "BODY.glb")]
     output: PathBuf,
@@ -101,10 +108,15 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     check_ending(&arguments.output)?;
-    let mut recipe = if arguments.sheet.is_asked() { None } else { Some(recipe(arguments)?) };
-    let foreign = arguments.mesh_file.opener(arguments.mesh.as_deref(), recipe.as_mut())?;
+    let has_places = arguments.sheet.is_asked() || arguments.skin.is_asked();
+    let mut recipe = if has_places { None } else { Some(recipe(arguments)?) };
+    let foreign = match arguments.skin.is_asked() {
+        true => None,
+        false => arguments.mesh_file.opener(arguments.mesh.as_deref(), recipe.as_mut())?,
+    };
     let read = FilesRead::default().bodies(&arguments.mesh).files(&arguments.recipe).files(arguments.sheet.files());
     let read = read.files(recipe.iter().flat_map(Recipe::files)).files(foreign.iter().flat_map(MeshFile::files));
+    let read = read.files(arguments.skin.files(&arguments.mesh_file)?);
     let output = read.outputs(arguments.force).add(&arguments.output)?;
     let authored = match (&recipe, &arguments.mesh) {
         (Some(recipe), Some(mesh)) => {
@@ -115,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             let mut bar = Bar::new("placing taxels");
             author(file, recipe, |share| bar.show(share))?
         }
+        _ if arguments.skin.is_asked() => arguments.skin.author(&arguments.mesh_file)?,
         _ => arguments.sheet.author(&name_of(&arguments.output))?,
     };
     authored.file.save(output)?;

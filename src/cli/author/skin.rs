@@ -1,0 +1,49 @@
+//! Skins that come with their places: the iCub's position files, tactile sensors in a URDF.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use somatic::author::mesh::author_urdf_skin;
+use somatic::author::{Authored, author_icub};
+use somatic::{Error, Result};
+
+use super::convert::MeshArguments;
+
+const HEADING: &str = "Skins of others, which have their places";
+
+#[derive(Args)]
+pub(super) struct SkinArguments {
+    /// The iCub's position files, one for each part, as a body without a mesh: a link for each.
+    #[arg(long, value_name = "FILE", num_args = 1.., help_heading = HEADING,
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "grid", "urdf_skin"])]
+    icub: Vec<PathBuf>,
+
+    /// A robot whose .urdf has its skin, as <sensor> with <tactile>, in an <array> or as <taxel>s; with --geometry none only
+    /// the taxels are taken.
+    #[arg(long, value_name = "FILE.urdf", help_heading = HEADING,
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "grid"])]
+    urdf_skin: Option<PathBuf>,
+}
+
+impl SkinArguments {
+    pub(super) fn is_asked(&self) -> bool {
+        !self.icub.is_empty() || self.urdf_skin.is_some()
+    }
+
+    /// The files that are read; `mesh` says how a URDF is.
+    pub(super) fn files(&self, mesh: &MeshArguments) -> Result<Vec<PathBuf>> {
+        let mut files = self.icub.clone();
+        if let Some(path) = &self.urdf_skin {
+            files.extend(somatic::author::mesh::files(path, &mesh.options(None)?));
+        }
+        Ok(files)
+    }
+
+    pub(super) fn author(&self, mesh: &MeshArguments) -> Result<Authored> {
+        match &self.urdf_skin {
+            Some(path) => author_urdf_skin(path, &mesh.options(None)?),
+            None if self.icub.is_empty() => Err(Error::usage("give a skin")),
+            None => author_icub(&self.icub),
+        }
+    }
+}
