@@ -8,7 +8,6 @@ use glam::DVec3;
 use super::curves::Curves;
 use super::members::{beside, quantity_of, surface, thresholds, unit_of, weights};
 use super::onset::{SoftOnset, softened};
-use super::skin::layer;
 use super::{Arithmetic, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
@@ -143,10 +142,6 @@ pub(crate) struct PlanField {
     /// Members' third coordinate in the unit.
     pub(crate) depths: Vec<f32>,
     pub(crate) origin_in_anchor: DVec3,
-    #[cfg_attr(
-        not(any(feature = "cli", feature = "page")),
-        expect(dead_code, reason = "only a trade and a page use it")
-    )]
     pub(crate) chart: Option<Chart>,
     /// Why there is none.
     #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "only a page says it"))]
@@ -274,8 +269,8 @@ impl Plan {
                 let in_letter = &mut plan_fields[first + letter];
                 in_letter.first = members.len();
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
-                in_letter.layer =
-                    layer(calibration.skin, in_letter, plan.letters[letter].receptor, scene.knobs.orientation_by);
+                let receptor = plan.letters[letter].receptor;
+                in_letter.layer = in_letter.layer_under(calibration.skin, receptor, scene.knobs.orientation_by);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),
                     weight: member.weight as f32,

@@ -13,27 +13,29 @@ const CURVED: f64 = 0.1;
 /// A place is beyond the sensors where it is farther from every one than this share of the longest way between neighbours.
 const REACH: f64 = 0.6;
 
-/// What contacts are fitted under in `field`, whose letter is of `receptor`, for orientations `by` something, or why none are.
-pub(super) fn layer(
-    skin: Option<SkinResponse>,
-    field: &PlanField,
-    receptor: Receptor,
-    by: OrientationBy,
-) -> Result<Layer, Flags> {
-    let Some(chart) = &field.chart else { return Err(Flags::NO_CHART) };
-    let Some(SkinResponse { sigma_m, gain_spread }) = skin else { return Err(Flags::NO_SKIN) };
-    if !field.area_known || receptor != Receptor::Sustained {
-        return Err(Flags::NO_SKIN);
+impl PlanField {
+    /// What contacts are fitted under, for a letter of `receptor` and orientations `by` something, or why none are.
+    pub(super) fn layer_under(
+        &self,
+        skin: Option<SkinResponse>,
+        receptor: Receptor,
+        by: OrientationBy,
+    ) -> Result<Layer, Flags> {
+        let Some(chart) = &self.chart else { return Err(Flags::NO_CHART) };
+        let Some(SkinResponse { sigma_m, gain_spread }) = skin else { return Err(Flags::NO_SKIN) };
+        if !self.area_known || receptor != Receptor::Sustained {
+            return Err(Flags::NO_SKIN);
+        }
+        if chart.distortion > CURVED {
+            return Err(Flags::CURVED);
+        }
+        let place = |member: usize| self.places[member].truncate();
+        let ways = self.beside.iter().enumerate().flat_map(|(member, beside)| {
+            beside.iter().map(move |&other| place(member).distance(place(other as usize)))
+        });
+        let reach_m = REACH * ways.fold(0.0, f64::max) * f64::from(self.unit_m);
+        Ok(Layer { sigma_m, gain_spread, reach_m, steps: by.steps().unwrap_or(STEPS) })
     }
-    if chart.distortion > CURVED {
-        return Err(Flags::CURVED);
-    }
-    let places = &field.places;
-    let ways = places.iter().zip(&field.beside).flat_map(|(place, beside)| {
-        beside.iter().map(|&other| place.truncate().distance(places[other as usize].truncate()))
-    });
-    let reach_m = REACH * ways.fold(0.0, f64::max) * f64::from(field.unit_m);
-    Ok(Layer { sigma_m, gain_spread, reach_m, steps: by.steps().unwrap_or(STEPS) })
 }
 
 impl Plan {
