@@ -45,11 +45,13 @@ fn taxel(plan: &Plan, field: &PlanField, raw: &RawBatch<'_>, frame: usize, membe
         return None;
     }
     let number = value.number()?;
+    // What a soft onset has taken off, the contact has pressed with all the same.
+    let taken_off = plan.onset(channel).threshold;
     Some(Taxel {
         place_m: field.places[member].truncate() * f64::from(field.unit_m),
         area_m2: plan.areas[channel],
-        pressure: pressure.value,
-        threshold: plan.feels_from[slot],
+        pressure: if pressure.value > 0.0 { pressure.value + taken_off } else { 0.0 },
+        threshold: plan.feels_from[slot] + taken_off,
         sigma: calibration.noise.map(|noise| calibrate::sigma(number, noise, calibration, curve)),
     })
 }

@@ -21,12 +21,19 @@ fn fitted(body: &Body, text: &str, field: &str, skin: Option<&str>) -> Fitted {
 
 /// The same in as many steps as `by` has.
 fn fitted_by(by: OrientationBy, body: &Body, text: &str, field: &str, skin: Option<&str>) -> Fitted {
+    fitted_under(by, body, text, field, |mut calibration| {
+        if let Some(skin) = skin {
+            calibration.truncate(calibration.find("\n[skin]").unwrap_or(calibration.len()));
+            calibration += skin;
+        }
+        calibration
+    })
+}
+
+/// The same under what `edit` makes of the simulation's calibration.
+fn fitted_under(by: OrientationBy, body: &Body, text: &str, field: &str, edit: impl Fn(String) -> String) -> Fitted {
     let mut source = SimulatedSource::on_body("simulation", text, body.clone()).unwrap();
-    let mut calibration = source.calibration();
-    if let Some(skin) = skin {
-        calibration.truncate(calibration.find("\n[skin]").unwrap_or(calibration.len()));
-        calibration += skin;
-    }
+    let calibration = edit(source.calibration());
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&calibration, &ids).unwrap();
     let scene = Scene::default().outputs(Outputs::all()).fields([field]).knobs(Knobs::default().orientation_by(by));
@@ -290,6 +297,25 @@ fn more_steps_are_truer() {
     );
     // After one there is little to gain.
     assert!(off[0] < 0.6 * centroid && off[1] < 1.02 * off[0] && off[2] < 1.02 * off[1], "{centroid} {off:?}");
+}
+
+#[test]
+fn a_soft_onset_takes_nothing_off_a_contact() {
+    let text = turning_rod(0.0, 0.0127, 0.05, "") + "[calibration]\ndead_band = 0.4\n";
+    let with = |onset: &str| {
+        let edit = |calibration: String| calibration.replacen("[all]\n", &format!("[all]\nonset = \"{onset}\"\n"), 1);
+        fitted_under(OrientationBy::Footprint, &hand(), &text, "hand/back", edit).percepts
+    };
+    let (mut compared, mut less) = (0, 0);
+    for (hard, soft) in with("hard").iter().zip(&with("soft")) {
+        less += u32::from(soft.total < hard.total);
+        let (Some(a), Some(b)) = (hard.footprint_angle, soft.footprint_angle) else { continue };
+        let ([u, v], [s, t]) = (hard.footprint_place.unwrap(), soft.footprint_place.unwrap());
+        assert!(degrees_between(a, b) < 1e-3 && f64::hypot(u - s, v - t) < 1e-7, "{a} and {b}, {u} {v} and {s} {t}");
+        compared += 1;
+    }
+    // The totals are less by what was taken off.
+    assert!(compared > 100 && less > 100, "{compared}, {less}");
 }
 
 #[test]
