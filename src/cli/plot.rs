@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
+use somatic::percept::Unit;
 use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
@@ -139,7 +141,9 @@ fn gather(asked: &RunOptions, wanted: Outputs, stop: &AtomicBool) -> Result<(Gat
     source.report_stale();
     let mut engine = Engine::new(&body, asked.options(&body, &ids, RECORDED_BATCH)?)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
-    let mut gatherer = Gatherer::new(&input.name, &body, &engine, wanted, !asked.fields.is_empty())?;
+    let p_unit = engine.plan().common_quantity().map_or(Unit::P.symbol(), Quantity::symbol);
+    let gatherer = Gatherer::new(&input.name, &body, &engine, wanted, !asked.fields.is_empty())?;
+    let mut gatherer = gatherer.with_p_unit(p_unit);
     let mut bar = Bar::new("reading");
     let width = source.taxels().len();
     let mut frames: Vec<Frame> = Vec::with_capacity(RECORDED_BATCH);

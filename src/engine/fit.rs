@@ -9,6 +9,7 @@ use crate::backend::RawBatch;
 use crate::backend::cpu::footprint::fit_all;
 use crate::percept::{Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
+use crate::signal::Quantity;
 use crate::stage::calibrate::{self, UNUSABLE};
 use crate::stage::footprint::{Footprint, Layer, Taxel, Touch};
 use crate::stage::touches::Found;
@@ -47,12 +48,14 @@ fn taxel(plan: &Plan, field: &PlanField, raw: &RawBatch<'_>, frame: usize, membe
     let number = value.number()?;
     // What a soft onset has taken off, the contact has pressed with all the same.
     let taken_off = plan.onset(channel).threshold;
+    // Contacts press with a force.
+    let by = if field.quantity == Quantity::Pascal { plan.areas[channel] } else { 1.0 };
     Some(Taxel {
         place_m: field.places[member].truncate() * f64::from(field.unit_m),
         area_m2: plan.areas[channel],
-        pressure: if pressure.value > 0.0 { pressure.value + taken_off } else { 0.0 },
-        threshold: plan.feels_from[slot] + taken_off,
-        sigma: calibration.noise.map(|noise| calibrate::sigma(number, noise, calibration, curve)),
+        pressure: if pressure.value > 0.0 { by * (pressure.value + taken_off) } else { 0.0 },
+        threshold: by * (plan.feels_from[slot] + taken_off),
+        sigma: calibration.noise.map(|noise| by * calibrate::sigma(number, noise, calibration, curve)),
     })
 }
 

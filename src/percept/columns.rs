@@ -38,6 +38,8 @@ pub struct Column {
 pub enum Unit {
     /// The unit of P, as the calibration has it.
     P,
+    /// N where P is in Pa, else the unit of P: what a force is in.
+    Force,
     /// None: a number, a part or a direction in space.
     One,
     /// m.
@@ -60,6 +62,7 @@ impl Unit {
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::P => "P",
+            Self::Force => "P or N",
             Self::One | Self::Kind => "1",
             Self::Metre => "m",
             Self::SquareMetre => "m²",
@@ -325,10 +328,10 @@ columns! {
     FOOTPRINT_PLACE 22 footprint_place: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlace];
     #[doc = "The standard deviation of that, m; of a line only what it is off across."]
     FOOTPRINT_PLACE_SIGMA 23 footprint_place_sigma: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlaceSigma];
-    #[doc = "How hard it presses in all, taxels or not, in the unit of P; absent where it goes on beyond the sensors."]
-    FOOTPRINT_FORCE 24 footprint_force: f64, P, Number, footprint, parts [] host [FootprintForce];
-    #[doc = "The standard deviation of that, in the unit of P."]
-    FOOTPRINT_FORCE_SIGMA 25 footprint_force_sigma: f64, P, Number, footprint, parts [] host [FootprintForceSigma];
+    #[doc = "How hard it presses in all, taxels or not, in N where P is in Pa, else in the unit of P; absent where it goes on beyond the sensors."]
+    FOOTPRINT_FORCE 24 footprint_force: f64, Force, Number, footprint, parts [] host [FootprintForce];
+    #[doc = "The standard deviation of that, in the same unit."]
+    FOOTPRINT_FORCE_SIGMA 25 footprint_force_sigma: f64, Force, Number, footprint, parts [] host [FootprintForceSigma];
     #[doc = "Its direction along, rad in [0, π); absent for a point."]
     FOOTPRINT_ANGLE 26 footprint_angle: f64, Radian, Line, footprint, parts [] host [FootprintAngle];
     #[doc = "The standard deviation of that, rad."]

@@ -80,6 +80,7 @@ struct Plot<'a> {
 fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
     match column.unit {
         Unit::P => p_for_people(p_unit),
+        Unit::Force => (1.0, if p_unit == "Pa" { "N" } else { p_unit }),
         Unit::Metre => (1e3, "mm"),
         Unit::SquareMetre => (1e4, "cm²"),
         Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
@@ -261,7 +262,8 @@ impl<'a> Plot<'a> {
             self.draw_key(pen, quantity, &gathered.p_unit, area)?;
         }
         let last = self.page.map(column, 2 * count - 1, 2 * count);
-        self.draw_length(pen, (last.right(), last.bottom()))
+        // Below the keys, where no map reaches.
+        self.draw_length(pen, (last.right(), last.bottom() + 52))
     }
 
     /// A length, which is the same in all maps.

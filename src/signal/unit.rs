@@ -33,6 +33,15 @@ impl Quantity {
         }
     }
 
+    /// What a force is in where P is this.
+    #[must_use]
+    pub const fn of_force(self) -> Self {
+        match self {
+            Self::Pascal => Self::Newton,
+            other => other,
+        }
+    }
+
     /// A factor and a unit in which people read values as large as `size`.
     #[must_use]
     pub fn readable(self, size: f64) -> (f64, &'static str) {

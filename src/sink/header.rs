@@ -18,6 +18,7 @@ pub(super) fn units(plan: &Plan) -> Vec<(&'static str, Value)> {
 fn unit(plan: &Plan, column: &Column) -> Value {
     match (column.unit, plan.common_quantity()) {
         (Unit::P, Some(quantity)) => quantity.symbol().into(),
+        (Unit::Force, Some(quantity)) => quantity.of_force().symbol().into(),
         (Unit::P, None) => {
             let of_field = |index: usize| (plan.label(index), plan.quantity(index).symbol().into());
             Value::Object((0..plan.fields().len()).map(of_field).collect())

@@ -448,7 +448,7 @@ fn standard_streams_led_into_an_input_are_that_input() {
 }
 
 /// Flags and places of arguments that name what is read.
-const READ: [&str; 12] = [
+const READ: &[&str] = &[
     "--body",
     "--source",
     "--calibration",
@@ -456,7 +456,12 @@ const READ: [&str; 12] = [
     "--recipe",
     "[SCENE]",
     "<BODY>",
-    "<MESH>",
+    "[MESH]",
+    "[SOURCE]...",
+    "--cells",
+    "--icub",
+    "--package",
+    "--urdf-skin",
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
@@ -465,6 +470,7 @@ const READ: [&str; 12] = [
 
 /// What values that name no file are called.
 const NO_FILES: &[&str] = &[
+    "AXIS",
     "BACKEND",
     "BAUD",
     "BITS",
@@ -482,12 +488,14 @@ const NO_FILES: &[&str] = &[
     "KIND",
     "LENGTH",
     "LENGTH,ANGLE",
+    "LENGTH[,LENGTH",
     "LETTER,...",
     "LOW..HIGH",
     "M",
     "MEASURE",
     "N",
     "NAME",
+    "ORDER",
     "OUTPUT,...",
     "P",
     "PART,...",

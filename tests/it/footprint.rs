@@ -300,6 +300,26 @@ fn more_steps_are_truer() {
 }
 
 #[test]
+fn a_contact_under_pressures_in_pascal_has_its_force_in_newtons() {
+    let (pitch, text) = (5e-3, presses(1.7e-3, [0.0; 2], INDENTERS[0], ""));
+    let with = |unit: &str| {
+        let edit = |calibration: String| {
+            assert!(calibration.contains("[all]\n"), "{calibration}");
+            calibration.replacen("[all]\n", &format!("[all]\nunit = \"{unit}\"\n"), 1)
+        };
+        fitted_under(OrientationBy::Footprint, &grid(pitch, 6), &text, "grid", edit).percepts
+    };
+    let mut compared = 0;
+    for (newton, pascal) in with("N").iter().zip(&with("Pa")) {
+        let (Some(force), Some(less)) = (newton.footprint_force, pascal.footprint_force) else { continue };
+        let ([u, v], [s, t]) = (newton.footprint_place.unwrap(), pascal.footprint_place.unwrap());
+        assert!((less / (force * pitch * pitch) - 1.0).abs() < 1e-6 && f64::hypot(u - s, v - t) < 1e-9, "{newton:?}");
+        compared += 1;
+    }
+    assert!(compared > 50, "{compared}");
+}
+
+#[test]
 fn a_soft_onset_takes_nothing_off_a_contact() {
     let text = turning_rod(0.0, 0.0127, 0.05, "") + "[calibration]\ndead_band = 0.4\n";
     let with = |onset: &str| {

@@ -201,7 +201,8 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
 
 fn unit_of(unit: Unit, session: &Session<'_>) -> String {
     match unit {
-        Unit::P if !session.p_unit.is_empty() => session.p_unit.to_owned(),
+        Unit::Force if session.p_unit == "Pa" => "N".to_owned(),
+        Unit::P | Unit::Force if !session.p_unit.is_empty() => session.p_unit.to_owned(),
         unit => unit.symbol().to_owned(),
     }
 }

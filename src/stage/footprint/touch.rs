@@ -27,7 +27,7 @@ pub(crate) struct Taxel {
     /// In the field's chart.
     pub(crate) place_m: DVec2,
     pub(crate) area_m2: f64,
-    /// P; 0 if it is not pressed.
+    /// The force that it feels, in N or in the unit of P; 0 if it is not pressed.
     pub(crate) pressure: f64,
     /// The P up to which one reads 0.
     pub(crate) threshold: f64,
