@@ -5,16 +5,20 @@ use super::surface_search::SurfaceSearch;
 use crate::body::{Body, ChartKind, FieldSpec, listed};
 use crate::field::Unroller;
 
+/// A surface farther off than this is not that of a taxel, m.
+const MAX_OFF_M: f64 = 0.03;
+
 /// Recomputes the normals of taxels that were moved and the (u, v) of geodesic charts of `body`. Values that are current,
 /// as in [`lint`](super::lint), stay unchanged. Returns a line for each change, and for each chart that can no longer be
 /// computed; such a chart loses its (u, v).
 ///
-/// Positions and areas stay: a taxel off the surface gets the normal of the nearest surface point.
+/// Positions and areas stay: a taxel off the surface gets the normal of the nearest surface point, if
+/// that is within 30 mm.
 pub fn refresh(body: &mut Body) -> Vec<String> {
     let mut notes = Vec::new();
     let surface_search = SurfaceSearch::of(body);
-    let fit =
-        |(index, taxel)| Some((index, SurfaceFit::of(body, &surface_search, taxel).filter(SurfaceFit::is_stale)?));
+    let is_stale = |fit: &SurfaceFit| fit.is_stale() && fit.off_m < MAX_OFF_M;
+    let fit = |(index, taxel)| Some((index, SurfaceFit::of(body, &surface_search, taxel).filter(is_stale)?));
     let stale: Vec<(usize, SurfaceFit)> = body.taxels.iter().enumerate().filter_map(fit).collect();
     if !stale.is_empty() {
         let ids: Vec<u32> = stale.iter().map(|&(index, _)| body.taxels[index].id).collect();

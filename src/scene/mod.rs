@@ -10,13 +10,15 @@ mod onset;
 mod plan;
 mod skin;
 mod slots;
+mod stages;
 
 pub use choose_fields::choose_fields;
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub use plan::Plan;
-pub(crate) use plan::{PlanField, Stages};
+pub(crate) use plan::PlanField;
+pub(crate) use stages::Stages;
 
 use crate::percept::Outputs;
 use crate::signal::Letter;

@@ -5,8 +5,9 @@ use std::path::Path;
 use glam::DVec3;
 use mesh_loader::Scene;
 
+use super::options::{Up, check_unit, ending};
 use super::triangles::Triangles;
-use super::{Up, check_unit, ending, ply};
+use super::{guarded, ply};
 use crate::error::{Error, Result, failed};
 
 /// The mesh at `path` in metres, and which axis points up if the file says so. `unit_m` is its unit, for formats without one.
@@ -34,7 +35,9 @@ pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Optio
             if unit_m.is_some() {
                 return Err(Error::usage("a COLLADA file says its unit itself; leave --unit out"));
             }
-            (of_scene(&mesh_loader::collada::from_slice(&bytes), "COLLADA")?, up_of(&bytes))
+            let scene = guarded::call(|| mesh_loader::collada::from_slice(&bytes));
+            let scene = scene.unwrap_or_else(|| Err(std::io::Error::other("an index leads nowhere")));
+            (of_scene(&scene, "COLLADA")?, up_of(&bytes))
         }
         other => return Err(failed!("a mesh `.{other}` is not read; give .stl, .obj, .dae, .ply or .glb")),
     };

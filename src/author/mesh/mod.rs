@@ -3,6 +3,8 @@
 //! A mesh becomes one link, a URDF a link for each of its own. What comes out is a file to author on, in metres.
 
 mod formats;
+mod guarded;
+mod options;
 mod ply;
 mod shapes;
 mod triangles;
@@ -10,52 +12,18 @@ mod urdf;
 mod urdf_file;
 mod urdf_skin;
 
+pub use options::{Geometry, MeshOptions, Up};
 pub use urdf_skin::author_urdf_skin;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DQuat};
+use self::options::{ending, y_up_from};
 
 use crate::body::{Glb, Original};
-use crate::error::{Error, Result, failed};
+use crate::error::{Error, Result};
 
 /// A body of over this size was probably not meant in metres, m.
 const MAX_LIKELY_SIZE_M: f64 = 20.0;
-
-/// The axis that points up in a mesh's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// y, as in glTF.
-    Y,
-    /// z, as in URDF and most CAD programs.
-    Z,
-}
-
-/// The geometry of a URDF that taxels are put on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Geometry {
-    /// What a person sees.
-    #[default]
-    Visual,
-    /// What collisions are computed with: coarser, often of simple shapes.
-    Collision,
-    /// None: links alone, for taxels that the file has itself.
-    None,
-}
-
-/// How a mesh of another format is read.
-#[derive(Clone, Debug, Default)]
-pub struct MeshOptions {
-    /// The unit of its numbers, m; by default that of the file if it has one, else m.
-    pub unit_m: Option<f64>,
-    /// The axis that points up; by default that of the file if it has one, else y.
-    pub up: Option<Up>,
-    /// Folders by name of a package, for `package://NAME/…` in a URDF.
-    pub packages: BTreeMap<String, PathBuf>,
-    /// The geometry of a URDF.
-    pub geometry: Geometry,
-}
 
 /// Whether `path` names a mesh or robot that this module reads, by its ending.
 #[must_use]
@@ -73,10 +41,6 @@ pub fn files(path: &Path, options: &MeshOptions) -> Vec<PathBuf> {
         files.extend(robot.mesh_files());
     }
     files
-}
-
-fn ending(path: &Path) -> String {
-    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
 /// Opens the mesh or robot at `path` as a glTF to author on.
@@ -110,17 +74,4 @@ fn one_link(path: &Path, options: &MeshOptions) -> Result<(Glb, f64)> {
     let link = glb.node(&name, None, glam::DVec3::ZERO);
     glb.mesh(link, &name, &mesh.into_mesh_data(), Some(material), None);
     Ok((glb, size_m))
-}
-
-/// Turns what points up in a file to y.
-fn y_up_from(up: Up) -> DAffine3 {
-    match up {
-        Up::Y => DAffine3::IDENTITY,
-        Up::Z => DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
-    }
-}
-
-/// `metres` as a length that a mesh's unit may have.
-fn check_unit(metres: f64) -> Result<f64> {
-    if metres.is_finite() && metres > 0.0 { Ok(metres) } else { Err(failed!("a unit of {metres} m; give one over 0")) }
 }

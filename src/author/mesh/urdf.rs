@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 
+use super::options::{MeshOptions, Up, y_up_from};
 use super::triangles::Triangles;
 use super::urdf_file::{Robot, RobotLink, ShapeKind};
-use super::{MeshOptions, Up, formats, shapes, y_up_from};
+use super::{formats, shapes};
 use crate::body::Glb;
 use crate::error::{Error, Result, failed};
 

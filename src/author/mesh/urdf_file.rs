@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DQuat, DVec3, EulerRot};
 use roxmltree::{Document, Node};
 
-use super::{Geometry, MeshOptions};
+use super::options::{Geometry, MeshOptions};
 use crate::error::{Error, Result, failed};
 
 /// The parts of a URDF that make its shape.

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::options::{MeshOptions, Up};
+use super::urdf;
 use super::urdf_file::Robot;
-use super::{MeshOptions, Up, urdf};
 use crate::author::recipe::Recipe;
 use crate::author::skin::{Authored, PlaceReport, author};
 use crate::body::{MAX_TAXEL_ID, Modality, Original, Taxel};

@@ -1,0 +1,59 @@
+//! How meshes of other formats are read.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DQuat};
+
+use crate::error::{Result, failed};
+
+/// The axis that points up in a mesh's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// y, as in glTF.
+    Y,
+    /// z, as in URDF and most CAD programs.
+    Z,
+}
+
+/// The geometry of a URDF that taxels are put on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Geometry {
+    /// What a person sees.
+    #[default]
+    Visual,
+    /// What collisions are computed with: coarser, often of simple shapes.
+    Collision,
+    /// None: links alone, for taxels that the file has itself.
+    None,
+}
+
+/// How a mesh of another format is read.
+#[derive(Clone, Debug, Default)]
+pub struct MeshOptions {
+    /// The unit of its numbers, m; by default that of the file if it has one, else m.
+    pub unit_m: Option<f64>,
+    /// The axis that points up; by default that of the file if it has one, else y.
+    pub up: Option<Up>,
+    /// Folders by name of a package, for `package://NAME/…` in a URDF.
+    pub packages: BTreeMap<String, PathBuf>,
+    /// The geometry of a URDF.
+    pub geometry: Geometry,
+}
+
+pub(super) fn ending(path: &Path) -> String {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// `metres` as a length that a mesh's unit may have.
+pub(super) fn check_unit(metres: f64) -> Result<f64> {
+    if metres.is_finite() && metres > 0.0 { Ok(metres) } else { Err(failed!("a unit of {metres} m; give one over 0")) }
+}
+
+/// Turns what points up in a file to y.
+pub(super) fn y_up_from(up: Up) -> DAffine3 {
+    match up {
+        Up::Y => DAffine3::IDENTITY,
+        Up::Z => DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
+    }
+}
