@@ -1,7 +1,7 @@
 //! Plots of recordings: quantities over time, the highest pressures with the path of the centre of pressure, and the
 //! pressure–time integrals, several recordings side by side.
 //!
-//! A [`Gatherer`] sees what an engine makes of a recording, in memory that does not grow with it; [`svg`] and [`png`] draw
+//! A [`Gatherer`] sees what an engine makes of a recording, in memory that does not grow with it; [`svg()`] and [`png()`] draw
 //! what was gathered.
 
 mod draw;
