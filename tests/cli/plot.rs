@@ -23,7 +23,8 @@ fn a_plot_has_load_area_and_maps_without_any_option() {
     let svg = drawn(folder.path(), "a.svg", &[]);
     let texts = texts(&svg);
     let has = |wanted: &str| texts.iter().any(|text| text.contains(wanted));
-    for wanted in ["bundled touch", "total [P]", "area [cm²]", "time [s]", "hand/palm", "pressure–time integral", "P·s"]
+    for wanted in
+        ["bundled touch", "total [count]", "area [cm²]", "time [s]", "hand/palm", "pressure–time integral", "count·s"]
     {
         assert!(has(wanted), "{wanted}: {texts:?}");
     }
