@@ -211,7 +211,7 @@ mod tests {
         let why = |text: &str| text.parse::<UnitOfP>().unwrap_err();
         assert!(why("kPA!").is_usage() && why("kPs").to_string().contains("did you mean"));
         assert!(why("furlong").to_string().contains("mmHg"));
-        // Neither a megapascal nor a millipascal: nobody knows.
+        // A megapascal or a millipascal: it is refused.
         assert!("mPa".parse::<UnitOfP>().is_err() && "MN".parse::<UnitOfP>().is_err());
     }
 

@@ -147,7 +147,7 @@ pub struct Session<'a> {
     pub outputs: Outputs,
     /// Whether the percepts are in double precision.
     pub is_double: bool,
-    /// What pressures are measured in; empty where nobody said it.
+    /// What pressures are measured in; empty where it is unknown.
     pub p_unit: &'a str,
     /// Whether NDJSON begins with a line that says units and body.
     pub header: bool,

@@ -14,7 +14,7 @@ pub struct PageSink {
     // In this order: what is published last is sent before the server ends.
     publisher: Publisher,
     server: Server,
-    /// What viewers ask, once somebody looks for it; the server answers that nobody does.
+    /// Percepts that viewers ask to have explained, from the first call of `questions` on; before it the server refuses.
     questions: Option<Receiver<(ViewerId, Request)>>,
 }
 

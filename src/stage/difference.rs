@@ -1,7 +1,7 @@
 //! **difference**: filtered motion over a time: the centroid now against where it was that long ago.
 //!
 //! The alternative to [`super::filter`]'s window. A single step between frames says little where few sensors feel a touch: its
-//! centroid stays with one sensor and then jumps towards the next. Over some tenths of a second the jumps average out; what is told
+//! centroid stays with one sensor and then jumps towards the next. Over some tenths of a second the jumps average out; what is given
 //! is the mean of that time, and lags behind by half of it.
 //!
 //! From the newest centroid that is at least as old as that time, of the same contact, come displacement, direction and speed. While
@@ -106,7 +106,7 @@ impl Memory {
     }
 }
 
-/// What the bound of a field's next frame hangs on.
+/// What the bound of a field's next frame depends on.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Doubt {
     right: Memory,

@@ -92,7 +92,7 @@ impl Sigmas {
     }
 }
 
-/// A quantity's variance, and what of it hangs on taxels that are near their thresholds.
+/// A quantity's variance, and the part of it from taxels near their thresholds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Variance {
     of_noise: f64,

@@ -62,7 +62,7 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<(Glb, Triangles, BTreeMap<S
     Ok((glb, whole, nodes))
 }
 
-/// The links, a parent before its children, each with the joint that it hangs on.
+/// The links, a parent before its children, each with the joint to its parent.
 fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&super::urdf_file::RobotJoint>)>> {
     let mut names = BTreeSet::new();
     for link in &robot.links {

@@ -1,4 +1,4 @@
-//! The formats, and how they are told from each other.
+//! The formats, and how one is recognised.
 
 use std::fmt;
 use std::str::FromStr;

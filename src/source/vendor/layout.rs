@@ -25,7 +25,7 @@ pub struct Panel {
     pub cells: Vec<Cell>,
     /// Whether the recording says where the cells are.
     pub is_placed: bool,
-    /// Where its origin is in the body, x to the right and y up the page, m. Nothing but where it is drawn hangs on it.
+    /// Where its origin is in the body, x to the right and y up the page, m. It only says where the panel is drawn.
     pub offset_m: [f64; 2],
 }
 

@@ -240,7 +240,7 @@ mod tests {
         assert_eq!(number(Separator::One(b';'), "1,5;"), Some(1.5));
         assert_eq!(number(Separator::Blanks, " 1,5 "), Some(1.5));
         assert_eq!(number(Separator::One(b','), "1,5"), Some(1.0));
-        assert_eq!(number(Separator::One(b';'), "1.234,5"), None, "of thousands nobody knows");
+        assert_eq!(number(Separator::One(b';'), "1.234,5"), None, "which of them separates thousands is unknown");
         assert!(number(Separator::Blanks, "NaN").unwrap().is_nan());
     }
 

@@ -1,4 +1,4 @@
-//! All kinds fitted, and one of them chosen: the contact that a user is told of.
+//! Fits all kinds of contact and chooses one.
 
 use glam::DVec2;
 
@@ -97,7 +97,7 @@ pub(crate) struct Sigma {
     pub(crate) angle: f64,
 }
 
-/// What is told of one kind's fit.
+/// The fit of one kind.
 struct Candidate {
     kind: ContactKind,
     parameters: usize,
@@ -141,12 +141,12 @@ impl Candidate {
 }
 
 impl Touch {
-    /// What is told of the touch that `fits` were made for, if it has taxels enough, and why what is absent is.
+    /// The footprint of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
     pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Footprint>, Flags) {
         let mut candidates = fits.map_or(Vec::new(), Candidate::all);
         candidates.retain(|candidate| self.pressed > candidate.parameters);
-        let told = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
-        let Some(best) = candidates.iter().min_by(|a, b| told(a).total_cmp(&told(b))) else {
+        let penalised = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
+        let Some(best) = candidates.iter().min_by(|a, b| penalised(a).total_cmp(&penalised(b))) else {
             return (None, Flags::FEW_TAXELS);
         };
         let spare = (self.pressed - best.parameters) as f64;
@@ -156,10 +156,10 @@ impl Touch {
         if !(explains && rests) {
             return (None, Flags::POOR_FIT);
         }
-        self.told(best)
+        self.checked(best)
     }
 
-    fn told(&self, best: &Candidate) -> (Option<Footprint>, Flags) {
+    fn checked(&self, best: &Candidate) -> (Option<Footprint>, Flags) {
         let Shape { place, along, force, width, length } = best.shape;
         let (mut place, along) = (DVec2::from_array(place), DVec2::from_array(along));
         let (half, is_line) = (libm::exp(length), best.kind == ContactKind::Line);
