@@ -78,7 +78,7 @@ export class Choices extends Observed {
     let most = 0;
     let best = this.followed;
     for (const field of whole.length ? whole : touched)
-      if (model.total(field) > most) [most, best] = [model.total(field), field];
+      if (model.load(field) > most) [most, best] = [model.load(field), field];
     if (best === null) best = fields.findIndex((field) => field.chart && field.letter === this.letter);
     if (best === this.followed || best < 0) return;
     this.followed = best;

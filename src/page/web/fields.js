@@ -1,4 +1,4 @@
-/** The tree of fields: search, totals as bars, a click chooses, a second one looks at the field. */
+/** The tree of fields: search, loads as bars, a click chooses, a second one looks at the field. */
 
 import { byId, make, setText } from "./dom.js";
 import { withUnit } from "./format.js";
@@ -188,23 +188,24 @@ export class Fields {
   /** Totals of the newest frame. */
   update() {
     const { model } = this;
-    for (const i of model.inContact.keys()) this.largest = Math.max(this.largest, model.total(i));
+    for (const i of model.inContact.keys()) this.largest = Math.max(this.largest, model.load(i));
     for (const [i, entry] of this.rows) {
       const touched = model.inContact.has(i);
-      const total = touched ? model.total(i) : 0;
-      const text = touched ? withUnit(total, "P", model.quantity) : "";
+      const load = touched ? model.load(i) : 0;
+      const text = touched ? model.loadText(i) : "";
       if (text !== entry.text) {
         if (!text !== !entry.text) entry.row.classList.toggle("touched", touched);
         entry.text = text;
         setText(entry.value, text);
       }
-      const width = this.largest > 0 ? Math.round((100 * total) / this.largest) : 0;
+      const width = this.largest > 0 ? Math.round((100 * load) / this.largest) : 0;
       if (width !== entry.width) {
         entry.width = width;
         entry.bar.style.width = `${width}%`;
       }
     }
-    if (this.largest > 0) setText(this.caption, `full bar: ${withUnit(this.largest, "P", model.quantity)}`);
+    if (this.largest > 0)
+      setText(this.caption, `full bar: ${withUnit(this.largest, model.loadUnit, model.quantity)}`);
     if (this.onlyTouched.checked) this.filter();
   }
 

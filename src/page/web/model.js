@@ -1,6 +1,7 @@
 /** What the page knows: the scene, the newest frame, events. It changes only by messages from the server. */
 
 import { Observed } from "./dom.js";
+import { withUnit } from "./format.js";
 import { poseToRows } from "./math.js";
 import { HEALTH } from "./wire.js";
 
@@ -242,9 +243,31 @@ export class Model extends Observed {
     return values.subarray(k * components, (k + 1) * components);
   }
 
-  /** @param {number} field */
-  total(field) {
-    return this.value(field, "total")?.[0] ?? 0;
+  /** The column that says how hard a field is pressed: its force where that is computed, else the sum of its pressures. */
+  get loadColumn() {
+    return this.columnIndex.has("force") ? "force" : "total";
+  }
+
+  /** Its unit. */
+  get loadUnit() {
+    return this.loadColumn === "force" ? "N" : "P";
+  }
+
+  /**
+   * How hard a field is pressed; 0 where that is absent.
+   * @param {number} field
+   */
+  load(field) {
+    return this.value(field, this.loadColumn)?.[0] ?? 0;
+  }
+
+  /**
+   * It as text; a dash where it is absent.
+   * @param {number} field
+   */
+  loadText(field) {
+    const value = this.value(field, this.loadColumn);
+    return value ? withUnit(value[0], this.loadUnit, this.quantity) : "–";
   }
 
   /**

@@ -1,4 +1,4 @@
-/** Marks of percepts over the picture: place, identity, total, orientation, axis, motion. */
+/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion. */
 
 import { cssColour, fitCanvas, paletteColour } from "./dom.js";
 import { withUnit } from "./format.js";
@@ -73,7 +73,7 @@ export class Marks {
     this.halo = cssColour("halo");
     const touches = model.touches.filter((touch) => marked.includes(touch.field));
     this.colours.update(touches);
-    /** @type {{at: Point, text: string, colour: string, total: number}[]} */
+    /** @type {{at: Point, text: string, colour: string, load: number}[]} */
     const labels = [];
     for (const field of marked) {
       const plane = tangentPlane(model, field);
@@ -88,26 +88,26 @@ export class Marks {
         ? own.map((touch) => ({
             at: camera.project(positionInWorld(model, field, touch.position)),
             colour: this.colours.of(touch),
-            total: touch.total,
+            load: touch.total,
             text: `#${touch.identity}  ${withUnit(touch.total, "P", model.quantity)}`,
           }))
         : [
             {
               at: camera.project(plane.point),
               colour,
-              total: model.total(field),
-              text: withUnit(model.total(field), "P", model.quantity),
+              load: model.load(field),
+              text: model.loadText(field),
             },
           ];
-      for (const { at, colour: fill, text, total } of places) {
+      for (const { at, colour: fill, text, load } of places) {
         this.ring(context, at, fill, field === choices.field);
         this.places.push({ x: at.x, y: at.y, field });
-        if (choices.labels && facing) labels.push({ at, text, colour: fill, total });
+        if (choices.labels && facing) labels.push({ at, text, colour: fill, load });
       }
     }
     context.globalAlpha = 1;
     // The strongest touches only, from the lowest place up, so that labels stand above what they name.
-    labels.sort((a, b) => b.total - a.total).splice(LABELS_MAX);
+    labels.sort((a, b) => b.load - a.load).splice(LABELS_MAX);
     labels.sort((a, b) => b.at.y - a.at.y);
     /** @type {Point[]} */
     const taken = [];

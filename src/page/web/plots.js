@@ -80,7 +80,12 @@ export class Plots {
       const below = fields.map((_, i) => i).filter((i) => roots.includes(fields[i].parent ?? -1));
       const letter = fields[roots[0]]?.letter;
       for (const f of (below.length ? below : roots).filter((i) => fields[i].letter === letter).slice(0, 5))
-        this.series.push({ field: f, column: "total", component: 0, colour: this.freeColour() });
+        this.series.push({
+          field: f,
+          column: this.model.loadColumn,
+          component: 0,
+          colour: this.freeColour(),
+        });
     }
     this.ask();
   }
