@@ -9,13 +9,14 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use console::style;
-use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, measure, plot_png, plot_svg};
+use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, TrueErrors, plot_png, plot_svg};
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
-use self::measured::{measure_options, missed, played, software};
+use self::measured::{Tested, in_words, measure_options, missed, played, recording, software};
 use self::settled::driver;
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
+use super::bodies::load_body;
 use super::files::FilesRead;
 use super::input::Input;
 use super::interrupt::stop_on_signal;
@@ -27,14 +28,17 @@ use super::words::{count, number};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic tradeoff                                       the bundled touch on the bundled hand
-  somatic tradeoff --source sim:examples/simulations/rod.toml --plot rod.svg     against the truth
-  somatic tradeoff robot.scene.toml --within '0.5 mm, 2 deg' --write   the fastest within it
+  somatic tradeoff --body robot.glb                      on touches simulated on the robot
+  somatic tradeoff --body robot.glb --calibration robot.toml --source night.csv   timed on a recording
+  somatic tradeoff --source sim:examples/simulations/rod.toml --plot rod.svg     on a simulation
+  somatic tradeoff robot.scene.toml --within '3 mm, 5 deg' --write     the fastest within it
   somatic tradeoff robot.scene.toml --budget 100us                     the most accurate within it
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
-Combinations of knobs take turns, so that a machine that slows down slows all of them. A front is
-what no other combination beats: none is as true in both and faster. What is measured is kept, and
+Methods are held against the truth of touches that are simulated on the body, under the layer that the
+calibration names in [skin], or of the source where it is a simulation. The knobs of rounding are held
+against the reference. Combinations take turns, so that a machine that slows down slows all of them.
+A front is what no other combination beats: none is as true and faster. What is measured is kept, and
 `somatic run` and `somatic plan` choose by it, on the same recording or live, where a scene leaves
 the backend or the knobs to be chosen. docs/tradeoff.md says what to conclude.";
 
@@ -96,19 +100,22 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         (Some(path), true) => Some((path, OutputPath::edit(path)?)),
         _ => None,
     };
-    let input = Input::named(&asked)?;
-    if !input.is_recording() {
+    let input = if asked.sources.is_empty() { None } else { Some(Input::named(&asked)?) };
+    if input.as_ref().is_some_and(|input| !input.is_recording()) {
         return Err(Error::usage("a trade is measured on a recording or a simulation; name one as --source"));
     }
-    let body = input.body(&asked)?;
+    let body = input
+        .as_ref()
+        .map_or_else(|| load_body(asked.body.as_deref().unwrap_or("hand")), |input| input.body(&asked))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(&body, &ids, 1)?;
     let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
-    let played = played(&input, &asked, &ids, most)?;
+    let played = input.as_ref().map(|input| played(input, &asked, &ids, most)).transpose()?;
+    let tested = Tested::new(&body, &options, played, most)?;
     let measure_options = measure_options(&asked, &options, arguments.seconds)?;
     let stop = stop_on_signal()?;
     let mut bar = Bar::new("measured");
-    let report = measure(&body, &options, &played, &measure_options, &mut |share| {
+    let report = tested.measure(&body, &measure_options, &mut |share| {
         bar.show_with_time_left(share);
         !stop.load(Ordering::Relaxed)
     });
@@ -119,7 +126,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
         && let Some(store) = Store::of_user()
-        && let Some(recording) = input.recording()
+        && let Some(recording) = recording(input.as_ref())
         && let Err(e) = store.keep(&body, &options, &driver(), &recording, &report)
     {
         say(&format!("cannot save the measurements: {e}"));
@@ -136,7 +143,8 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         say(&missed(&target, &pick)?);
         return Ok(FAILED);
     }
-    say(&format!("{} for {}: {combination}; {:.2} µs a frame", picked(way), target.words(), pick.row.p50_us));
+    let words = in_words(pick.row);
+    say(&format!("{} for {}: {combination}; {words}", picked(way), target.words()));
     if let Some((path, edit)) = scene {
         write_scene::write(edit, &settled::of_row(pick.row, &report)?, &target)?;
         say(&format!("written into {}", path.display()));
@@ -161,44 +169,92 @@ fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {
 fn text(report: &Report, all: bool) -> String {
     let frames = count(report.frames as u64, "frame");
     let mut text = format!("{}, {frames} of {}\n", style(&report.body).bold(), report.source);
-    text += &format!(
-        "  {} of touched fields, {} ties left out of orientations\n",
-        count(report.touched, "percept"),
-        report.ties
-    );
     for line in report.kept_charts.iter().chain(&report.left_out) {
         text += &format!("  not measured  {line}\n");
     }
+    if report.truth {
+        text += &truth(report);
+    }
     for way in CallMode::ALL {
-        let rows = report.of(way);
-        if rows.is_empty() {
-            continue;
-        }
-        let listed: Vec<&&Measurement> = rows.iter().filter(|row| all || row.front).collect();
-        let beaten = rows.len() - rows.iter().filter(|row| row.front).count();
-        text += &format!(
-            "\n{}: {} of {} combinations, of which {beaten} are beaten\n",
-            way.word(),
-            listed.len(),
-            rows.len()
-        );
-        let headings = ["µs", "p99", "mm: rms", "p99", "worst", "°: rms", "p99", "worst"].into_iter();
-        let of_truth = if report.truth { ["true mm: p99", "°: p99"] } else { [""; 2] };
-        let mut table = plain(headings.chain(of_truth).chain(["combination"]), 0..10);
-        for row in listed {
-            let said = |value: f64, errors: &Errors| if errors.compared > 0 { number(value) } else { "–".to_owned() };
-            let of_truth = |errors: &Option<Errors>| errors.map_or(String::new(), |errors| said(errors.p99, &errors));
-            let mut cells = vec![number(row.p50_us), number(row.p99_us)];
-            for errors in [&row.centroid_mm, &row.orientation_deg] {
-                cells.extend([errors.rms, errors.p99, errors.worst].map(|value| said(value, errors)));
-            }
-            cells.extend([of_truth(&row.true_centroid_mm), of_truth(&row.true_orientation_deg)]);
-            cells.push(row.combination().map_or(String::new(), |combination| combination.to_string()));
-            table.add_row(cells.into_iter().map(|cell| if row.front { cell } else { style(cell).dim().to_string() }));
-        }
-        text += &shown(&table);
+        text += &rounding(report, way, all);
     }
     text
+}
+
+/// A number, or a dash where nothing was compared.
+fn said(value: f64, errors: &Errors) -> String {
+    if errors.compared > 0 { number(value) } else { "–".to_owned() }
+}
+
+/// How far each method is from the truth, and what it costs.
+fn truth(report: &Report) -> String {
+    let of = if report.touches.is_empty() { "touches of the source" } else { &report.touches };
+    let mut text = format!("\n{}: {of}\n", style("from the truth").bold());
+    text += &rungs(report, &|row| row.truth.as_ref());
+    let fitted = report.rows.iter().find_map(|row| row.truth_with_footprint.as_ref());
+    if let Some(fitted) = fitted.filter(|fitted| fitted.touches > 0) {
+        text += &format!("\nof these the {} touches that have a footprint\n", fitted.touches);
+        text += &rungs(report, &|row| row.truth_with_footprint.as_ref());
+    }
+    text
+}
+
+/// A table of the methods by their errors `of` some touches.
+fn rungs(report: &Report, of: &dyn Fn(&Measurement) -> Option<&TrueErrors>) -> String {
+    let ways: Vec<CallMode> = CallMode::ALL.into_iter().filter(|way| !report.of(*way).is_empty()).collect();
+    let times = ways.iter().map(|way| format!("{}, µs", way.word()));
+    let errors =
+        ["round, mm: median", "p95", "across rods, mm: median", "p95", "angle, °: median", "p95", "rms", "given"];
+    let headings: Vec<String> = times.chain(errors.map(str::to_owned)).collect();
+    let headings = headings.iter().map(String::as_str).chain(["orientation_by"]);
+    let mut table = plain(headings, 0..ways.len() + errors.len());
+    let rungs: Vec<Vec<&Measurement>> = ways.iter().map(|way| report.rungs(*way)).collect();
+    for row in rungs.first().into_iter().flatten() {
+        let Some(errors) = of(row) else { continue };
+        let by = &row.words.orientation_by;
+        let time = |rows: &Vec<&Measurement>| {
+            let row = rows.iter().find(|other| other.words.orientation_by == *by);
+            row.map_or("–".to_owned(), |row| number(row.p50_us))
+        };
+        let mut cells: Vec<String> = rungs.iter().map(time).collect();
+        for part in [&errors.round_mm, &errors.across_mm, &errors.orientation_deg] {
+            cells.extend([part.median, part.p95].map(|value| said(value, part)));
+        }
+        cells.push(said(errors.orientation_deg.rms, &errors.orientation_deg));
+        cells.push(format!("{:.0} %", 100.0 * errors.given));
+        cells.push(by.clone());
+        table.add_row(cells.into_iter().map(|cell| if row.front { cell } else { style(cell).dim().to_string() }));
+    }
+    shown(&table)
+}
+
+/// What rounding costs and gives: the combinations of the other knobs against the reference.
+fn rounding(report: &Report, way: CallMode, all: bool) -> String {
+    let rows = report.of(way);
+    if rows.is_empty() {
+        return String::new();
+    }
+    let best = report.rounding(way);
+    let is_best = |row: &Measurement| best.iter().any(|best| std::ptr::eq(*best, row));
+    let text = format!(
+        "\n{}: {} of {} combinations that no other beats; {} of touched fields against the reference, {} ties left out\n",
+        style(way.word()).bold(),
+        best.len(),
+        rows.len(),
+        count(report.touched, "percept"),
+        report.ties
+    );
+    let headings = ["µs", "p99", "mm: rms", "p99", "worst", "°: rms", "p99", "worst", "combination"];
+    let mut table = plain(headings.into_iter(), 0..8);
+    for row in rows.iter().filter(|row| all || is_best(row)) {
+        let mut cells = vec![number(row.p50_us), number(row.p99_us)];
+        for errors in [&row.centroid_mm, &row.orientation_deg] {
+            cells.extend([errors.rms, errors.p99, errors.worst].map(|value| said(value, errors)));
+        }
+        cells.push(row.combination().map_or(String::new(), |combination| combination.to_string()));
+        table.add_row(cells.into_iter().map(|cell| if is_best(row) { cell } else { style(cell).dim().to_string() }));
+    }
+    text + &shown(&table)
 }
 
 /// Says once which fields stay in charts that the scene does not ask for.

@@ -20,6 +20,10 @@ pub struct Errors {
     pub compared: u64,
     /// Root of the mean square.
     pub rms: f64,
+    /// The middle one.
+    pub median: f64,
+    /// The 95th percentile.
+    pub p95: f64,
     /// The 99th percentile.
     pub p99: f64,
     /// The largest.
@@ -36,6 +40,8 @@ impl Errors {
         Self {
             compared: errors.len() as u64,
             rms: (squares / errors.len() as f64).sqrt(),
+            median: rank(errors, 0.5),
+            p95: rank(errors, 0.95),
             p99: rank(errors, 0.99),
             worst: errors[errors.len() - 1],
         }
@@ -115,8 +121,50 @@ pub(super) struct ErrorSamples {
     /// mm, and degrees.
     pub(super) centroid: Vec<f64>,
     pub(super) orientation: Vec<f64>,
-    pub(super) true_centroid: Vec<f64>,
-    pub(super) true_orientation: Vec<f64>,
+}
+
+/// Errors against the truth.
+#[derive(Default)]
+pub(super) struct TrueErrorSamples {
+    /// Of the place of what is round, mm.
+    round: Vec<f64>,
+    /// Of the place of a rod or an edge, across it, mm.
+    across: Vec<f64>,
+    /// Of its orientation, degrees.
+    orientation: Vec<f64>,
+    touches: u64,
+    given: u64,
+}
+
+/// How far what percepts say of simulated touches is from the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueErrors {
+    /// Number of touches.
+    pub touches: u64,
+    /// The share of them of which a place is given. Moments always give one, a fit of contacts only where it explains the sensors.
+    pub given: f64,
+    /// Errors of all places that are given, mm: of round contacts, and of rods and edges across them.
+    pub place_mm: Errors,
+    /// Those of round contacts, mm.
+    pub round_mm: Errors,
+    /// Those of rods and edges, across them, mm: where along it one is pressed, the sensors under it cannot say.
+    pub across_mm: Errors,
+    /// Errors of the orientations that are given of rods and edges, degrees.
+    pub orientation_deg: Errors,
+}
+
+impl TrueErrors {
+    pub(super) fn of(samples: &mut TrueErrorSamples) -> Self {
+        let mut places = [&samples.round[..], &samples.across].concat();
+        Self {
+            touches: samples.touches,
+            given: if samples.touches > 0 { samples.given as f64 / samples.touches as f64 } else { 0.0 },
+            place_mm: Errors::of(&mut places),
+            round_mm: Errors::of(&mut samples.round),
+            across_mm: Errors::of(&mut samples.across),
+            orientation_deg: Errors::of(&mut samples.orientation),
+        }
+    }
 }
 
 /// The orientation of a percept `by` a method; where no contact could be fitted, by second moments.
@@ -169,9 +217,11 @@ impl ErrorSamples {
         };
         self.orientation.extend(turned.filter(|_| !tied));
     }
+}
 
+impl TrueErrorSamples {
     /// Adds the errors of `got` against the `truth` of the only touch on its field.
-    pub(super) fn add_truth(
+    pub(super) fn add(
         &mut self,
         geometry: &ChartGeometry,
         authored: &ChartGeometry,
@@ -179,14 +229,22 @@ impl ErrorSamples {
         truth: &Truth,
         by: OrientationBy,
     ) {
+        self.touches += 1;
         let field = got.field;
-        let Some(at) = place(got, by) else { return };
-        let off = geometry.point(field, at).map(|point| point.distance(truth.position_in_link));
-        self.true_centroid.extend(off.map(|metres| metres * 1e3));
+        let fits = by.steps().is_some();
+        let at = if fits { got.footprint_place.map(DVec2::from_array) } else { place(got, by) };
+        let Some(at) = at else { return };
+        self.given += 1;
         let right = truth.angle.zip(truth.uv);
         let right = right.and_then(|(angle, uv)| authored.direction(field, DVec2::from_array(uv), angle));
-        let got = orientation(got, by).and_then(|angle| geometry.direction(field, at, angle));
-        self.true_orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
+        let off = geometry.point(field, at).map(|point| point - truth.position_in_link);
+        match right {
+            Some(along) => self.across.extend(off.map(|off| 1e3 * off.reject_from_normalized(along).length())),
+            None => self.round.extend(off.map(|off| 1e3 * off.length())),
+        }
+        let angle = if fits { got.footprint_angle } else { orientation(got, by) };
+        let got = angle.and_then(|angle| geometry.direction(field, at, angle));
+        self.orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
     }
 }
 
@@ -200,10 +258,13 @@ mod tests {
     fn errors_are_counted_and_ranked() {
         let mut errors: Vec<f64> = (1..=200).rev().map(f64::from).collect();
         let of = Errors::of(&mut errors);
-        assert_eq!((of.compared, of.p99, of.worst), (200, 198.0, 200.0));
+        assert_eq!((of.compared, of.median, of.p95, of.p99, of.worst), (200, 100.0, 190.0, 198.0, 200.0));
         assert!((of.rms - (200.0 * 201.0 * 401.0 / 6.0 / 200.0_f64).sqrt()).abs() < 1e-9);
         assert_eq!(Errors::of(&mut []), Errors::default());
-        assert_eq!(Errors::of(&mut [3.0]), Errors { compared: 1, rms: 3.0, p99: 3.0, worst: 3.0 });
+        assert_eq!(
+            Errors::of(&mut [3.0]),
+            Errors { compared: 1, rms: 3.0, median: 3.0, p95: 3.0, p99: 3.0, worst: 3.0 }
+        );
     }
 
     #[test]

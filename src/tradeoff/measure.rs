@@ -5,7 +5,8 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
-use super::{CallMode, Combination, Measurement, Report};
+use super::truth::{OfTouches, Truths};
+use super::{CallMode, Combination, Measurement, Report, SimulatedTouches};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
@@ -57,6 +58,7 @@ struct Trial {
     passes: u32,
     times_us: Vec<f64>,
     errors: ErrorSamples,
+    truth: Option<OfTouches>,
 }
 
 /// Calls of some frames each, which are repeated with continuing times.
@@ -88,6 +90,9 @@ impl Calls {
 
 /// Measures all combinations of knobs for `options` on `body`; knobs that `options` sets stay fixed.
 ///
+/// Times, and errors against the reference, are of `played`. Errors against the truth are of `played` too where it has one, else
+/// of `touches` where there are some.
+///
 /// `progress` gets the share that is done and returns whether to continue. If not, the report has what was measured so far,
 /// if every combination had a turn.
 ///
@@ -97,6 +102,7 @@ pub fn measure(
     body: &Body,
     options: &Options,
     played: &TestFrames,
+    touches: Option<&SimulatedTouches>,
     measure_options: &MeasureOptions,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
@@ -115,6 +121,9 @@ pub fn measure(
     let another = |charts: Charts| charts == options.scene.knobs.charts || !geometries[charts.word()].is_like(authored);
     for charts in Charts::ALL.iter().filter(|charts| geometries.contains_key(charts.word()) && !another(**charts)) {
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
+    }
+    if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) && !has_skin(options) {
+        report.left_out.push("footprints: no calibration says what the layer is; see docs/footprint.md".to_owned());
     }
     const PROGRESS_BUILT: f64 = 0.1;
     const PROGRESS_COMPARED: f64 = 0.3;
@@ -147,8 +156,11 @@ pub fn measure(
         }
     }
     // Errors, once.
-    let right = ReferencePercepts::new(body, options, played, authored)?;
-    (report.touched, report.ties, report.truth) = (right.touched, right.ties, right.has_truth);
+    let right = ReferencePercepts::new(body, options, played)?;
+    (report.touched, report.ties) = (right.touched, right.ties);
+    let mut truth = Truths::new(body, options, played, touches, &charted, authored)?;
+    report.truth = truth.is_some();
+    report.touches = truth.as_ref().map_or(String::new(), |truth| truth.description.clone());
     if report.touched == 0 {
         return Err(Error::failed("no field with a chart is touched in these frames; give others").at(&played.source));
     }
@@ -157,6 +169,10 @@ pub fn measure(
     for (index, trial) in trials.iter_mut().enumerate() {
         let geometry = &geometries[&trial.combination.knobs.charts.word()];
         trial.compare(&mut calls[trial.way as usize], geometry, authored, &right)?;
+        if let Some(truth) = &mut truth {
+            let recharted = &charted[trial.combination.knobs.charts.word()];
+            trial.truth = Some(truth.errors(trial.combination, recharted, geometry, authored)?);
+        }
         if !progress(PROGRESS_BUILT + (PROGRESS_COMPARED - PROGRESS_BUILT) * (index + 1) as f64 / count as f64) {
             return Err(stopped());
         }
@@ -181,7 +197,7 @@ pub fn measure(
             break;
         }
     }
-    report.rows = trials.into_iter().map(|trial| trial.row(report.truth)).collect();
+    report.rows = trials.into_iter().map(Trial::row).collect();
     report.find_front();
     Ok(report)
 }
@@ -218,18 +234,15 @@ fn geometries(
     kinds.map(|(&kind, charted)| Ok((kind.word(), ChartGeometry::new(body, options, kind, charted)?))).collect()
 }
 
-/// The reference's percepts of all frames, and the truth.
+/// The reference's percepts of all frames.
 struct ReferencePercepts {
     percepts: Percepts,
     touched: u64,
     ties: u64,
-    has_truth: bool,
-    /// Per frame the fields with a single touch, and its truth.
-    truth: Vec<Vec<(usize, Truth)>>,
 }
 
 impl ReferencePercepts {
-    fn new(body: &Body, options: &Options, played: &TestFrames, authored: &ChartGeometry) -> Result<Self> {
+    fn new(body: &Body, options: &Options, played: &TestFrames) -> Result<Self> {
         let fitted = if has_skin(options) { Outputs::FOOTPRINT } else { Outputs::empty() };
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | fitted;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
@@ -237,7 +250,6 @@ impl ReferencePercepts {
         let mut engine = Engine::new(body, options)?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let percepts = engine.process(&played.frames)?.clone();
-        let letters = engine.plan().letters().len();
         let (mut touched, mut ties) = (0, 0);
         for frame in 0..percepts.frames() {
             for percept in percepts.touched(frame).filter(|percept| percept.letter == 0 && percept.centroid.is_some()) {
@@ -245,16 +257,7 @@ impl ReferencePercepts {
                 ties += u64::from(percept.flags.contains(Flags::TIE));
             }
         }
-        let of_frame = |truths: &Vec<Truth>| -> Vec<(usize, Truth)> {
-            let known = truths.iter().filter_map(|truth| {
-                let field = authored.index_of(truth.field.as_deref()?)?;
-                let alone = truths.iter().filter(|other| other.field == truth.field).count() == 1;
-                (alone && authored.link(field) == truth.link).then(|| (field * letters, truth.clone()))
-            });
-            known.collect()
-        };
-        let truth: Vec<Vec<(usize, Truth)>> = played.truth.iter().map(of_frame).collect();
-        Ok(Self { percepts, touched, ties, has_truth: truth.iter().any(|known| !known.is_empty()), truth })
+        Ok(Self { percepts, touched, ties })
     }
 }
 
@@ -279,7 +282,7 @@ impl Trial {
         let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let (times_us, errors) = (Vec::new(), ErrorSamples::default());
-        Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors })
+        Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors, truth: None })
     }
 
     /// Processes all frames once, and collects errors.
@@ -300,10 +303,6 @@ impl Trial {
                     let mut got = percepts.get(index, field);
                     got.field = field / letters;
                     self.errors.add(geometry, authored, &got, &right.percepts.get(frame, field), by);
-                    let truths = right.truth.get(frame).into_iter().flatten();
-                    for (_, truth) in truths.filter(|(of, _)| *of == field && got.contact) {
-                        self.errors.add_truth(geometry, authored, &got, truth, by);
-                    }
                 }
                 frame += 1;
             }
@@ -328,7 +327,7 @@ impl Trial {
         Ok(())
     }
 
-    fn row(mut self, truth: bool) -> Measurement {
+    fn row(mut self) -> Measurement {
         self.times_us.sort_by(f64::total_cmp);
         let errors = &mut self.errors;
         Measurement {
@@ -338,9 +337,8 @@ impl Trial {
             p99_us: rank(&self.times_us, 0.99),
             centroid_mm: Errors::of(&mut errors.centroid),
             orientation_deg: Errors::of(&mut errors.orientation),
-            true_centroid_mm: truth.then(|| Errors::of(&mut errors.true_centroid)),
-            true_orientation_deg: (truth && !errors.true_orientation.is_empty())
-                .then(|| Errors::of(&mut errors.true_orientation)),
+            truth: self.truth.map(|(all, _)| all),
+            truth_with_footprint: self.truth.and_then(|(_, with_footprint)| with_footprint),
             front: false,
         }
     }
@@ -374,7 +372,7 @@ mod tests {
             ..Options::default()
         };
         let mut shares = Vec::new();
-        let report = measure(&body, &options, &touch(), &measure_options(0.05), &mut |share| {
+        let report = measure(&body, &options, &touch(), None, &measure_options(0.05), &mut |share| {
             shares.push(share);
             true
         })
@@ -400,12 +398,55 @@ mod tests {
     }
 
     #[test]
+    fn methods_are_held_against_the_truth_of_simulated_touches() {
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let scene = Scene { fields: vec!["hand/back".into()], ..Scene::default() };
+        let options = Options { scene, ..Options::default() };
+        let mut touches = SimulatedTouches::on(&body, &options, 400).unwrap();
+        let own = options.clone().calibration(touches.calibration.clone());
+        let played = TestFrames { truth: Vec::new(), ..touches.frames.clone() };
+        let measured = |touches: Option<&SimulatedTouches>| {
+            measure(&body, &own, &played, touches, &measure_options(0.05), &mut |_| true).unwrap()
+        };
+        let report = measured(Some(&touches));
+        assert!(report.truth && report.touches.contains("touches simulated on it"));
+        let rungs = report.rungs(CallMode::Live);
+        assert_eq!(rungs.len(), 5);
+        let by = |by: OrientationBy| {
+            *rungs.iter().find(|row| row.words.orientation_by == by.word()).expect("every method is a rung")
+        };
+        let [moments, footprint] = [OrientationBy::SecondMoments, OrientationBy::Footprint].map(by);
+        // Moments say something of every touch, a fit only of what it explains.
+        assert_eq!(moments.truth.unwrap().given, 1.0);
+        assert!((0.1..0.5).contains(&footprint.truth.unwrap().given), "{:?}", footprint.truth);
+        assert_eq!(
+            footprint.truth,
+            footprint.truth_with_footprint.map(|of| crate::tradeoff::TrueErrors {
+                touches: footprint.truth.unwrap().touches,
+                given: footprint.truth.unwrap().given,
+                ..of
+            })
+        );
+        // On the same touches, truer by half and more.
+        let [moments, fit] = [moments, footprint].map(|row| row.truth_with_footprint.unwrap());
+        assert!(2.0 * fit.orientation_deg.median < moments.orientation_deg.median, "{fit:?} {moments:?}");
+        assert!(2.0 * fit.round_mm.median < moments.round_mm.median, "{fit:?} {moments:?}");
+        // Negative control: a truth that is 3 mm elsewhere.
+        for truth in touches.frames.truth.iter_mut().flatten() {
+            truth.position_in_link += 3e-3 * truth.normal_in_link.any_orthonormal_vector();
+        }
+        let moved = measured(Some(&touches)).rungs(CallMode::Live)[0].truth.unwrap().round_mm.median;
+        assert!(moved > 2.0, "{moved}");
+        assert!(!measured(None).truth);
+    }
+
+    #[test]
     fn what_is_stopped_too_early_says_so() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        let stopped = measure(&body, &Options::default(), &touch(), &measure_options(60.0), &mut |_| false);
+        let stopped = measure(&body, &Options::default(), &touch(), None, &measure_options(60.0), &mut |_| false);
         assert!(stopped.unwrap_err().to_string().contains("stopped before"));
         let nothing = TestFrames { frames: touch().frames[..1].to_vec(), ..touch() };
-        let untouched = measure(&body, &Options::default(), &nothing, &measure_options(0.1), &mut |_| true);
+        let untouched = measure(&body, &Options::default(), &nothing, None, &measure_options(0.1), &mut |_| true);
         assert!(untouched.unwrap_err().to_string().contains("no field with a chart is touched"));
     }
 }

@@ -10,17 +10,20 @@ mod measure;
 mod plot;
 mod store;
 mod target;
+mod touches;
+mod truth;
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-pub use errors::Errors;
+pub use errors::{Errors, TrueErrors};
 pub use ladder::{Rung, ladder};
 pub use measure::{MeasureOptions, TestFrames, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
 pub use target::{Pick, Target, angle, length, time};
+pub use touches::SimulatedTouches;
 
 use crate::backend::BackendKind;
 use crate::percept::Outputs;
@@ -191,10 +194,10 @@ pub struct Measurement {
     pub centroid_mm: Errors,
     /// Errors of orientations against the reference's by the same method, degrees.
     pub orientation_deg: Errors,
-    /// Errors of centroids against the truth, if known, mm.
-    pub true_centroid_mm: Option<Errors>,
-    /// Errors of orientations against the truth, if known, degrees.
-    pub true_orientation_deg: Option<Errors>,
+    /// Errors against the truth, if known.
+    pub truth: Option<TrueErrors>,
+    /// The same of those touches of which all steps of a fit find a footprint.
+    pub truth_with_footprint: Option<TrueErrors>,
     /// Whether it is on the Pareto front of its way: no other is faster and at least as accurate.
     pub front: bool,
 }
@@ -216,13 +219,10 @@ impl Measurement {
         Ok(Combination { backend: backend.parse()?, knobs })
     }
 
-    /// Its errors against the truth, or else the reference: centroid, mm, and orientation, degrees.
+    /// Its errors against the truth, or else the reference: place, mm, and orientation, degrees.
     #[must_use]
     pub fn judged(&self) -> [&Errors; 2] {
-        [
-            self.true_centroid_mm.as_ref().unwrap_or(&self.centroid_mm),
-            self.true_orientation_deg.as_ref().unwrap_or(&self.orientation_deg),
-        ]
+        self.truth.as_ref().map_or([&self.centroid_mm, &self.orientation_deg], |t| [&t.place_mm, &t.orientation_deg])
     }
 }
 
@@ -243,6 +243,8 @@ pub struct Report {
     pub ties: u64,
     /// Whether the truth was known.
     pub truth: bool,
+    /// The touches that the truth was known of, in words; empty where the source has its own.
+    pub touches: String,
     /// Fields that cannot have another kind of chart, `charts: field: why`.
     pub kept_charts: Vec<String>,
     /// Combinations that were not measured, and why.
@@ -254,16 +256,53 @@ pub struct Report {
 impl Report {
     /// Marks the rows on the Pareto front.
     fn find_front(&mut self) {
+        // Against the truth a hundredth is nothing: percepts of any arithmetic are that near to each other.
+        let alike = if self.truth { 1.01 } else { 1.0 };
         let beaten = |row: &Measurement, by: &Measurement| {
             let (a, b) = (row.judged(), by.judged());
-            let no_worse = b[0].p99 <= a[0].p99 && b[1].p99 <= a[1].p99 && by.p50_us <= row.p50_us;
-            let better = b[0].p99 < a[0].p99 || b[1].p99 < a[1].p99 || by.p50_us < row.p50_us;
+            let is_no_worse = |a: &Errors, b: &Errors| b.p95 <= alike * a.p95;
+            let is_better = |a: &Errors, b: &Errors| alike * b.p95 < a.p95;
+            let no_worse = is_no_worse(a[0], b[0]) && is_no_worse(a[1], b[1]) && by.p50_us <= row.p50_us;
+            let better = is_better(a[0], b[0]) || is_better(a[1], b[1]) || by.p50_us < row.p50_us;
             // Without a truth, orientations of different methods cannot be compared.
             let alike = self.truth || row.words.orientation_by == by.words.orientation_by;
             row.way == by.way && alike && no_worse && better
         };
         let fronts: Vec<bool> = self.rows.iter().map(|row| !self.rows.iter().any(|other| beaten(row, other))).collect();
         self.rows.iter_mut().zip(fronts).for_each(|(row, front)| row.front = front);
+    }
+
+    /// The rungs of `way` from the fastest up: of each method of orientation the fastest row whose places are as near to the truth
+    /// as those of any, and as its orientations.
+    #[must_use]
+    pub fn rungs(&self, way: CallMode) -> Vec<&Measurement> {
+        let rows = self.of(way);
+        let is_rung = |row: &&Measurement| {
+            let alike = || rows.iter().filter(|other| other.words.orientation_by == row.words.orientation_by);
+            let least = |index: usize| alike().map(|other| other.judged()[index].p95).fold(f64::INFINITY, f64::min);
+            let is_near = |row: &Measurement| (0..2).all(|index| row.judged()[index].p95 <= 1.01 * least(index));
+            is_near(row) && alike().find(|other| is_near(other)).is_some_and(|first| std::ptr::eq(*first, *row))
+        };
+        rows.iter().copied().filter(is_rung).collect()
+    }
+
+    /// The rows of `way` with the method of orientation that was asked for which no other beats in time and errors against the
+    /// reference, the fastest first: what the knobs of rounding give.
+    #[must_use]
+    pub fn rounding(&self, way: CallMode) -> Vec<&Measurement> {
+        let mut rows = self.of(way);
+        rows.retain(|row| row.words.orientation_by == self.asked_by);
+        let errors = |row: &Measurement| [row.centroid_mm.p99, row.orientation_deg.p99];
+        let is_beaten = |row: &Measurement| {
+            let (time, errors_of_row) = (row.p50_us, errors(row));
+            rows.iter().any(|by| {
+                let of = errors(by);
+                let no_worse = by.p50_us <= time && of[0] <= errors_of_row[0] && of[1] <= errors_of_row[1];
+                no_worse && (by.p50_us < time || of != errors_of_row)
+            })
+        };
+        let front: Vec<bool> = rows.iter().map(|row| !is_beaten(row)).collect();
+        rows.into_iter().zip(front).filter_map(|(row, front)| front.then_some(row)).collect()
     }
 
     /// The rows of `way`, the fastest first.
@@ -280,7 +319,10 @@ mod tests {
     use super::*;
 
     pub(super) fn row(backend: &str, p50_us: f64, centroid: f64, orientation: f64) -> Measurement {
-        let errors = |p99: f64| Errors { compared: 10, rms: p99 / 2.0, p99, worst: p99 * 2.0 };
+        let errors = |p95: f64| {
+            let [rms, median, p99, worst] = [p95 / 2.0, p95 / 4.0, p95, p95 * 2.0];
+            Errors { compared: 10, rms, median, p95, p99, worst }
+        };
         let knobs = Knobs { arithmetic: (backend != "reference").then_some(Arithmetic::OnePass), ..Knobs::default() };
         let combination = Combination { backend: backend.parse().unwrap(), knobs };
         Measurement {
@@ -290,8 +332,8 @@ mod tests {
             p99_us: 2.0 * p50_us,
             centroid_mm: errors(centroid),
             orientation_deg: errors(orientation),
-            true_centroid_mm: None,
-            true_orientation_deg: None,
+            truth: None,
+            truth_with_footprint: None,
             front: false,
         }
     }

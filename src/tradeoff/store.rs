@@ -13,7 +13,7 @@ use crate::output::OutputPaths;
 use crate::scene::Knobs;
 
 /// Version of the files.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A folder of measurements.
 #[derive(Clone, Debug)]
@@ -229,7 +229,7 @@ mod tests {
         assert!(matches!(find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
         let path = store.file(&body, &options);
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("\"version\": 2", "\"version\": 1").replace("\"recording\"", "\"other\""))
+        std::fs::write(&path, text.replace("\"version\": 3", "\"version\": 1").replace("\"recording\"", "\"other\""))
             .unwrap();
         assert!(why(find(&body, &options, "a")).contains("another version"));
         std::fs::write(&path, &text[..text.len() / 2]).unwrap();

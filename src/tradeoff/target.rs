@@ -129,7 +129,7 @@ impl Target {
         let [centroid, orientation] = row.judged();
         let over = |value: f64, limit: Option<f64>| limit.map_or(0.0, |limit| value / limit);
         // Without a comparison no tolerance is met.
-        let of = |errors: &super::Errors| if errors.compared > 0 { errors.p99 } else { f64::INFINITY };
+        let of = |errors: &super::Errors| if errors.compared > 0 { errors.p95 } else { f64::INFINITY };
         [
             over(if self.centroid_m.is_some() { of(centroid) * 1e-3 } else { 0.0 }, self.centroid_m),
             over(if self.orientation_rad.is_some() { of(orientation).to_radians() } else { 0.0 }, self.orientation_rad),
@@ -148,7 +148,7 @@ impl Target {
         let true_to = |row: &Measurement| {
             let [centroid, orientation] = row.judged();
             // A degree counts like a millimetre: at a distance of 57 mm they are equal.
-            centroid.p99.hypot(orientation.p99)
+            centroid.p95.hypot(orientation.p95)
         };
         let picked = if tolerant || self.is_empty() {
             rows.iter().find(granted)
@@ -167,8 +167,8 @@ impl Target {
     fn missed(&self, row: &Measurement) -> Vec<String> {
         let [centroid, orientation] = row.judged();
         let texts = [
-            format!("centroid {:.3} mm", centroid.p99),
-            format!("orientation {:.3}°", orientation.p99),
+            format!("centroid {:.3} mm", centroid.p95),
+            format!("orientation {:.3}°", orientation.p95),
             format!("{:.2} µs a frame", row.p50_us),
         ];
         let limits = [

@@ -1,5 +1,6 @@
 //! What a scene costs: counted and measured.
 
+use somatic::scene::OrientationBy;
 use somatic::scene::PlannedStage;
 use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result};
@@ -61,6 +62,10 @@ impl Bill {
         let made = |outputs: Outputs| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
+            if !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
+                // A way to an orientation is for those that have one.
+                options.scene.knobs.orientation_by = OrientationBy::AsAsked;
+            }
             Engine::new(body, options)
         };
         let planned = plan.explain().into_iter();

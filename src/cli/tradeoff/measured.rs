@@ -2,7 +2,9 @@
 
 use somatic::signal::Frame;
 use somatic::source::{SimulatedSource, Source, SourceSpec};
-use somatic::tradeoff::{CallMode, MeasureOptions, Measurement, Pick, Target, TestFrames};
+use somatic::tradeoff::{
+    CallMode, MeasureOptions, Measurement, Pick, Report, SimulatedTouches, Target, TestFrames, measure,
+};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use crate::cli::input::{Input, RECORDED_BATCH};
@@ -70,15 +72,63 @@ pub(super) fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize
     Ok(played)
 }
 
+/// What is measured on.
+pub(super) struct Tested {
+    /// What is timed.
+    pub(super) played: TestFrames,
+    /// How: as a run would, but for the calibration where the frames are simulated touches, which have their own.
+    pub(super) options: Options,
+    /// Touches to hold percepts against the truth on, or why there are none.
+    pub(super) touches: Result<SimulatedTouches>,
+}
+
+impl Tested {
+    /// `played`, or else simulated touches; up to `most` of these.
+    pub(super) fn new(body: &Body, options: &Options, played: Option<TestFrames>, most: usize) -> Result<Self> {
+        let touches = SimulatedTouches::on(body, options, most);
+        match (played, touches) {
+            (Some(played), touches) => Ok(Self { played, options: options.clone(), touches }),
+            (None, Ok(touches)) => {
+                let options = options.clone().calibration(touches.calibration.clone());
+                let played = TestFrames { truth: Vec::new(), ..touches.frames.clone() };
+                Ok(Self { played, options, touches: Ok(touches) })
+            }
+            (None, Err(e)) => Err(e),
+        }
+    }
+
+    /// Measures it, see [`measure`].
+    pub(super) fn measure(
+        &self,
+        body: &Body,
+        measure_options: &MeasureOptions,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Report> {
+        let touches = self.touches.as_ref().ok();
+        let mut report = measure(body, &self.options, &self.played, touches, measure_options, progress)?;
+        report.left_out.extend(self.touches.as_ref().err().map(|e| format!("against the truth: {e}")));
+        Ok(report)
+    }
+}
+
+/// What measurements on `input`, or on touches simulated on the body, are kept for.
+pub(super) fn recording(input: Option<&Input>) -> Option<String> {
+    input.map_or(Some("touches".to_owned()), Input::recording)
+}
+
 /// What `somatic plan` calls a row.
 pub(super) fn in_words(row: &Measurement) -> String {
-    let [centroid, orientation] = row.judged();
+    let [place, orientation] = row.judged();
     let mut words = vec![format!("{:.2} µs a frame, p99 {:.2} µs", row.p50_us, row.p99_us)];
-    if centroid.compared > 0 {
-        words.push(format!("centroid within {} mm", number(centroid.p99)));
+    let from = if row.truth.is_some() { "the truth" } else { "the reference" };
+    if place.compared > 0 {
+        words.push(format!("95 % of places within {} mm of {from}", number(place.p95)));
     }
     if orientation.compared > 0 {
-        words.push(format!("orientation within {}°", number(orientation.p99)));
+        words.push(format!("95 % of orientations within {}°", number(orientation.p95)));
+    }
+    if let Some(truth) = row.truth.filter(|truth| truth.given < 1.0) {
+        words.push(format!("given for {:.0} % of the touches, absent for the others", 100.0 * truth.given));
     }
     words.join(", ")
 }

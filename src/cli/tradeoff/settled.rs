@@ -1,10 +1,10 @@
 //! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
 
 use somatic::scene::{Coverage, OrientationBy};
-use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day, measure};
+use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::measured::{in_words, made_up, measure_options, missed, played, software};
+use super::measured::{Tested, in_words, made_up, measure_options, missed, played, software};
 use crate::cli::input::Input;
 use crate::cli::scene::RunOptions;
 use crate::cli::stdio::say;
@@ -75,9 +75,12 @@ pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &
             let played = again.map(|input| played(input, asked, &ids, BRIEF_FRAMES)).transpose()?;
             let played = played.unwrap_or_else(|| made_up(body, ids.clone()));
             let brief = measure_options(asked, &options, BRIEF_S)?;
-            let measured = measure(body, &options, &played, &brief, &mut |_| true);
-            // The first frames of a recording may touch nothing.
-            let measured = measured.or_else(|_| measure(body, &options, &made_up(body, ids), &brief, &mut |_| true))?;
+            let mut tested = Tested::new(body, &options, Some(played), BRIEF_FRAMES)?;
+            let measured = tested.measure(body, &brief, &mut |_| true).or_else(|_| {
+                // The first frames of a recording may touch nothing.
+                tested.played = made_up(body, ids);
+                tested.measure(body, &brief, &mut |_| true)
+            })?;
             let when = format!("briefly, just now, on {}", measured.source);
             (measured, when)
         }

@@ -19,6 +19,7 @@ mod truth;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -58,7 +59,14 @@ pub struct SimulatedSource {
 struct LinkTouch {
     touch: Touch,
     link: String,
-    taxels: Vec<(DVec3, DVec3)>,
+    taxels: Arc<[(DVec3, DVec3)]>,
+}
+
+/// What becomes of a touch that the body has no place for.
+#[derive(Clone, Copy, PartialEq)]
+enum WrongTouch {
+    Refuse,
+    LeaveOut,
 }
 
 impl SimulatedSource {
@@ -100,7 +108,7 @@ impl SimulatedSource {
         let text = Text(text);
         let opened = text.parse().and_then(|file| {
             let body = load_body(text, &file, folder)?;
-            Self::new(name, text, &file, body)
+            Self::new(name, text, &file, body, WrongTouch::Refuse)
         });
         opened.map_err(|e| e.at(name))
     }
@@ -111,10 +119,19 @@ impl SimulatedSource {
     /// As [`SimulatedSource::open`].
     pub fn on_body(name: &str, text: &str, body: Body) -> Result<Self> {
         let text = Text(text);
-        text.parse().and_then(|file| Self::new(name, text, &file, body)).map_err(|e| e.at(name))
+        text.parse().and_then(|file| Self::new(name, text, &file, body, WrongTouch::Refuse)).map_err(|e| e.at(name))
     }
 
-    fn new(name: &str, text: Text<'_>, file: &File, body: Body) -> Result<Self> {
+    /// As [`SimulatedSource::on_body`], without the touches that the body's surface has no place for.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`], but for those touches.
+    pub(crate) fn on_body_where_it_can(name: &str, text: &str, body: Body) -> Result<Self> {
+        let text = Text(text);
+        text.parse().and_then(|file| Self::new(name, text, &file, body, WrongTouch::LeaveOut)).map_err(|e| e.at(name))
+    }
+
+    fn new(name: &str, text: Text<'_>, file: &File, body: Body, wrong: WrongTouch) -> Result<Self> {
         let rate_hz = text.positive("rate_hz", &file.rate_hz)?;
         let duration_s = text.positive("duration_s", &file.duration_s)?;
         // 0.3 s at 10 Hz are three frames, although 0.3 · 10 is a little over 3.
@@ -139,15 +156,22 @@ impl SimulatedSource {
         let skin = setup.skin(file.skin.as_ref())?;
         let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let mut touches = Vec::with_capacity(file.touch.len());
+        let mut places = BTreeMap::new();
         for (index, keys) in file.touch.iter().enumerate() {
-            let touch = setup.touch(index, keys.get_ref())?;
-            let places = taxels.iter().map(|&(taxel, _)| {
-                let taxel = &body.taxels[taxel];
-                let link_from_taxel = body.rest_transform(touch.link, taxel.link);
-                let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
-                (link_from_taxel.transform_point3(taxel.position_in_link), normal)
-            });
-            let places = places.collect();
+            let touch = match (setup.touch(index, keys.get_ref()), wrong) {
+                (Err(_), WrongTouch::LeaveOut) => continue,
+                (touch, _) => touch?,
+            };
+            let in_link = || -> Arc<[(DVec3, DVec3)]> {
+                let place = |&(taxel, _): &(usize, f64)| {
+                    let taxel: &Taxel = &body.taxels[taxel];
+                    let link_from_taxel = body.rest_transform(touch.link, taxel.link);
+                    let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
+                    (link_from_taxel.transform_point3(taxel.position_in_link), normal)
+                };
+                taxels.iter().map(place).collect()
+            };
+            let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
             touches.push(LinkTouch { link: body.links[touch.link].name.clone(), touch, taxels: places });
         }
         Ok(Self {
@@ -237,7 +261,9 @@ impl SimulatedSource {
         let along = touch.path.direction(&place, angle.unwrap_or(0.0));
         let across = along.cross(place.normal_in_link);
         let footprint = Footprint::new(&touch.indenter, &self.skin, force_newton);
-        for ((force, (position, normal)), (_, side_m)) in self.forces_newton.iter_mut().zip(taxels).zip(&self.taxels) {
+        for ((force, (position, normal)), (_, side_m)) in
+            self.forces_newton.iter_mut().zip(taxels.iter()).zip(&self.taxels)
+        {
             let offset = *position - place.position_in_link;
             if normal.dot(place.normal_in_link) > 0.0 && offset.dot(place.normal_in_link).abs() <= footprint.depth_m() {
                 *force += force_newton * footprint.share_on(offset.dot(across), offset.dot(along), *side_m);

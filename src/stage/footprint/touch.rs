@@ -84,6 +84,10 @@ impl<R: Real> Start<R> {
 /// A taxel's noise counts as at least this part of the touch's largest pressure: what it is taken for where it is not known.
 const LEAST_NOISE: f64 = 1e-3;
 const UNKNOWN_NOISE: f64 = 1e-2;
+/// A place farther than this outside of all sensors, in σ, is a guess: nothing on its other side feels it.
+const BEYOND: f64 = 0.5;
+/// Moves after which a place is as far from the hull as has been found: it is at its edge.
+const MOVES: usize = 32;
 /// Half of a segment's length starts at least here, in σ.
 const SHORTEST_HALF: f64 = 0.5;
 
@@ -121,9 +125,34 @@ impl Touch {
         &self.sensors
     }
 
-    /// Whether a sensor is near `place`.
+    /// Whether `place` is between sensors: near one, and not beyond the outermost.
     pub(super) fn reaches(&self, place: DVec2) -> bool {
-        self.sensors.iter().any(|sensor| DVec2::from_array(sensor.at).distance(place) <= self.reach)
+        let at = |sensor: &Sensor<f64>| DVec2::from_array(sensor.at);
+        self.sensors.iter().any(|sensor| at(sensor).distance(place) <= self.reach) && !self.is_beyond(place)
+    }
+
+    /// Whether `place` is farther than [`BEYOND`] from the convex hull of the sensors, by Gilbert's algorithm (1966): the place in the
+    /// hull that is nearest so far moves towards the sensor that is farthest in the direction of `place`.
+    fn is_beyond(&self, place: DVec2) -> bool {
+        let at = |sensor: &Sensor<f64>| DVec2::from_array(sensor.at);
+        let Some(mut nearest) = self.sensors.first().map(at) else { return true };
+        for _ in 0..MOVES {
+            let out = place - nearest;
+            let distance = out.length();
+            if distance <= BEYOND {
+                return false;
+            }
+            let ahead = |sensor: &Sensor<f64>| out.dot(at(sensor));
+            let Some(farthest) = self.sensors.iter().max_by(|a, b| ahead(a).total_cmp(&ahead(b))) else { return true };
+            // All sensors lie behind the line through it.
+            if out.dot(place - at(farthest)) > BEYOND * distance {
+                return true;
+            }
+            let way = at(farthest) - nearest;
+            let share = out.dot(way) / way.length_squared().max(f64::MIN_POSITIVE);
+            nearest += way * share.clamp(0.0, 1.0);
+        }
+        false
     }
 
     /// Where its descents start: from its second moments. None where taxels are too few for any kind.
