@@ -55,6 +55,9 @@ pub enum Found {
 }
 
 impl Store {
+    /// The recording of measurements on touches that were simulated on the body: they are for every recording.
+    pub const TOUCHES: &str = "touches";
+
     /// The user's store: `somatic/tradeoff` in `$XDG_CACHE_HOME` or `~/.cache`. `None` without such a folder.
     #[must_use]
     pub fn of_user() -> Option<Self> {
@@ -78,7 +81,7 @@ impl Store {
 
     /// The measurement of `options` on `body` that is valid on this machine with this `driver`.
     ///
-    /// It must be of the same `recording`. `None` accepts any recording, for live frames.
+    /// It must be of the same `recording`, or of [`Store::TOUCHES`]. `None` accepts any recording, for live frames.
     #[must_use]
     pub fn find(&self, body: &Body, options: &Options, driver: &str, recording: Option<&str>) -> Found {
         let path = self.file(body, options);
@@ -102,7 +105,7 @@ impl Store {
         ];
         match differs.iter().find(|(differs, _)| *differs) {
             Some((_, why)) => useless(why),
-            None if recording.is_some_and(|recording| recording != stored.recording) => Found::Nothing,
+            None if recording.is_some_and(|of| ![of, Self::TOUCHES].contains(&&*stored.recording)) => Found::Nothing,
             None => Found::Fresh(Box::new(stored)),
         }
     }
@@ -217,6 +220,9 @@ mod tests {
             }
         }
         assert!(matches!(store.find(&body, &options, "a", Some("another")), Found::Nothing));
+        store.keep(&body, &options, "a", Store::TOUCHES, &report).unwrap();
+        assert!(matches!(store.find(&body, &options, "a", Some("another")), Found::Fresh(_)));
+        store.keep(&body, &options, "a", "touch", &report).unwrap();
         assert!(why(find(&body, &options, "b")).contains("other GPU drivers"));
         let mut moved = body.clone();
         moved.taxels[0].position_in_link.x += 1e-3;

@@ -3,7 +3,7 @@
 use somatic::signal::Frame;
 use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{
-    CallMode, MeasureOptions, Measurement, Pick, Report, SimulatedTouches, Target, TestFrames, measure,
+    CallMode, MeasureOptions, Measurement, Pick, Report, SimulatedTouches, Store, Target, TestFrames, measure,
 };
 use somatic::{BackendKind, Body, Error, Options, Result};
 
@@ -113,7 +113,7 @@ impl Tested {
 
 /// What measurements on `input`, or on touches simulated on the body, are kept for.
 pub(super) fn recording(input: Option<&Input>) -> Option<String> {
-    input.map_or(Some("touches".to_owned()), Input::recording)
+    input.map_or(Some(Store::TOUCHES.to_owned()), Input::recording)
 }
 
 /// What `somatic plan` calls a row.
