@@ -39,24 +39,24 @@ const SHORTENED: [(&str, &str); 10] = [
     ),
     ("somatic tradeoff", "somatic tradeoff --seconds 0.1 --frames 60"),
     (
-        "somatic tradeoff --source sim:examples/simulations/rod.toml --fields hand/back --plot rod.svg",
-        "somatic tradeoff --source sim:examples/simulations/rod.toml --fields hand/back --plot rod.svg --seconds 0.1 --frames 60",
+        "somatic tradeoff --fields hand/back --plot hand.svg",
+        "somatic tradeoff --fields hand/back --plot hand.svg --seconds 0.1 --frames 60",
     ),
     (
-        "somatic tradeoff --source sim:examples/simulations/rod.toml --fields hand/back --all --plot hand.svg",
-        "somatic tradeoff --source sim:examples/simulations/rod.toml --fields hand/back --all --plot hand.svg --seconds 0.1 --frames 60",
+        "somatic tradeoff --body grid.glb --plot grid.svg",
+        "somatic tradeoff --body grid.glb --plot grid.svg --seconds 0.1 --frames 60",
     ),
     (
-        "somatic tradeoff --source sim:examples/simulations/mat.toml --all --plot mat.svg",
-        "somatic tradeoff --source sim:examples/simulations/mat.toml --all --plot mat.svg --seconds 0.1 --frames 20",
+        "somatic tradeoff --body dense.glb --plot humanoid.svg",
+        "somatic tradeoff --body dense.glb --plot humanoid.svg --seconds 0.1 --frames 20",
     ),
     (
-        "somatic tradeoff --source sim:examples/simulations/arm.toml --all --plot humanoid.svg",
-        "somatic tradeoff --source sim:examples/simulations/arm.toml --all --plot humanoid.svg --seconds 0.1 --frames 40",
+        "somatic tradeoff --source sim:examples/simulations/mat.toml --all --seconds 0.2",
+        "somatic tradeoff --source sim:examples/simulations/mat.toml --all --seconds 0.1 --frames 20",
     ),
     (
-        "somatic tradeoff examples/scenes/palm.toml --within '0.5 mm, 2 deg' --write",
-        "somatic tradeoff examples/scenes/palm.toml --within '0.5 mm, 2 deg' --write --seconds 0.1 --frames 250",
+        "somatic tradeoff examples/scenes/palm.toml --within '3 mm, 30 deg' --write",
+        "somatic tradeoff examples/scenes/palm.toml --within '3 mm, 30 deg' --write --seconds 0.1 --frames 250",
     ),
     ("somatic paper --out paper", "somatic paper --quick --out paper"),
     (

@@ -169,8 +169,13 @@ fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {
 fn text(report: &Report, all: bool) -> String {
     let frames = count(report.frames as u64, "frame");
     let mut text = format!("{}, {frames} of {}\n", style(&report.body).bold(), report.source);
-    for line in report.kept_charts.iter().chain(&report.left_out) {
+    const KEPT: usize = 3;
+    for line in report.kept_charts.iter().take(KEPT).chain(&report.left_out) {
         text += &format!("  not measured  {line}\n");
+    }
+    if report.kept_charts.len() > KEPT {
+        let more = report.kept_charts.len() - KEPT;
+        text += &format!("  and {more} more fields in their own charts; --json lists them\n");
     }
     if report.truth {
         text += &truth(report);

@@ -219,6 +219,12 @@ impl Measurement {
         Ok(Combination { backend: backend.parse()?, knobs })
     }
 
+    /// How far it is off, in one number: a degree counts like a millimetre; at a distance of 57 mm they are equal.
+    pub(super) fn off(&self) -> f64 {
+        let [place, orientation] = self.judged();
+        place.p95.hypot(orientation.p95)
+    }
+
     /// Its errors against the truth, or else the reference: place, mm, and orientation, degrees.
     #[must_use]
     pub fn judged(&self) -> [&Errors; 2] {
@@ -272,15 +278,14 @@ impl Report {
         self.rows.iter_mut().zip(fronts).for_each(|(row, front)| row.front = front);
     }
 
-    /// The rungs of `way` from the fastest up: of each method of orientation the fastest row whose places are as near to the truth
-    /// as those of any, and as its orientations.
+    /// The rungs of `way` from the fastest up: of each method of orientation the fastest row of those nearest to the truth.
     #[must_use]
     pub fn rungs(&self, way: CallMode) -> Vec<&Measurement> {
         let rows = self.of(way);
         let is_rung = |row: &&Measurement| {
             let alike = || rows.iter().filter(|other| other.words.orientation_by == row.words.orientation_by);
-            let least = |index: usize| alike().map(|other| other.judged()[index].p95).fold(f64::INFINITY, f64::min);
-            let is_near = |row: &Measurement| (0..2).all(|index| row.judged()[index].p95 <= 1.01 * least(index));
+            let least = alike().map(|other| other.off()).fold(f64::INFINITY, f64::min);
+            let is_near = |row: &Measurement| row.off() <= 1.01 * least;
             is_near(row) && alike().find(|other| is_near(other)).is_some_and(|first| std::ptr::eq(*first, *row))
         };
         rows.iter().copied().filter(is_rung).collect()

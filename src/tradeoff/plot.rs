@@ -138,14 +138,14 @@ impl Panel<'_> {
         let y = decades(places.iter().map(|point| point.1));
         let title = format!("{}: {} {from}", self.way.word(), self.what);
         let (width, _) = area.dim_in_pixel();
-        area.draw_text(&title, &text(24, HPos::Center), (width as i32 / 2, 16)).map_err(cannot)?;
+        area.draw_text(&title, &text(24, HPos::Center), (width as i32 / 2, 26)).map_err(cannot)?;
         let mut chart = ChartBuilder::on(area)
-            .margin_top(36)
+            .margin_top(48)
             .margin_right(36)
             .margin_left(20)
             .set_label_area_size(LabelAreaPosition::Left, 120)
             .set_label_area_size(LabelAreaPosition::Bottom, 72)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())
+            .build_cartesian_2d(x.clone().log_scale(), y.log_scale())
             .map_err(cannot)?;
         chart
             .configure_mesh()
@@ -176,9 +176,16 @@ impl Panel<'_> {
         chart.draw_series(dots(true)).map_err(cannot)?;
         chart.draw_series(dots(false)).map_err(cannot)?;
         if self.truth {
-            let names = self.points.iter().zip(&places).map(|((row, _), at)| {
-                let style = text(20, HPos::Left);
-                EmptyElement::at(*at) + Text::new(row.words.orientation_by.clone(), (14, -12), style)
+            // Names beside their dots, by turns over and under them: left of those on the right, and under the last.
+            let (middle, last) = ((x.start * x.end).sqrt(), places.len() - 1);
+            let names = self.points.iter().zip(&places).enumerate().map(|(index, ((row, _), at))| {
+                let (aligned, beside) = match index {
+                    _ if index == last => (HPos::Center, 0),
+                    _ if at.0 > middle => (HPos::Right, -12),
+                    _ => (HPos::Left, 12),
+                };
+                let over = if index % 2 == 0 && index != last { -14 } else { 18 };
+                EmptyElement::at(*at) + Text::new(row.words.orientation_by.clone(), (beside, over), text(20, aligned))
             });
             chart.draw_series(names).map_err(cannot)?;
         }

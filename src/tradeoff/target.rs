@@ -145,15 +145,10 @@ impl Target {
         rows.retain(|row| report.truth || row.words.orientation_by == report.asked_by);
         let granted = |row: &&&Measurement| self.misses(row).iter().all(|times| *times <= 1.0);
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();
-        let true_to = |row: &Measurement| {
-            let [centroid, orientation] = row.judged();
-            // A degree counts like a millimetre: at a distance of 57 mm they are equal.
-            centroid.p95.hypot(orientation.p95)
-        };
         let picked = if tolerant || self.is_empty() {
             rows.iter().find(granted)
         } else {
-            rows.iter().filter(granted).min_by(|a, b| true_to(a).total_cmp(&true_to(b)))
+            rows.iter().filter(granted).min_by(|a, b| a.off().total_cmp(&b.off()))
         };
         if let Some(row) = picked {
             return Some(Pick { row, missed: Vec::new() });

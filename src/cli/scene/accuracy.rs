@@ -21,18 +21,18 @@ use super::flags::{ACCURACY, one_of};
 pub(in crate::cli) struct Accuracy {
     /// Tolerances by flag; in a file they are two keys.
     #[arg(long, help_heading = ACCURACY, value_name = "LENGTH,ANGLE", value_parser = Target::within,
-        help = "Measure, and use the fastest knobs that keep 99 % of the centroids and orientations within this, such as \
-                '0.5 mm, 2 deg' or one of these")]
+        help = "Measure, and use the fastest method that keeps 95 of 100 places and orientations within this of the truth, such as \
+                '3 mm, 5 deg' or one of these")]
     #[serde(skip)]
     pub(in crate::cli) within: Option<Target>,
 
-    /// How far 99 % of the centroids may be off, such as "0.5 mm".
+    /// How far 95 of 100 places may be from the truth, such as "3 mm".
     #[arg(skip)]
     #[serde(deserialize_with = "metres")]
     #[schemars(with = "Option<String>")]
     centroid: Option<f64>,
 
-    /// How far 99 % of the orientations may be turned, such as "2 deg".
+    /// How far 95 of 100 orientations may be turned from it, such as "5 deg".
     #[arg(skip)]
     #[serde(deserialize_with = "radians")]
     #[schemars(with = "Option<String>")]
