@@ -72,6 +72,7 @@ pub mod error;
 pub mod field;
 #[cfg(feature = "cli")]
 pub mod figure;
+pub mod gains;
 #[cfg(feature = "cli")]
 mod ink;
 mod keys;

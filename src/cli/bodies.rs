@@ -3,7 +3,19 @@
 use std::path::Path;
 
 use somatic::error::nearest;
+use somatic::source::Source;
 use somatic::{Body, Error, Result, bundled};
+
+/// The ids that `source` delivers, each of which `body` must have.
+pub(super) fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
+    match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
+        Some(id) => Err(Error::failed(format!(
+            "the source has taxel {id}, and the body has none of that number; is it for another body?"
+        ))
+        .at(&body.name)),
+        None => Ok(source.taxels().to_vec()),
+    }
+}
 
 /// The body in the file `name`, or the bundled one of that name where there is no such file.
 pub(super) fn load_body(name: &str) -> Result<Body> {

@@ -1,5 +1,7 @@
 //! `somatic calibrate`: from a rest and a press to a calibration file.
 
+mod skin;
+
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -8,9 +10,10 @@ use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
 use somatic::source::{Lines, Source, SourceSpec, VendorOptions};
+use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
-use super::bodies::load_body;
+use super::bodies::{in_body, load_body};
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
@@ -26,9 +29,11 @@ Examples:
   robot-driver | somatic calibrate --body robot.glb --source - --bits 10 -o robot.toml
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
+  somatic calibrate --body robot.glb --skin touches.csv --calibration robot.toml -o skin.toml
 
 First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one
 after the other or many at once, until the recording ends, --press seconds are over, or Ctrl-C.
+--skin needs no rest and no order: a finger that wanders over the skin for two minutes.
 docs/calibration.md describes the file.";
 
 /// Find baselines, noise, direction and range of a robot's sensors, and write them down as its calibration.
@@ -40,8 +45,23 @@ pub(super) struct Arguments {
     body: String,
 
     /// Where frames come from: as for `somatic run`; serial lines may be several.
-    #[arg(long = "source", value_name = "SOURCE", required = true)]
+    #[arg(long = "source", value_name = "SOURCE", required_unless_present = "skin")]
     sources: Vec<String>,
+
+    /// Find each sensor's gain and how wide the layer makes a contact, from ordinary touches that move about; writes them into
+    /// the calibration that --calibration names.
+    #[arg(long, value_name = "RECORDING", requires = "calibration",
+        conflicts_with_all = ["sources", "plot", "press", "bits", "equalise", "mask_moved"])]
+    skin: Option<String>,
+
+    /// For --skin: the calibration with baselines and dead bands, which gains are added to.
+    #[arg(long, value_name = "FILE.toml", requires = "skin")]
+    calibration: Option<PathBuf>,
+
+    /// For --skin: the touches are all by the flat end of a stamp of this radius, such as 6mm, so that the layer's own σ is told
+    /// apart from the contact's size.
+    #[arg(long, value_name = "RADIUS", requires = "skin", value_parser = length)]
+    stamp: Option<f64>,
 
     #[command(flatten)]
     lines: LineFlags,
@@ -89,8 +109,9 @@ pub(super) struct Arguments {
 
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
-    let read =
-        FilesRead::default().bodies([&arguments.body]).sources(&arguments.sources).files(&arguments.lines.wiring);
+    let sources: Vec<String> = arguments.sources.iter().chain(&arguments.skin).cloned().collect();
+    let read = FilesRead::default().bodies([&arguments.body]).sources(&sources).files(&arguments.lines.wiring);
+    let read = read.files(&arguments.calibration);
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
@@ -98,6 +119,11 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     }
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let body = load_body(&arguments.body)?;
+    if let Some(recording) = &arguments.skin {
+        let touches =
+            skin::Touches { recording, calibration: arguments.calibration.as_deref(), rate_hz: arguments.rate };
+        return skin::calibrate(&touches, &body, arguments.stamp, to, arguments.json);
+    }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;
     let (source, lines): (Box<dyn Source + Send>, _) = if ports.is_empty() {
@@ -148,17 +174,6 @@ fn first_of(sources: &[String]) -> Result<SourceSpec> {
 /// Says what is to be said of serial lines.
 fn tell(lines: &Lines) {
     lines.notices().iter().for_each(|notice| say(&notice.to_string()));
-}
-
-/// The ids that `source` delivers, each of which `body` must have.
-fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
-    match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
-        Some(id) => Err(Error::failed(format!(
-            "the source has taxel {id}, and the body has none of that number; is it for another body?"
-        ))
-        .at(&body.name)),
-        None => Ok(source.taxels().to_vec()),
-    }
 }
 
 /// What a calibration calls `body`: its file's name without folder and ending.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
 use super::truth::{OfTouches, Truths};
-use super::{CallMode, Combination, Measurement, Report, SimulatedTouches};
+use super::{CallMode, Combination, Measurement, Report, SimulatedTouches, TestFrames};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
@@ -15,20 +15,6 @@ use crate::field::{FieldSet, Recharted};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Charts, Knobs, OrientationBy, Scene};
 use crate::signal::Frame;
-use crate::source::Truth;
-
-/// Frames, and their truth if known.
-#[derive(Clone, Debug, Default)]
-pub struct TestFrames {
-    /// Their source, for display.
-    pub source: String,
-    /// The ids of their taxels.
-    pub taxels: Vec<u32>,
-    /// The frames.
-    pub frames: Vec<Frame>,
-    /// Per frame; empty if unknown.
-    pub truth: Vec<Vec<Truth>>,
-}
 
 /// Settings of a measurement.
 #[derive(Clone, Debug)]

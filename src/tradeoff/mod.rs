@@ -5,6 +5,7 @@
 //! the reference in the layout's own charts, and with the truth if the source has it.
 
 mod errors;
+mod frames;
 mod ladder;
 mod measure;
 mod plot;
@@ -18,8 +19,9 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 pub use errors::{Errors, TrueErrors};
+pub use frames::TestFrames;
 pub use ladder::{Rung, ladder};
-pub use measure::{MeasureOptions, TestFrames, measure};
+pub use measure::{MeasureOptions, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
 pub use target::{Pick, Target, angle, length, time};

@@ -144,7 +144,8 @@ fn touches(fields: &[&PlanField], count: usize) -> String {
         let [least, most] = indenter.newtons;
         let newtons = least + (most - least) * random.unit();
         let angle = 180.0 * random.unit();
-        let (name, t_s) = (toml::Value::from(field.name.as_str()), (touch + 1) as f64 / RATE_HZ);
+        // JSON's strings are TOML's, too.
+        let (name, t_s) = (serde_json::Value::from(field.name.as_str()), (touch + 1) as f64 / RATE_HZ);
         let (from_s, to_s) = (t_s - 0.25 / RATE_HZ, t_s + 0.25 / RATE_HZ);
         let _ = writeln!(text, "[[touch]]\non = {name}\n{}\npath = [[{}, {}]]", indenter.keys, place.x, place.y);
         if indenter.is_long {

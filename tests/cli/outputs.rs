@@ -131,6 +131,12 @@ const WRITTEN: &[Written] = &[
         reads: &["hand.glb", "touch.csv"],
     },
     Written {
+        flag: "--output",
+        command: "calibrate --body hand.glb --skin touch.csv --calibration cal.toml --output OUT",
+        ending: "",
+        reads: &["hand.glb", "touch.csv", "cal.toml"],
+    },
+    Written {
         flag: "--plot",
         command: "calibrate --body hand.glb --source serial:nowhere --wiring wiring.toml --output new.toml --plot OUT",
         ending: ".svg",
@@ -462,6 +468,7 @@ const READ: &[&str] = &[
     "--icub",
     "--package",
     "--urdf-skin",
+    "--skin",
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
@@ -502,6 +509,7 @@ const NO_FILES: &[&str] = &[
     "PIXELS",
     "REST",
     "ROWSxCOLUMNS",
+    "RADIUS",
     "S",
     "SEED",
     "SHELL",

@@ -26,6 +26,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("scene", vec!["error", "length", "percept", "signal", "body", "field", "stage"]),
         ("backend", [&below_backend[..], &["parallel"]].concat()),
         ("engine", [&below_backend[..], &["backend", "parallel"]].concat()),
+        ("gains", [&below_backend[..], &["backend", "engine"]].concat()),
         ("wire", vec!["error"]),
         ("recording", vec!["error", "output", "signal", "body"]),
         (

@@ -14,6 +14,7 @@ mod extremes;
 mod filter;
 mod firmware;
 mod footprint;
+mod gains;
 mod gate;
 mod geodesic;
 mod grouping;

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::descent::{Fitted, STEPS, descend};
-use super::kinds::{Blob, Line, Point, Segment};
+use super::kinds::{Blob, Contact, Kind as _, Line, Point, Segment};
 use super::objective::Sensor;
 use super::real::Real;
 use super::shape::{Parameter, Shape};
@@ -127,7 +127,6 @@ impl Candidate {
     }
 
     fn all(fits: &Fits<f64>) -> Vec<Self> {
-        use super::kinds::Kind as _;
         let mut all = vec![
             Self::of(ContactKind::Point, Point::FREE, &fits.point),
             Self::of(ContactKind::Line, Line::FREE, &fits.line),
@@ -140,15 +139,47 @@ impl Candidate {
     }
 }
 
+/// What the contact that explains a touch best makes its taxels feel.
+pub(crate) struct Explained {
+    /// By taxel, in the unit of P.
+    pub(crate) felt: Vec<f64>,
+    /// The standard deviation of its pressure across, at the sensors.
+    pub(crate) width_m: f64,
+}
+
 impl Touch {
-    /// The footprint of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
-    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Footprint>, Flags) {
+    /// What the best of `fits` makes the taxels feel, however well it explains them: what they differ by may be their gains.
+    pub(crate) fn explained(&self, fits: &Fits<f64>) -> Option<Explained> {
+        let best = self.best(Some(fits))?;
+        if best.ahead > AT_REST || !self.reaches(DVec2::from_array(best.shape.place)) {
+            return None;
+        }
+        let contact = Contact::of(&best.shape);
+        let felt = |sensor: &Sensor<f64>| {
+            let (at, margin) = (sensor.at, sensor.margin);
+            let felt = match best.kind {
+                ContactKind::Point => Point::felt(&contact, at, margin).0,
+                ContactKind::Line => Line::felt(&contact, at, margin).0,
+                ContactKind::Segment => Segment::felt(&contact, at, margin).0,
+                ContactKind::Blob => Blob::felt(&contact, at, margin).0,
+            };
+            felt * self.peak
+        };
+        let width_m = libm::exp(best.shape.width) * self.unit_m;
+        Some(Explained { felt: self.sensors().iter().map(felt).collect(), width_m })
+    }
+
+    /// The kind with the least cost of those that the taxels are enough for.
+    fn best(&self, fits: Option<&Fits<f64>>) -> Option<Candidate> {
         let mut candidates = fits.map_or(Vec::new(), Candidate::all);
         candidates.retain(|candidate| self.pressed > candidate.parameters);
         let penalised = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
-        let Some(best) = candidates.iter().min_by(|a, b| penalised(a).total_cmp(&penalised(b))) else {
-            return (None, Flags::FEW_TAXELS);
-        };
+        candidates.into_iter().min_by(|a, b| penalised(a).total_cmp(&penalised(b)))
+    }
+
+    /// The footprint of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
+    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Footprint>, Flags) {
+        let Some(best) = self.best(fits) else { return (None, Flags::FEW_TAXELS) };
         let spare = (self.pressed - best.parameters) as f64;
         // Not a number is not within either. Of a descent that is cut short there is less to ask.
         let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare;
@@ -156,7 +187,7 @@ impl Touch {
         if !(explains && rests) {
             return (None, Flags::POOR_FIT);
         }
-        self.checked(best)
+        self.checked(&best)
     }
 
     fn checked(&self, best: &Candidate) -> (Option<Footprint>, Flags) {

@@ -37,6 +37,6 @@ mod touch;
 
 pub(crate) use choice::{Fits, Footprint, fit};
 pub(crate) use descent::STEPS;
-pub(crate) use objective::Sensor;
+pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};
