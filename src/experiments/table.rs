@@ -133,6 +133,10 @@ struct Scores {
     /// Degrees.
     two_points: Errors,
     axis: Errors,
+    /// The place of the fitted contact, as `centroid`, and its angle.
+    footprint_place: Errors,
+    footprint: Errors,
+    fitted: u64,
     /// Frames flagged `tie`; those of them in which two points are over [`ACROSS_DEG`] off; and all such frames.
     tied: u64,
     tied_across: u64,
@@ -158,17 +162,21 @@ impl Scores {
         let percept = &moment.percepts[signal];
         self.frames += 1;
         self.felt += u64::from(percept.contact);
-        if let Some((seen, right)) = percept.centroid.zip(truth.uv) {
+        self.fitted += u64::from(percept.footprint_place.is_some());
+        let place = |errors: &mut Errors, seen: Option<[f64; 2]>| {
+            let Some((seen, right)) = seen.zip(truth.uv) else { return };
             let error = [(seen[0] - right[0]) * 1e3, (seen[1] - right[1]) * 1e3];
-            self.centroid
-                .add(truth.angle.map_or_else(|| libm::hypot(error[0], error[1]), |angle| across(error, angle)));
-        }
+            errors.add(truth.angle.map_or_else(|| libm::hypot(error[0], error[1]), |angle| across(error, angle)));
+        };
+        place(&mut self.centroid, percept.centroid);
+        place(&mut self.footprint_place, percept.footprint_place);
         if let Some(right) = truth.angle {
             let compare = |errors: &mut Errors, seen: Option<f64>| {
                 seen.into_iter().for_each(|seen| errors.add(between_lines(seen, right).to_degrees()));
             };
             compare(&mut self.two_points, percept.orientation);
             compare(&mut self.axis, percept.axis);
+            compare(&mut self.footprint, percept.footprint_angle);
             let tied = percept.flags.contains(Flags::TIE);
             let is_across = |seen: f64| between_lines(seen, right).to_degrees() > ACROSS_DEG;
             let across = percept.orientation.is_some_and(is_across);
@@ -194,6 +202,9 @@ impl Scores {
         self.centroid.merge(&other.centroid);
         self.two_points.merge(&other.two_points);
         self.axis.merge(&other.axis);
+        self.footprint_place.merge(&other.footprint_place);
+        self.footprint.merge(&other.footprint);
+        self.fitted += other.fitted;
         self.tied += other.tied;
         self.tied_across += other.tied_across;
         self.across += other.across;
@@ -220,6 +231,10 @@ struct TableRow {
     centroid_mm: Option<Spread>,
     two_points_deg: Option<Spread>,
     axis_deg: Option<Spread>,
+    /// Of the fitted contacts, and in how many of the frames in contact there is one.
+    footprint_mm: Option<Spread>,
+    footprint_deg: Option<Spread>,
+    fitted_percent: Option<f64>,
     speed_percent: Option<Spread>,
     speed_over_100_ms_percent: Option<Spread>,
     radial_speed_percent: Option<Spread>,
@@ -257,6 +272,9 @@ impl TableRow {
             centroid_mm: spread(|scores| &scores.centroid),
             two_points_deg: spread(|scores| &scores.two_points),
             axis_deg: spread(|scores| &scores.axis),
+            footprint_mm: spread(|scores| &scores.footprint_place),
+            footprint_deg: spread(|scores| &scores.footprint),
+            fitted_percent: (scores.fitted > 0).then(|| 100.0 * scores.fitted as f64 / scores.felt.max(1) as f64),
             speed_percent: spread(|scores| &scores.speed),
             speed_over_100_ms_percent: spread(|scores| &scores.steady_speed),
             radial_speed_percent: spread(|scores| &scores.radial_speed),
@@ -314,21 +332,25 @@ impl Table {
         let mut text = format!(
             "Each cell is RMS / worst over all frames of all angles and, with noise, of {SEEDS} seeds; in brackets the\n\
              lowest and the highest RMS of a seed, where they differ.\n\n\
-             | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | two points ° | principal axis ° | \
-             speed % | speed over 0.1 s % |\n|---|---|---|---|---|---|---|---|---|---|\n",
+             | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | footprint mm | two points ° | \
+             principal axis ° | footprint ° | footprint in % | speed % | speed over 0.1 s % |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for row in &self.over_all_angles {
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {:.0} | {} | {} | {} | {} | {} |",
+                "| {} | {} | {} | {} | {:.0} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 row.indenter,
                 row.signal,
                 row.speed_mm_s,
                 row.noise_counts,
                 row.felt_percent,
                 cell(row.centroid_mm, 2),
+                cell(row.footprint_mm, 2),
                 cell(row.two_points_deg, 1),
                 cell(row.axis_deg, 1),
+                cell(row.footprint_deg, 1),
+                row.fitted_percent.map_or_else(|| "–".to_owned(), |share| format!("{share:.0}")),
                 cell(row.speed_percent, 0),
                 cell(row.speed_over_100_ms_percent, 0),
             );
@@ -336,19 +358,20 @@ impl Table {
         let _ = write!(
             text,
             "\nRods by angle, {DEFAULT_SPEED_MM_S} mm/s, noise of {DEFAULT_NOISE_COUNTS} count, RMS / worst.\n\n\
-             | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | centroid mm, raw | \
-             linearised |\n|---|---|---|---|---|---|---|\n",
+             | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | footprint °, linearised | \
+             centroid mm, raw | linearised |\n|---|---|---|---|---|---|---|---|\n",
         );
         for rows in self.rods_by_angle.chunks(2) {
             let [raw, linearised] = rows else { continue };
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
                 raw.angle_deg.unwrap_or(0.0),
                 cell(raw.two_points_deg, 1),
                 cell(linearised.two_points_deg, 1),
                 cell(raw.axis_deg, 1),
                 cell(linearised.axis_deg, 1),
+                cell(linearised.footprint_deg, 1),
                 cell(raw.centroid_mm, 2),
                 cell(linearised.centroid_mm, 2),
             );

@@ -7,7 +7,7 @@ use somatic::body::Body;
 use somatic::error::Result;
 use somatic::percept::{Outputs, Percept};
 use somatic::scene::{FilterBy, MotionFilter, Scene};
-use somatic::signal::{Frame, FsrCircuit, RawValue};
+use somatic::signal::{Calibration, Frame, FsrCircuit, RawValue, SkinResponse};
 use somatic::source::{SimulatedSource, Source as _, Truth};
 use somatic::{Engine, Options};
 
@@ -43,6 +43,22 @@ impl Signal {
             Self::Linearised => circuit.linearised(counts, FsrCircuit::SATURATION_NEWTON),
         }
     }
+}
+
+/// σ of the layer in the paper's experiments, m: 7 mm of silicone.
+const SIGMA_M: f64 = 7e-3 * 0.577_350_269_189_625_8;
+
+/// What the percepts of `signal` know of the sensors: nothing, but for what fits of contacts need where it is in proportion to the force.
+fn calibration(signal: Signal, taxels: usize) -> Option<Calibration> {
+    if signal == Signal::Raw {
+        return None;
+    }
+    let mut calibration = Calibration::identity(taxels);
+    // The smallest value that is not 0: below it, one of 0 says nothing.
+    let least = signal.value(FsrCircuit::OPEN_COUNTS - Signal::DEAD_BAND_COUNTS - 1);
+    calibration.taxels.iter_mut().for_each(|taxel| taxel.dead_band = (1.0 - 1e-6) * least);
+    calibration.skin = Some(SkinResponse { sigma_m: SIGMA_M, gain_spread: SkinResponse::GAIN_SPREAD });
+    Some(calibration)
 }
 
 /// From about the noise of a frame to half of the sensors' pitch.
@@ -133,13 +149,19 @@ impl Series {
 
     fn with_percepts(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
         let mut percepts = Vec::with_capacity(2);
-        for frames in &self.signals {
+        for (signal, frames) in Signal::ALL.into_iter().zip(&self.signals) {
+            let calibration = calibration(signal, source.body().taxels.len());
+            let fitted = if calibration.is_some() { Outputs::FOOTPRINT } else { Outputs::empty() };
+            let moments = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
             let scene = Scene::default()
-                .outputs(Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | Outputs::MOTION | Outputs::FILTERED)
+                .outputs(moments | fitted | Outputs::MOTION | Outputs::FILTERED)
                 .filter(filter())
                 .fields(vec![field.to_owned()]);
-            let options =
-                Options::default().scene(scene).calibration(None).backend(BackendKind::Reference).batch(frames.len());
+            let options = Options::default()
+                .scene(scene)
+                .calibration(calibration)
+                .backend(BackendKind::Reference)
+                .batch(frames.len());
             let mut engine = Engine::new(source.body(), options)?;
             engine.set_channels(source.taxels())?;
             let batch = engine.process(frames)?;
