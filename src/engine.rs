@@ -1,10 +1,12 @@
 //! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
 
 mod advance;
+mod block;
 mod cadence;
 mod check;
 mod fit;
 mod ids;
+mod input;
 mod place;
 mod post;
 mod state;
@@ -13,6 +15,7 @@ mod upkeep_state;
 use self::cadence::OnChange;
 use self::check::Check;
 use self::ids::ranges;
+use self::input::Input;
 use self::place::Links;
 use self::post::PostState;
 pub use self::state::EngineState;
@@ -95,6 +98,8 @@ pub struct Engine {
     /// Whether the calibration may change while the engine runs, by upkeep or tare.
     recalibrates: bool,
     frames_done: u64,
+    /// Times and poses of frames that came in one slice, for the next such call.
+    heads: Vec<Frame>,
     ids: Vec<u32>,
     links: Links,
     /// Fields that could not have the kind of chart that is asked for.
@@ -156,6 +161,7 @@ impl Engine {
             picks: None,
             tare,
             frames_done: 0,
+            heads: Vec::new(),
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
             links: Links {
                 posed: scene.coordinates == Coordinates::World,
@@ -254,7 +260,7 @@ impl Engine {
     /// the device was lost.
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
         self.check = None;
-        self.advance(frames, None)?;
+        self.advance(Input::of(frames), None, None)?;
         Ok(&self.percepts)
     }
 
@@ -305,7 +311,7 @@ impl Engine {
             Some(check) => check,
             None => Box::new(Check::new(&self.plan, &self.backend.state()?, &self.post)?),
         };
-        self.advance(frames, Some(&mut check))?;
+        self.advance(Input::of(frames), Some(&mut check), None)?;
         let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
         let agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
         self.check = Some(check);

@@ -87,6 +87,12 @@ impl Error {
         self
     }
 
+    /// Where it is: a file, then what in it, `: ` between them.
+    #[must_use]
+    pub fn place(&self) -> Option<&str> {
+        self.place.as_deref()
+    }
+
     /// True when the request itself was wrong: arguments that do not exist or do not go together.
     #[must_use]
     pub fn is_usage(&self) -> bool {
@@ -228,6 +234,7 @@ mod tests {
     fn an_error_is_one_line_with_its_place() {
         let error = Error::failed("bad\n  value").at("row 3").at("a.csv");
         assert_eq!(error.to_string(), "a.csv: row 3: bad value");
+        assert_eq!(error.place(), Some("a.csv: row 3"));
         assert_eq!(error.exit_code(), 1);
         assert_eq!(Error::usage("x").exit_code(), 2);
     }

@@ -30,6 +30,7 @@ mod batch;
 mod cells;
 mod columns;
 mod contact_kind;
+mod export;
 mod flags;
 mod keep;
 mod presence;
@@ -40,6 +41,7 @@ pub(crate) use cells::{CellsMut, PlaceCells};
 pub use columns::{COLUMNS, Column, Measure, Outputs, Percept, Unit};
 pub(crate) use columns::{Component, Host, Store};
 pub use contact_kind::ContactKind;
+pub use export::ColumnValues;
 pub use flags::Flags;
 
 /// The arithmetic that made the numbers, and so the digits worth printing.

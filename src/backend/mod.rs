@@ -13,7 +13,7 @@ mod state;
 
 pub(crate) use self::choose::choose;
 pub use self::choose::processor;
-pub(crate) use self::raw::{Picks, RawBatch, Rows, Step};
+pub(crate) use self::raw::{Delivered, Picks, RawBatch, Rows, Step};
 pub(crate) use self::state::{BackendState, FieldState};
 use crate::error::{Error, Result};
 use crate::percept::{Percepts, Precision};

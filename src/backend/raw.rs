@@ -141,7 +141,34 @@ pub(crate) enum Rows<'a> {
     /// Gathered: one frame after the other, each with one value a channel.
     Packed { values: &'a [RawValue], channels: usize },
     /// As the source delivered them, each value where `picks` says.
-    Picked { frames: &'a [Frame], picks: &'a Picks },
+    Picked { frames: Delivered<'a>, picks: &'a Picks },
+}
+
+/// Frames' values as their source delivered them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Delivered<'a> {
+    /// Each frame has its own.
+    Frames(&'a [Frame]),
+    /// In one slice, frame by frame, so many a frame.
+    Flat { values: &'a [RawValue], width: usize },
+}
+
+impl<'a> Delivered<'a> {
+    /// The values of frame `frame`.
+    #[inline(always)]
+    pub(crate) fn row(self, frame: usize) -> &'a [RawValue] {
+        match self {
+            Self::Frames(frames) => &frames[frame].values,
+            Self::Flat { values, width } => &values[frame * width..][..width],
+        }
+    }
+
+    fn part(self, part: Range<usize>) -> Self {
+        match self {
+            Self::Frames(frames) => Self::Frames(&frames[part]),
+            Self::Flat { values, width } => Self::Flat { values: &values[part.start * width..part.end * width], width },
+        }
+    }
 }
 
 impl<'a> Rows<'a> {
@@ -149,7 +176,7 @@ impl<'a> Rows<'a> {
     pub(crate) fn row(self, frame: usize) -> impl Iterator<Item = RawValue> + 'a {
         let (values, picks, channels): (&[RawValue], &[u32], usize) = match self {
             Self::Packed { values, channels } => (&values[frame * channels..], &[], channels),
-            Self::Picked { frames, picks } => (&frames[frame].values, &picks.places, picks.channels),
+            Self::Picked { frames, picks } => (frames.row(frame), &picks.places, picks.channels),
         };
         (0..channels).map(move |channel| values[picks.get(channel).map_or(channel, |&pick| pick as usize)])
     }
@@ -158,7 +185,7 @@ impl<'a> Rows<'a> {
     pub(crate) fn value(self, frame: usize, channel: usize) -> RawValue {
         match self {
             Self::Packed { values, channels } => values[frame * channels + channel],
-            Self::Picked { frames, picks } => frames[frame].values[picks.places[channel] as usize],
+            Self::Picked { frames, picks } => frames.row(frame)[picks.places[channel] as usize],
         }
     }
 
@@ -172,7 +199,7 @@ impl<'a> Rows<'a> {
                 (&values[frame * channels..][..channels], straight.then_some(first)?)
             }
             Self::Picked { frames, picks } => match picks.near[tile] {
-                Near::Straight(from) => (&frames[frame].values[..], from as usize),
+                Near::Straight(from) => (frames.row(frame), from as usize),
                 _ => return None,
             },
         };
@@ -189,7 +216,7 @@ impl<'a> Rows<'a> {
             }
             Self::Picked { frames, picks } => {
                 let from = (*picks.blocks.get(block)?)?;
-                &frames[frame].values[from..from + SLOTS]
+                &frames.row(frame)[from..from + SLOTS]
             }
         };
         Some(bytemuck::cast_slice(values))
@@ -212,7 +239,7 @@ impl<'a> Rows<'a> {
                 }
             }
             Self::Picked { frames, picks } => {
-                let values = &frames[frame].values[..];
+                let values = frames.row(frame);
                 for (bits, &pick) in bits.iter_mut().zip(&picks.places[first..first + count]) {
                     *bits = values[pick as usize].to_bits();
                 }
@@ -226,7 +253,7 @@ impl<'a> Rows<'a> {
             Self::Packed { values, channels } => {
                 Self::Packed { values: &values[part.start * channels..part.end * channels], channels }
             }
-            Self::Picked { frames, picks } => Self::Picked { frames: &frames[part], picks },
+            Self::Picked { frames, picks } => Self::Picked { frames: frames.part(part), picks },
         }
     }
 }

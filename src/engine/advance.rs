@@ -1,19 +1,32 @@
 //! Engine → backend → post-processing: how a call's frames go through.
 
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
 use super::Engine;
 use super::cadence::step;
 use super::check::Check;
+use super::input::{GoOn, Input};
 use super::post::{Post, flag_stale};
-use crate::backend::{FieldState, Picks, RawBatch, Rows};
+use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
-use crate::signal::{Frame, RawValue};
+use crate::signal::RawValue;
+
+/// Frames until `go_on` is asked first.
+const FIRST_PART: usize = 256;
+/// About how long the engine computes until it is asked again.
+const PART: Duration = Duration::from_millis(100);
 
 impl Engine {
-    /// All of `frames`, epoch by epoch where there is upkeep; with `check`, on the reference too.
-    pub(super) fn advance(&mut self, frames: &[Frame], mut check: Option<&mut Check>) -> Result<()> {
-        self.gather(frames)?;
+    /// All of `input`, epoch by epoch where there is upkeep; with `check`, on the reference too. `false` if `go_on` said so.
+    pub(super) fn advance(
+        &mut self,
+        input: Input<'_>,
+        mut check: Option<&mut Check>,
+        mut go_on: Option<GoOn<'_>>,
+    ) -> Result<bool> {
+        let frames = input.frames;
+        self.gather(input)?;
         self.percepts.reset(frames.len());
         self.percepts.first_frame = self.frames_done;
         if let Some(check) = check.as_deref_mut() {
@@ -21,12 +34,14 @@ impl Engine {
         }
         if self.tare && !frames.is_empty() {
             self.tare = false;
-            self.take_as_baselines(&frames[0], check.as_deref_mut());
+            self.take_as_baselines(input, check.as_deref_mut());
         }
         let mut start = 0;
         for index in 0..frames.len() {
             if self.upkeep.as_ref().is_some_and(|state| state.upkeep.is_due(frames[index].t_s)) {
-                self.segment(frames, start..index, check.as_deref_mut())?;
+                if !self.segments(input, start..index, check.as_deref_mut(), &mut go_on)? {
+                    return Ok(false);
+                }
                 self.close_epoch(check.as_deref_mut());
                 start = index;
             }
@@ -35,20 +50,23 @@ impl Engine {
                 state.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }
-        self.segment(frames, start..frames.len(), check.as_deref_mut())?;
+        if !self.segments(input, start..frames.len(), check.as_deref_mut(), &mut go_on)? {
+            return Ok(false);
+        }
         for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
             flag_stale(&self.plan, self.intake.stale(), percepts);
         }
         self.frames_done += frames.len() as u64;
-        Ok(())
+        Ok(true)
     }
 
-    /// Checks `frames`, and brings their values and times into the form that backends read.
-    fn gather(&mut self, frames: &[Frame]) -> Result<()> {
+    /// Checks `input`, and brings its values and times into the form that backends read.
+    fn gather(&mut self, input: Input<'_>) -> Result<()> {
+        let Input { frames, values } = input;
         for (index, frame) in frames.iter().enumerate() {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
-            if frame.values.len() != self.intake.width() {
-                let (got, want) = (frame.values.len(), self.intake.width());
+            let (got, want) = (values.row(index).len(), self.intake.width());
+            if got != want {
                 return Err(at(Error::failed(format!("it has {got} values, and {want} are expected"))));
             }
             if let Some((name, _)) = frame.pose.iter().find(|(name, _)| !self.links.index_of.contains_key(name)) {
@@ -60,8 +78,8 @@ impl Engine {
         self.raw.clear();
         self.intake.forget_stale();
         if self.picks.is_none() {
-            for frame in frames {
-                self.intake.take(frame, &self.plan.body_taxels, &mut self.raw);
+            for (index, frame) in frames.iter().enumerate() {
+                self.intake.take(frame.t_s, values.row(index), &self.plan.body_taxels, &mut self.raw);
             }
         }
         self.steps.clear();
@@ -72,16 +90,44 @@ impl Engine {
         Ok(())
     }
 
+    /// Frames with the same calibration, in parts where `go_on` is to be asked between them: `false` if it said so.
+    fn segments(
+        &mut self,
+        input: Input<'_>,
+        range: Range<usize>,
+        mut check: Option<&mut Check>,
+        go_on: &mut Option<GoOn<'_>>,
+    ) -> Result<bool> {
+        let Some(go_on) = go_on else { return self.segment(input, range, check).map(|()| true) };
+        let (mut start, mut size) = (range.start, FIRST_PART);
+        while start < range.end {
+            let end = range.end.min(start + size);
+            let began = Instant::now();
+            self.segment(input, start..end, check.as_deref_mut())?;
+            start = end;
+            if !go_on(start) {
+                return Ok(false);
+            }
+            match began.elapsed() {
+                took if took < PART / 4 => size *= 4,
+                took if took > 2 * PART => size = (size / 2).max(1),
+                _ => {}
+            }
+        }
+        Ok(true)
+    }
+
     /// Frames with the same calibration: through the backend, then through post-processing.
-    fn segment(&mut self, frames: &[Frame], range: Range<usize>, mut check: Option<&mut Check>) -> Result<()> {
+    fn segment(&mut self, input: Input<'_>, range: Range<usize>, mut check: Option<&mut Check>) -> Result<()> {
         if range.is_empty() {
             return Ok(());
         }
+        let frames = input.frames;
         let channels = self.plan.channels();
         let raw = RawBatch {
             first: range.start,
             frames: range.len(),
-            rows: rows(self.picks.as_ref(), &self.raw, frames, channels).part(range.clone()),
+            rows: rows(self.picks.as_ref(), &self.raw, input.values, channels).part(range.clone()),
             steps: &self.steps[range.clone()],
         };
         let frames = &frames[range.clone()];
@@ -114,10 +160,10 @@ impl Engine {
     }
 
     /// Calibrates from now on with the first gathered frame as the baselines; where it has no number, the file's stays.
-    fn take_as_baselines(&mut self, first: &Frame, check: Option<&mut Check>) {
+    fn take_as_baselines(&mut self, input: Input<'_>, check: Option<&mut Check>) {
         let made = self.plan.taxels.clone();
         let channels = self.plan.channels();
-        let first = rows(self.picks.as_ref(), &self.raw, std::slice::from_ref(first), channels);
+        let first = rows(self.picks.as_ref(), &self.raw, input.values, channels);
         for (channel, value) in first.row(0).enumerate() {
             if let Some(value) = value.number() {
                 self.plan.keep_up(channel, value as f32, false, &made);
@@ -148,10 +194,10 @@ impl Engine {
     }
 }
 
-/// Where the values of `frames` lie: where `picks` says, or gathered in `raw`.
-fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], frames: &'a [Frame], channels: usize) -> Rows<'a> {
+/// Where frames' values lie: in `values` where `picks` says, or gathered in `raw`.
+fn rows<'a>(picks: Option<&'a Picks>, raw: &'a [RawValue], values: Delivered<'a>, channels: usize) -> Rows<'a> {
     match picks {
-        Some(picks) => Rows::Picked { frames, picks },
+        Some(picks) => Rows::Picked { frames: values, picks },
         None => Rows::Packed { values: raw, channels },
     }
 }

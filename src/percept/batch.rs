@@ -120,6 +120,20 @@ impl Percepts {
         self
     }
 
+    /// Whether both have room for the same columns of the same fields.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let shape = |of: &Self| (of.outputs, of.columns, of.fields, of.letters, of.slots, of.precision());
+        shape(self) == shape(other) && Arc::ptr_eq(&self.names, &other.names)
+    }
+
+    /// The same with no frames.
+    pub(crate) fn empty_like(&self) -> Self {
+        Self::new(self.outputs, self.fields, self.precision())
+            .with_columns(self.columns, self.slots)
+            .with_letters(self.letters)
+            .with_names(Arc::clone(&self.names))
+    }
+
     /// Makes room for `frames` frames, every cell empty. Allocates only when a batch is larger than all before it.
     pub(crate) fn reset(&mut self, frames: usize) {
         fn refill<V: Clone>(column: &mut Vec<V>, length: usize, value: V) {

@@ -2,7 +2,7 @@
 //!
 //! It runs on the host, frame by frame, so that all backends get the same input for any batch size.
 
-use super::{Calibration, Frame, RawValue};
+use super::{Calibration, RawValue};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Intake {
@@ -100,14 +100,14 @@ impl Intake {
         slots.iter().map(|&slot| value_of[slot]).collect()
     }
 
-    /// Appends to `out` the values of the taxels `slots` in `frame`.
-    pub(crate) fn take(&mut self, frame: &Frame, slots: &[usize], out: &mut Vec<RawValue>) {
+    /// Appends to `out` the values of the taxels `slots` in the frame at `t_s` with `values`.
+    pub(crate) fn take(&mut self, t_s: f64, values: &[RawValue], slots: &[usize], out: &mut Vec<RawValue>) {
         self.now.fill(RawValue::MISSING);
-        for (&taxel, &value) in self.taxel_of_value.iter().zip(&frame.values) {
+        for (&taxel, &value) in self.taxel_of_value.iter().zip(values) {
             self.now[taxel] = value;
         }
         if self.max_age_s > 0.0 {
-            self.hold(frame.t_s);
+            self.hold(t_s);
         }
         self.note_stale();
         let settling = self.state.frames_seen < self.calibration.checks.settle_frames;
@@ -191,7 +191,7 @@ mod tests {
 
     fn take(intake: &mut Intake, frame: &Frame) -> Vec<RawValue> {
         let mut out = Vec::new();
-        intake.take(frame, &[0, 1, 2], &mut out);
+        intake.take(frame.t_s, &frame.values, &[0, 1, 2], &mut out);
         out
     }
 

@@ -1,5 +1,6 @@
 //! Signals: the sensors' raw values, and their calibration.
 
+mod block;
 mod board_health;
 mod calibration;
 mod curve;
@@ -12,6 +13,7 @@ mod unit;
 mod upkeep;
 mod wiring;
 
+pub use block::FrameBlock;
 pub use board_health::BoardHealth;
 pub use calibration::{
     Calibration, ChangeCalibration, Checks, ContactThresholds, Onset, SkinResponse, TaxelCalibration,

@@ -22,6 +22,8 @@ pub use recorded::RecordingSink;
 pub use spec::{SinkSpec, SinkTarget, TableWish};
 #[cfg(feature = "parquet")]
 pub use table::ParquetSink;
+#[cfg(feature = "arrow")]
+pub use table::{ArrowTable, TableKind};
 pub use table::{CsvSink, TableColumn, TableType, percept_columns, touch_columns};
 
 use std::str::FromStr;

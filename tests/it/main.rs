@@ -4,6 +4,7 @@ mod areas;
 mod author;
 mod batches;
 mod blender;
+mod blocks;
 mod bodies;
 mod change;
 mod common;

@@ -29,7 +29,7 @@ impl<'a> OneFrame<'a> {
     pub(super) fn new(raw: Rows<'a>, frame: usize, calibrated: usize) -> Self {
         let picked = match raw {
             Rows::Packed { .. } => None,
-            Rows::Picked { frames, picks } => Some((bytemuck::cast_slice(&frames[frame].values), picks)),
+            Rows::Picked { frames, picks } => Some((bytemuck::cast_slice(frames.row(frame)), picks)),
         };
         Self { raw, frame, calibrated, picked }
     }
@@ -81,7 +81,7 @@ impl<'a> SomeFrames<'a> {
         for (frame, values) in (first..first + frames).zip(&mut values) {
             *values = bytemuck::cast_slice(match raw {
                 Rows::Packed { values, channels } => &values[frame * channels..][..channels],
-                Rows::Picked { frames, .. } => &frames[frame].values,
+                Rows::Picked { frames, .. } => frames.row(frame),
             });
         }
         Self { raw, first, frames, values }
@@ -245,6 +245,7 @@ pub(crate) fn side_by_side(raw: Rows<'_>, frames: Range<usize>, channels: usize,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::Delivered;
     use crate::signal::{Frame, RawValue};
 
     #[test]
@@ -265,7 +266,7 @@ mod tests {
             let words_a_channel = frames.next_multiple_of(4);
             for (raw, place) in [
                 (Rows::Packed { values: &packed, channels }, (|c, _| c) as fn(usize, usize) -> usize),
-                (Rows::Picked { frames: &picked, picks: &picks }, |c, channels| channels - 1 - c),
+                (Rows::Picked { frames: Delivered::Frames(&picked), picks: &picks }, |c, channels| channels - 1 - c),
             ] {
                 let mut words = vec![0; channels * words_a_channel];
                 for at in (0..frames).step_by(FRAMES) {

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 use super::lanes::{LANES, levels};
 use super::*;
 use crate::backend::raw::{Near, Picks};
-use crate::backend::{Rows, Step};
+use crate::backend::{Delivered, Rows, Step};
 use crate::body::{Body, FieldSpec, Link, MemberSpec, Modality, Taxel};
 use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Precision};
@@ -244,7 +244,7 @@ fn same_bits_however_cut(plan: &Plan, frames: usize) {
         let (rows, picks) = (delivered(&raw, &channels, width), Picks::new(&channels, plan.calibrated(), width));
         for level in levels() {
             assert!(right == run(plan, level, &raw, frames, frames), "{level:?}");
-            let rows = Rows::Picked { frames: &rows, picks: &picks };
+            let rows = Rows::Picked { frames: Delivered::Frames(&rows), picks: &picks };
             assert!(right == run_rows(plan, level, rows, frames, frames), "{level:?}, as delivered");
         }
     }
@@ -276,7 +276,7 @@ fn bits_do_not_depend_on_where_values_lie() {
     for raw in recordings(&plan, FRAMES) {
         let right = run(&plan, Level::new(), &raw, FRAMES, 1);
         let frames = delivered(&raw, &channels, 1203);
-        let rows = Rows::Picked { frames: &frames, picks: &picks };
+        let rows = Rows::Picked { frames: Delivered::Frames(&frames), picks: &picks };
         for level in levels() {
             assert!(right == run_rows(&plan, level, rows, FRAMES, FRAMES), "{level:?}");
         }

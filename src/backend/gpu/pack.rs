@@ -76,7 +76,7 @@ fn pack_rows(raw: &RawBatch<'_>, channels: usize, row: &mut Vec<RawValue>, mut m
         row.clear();
         match raw.rows {
             Rows::Picked { frames, picks } => {
-                let values = &frames[frame].values[..];
+                let values = frames.row(frame);
                 row.extend(picks.places[..channels].iter().map(|&place| values[place as usize]));
             }
             Rows::Packed { values, channels } => row.extend_from_slice(&values[frame * channels..][..channels]),

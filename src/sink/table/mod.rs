@@ -2,11 +2,15 @@
 //!
 //! [`percept_columns`] and [`touch_columns`] list the columns; sinks write by these lists.
 
+#[cfg(feature = "arrow")]
+mod arrow_table;
 mod csv_sink;
 #[cfg(feature = "parquet")]
 mod parquet_sink;
 mod touches_path;
 
+#[cfg(feature = "arrow")]
+pub use arrow_table::{ArrowTable, TableKind};
 pub use csv_sink::CsvSink;
 #[cfg(feature = "parquet")]
 pub use parquet_sink::ParquetSink;
