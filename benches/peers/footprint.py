@@ -3,11 +3,12 @@
 
     benches/peers/footprint.py SOMATIC     after benches/peers/run has made the Python environment; SOMATIC is the program
 
-Simulates examples/simulations/turn.toml, fits every frame 64 times over, checks the angles against somatic's own, and prints the time
-of a touch. `cargo bench --bench footprint` has somatic's.
+Simulates examples/simulations/turn.toml, fits every frame four times over, checks the angles against somatic's own, and takes turns with
+`somatic tradeoff` on the same frames.
 """
 import json
 import math
+import re
 import subprocess
 import sys
 import tempfile
@@ -266,7 +267,10 @@ def newton_at_break(counts, divider, exponent):
 def main(somatic):
     simulation = Path(__file__).resolve().parents[2] / "examples/simulations/turn.toml"
     with tempfile.TemporaryDirectory() as folder:
-        rod = Path(folder, "rod.csv")
+        # Sixteen times as many frames as the example has, so that a call has many.
+        rod, text = Path(folder, "rod.csv"), simulation.read_text()
+        simulation = Path("target/peers/turn.toml")
+        simulation.write_text(re.sub(r"(?m)^rate_hz = (\d+)", lambda rate: f"rate_hz = {16 * int(rate[1])}", text))
         subprocess.run([somatic, "simulate", simulation, "-o", rod], check=True, capture_output=True)
         header = rod.read_text().splitlines()[0].split(",")
         table = np.genfromtxt(rod, delimiter=",", skip_header=1)
@@ -286,13 +290,26 @@ def main(somatic):
     pairs = [(f, t) for f, t in zip(found, theirs) if f[0] > 0 and "footprint_angle" in t]
     apart = [abs((f[3] - t["footprint_angle"] + math.pi / 2) % math.pi - math.pi / 2) for f, t in pairs]
     print(f"{len(pairs)} of {len(found)} are fitted by both; angles differ by up to {math.degrees(max(apart)):.1e} degrees")
-    many = np.tile(pressures, (64, 1)), np.tile(sigmas, (64, 1)), np.zeros((64 * len(pressures), 4))
-    times = []
-    for _ in range(20):
-        begin = time.perf_counter()
-        fit_all(uv, many[0], many[1], threshold, many[2])
-        times.append((time.perf_counter() - begin) / len(many[0]) * 1e6)
-    print(f"numba, {numba.get_num_threads()} threads: {min(times):.2f} us a touch, median {sorted(times)[10]:.2f}")
+    many, results = np.tile(counts, (4, 1)), np.zeros((4 * len(counts), 4))
+    tradeoff = [somatic, "tradeoff", "--source", f"sim:{simulation}", "--fields", "hand/back", "--backend", "cpu", "--seconds", "2", "--frames", "2880", "--json"]
+    times, own, ratios = [], [], []
+    for _ in range(5):
+        rounds = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            # From raw values on, as somatic does.
+            pressed = newton(many)[0]
+            fit_all(uv, pressed, np.abs(newton(np.minimum(many - noise, 1022))[0] - pressed), threshold, results)
+            rounds.append((time.perf_counter() - begin) / len(many) * 1e6)
+        rows = json.loads(subprocess.run(tradeoff, check=True, capture_output=True, text=True).stdout)["rows"]
+        of = lambda by: min(row["p50_us"] for row in rows if row["way"] == "batch" and row["orientation_by"] == by)
+        times.append(sorted(rounds)[2])
+        # What fits take beside the moments of the same frames.
+        own.append(of("footprint") - of("second-moments"))
+        ratios.append(times[-1] / own[-1])
+    middle = lambda numbers: sorted(numbers)[2]
+    print(f"a frame's fits: numba, {numba.get_num_threads()} threads {middle(times):.2f} us, somatic {middle(own):.2f} us: "
+          f"{middle(ratios):.1f} times ({min(ratios):.1f} to {max(ratios):.1f})")
 
 
 if __name__ == "__main__":

@@ -183,6 +183,7 @@ impl Intake {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Frame;
 
     fn frame(t_s: f64, values: &[Option<f64>]) -> Frame {
         let values = values.iter().map(|v| v.map_or(RawValue::MISSING, RawValue::new)).collect();
