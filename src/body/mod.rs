@@ -20,6 +20,7 @@ mod primitives;
 mod read;
 mod referenced_files;
 mod repair;
+mod sheet;
 mod surface;
 mod topology;
 
@@ -30,6 +31,7 @@ pub use model::{Body, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
 pub use original::Original;
 pub use read::TaxelSource;
 pub(crate) use repair::listed;
+pub use sheet::{Sheet, SheetCell, sheets};
 pub use surface::{Hit, SurfaceIndex};
 pub(crate) use surface::{Nearest, PointTree, area_vector, point_tree};
 pub(crate) use topology::next;
