@@ -22,6 +22,7 @@ mod referenced_files;
 mod repair;
 mod sheet;
 mod surface;
+mod taxel_table;
 mod topology;
 
 pub use details::{Details, Mark, Paint, Part};
@@ -34,5 +35,6 @@ pub(crate) use repair::listed;
 pub use sheet::{Sheet, SheetCell, sheets};
 pub use surface::{Hit, SurfaceIndex};
 pub(crate) use surface::{Nearest, PointTree, area_vector, point_tree};
+pub use taxel_table::{TaxelRow, read_taxel_table, taxel_table};
 pub(crate) use topology::next;
 pub use topology::{Flaws, NONE, Topology};
