@@ -71,11 +71,16 @@ fn root() -> PathBuf {
 
 /// The lines of all `sh` blocks of a page, comments cut off.
 fn commands(page: &str) -> Vec<String> {
+    commands_of(page, "```sh")
+}
+
+/// The same of blocks that begin with `begin`.
+fn commands_of(page: &str, begin: &str) -> Vec<String> {
     let mut inside = false;
     let mut commands = Vec::new();
     for line in page.lines() {
         match line.trim() {
-            "```sh" => inside = true,
+            line if line == begin => inside = true,
             "```" => inside = false,
             command if inside && !command.is_empty() && !command.starts_with('#') => {
                 commands.push(command.split("  #").next().unwrap().trim().to_owned());
@@ -185,10 +190,43 @@ fn every_command_that_is_shown_runs() {
     assert!(run >= 6, "only {run} commands were found in the documentation");
 }
 
+/// Files that blocks of `sh data` need, where they lie below the data.
+const DATA: [&str; 2] = ["layouts/icub/left_forearm_V2.txt", "layouts/icub/left_hand_V2_1.txt"];
+
+#[test]
+fn every_command_about_files_made_elsewhere_runs() {
+    let data = std::env::var_os("SOMATIC_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    let missing = DATA.iter().find(|name| !data.join(name).is_file());
+    if let Some(missing) = missing {
+        skip("DATA", format!("{} is not there", data.join(missing).display()));
+        return;
+    }
+    let mut run = 0;
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for name in DATA {
+            std::fs::copy(data.join(name), folder.path().join(Path::new(name).file_name().unwrap())).unwrap();
+        }
+        for command in commands_of(&text, "```sh data") {
+            let output = shell(&command, folder.path());
+            let said = String::from_utf8_lossy(&output.stderr);
+            if said.contains("no GPU driver answers") {
+                skip("GPU", format!("no adapter answers, and `{command}` draws"));
+                continue;
+            }
+            assert!(output.status.success(), "{}: `{command}` ended with {}\n{said}", page.display(), output.status);
+            run += 1;
+        }
+    }
+    assert!(run >= 6, "only {run} commands were found");
+}
+
 #[test]
 fn commands_are_found_where_they_stand() {
     let page = "text\n```sh\nsomatic run   # why\n\n# no\nls\n```\nsomatic no\n```json\n{}\n```\n";
     assert_eq!(commands(page), ["somatic run", "ls"]);
+    assert_eq!(commands_of("```sh data\nls\n```\n```sh\npwd\n```\n", "```sh data"), ["ls"]);
 }
 
 #[test]

@@ -42,6 +42,7 @@ mod sheet;
 mod skin;
 mod skin_weights;
 mod surface_search;
+mod table_body;
 mod voronoi;
 
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
@@ -54,3 +55,4 @@ pub use refresh::refresh;
 pub use sheet::{GridOrder, Sheet, SheetCell, SheetGrid, author_sheets, sheets};
 pub use skin::{Authored, PlaceReport, author};
 pub use skin_weights::{blend_skinning, heaviest_four};
+pub use table_body::author_csv_skin;

@@ -9,7 +9,7 @@ use super::placed::{Placed, SurfacePoint};
 use super::recipe_values::Globs;
 use super::rest_surface::RestSurface;
 use super::{recipe, voronoi};
-use crate::body::{Body, MAX_TAXEL_ID, Modality, SurfaceIndex};
+use crate::body::{Body, Modality, SurfaceIndex, read_taxel_table};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::geodesic::barycentric;
 
@@ -70,13 +70,8 @@ fn natural(name: &str) -> Vec<(String, u64)> {
     pieces
 }
 
-const COLUMNS: [&str; 6] = ["id", "x", "y", "z", "link", "area"];
-
-/// Maximum area of a taxel, m²; larger ones are in another unit.
-const MAX_TAXEL_AREA_M2: f64 = 1.0;
-
 /// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres, optionally `link` for coordinates in a link's
-/// frame, and `area` in m².
+/// frame, and `area` in m²; normals are the surface's, and what taxels measure is the place's.
 pub(super) fn of_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
     read_table(rest_surface, path).map_err(|e| e.at(path.display()))
 }
@@ -86,65 +81,15 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
         std::io::ErrorKind::NotFound => Error::failed("no such file; it is looked for beside the recipe"),
         _ => Error::failed(e.to_string()),
     })?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
-    let broken = |e: &csv::Error| {
-        let row = e.position().map_or(0, csv::Position::line);
-        failed!("not a valid table: {e}; give the columns id,x,y,z").at(format!("line {row}"))
-    };
-    let header = reader.headers().map_err(|e| broken(&e))?.clone();
-    if let Some(unknown) = header.iter().find(|own| !COLUMNS.iter().any(|known| own.eq_ignore_ascii_case(known))) {
-        return Err(failed!(
-            "there is no column `{unknown}` in a table of taxels; it may have {}: rename or remove it",
-            COLUMNS.join(", ")
-        )
-        .at("line 1"));
-    }
-    let column = |name: &str| header.iter().position(|own| own.eq_ignore_ascii_case(name));
-    let needed = |name: &str| {
-        let what =
-            format!("there is no column `{name}`; the first line names id, x, y, z and optionally link and area");
-        column(name).ok_or_else(|| Error::failed(what))
-    };
-    let (id, places) = (needed("id")?, [needed("x")?, needed("y")?, needed("z")?]);
-    let (link, area) = (column("link"), column("area"));
-    let mut given: Vec<GivenPoint> = Vec::new();
-    let mut seen = std::collections::HashMap::new();
-    for row in reader.records() {
-        let row = row.map_err(|e| broken(&e))?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let at = |e: Error| e.at(format!("line {line}"));
-        let cell = |column: usize| row.get(column).unwrap_or_default();
-        let id: u32 =
-            cell(id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID).ok_or_else(|| {
-                at(failed!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(id)))
-            })?;
-        if let Some(before) = seen.insert(id, line) {
-            return Err(at(failed!("id {id} is on line {before} already; give each taxel its own")));
+    let mut given = Vec::new();
+    for row in read_taxel_table(file, false)? {
+        let mut position_in_world = row.position;
+        if let Some(name) = &row.link {
+            let link = find_link(rest_surface.body, name).map_err(|e| e.at(format!("line {}", row.line)))?;
+            position_in_world = rest_surface.body.links[link].world_from_link.transform_point3(position_in_world);
         }
-        let mut position = [0.0; 3];
-        for (value, &column) in position.iter_mut().zip(&places) {
-            *value = cell(column)
-                .parse()
-                .ok()
-                .filter(|x: &f64| x.is_finite())
-                .ok_or_else(|| at(failed!("`{}` is no coordinate; give metres", cell(column))))?;
-        }
-        let mut position = DVec3::from_array(position);
-        if let Some(name) = link.map(cell).filter(|name| !name.is_empty()) {
-            let link = find_link(rest_surface.body, name).map_err(at)?;
-            position = rest_surface.body.links[link].world_from_link.transform_point3(position);
-        }
-        let area_m2 =
-            area.map(cell).filter(|text| !text.is_empty()).map(|text| area_of(text).map_err(at)).transpose()?;
-        given.push(GivenPoint {
-            id: Some(id),
-            position_in_world: position,
-            area_m2,
-            name: format!("line {line}: taxel {id}"),
-        });
-    }
-    if given.is_empty() {
-        return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));
+        let name = format!("line {}: taxel {}", row.line, row.id);
+        given.push(GivenPoint { id: Some(row.id), position_in_world, area_m2: row.area_m2, name });
     }
     Ok(given)
 }
@@ -152,11 +97,6 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
 fn find_link(body: &Body, name: &str) -> Result<usize> {
     let hint = || suggestion(name, body.links.iter().map(|link| link.name.as_str()));
     body.link_index(name).ok_or_else(|| failed!("the body has no link `{name}`; {}", hint()))
-}
-
-fn area_of(text: &str) -> Result<f64> {
-    let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
-    area.ok_or_else(|| failed!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
 }
 
 /// The places of the taxels of `modality` in the iCub's position file at `path`, in the frame of `link` or of the link that

@@ -1,4 +1,6 @@
-//! `somatic convert`: recordings from one kind of file to another.
+//! `somatic convert`: recordings and skins from one kind of file to another.
+
+mod skin;
 
 use std::path::PathBuf;
 use std::slice;
@@ -11,8 +13,9 @@ use somatic::{Error, Frame, Result};
 
 use super::attached::{body_bytes, file_name};
 use super::bar::Bar;
-use super::exports::{ExportFlags, source_of};
+use super::exports::ExportFlags;
 use super::files::FilesRead;
+use super::first_source::source_of;
 use super::interrupt::stop_on_signal;
 use super::stdio::{say, tell_losses};
 use super::words::count;
@@ -23,21 +26,29 @@ Examples:
   somatic convert touch.mcap touch.csv
   somatic convert insoles.lst insoles.mcap    a pressure system's export, with its sensors and unit
   somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
+  somatic convert skin.glb -o skin.csv        the taxels of a body as a table
+  somatic convert skin.glb -o skin.urdf       as tactile sensors of a robot
 
 Frames come through bit for bit. A CSV has no place for poses, body and calibration, an MCAP gets
-no percepts: make them with `somatic run`.";
+no percepts: make them with `somatic run`. Of a skin, taxels come back by `somatic author --csv-skin`
+and `--urdf-skin`: id, link, place, normal and area; fields are made anew, meshes stay behind.";
 
-/// Turn a recording into one of another kind: CSV and MCAP, either way.
+/// Turn a recording into one of another kind, CSV and MCAP, either way; or the skin of a body into a table or a URDF.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export.
+    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export. Or a body:
+    /// a .glb or .gltf file, or one of the bundled hand, mat and humanoid.
     #[arg(value_name = "IN")]
     from: String,
 
-    /// What it is to become: csv:FILE or mcap:FILE, or just a .csv or .mcap.
-    #[arg(value_name = "OUT")]
-    to: String,
+    /// What it is to become: of a recording csv:FILE or mcap:FILE, or just a .csv or .mcap; of a body a .csv or a .urdf.
+    #[arg(value_name = "OUT", required_unless_present = "output")]
+    to: Option<String>,
+
+    /// The same as OUT.
+    #[arg(short, long, value_name = "OUT", conflicts_with = "to")]
+    output: Option<String>,
 
     /// The robot to put into an MCAP, a .glb or .gltf file, or one of the bundled bodies [default: the recording's own].
     #[arg(long, value_name = "BODY")]
@@ -61,6 +72,14 @@ enum Target {
 }
 
 pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
+    let to_name = arguments.to.as_deref().or(arguments.output.as_deref()).unwrap_or_default();
+    if skin::is_body(&arguments.from) {
+        let is_plain = arguments.body.is_none() && arguments.calibration.is_none();
+        if !is_plain || arguments.export.options()? != VendorOptions::default() {
+            return Err(Error::usage("of a body nothing else can be said; leave out the flags for recordings"));
+        }
+        return skin::convert(&arguments.from, to_name, arguments.force);
+    }
     if arguments.from == "-" || arguments.from.starts_with("serial:") {
         return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
             .at(&arguments.from));
@@ -68,16 +87,23 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let options = arguments.export.options()?;
     let from = source_of(&arguments.from, Some(&["csv", "mcap", "export", "sim"]), &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
-    let to = SourceSpec::one_of(&arguments.to, &["csv", "mcap"]);
-    let to = to.map_err(|e| e.at(format!("output `{}`", arguments.to)))?;
+    let to = SourceSpec::one_of(to_name, &["csv", "mcap"]);
+    let to = to.map_err(|e| e.at(format!("output `{to_name}`")))?;
     let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
         unreachable!("it is of one of these kinds");
     };
     let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
+    let read = read.files(&arguments.export.layout);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
-    let mut source = from.open(&[], &options)?;
+    let (mut source, attached): (Box<dyn Source + Send>, _) = match &from {
+        SourceSpec::Vendor(path) => {
+            let export = VendorSource::open(path, &options)?;
+            let attached = files(arguments, &from, Some(&export))?;
+            (Box::new(export), attached)
+        }
+        _ => (from.open(&[], &options)?, files(arguments, &from, None)?),
+    };
     source.report_stale();
-    let attached = files(arguments, &from, &options)?;
     let mut target = match &to {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
             return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
@@ -134,7 +160,11 @@ fn copy(source: &mut dyn Source, target: &mut Target) -> Result<(u64, u64)> {
 
 /// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the
 /// simulation has.
-fn files(arguments: &Arguments, from: &SourceSpec, options: &VendorOptions) -> Result<Vec<(String, String, Vec<u8>)>> {
+fn files(
+    arguments: &Arguments,
+    from: &SourceSpec,
+    export: Option<&VendorSource>,
+) -> Result<Vec<(String, String, Vec<u8>)>> {
     let mut files = Vec::new();
     if let Some(body) = &arguments.body {
         files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
@@ -154,8 +184,7 @@ fn files(arguments: &Arguments, from: &SourceSpec, options: &VendorOptions) -> R
             files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
         }
     }
-    if let SourceSpec::Vendor(path) = from {
-        let export = VendorSource::open(path, options)?;
+    if let Some(export) = export {
         if arguments.body.is_none() {
             files.push((export.body_name(), BODY.to_owned(), export.body()?));
         }

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use somatic::Result;
 use somatic::signal::UnitOfP;
 use somatic::source::{SourceSpec, VendorFormat, VendorOptions, VendorSource};
-use somatic::{Error, Result};
 
+use super::first_source::{Export, Found};
 use super::scene::{RunOptions, one_of};
 
 /// What is said of a recording beside what its file says.
@@ -32,6 +33,11 @@ pub(super) struct ExportFlags {
     /// The unit of the values where the file does not say it: kPa, mmHg, N/cm2, psi, N, and others.
     #[arg(long, value_name = "UNIT")]
     pub(super) unit: Option<String>,
+
+    /// Where the sensors of pedar's insoles are, which its files do not say: a CSV with the columns id, x, y and area, in
+    /// metres and square metres.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(super) layout: Option<PathBuf>,
 }
 
 impl ExportFlags {
@@ -42,60 +48,62 @@ impl ExportFlags {
             grid: self.grid.as_deref().map(VendorOptions::grid_of).transpose()?,
             pitch_m: self.pitch.as_deref().map(VendorOptions::pitch_of).transpose()?,
             unit: self.unit.as_deref().map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("--unit"))?,
+            layout: self.layout.clone(),
         })
     }
 }
 
-/// The source `text` as one of `kinds`, and what its content says that it is.
-pub(super) fn source_of(text: &str, kinds: Option<&[&str]>, options: &VendorOptions) -> Result<SourceSpec> {
-    let spec = match kinds {
-        Some(kinds) => SourceSpec::one_of(text, kinds),
-        None => text.parse(),
-    };
-    let spec = spec?.with_content(options);
-    if let SourceSpec::Vendor(path) = &spec
-        && path.exists()
-        && !path.is_file()
-        && !path.is_dir()
-    {
-        let what = "the file is read more than once, for its sensors and for its frames; save it first";
-        return Err(Error::usage(what).at(path.display()));
-    }
-    Ok(spec)
-}
-
 impl RunOptions {
     pub(super) fn export_options(&self) -> Result<VendorOptions> {
-        let Self { rate, format, grid, pitch, unit, .. } = self.clone();
-        ExportFlags { rate, format, grid, pitch, unit }.options()
+        let Self { rate, format, grid, pitch, unit, layout, .. } = self.clone();
+        ExportFlags { rate, format, grid, pitch, unit, layout }.options()
+    }
+
+    /// What `look` sees of the first source, which is found out once.
+    fn found<T>(&self, look: impl FnOnce(&mut Found) -> Result<T>) -> Result<Option<T>> {
+        let Some(text) = self.sources.first() else { return Ok(None) };
+        let options = self.export_options()?;
+        self.first.look(text, options, look).map(Some)
+    }
+
+    /// What `look` sees of the export that is read, if it is one.
+    fn export<T>(&self, look: impl FnOnce(&mut Export) -> T) -> Result<Option<T>> {
+        Ok(self.found(|found| Ok(found.export()?.map(look)))?.flatten())
     }
 
     /// The first source, and what its content says that it is.
     pub(super) fn first_source(&self) -> Result<Option<SourceSpec>> {
-        let options = self.export_options()?;
-        self.sources.first().map(|text| source_of(text, None, &options)).transpose()
+        self.found(|found| Ok(found.spec.clone()))
     }
 
-    /// The export that is read, if it is one.
-    pub(super) fn export(&self) -> Result<Option<VendorSource>> {
-        let Some(SourceSpec::Vendor(path)) = self.first_source()? else { return Ok(None) };
-        VendorSource::open(path, &self.export_options()?).map(Some)
+    /// The export that is read, from its first frame on, if it is one and has not been taken before.
+    pub(super) fn take_export(&self) -> Result<Option<Box<VendorSource>>> {
+        Ok(self.export(|export| export.source.take())?.flatten())
+    }
+
+    /// Whether the export that is read says where its sensors are; `None` where it is none.
+    pub(super) fn export_is_placed(&self) -> Result<Option<bool>> {
+        self.export(|export| export.is_placed)
     }
 
     /// The export whose body is used, which is so where none is named.
     pub(super) fn export_body(&self) -> Result<Option<(String, Vec<u8>)>> {
-        let export = if self.body.is_none() { self.export()? } else { None };
-        export.map(|export| Ok((export.body_name(), export.body()?))).transpose()
+        if self.body.is_some() {
+            return Ok(None);
+        }
+        self.export(|export| Ok((export.body_name.clone(), export.body.clone()?)))?.transpose()
     }
 
     /// The calibration of the export that is read: where it comes from, and its text.
     pub(super) fn export_calibration(&self) -> Result<Option<(PathBuf, String)>> {
-        let Some(export) = self.export()? else { return Ok(None) };
+        let known = self.export(|export| Some((export.path.clone(), export.calibration.clone()?)))?.flatten();
         // Of another body than its own it would be refused by name.
-        let text = export.calibration().map(|text| match self.body {
-            None => text,
-            Some(_) => text.lines().filter(|line| !line.starts_with("body")).collect::<Vec<_>>().join("\n"),
-        });
-        Ok(text.map(|text| (export.path().to_owned(), text)))
+        Ok(known.map(|(path, text)| match self.body {
+            None => (path, text),
+            Some(_) => {
+                let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("body")).collect();
+                (path, lines.join("\n"))
+            }
+        }))
     }
 }

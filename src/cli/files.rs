@@ -16,6 +16,7 @@ impl FilesRead {
     /// Those of `asked`, by flags or by the scene file at `scene`.
     pub(super) fn of(asked: &RunOptions, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
+        let named = named.chain(asked.layout.as_deref());
         Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
     }
 

@@ -5,7 +5,6 @@ use somatic::{Body, Error, Result, bundled};
 
 use super::attached;
 use super::bodies::{check_body_name, load_body};
-use super::exports::source_of;
 use super::scene::RunOptions;
 
 /// Frames a call for recordings, unless told otherwise.
@@ -40,7 +39,7 @@ impl Input {
                 }
             };
         };
-        let spec = source_of(text, None, &asked.export_options()?)?;
+        let Some(spec) = asked.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
@@ -125,7 +124,12 @@ impl Input {
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
         let options = asked.export_options()?;
         let strict = asked.strict;
-        let open = move || -> Result<Box<dyn Source + Send>> {
+        // It was opened for its sensors; what comes after its first frame is still to be read.
+        let mut opened = asked.take_export()?;
+        let mut open = move || -> Result<Box<dyn Source + Send>> {
+            if let Some(source) = opened.take() {
+                return Ok(source);
+            }
             match &spec {
                 Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {
                     Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict()))

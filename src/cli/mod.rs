@@ -21,6 +21,7 @@ mod explanation;
 mod exports;
 mod feed;
 mod files;
+mod first_source;
 mod info;
 mod input;
 mod inspect;

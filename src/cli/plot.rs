@@ -10,6 +10,7 @@ use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
+use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
 use super::interrupt::stop_on_signal;
@@ -37,7 +38,8 @@ const MAX_RECORDINGS: usize = 8;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recordings: csv:FILE, mcap:FILE or sim:FILE.toml, or just the file [default: a bundled touch].
+    /// The recordings: csv:FILE, mcap:FILE or sim:FILE.toml, a pressure system's export, or just the file [default: a bundled
+    /// touch].
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
 
@@ -57,9 +59,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = plot_outputs_help())]
     outputs: Vec<Outputs>,
 
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[command(flatten)]
+    export: ExportFlags,
 
     /// Begin at this time of the recording, s.
     #[arg(long, value_name = "S")]
@@ -97,7 +98,7 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
         sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect(),
     };
     let read = runs.iter().fold(FilesRead::default(), |read, asked| {
-        read.files(&asked.calibration).bodies(&asked.body).sources(&asked.sources)
+        read.files(asked.calibration.iter().chain(&asked.layout)).bodies(&asked.body).sources(&asked.sources)
     });
     let mut outputs = read.outputs(arguments.force);
     let file = PlotFile::at(&arguments.output, "-o", &mut outputs)?;
@@ -115,14 +116,20 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
 
 /// What is run for the recording `source`.
 fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> RunOptions {
+    let ExportFlags { rate, format, grid, pitch, unit, layout } = arguments.export.clone();
     RunOptions {
+        rate,
+        format,
+        grid,
+        pitch,
+        unit,
+        layout,
         body: arguments.body.clone(),
         sources: source.cloned().into_iter().collect(),
         fields: arguments.fields.clone(),
         outputs: vec![outputs_for(wanted)],
         calibration: arguments.calibration.clone(),
         backend: Some(BackendKind::Cpu),
-        rate: arguments.rate,
         from: arguments.from,
         to: arguments.to,
         ..RunOptions::default()

@@ -14,6 +14,7 @@ use somatic::scene::choose_fields;
 
 use super::bodies::load_body;
 use super::files::FilesRead;
+use super::input::Input;
 use super::stdio::DONE;
 
 const EXAMPLES: &str = "\
@@ -24,6 +25,7 @@ Examples:
   somatic render hand -o hand.png --ids --look-at hand/palm --view bottom
   somatic render hand -o touch.png --source touch.csv --at 2.9
   somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
+  somatic render insoles.csv -o peak.png       a pressure system's export, with its own sensors
 
 With a recording, taxels have the colours of their pressures, and each touched field has its
 centroid, the line of its orientation, its principal axis as an ellipse and its motion of a
@@ -34,8 +36,10 @@ side by side differ in colour.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
-    body: String,
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid; or a recording that has its body:
+    /// .mcap, sim:FILE.toml, or a pressure system's export [default: that of the source].
+    #[arg(value_name = "BODY", required_unless_present = "source")]
+    body: Option<String>,
 
     /// The picture to write, PNG.
     #[arg(short, long, value_name = "FILE.png")]
@@ -95,8 +99,8 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
     }
-    let read = FilesRead::default().bodies([&arguments.body]);
-    let output = arguments.touched.files(read).outputs(arguments.force).add(path)?;
+    let asked = arguments.touched.asked(arguments.body.as_deref())?;
+    let output = FilesRead::of(&asked, None).outputs(arguments.force).add(path)?;
     let mut views = Vec::new();
     for name in &arguments.views {
         match name.as_str() {
@@ -104,14 +108,17 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
             name => views.push(name.parse()?),
         }
     }
-    let body = load_body(&arguments.body)?;
+    let body = match &asked.body {
+        Some(name) => load_body(name)?,
+        None => Input::named(&asked)?.body(&asked)?,
+    };
     let set = FieldSet::new(&body)?;
     let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
     let fields = if arguments.fields.is_empty() { Vec::new() } else { named(&arguments.fields)? };
     let options = Options { size: arguments.size.0, views, fields, look_at: arguments.look_at.clone() };
     let picture = match &arguments.uv {
-        None if arguments.touched.is_given() || arguments.ids => {
-            arguments.touched.draw(&body, &arguments.body, &set.fields, options, arguments.ids)?
+        None if !asked.sources.is_empty() || arguments.ids => {
+            arguments.touched.draw(&asked, &body, &set.fields, options, arguments.ids)?
         }
         None => picture::of_body(&body, &set.fields, &options)?,
         Some(name) => {

@@ -23,6 +23,7 @@ pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
+use super::first_source::FirstSource;
 use super::ports::LineFlags;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
@@ -187,6 +188,11 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = RECORDINGS, value_name = "UNIT")]
     pub(super) unit: Option<String>,
 
+    /// Where the sensors of pedar's insoles are, which its files do not say: a CSV with the columns id, x, y and area, in
+    /// metres and square metres.
+    #[arg(long, help_heading = RECORDINGS, value_name = "FILE.csv")]
+    pub(super) layout: Option<PathBuf>,
+
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
     #[arg(long, help_heading = RECORDINGS, value_name = "PART,...", value_delimiter = ',',
         value_parser = one_of::<RecordPart>(&["frames", "percepts", "view"]))]
@@ -250,6 +256,11 @@ pub(super) struct RunOptions {
     /// Show no table, progress or remarks.
     #[arg(short, long, help_heading = OUTPUT)]
     pub(super) quiet: bool,
+
+    #[arg(skip)]
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub(super) first: FirstSource,
 }
 
 /// Says in a schema which outputs there are.
@@ -282,6 +293,7 @@ impl RunOptions {
         let there = |file: &Path| folder.join(file).display().to_string();
         asked.calibration = asked.calibration.map(|file| folder.join(file));
         asked.wiring = asked.wiring.map(|file| folder.join(file));
+        asked.layout = asked.layout.map(|file| folder.join(file));
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
@@ -318,11 +330,12 @@ impl RunOptions {
                     $($list: if self.$list.is_empty() { file.$list } else { self.$list.clone() },)*
                     $($switch: self.$switch || file.$switch,)*
                     accuracy: self.accuracy.or(file.accuracy),
+                    first: FirstSource::default(),
                 }
             };
         }
         let asked = merged! {
-            values: body backend calibration rate wiring format grid pitch unit live_rate board_rate batch speed from to repeat max_age max_gap
+            values: body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
                 coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet

@@ -159,3 +159,48 @@ fn a_calibration_is_converted_once_and_thresholds_with_it() {
     let (total, force) = (field["total"].as_f64().unwrap(), field["force"].as_f64().unwrap());
     assert!((total - force).abs() < 1e-6 * total, "{field}");
 }
+
+/// pedar's insoles of five sensors each, and a table of their places.
+fn pedar() -> (tempfile::TempDir, String, String) {
+    let mut text = "pressure values in  kPa\n\nleft insole: 1,2,3,4,5,\nright insole: 1,2,3,4,5,\n\n".to_owned();
+    text += "time[secs]    1 2 3 4 5 1 2 3 4 5\n";
+    for frame in 0..20 {
+        let load = |side: usize, sensor: usize| ((frame + 7 * side) % 20) * (10 + sensor);
+        let row: Vec<String> = (0..10).map(|cell| load(cell / 5, cell % 5).to_string()).collect();
+        text += &format!("  {:.2} {}\n", 0.02 * frame as f64, row.join(" "));
+    }
+    let (folder, path) = file("walk.asc", &text);
+    let table = folder.path().join("insole.csv");
+    let rows = (1..=5).map(|id| format!("{id},{},{},1e-4\n", 0.01 * f64::from(id % 2), 0.02 * f64::from(id)));
+    std::fs::write(&table, format!("id,x,y,area\n{}", rows.collect::<String>())).unwrap();
+    let (path, table) = (text_of(&path).to_owned(), text_of(&table).to_owned());
+    (folder, path, table)
+}
+
+#[test]
+fn places_of_insoles_are_used_by_every_command_that_reads_them() {
+    let (folder, path, table) = pedar();
+    let bare = run(&["--source", &path]);
+    assert!(bare[5]["fields"][0]["force"].is_null() && bare[5]["fields"][0]["centroid"].is_null());
+    let placed = run(&["--source", &path, "--layout", &table]);
+    let (force, centroid) = (&placed[5]["fields"][0]["force"], &placed[5]["fields"][0]["centroid"]);
+    assert!((force.as_f64().unwrap() - 5.0 * 60.0 * 1000.0 * 1e-4).abs() < 1e-3 && centroid.is_array(), "{force}");
+    let info: Value = serde_json::from_str(&done(&["info", &path, "--layout", &table, "--json"])).unwrap();
+    assert_eq!((&info["panels"][0]["placed"], &info["fields"][0]["load_unit"]), (&true.into(), &"N".into()), "{info}");
+    let plot = folder.path().join("walk.svg");
+    done(&["plot", &path, "--layout", &table, "-o", text_of(&plot)]);
+    assert!(std::fs::read_to_string(&plot).unwrap().len() > 1000);
+    let mcap = folder.path().join("walk.mcap");
+    done(&["convert", &path, text_of(&mcap), "--layout", &table]);
+    assert_eq!(run(&["--source", text_of(&mcap)]), placed);
+    // A scene names it beside itself.
+    let scene = folder.path().join("walk.scene.toml");
+    std::fs::write(&scene, "source = \"walk.asc\"\nlayout = \"insole.csv\"\n").unwrap();
+    assert_eq!(run(&[text_of(&scene)]), placed);
+    assert!(fails(2, &["run", "--source", INSOLES, "--layout", &table]).contains("--layout is for pedar"));
+    let touch = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+    assert!(fails(2, &["run", "--source", touch, "--layout", &table]).contains("--layout is for recordings"));
+    // What is read is no output.
+    let output = format!("ndjson:{table}");
+    fails(2, &["run", "--source", &path, "--layout", &table, "--sink", &output, "--force"]);
+}

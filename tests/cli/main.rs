@@ -13,6 +13,7 @@ mod exports;
 mod fields;
 mod inspect;
 mod live;
+mod mjcf;
 mod outputs;
 #[cfg(all(unix, feature = "page"))]
 mod page;
@@ -30,6 +31,7 @@ mod run;
 #[cfg(unix)]
 mod serial;
 mod simulate;
+mod skins;
 #[path = "../skips/mod.rs"]
 mod skips;
 mod sources;

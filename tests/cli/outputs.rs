@@ -117,6 +117,8 @@ const WRITTEN: &[Written] = &[
         ending: "",
         reads: &["touch.csv", "hand.glb", "cal.toml"],
     },
+    Written { flag: "--output", command: "convert hand.glb --output OUT", ending: ".csv", reads: &["hand.glb"] },
+    Written { flag: "--output", command: "convert hand.glb --output OUT", ending: ".urdf", reads: &["hand.glb"] },
     Written { flag: "OUT", command: "convert sim:sim.toml csv:OUT", ending: "", reads: &["sim.toml", "hand.glb"] },
     Written {
         flag: "--link",
@@ -462,6 +464,7 @@ const READ: &[&str] = &[
     "--recipe",
     "[SCENE]",
     "<BODY>",
+    "[BODY]",
     "[MESH]",
     "[SOURCE]...",
     "--cells",
@@ -469,6 +472,9 @@ const READ: &[&str] = &[
     "--package",
     "--urdf-skin",
     "--skin",
+    "--mjcf-skin",
+    "--csv-skin",
+    "--layout",
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
@@ -566,7 +572,7 @@ fn every_output_of_every_subcommand_is_in_these_tests() {
     let mut seen = BTreeSet::new();
     for subcommand in subcommands.into_iter().filter(|name| *name != "help") {
         for (flag, value) in valued(&done(&[subcommand, "--help"])) {
-            let named = flag.trim_matches(['<', '>']);
+            let named = flag.trim_matches(['<', '>', '[', ']']);
             if let Some(&known) = tested.iter().find(|known| **known == (subcommand, named)) {
                 seen.insert(known);
                 continue;

@@ -172,7 +172,7 @@ fn an_area_that_the_table_gives_is_kept() {
         assert!(line.contains("line 2") && line.contains("square metres"), "{line}");
     }
     let line = refused("id,x,y,z,aera\n0,0,0,0,1e-5\n");
-    assert!(line.contains("line 1") && line.contains("`aera`") && line.contains("id, x, y, z, link, area"), "{line}");
+    assert!(line.contains("line 1") && line.contains("`aera`") && line.contains("id, link, x, y, z"), "{line}");
 }
 
 #[test]

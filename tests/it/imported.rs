@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use somatic::author::mesh::{Geometry, MeshOptions, Up, author_urdf_skin, files, open};
-use somatic::author::{Recipe, author, author_icub};
+use somatic::author::mesh::{Geometry, MeshOptions, Up, author_mjcf_skin, author_urdf_skin, files, open};
+use somatic::author::{Authored, Recipe, author, author_csv_skin, author_icub};
 use somatic::body::Body;
 
 /// The corners and sides, counter-clockwise seen from outside, of a box of 20 × 40 × 60 from the origin on.
@@ -359,4 +359,102 @@ fn the_icubs_files_are_a_body_without_a_mesh() {
         assert!(place.ids.iter().all(|id| id / 1000 >= index as u32), "{:?}", place.ids);
     }
     assert!(somatic::Engine::new(&made.body, somatic::Options::default()).is_ok());
+}
+
+/// A model for MuJoCo without files of its own.
+fn mjcf() -> String {
+    let text = include_str!("../mujoco/skin.xml");
+    text.lines().filter(|line| !line.contains("\"stl\"") && !line.contains("\"obj\"")).collect::<Vec<_>>().join("\n")
+}
+
+/// Damages skins of others in many ways: each is read or refused in one line, and nothing panics or fills the memory.
+///
+/// `SOMATIC_MUTATIONS` files of each kind, by default two hundred.
+#[test]
+fn damaged_skins_are_one_line_or_a_body() {
+    const TABLE: &str = "id,link,x,y,z,nx,ny,nz,area,modality\n1,a,0,0,0,0,0,1,1e-4,pressure\n\
+                         2,a,0.01,0,0,0,0,1,,proximity\n3,\"b, c\",0,0.01,0,0,1,0,1e-4,\n";
+    const ROBOT: &str = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\"><parent link=\"a\"/>\
+                         <child link=\"b\"/><origin xyz=\"0 0 1\" rpy=\"0 1 0\"/></joint><sensor name=\"s\">\
+                         <parent link=\"b\"/><tactile channel=\"c\"><array rows=\"3\" cols=\"4\" size=\"0.01 0.01\"/>\
+                         </tactile></sensor></robot>";
+    const WORDS: [&str; 16] = [
+        "",
+        "0",
+        "-1",
+        "1e308",
+        "1e-320",
+        "nan",
+        "inf",
+        "4294967296",
+        "99999",
+        "\"",
+        "<",
+        "/>",
+        ",",
+        "body",
+        "ü",
+        "1 2 3",
+    ];
+    let count: u64 = std::env::var("SOMATIC_MUTATIONS").ok().and_then(|word| word.parse().ok()).unwrap_or(200);
+    let folder = tempfile::tempdir().unwrap();
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut below = |end: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as usize % end.max(1)
+    };
+    type Author = fn(&Path) -> somatic::Result<Authored>;
+    let kinds: [(&str, String, Author); 3] = [
+        ("skin.xml", mjcf(), |path| author_mjcf_skin(path, &options())),
+        ("skin.urdf", ROBOT.to_owned(), |path| author_urdf_skin(path, &options())),
+        ("skin.csv", TABLE.to_owned(), |path| author_csv_skin(path)),
+    ];
+    for (name, whole, author) in kinds {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &whole).unwrap();
+        author(&path).unwrap();
+        let (mut read, mut refused) = (0, 0);
+        for _ in 0..count {
+            let mut bytes = whole.clone().into_bytes();
+            for _ in 0..1 + below(2) {
+                let at = below(bytes.len());
+                match below(5) {
+                    0 => bytes[at] = below(256) as u8,
+                    1 => drop(bytes.drain(at..(at + below(30)).min(bytes.len()))),
+                    2 => drop(bytes.splice(at..at, WORDS[below(WORDS.len())].bytes())),
+                    3 => bytes.truncate(at.max(1)),
+                    _ => {
+                        // A word for another.
+                        let ends = |byte: &u8| b" \"\n,<>=".contains(byte);
+                        let begin = bytes[..at].iter().rposition(ends).map_or(0, |begin| begin + 1);
+                        let end = bytes[at..].iter().position(ends).map_or(bytes.len(), |end| at + end);
+                        drop(bytes.splice(begin..end, WORDS[below(WORDS.len())].bytes()));
+                    }
+                }
+                if bytes.is_empty() {
+                    bytes.push(b'\n');
+                }
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            match author(&path) {
+                Ok(made) => {
+                    read += 1;
+                    let is_sound = |t: &somatic::body::Taxel| {
+                        t.position_in_link.is_finite()
+                            && (t.normal_in_link.length() - 1.0).abs() < 1e-5
+                            && t.area >= 0.0
+                    };
+                    assert!(made.body.taxels.iter().all(is_sound), "{}", String::from_utf8_lossy(&bytes));
+                }
+                Err(error) => {
+                    refused += 1;
+                    let text = error.to_string();
+                    assert!(!text.contains('\n') && text.contains(name), "{text}");
+                }
+            }
+        }
+        assert!(read > count / 50 && refused > count / 20, "{name}: {read} read, {refused} refused");
+    }
 }

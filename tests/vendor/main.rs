@@ -3,6 +3,7 @@
 #[path = "../it/common.rs"]
 mod common;
 mod damaged;
+mod insoles;
 mod make;
 mod oracle;
 #[path = "../skips/mod.rs"]

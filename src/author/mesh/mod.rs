@@ -4,6 +4,7 @@
 
 mod formats;
 mod guarded;
+mod mjcf;
 mod options;
 mod ply;
 mod shapes;
@@ -11,9 +12,12 @@ mod triangles;
 mod urdf;
 mod urdf_file;
 mod urdf_skin;
+mod urdf_text;
 
+pub use mjcf::author_mjcf_skin;
 pub use options::{Geometry, MeshOptions, Up};
 pub use urdf_skin::author_urdf_skin;
+pub use urdf_text::urdf_of_skin;
 
 use std::path::{Path, PathBuf};
 

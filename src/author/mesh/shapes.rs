@@ -32,6 +32,17 @@ pub(super) fn cylinder(radius_m: f64, length_m: f64) -> Triangles {
     revolved(&[(0.0, -half), (radius_m, -half), (radius_m, half), (0.0, half)])
 }
 
+/// A capsule along z around the origin: a cylinder of `length_m` with half a sphere at each end.
+pub(super) fn capsule(radius_m: f64, length_m: f64) -> Triangles {
+    let mut ball = sphere(radius_m);
+    ball.positions.iter_mut().enumerate().for_each(|(index, p)| {
+        // The middle ring is the lower half's end.
+        let is_upper = index as u32 / SIDES > RINGS / 2;
+        p.z += if is_upper { length_m / 2.0 } else { -length_m / 2.0 };
+    });
+    ball
+}
+
 /// A sphere around the origin.
 pub(super) fn sphere(radius_m: f64) -> Triangles {
     let ring = |index: u32| {

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::{Sheet, sheets};
 use crate::author::place::nearest_on_its_side;
 use crate::author::placed::SurfacePoint;
 use crate::author::skin::{Authored, PlaceReport};
-use crate::body::{Body, Original};
+use crate::body::{Body, Original, Sheet, sheets};
 use crate::error::Result;
 
 /// The body of `sheets_of` as a file called `name` in messages, with a report for each sheet.

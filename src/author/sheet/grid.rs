@@ -1,9 +1,7 @@
 //! Sheets whose cells stand in rows and columns.
 
-use glam::DVec3;
-
 use super::mask;
-use super::{Sheet, SheetCell};
+use crate::body::{Sheet, SheetCell};
 use crate::error::{Error, Result, failed};
 
 /// Most cells of a grid.
@@ -99,7 +97,7 @@ impl SheetGrid {
             return Err(Error::failed("none of its cells is there; mark those that are with 1"));
         }
         cells.sort_unstable_by_key(|cell| cell.id);
-        Ok(Sheet { name: name.to_owned(), cells, parts: self.parts(), origin_in_world: DVec3::ZERO })
+        Ok(Sheet { parts: self.parts(), ..Sheet::new(name, cells) })
     }
 
     fn all(&self) -> impl Iterator<Item = (u32, u32)> + use<> {

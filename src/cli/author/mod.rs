@@ -30,6 +30,7 @@ Examples:
   somatic author finger.stl --unit mm --spacing 3mm -o finger.glb
   somatic author --icub left_hand.txt left_forearm.txt -o icub.glb
   somatic author --urdf-skin robot.urdf --geometry none -o robot.glb
+  somatic author --mjcf-skin hand.xml -o hand.glb
   somatic author robot.urdf --package my_robot=. --taxels 800 -o robot.glb   its links become links
   somatic inspect skin.glb
   somatic run --body skin.glb --source touch.csv
@@ -57,7 +58,8 @@ is brought up to date, as after editing it in Blender:
 pub(super) struct Arguments {
     /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
     /// humanoid.
-    #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin"], conflicts_with_all = ["grid", "icub", "urdf_skin"])]
+    #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin"],
+        conflicts_with_all = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin"])]
     mesh: Option<String>,
 
     /// What to place where, a TOML file.

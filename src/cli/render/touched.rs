@@ -1,6 +1,6 @@
 //! The touch that a picture shows.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use somatic::field::Field;
@@ -10,7 +10,6 @@ use somatic::signal::Quantity;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Percept, Result, Scene};
 
 use super::super::bar::Bar;
-use super::super::files::FilesRead;
 use super::super::input::Input;
 use super::super::scene::RunOptions;
 
@@ -18,6 +17,8 @@ use super::super::scene::RunOptions;
 const MAX_PICTURES: usize = 1000;
 /// Sides that a touch is shown from, unless others are asked for.
 const MAX_SIDES: usize = 2;
+/// Endings of recordings, which bodies do not have.
+const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"];
 
 /// Which touch.
 #[derive(Args)]
@@ -27,23 +28,23 @@ pub(super) struct Flags {
     source: Option<String>,
 
     /// The calibration of the sensors, a TOML file [default: the source's own, if it has one].
-    #[arg(long, value_name = "FILE", requires = "source")]
+    #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
     /// The time to show, in seconds [default: where most is pressed].
-    #[arg(long, value_name = "S", requires = "source", conflicts_with_all = ["from", "to"])]
+    #[arg(long, value_name = "S", conflicts_with_all = ["from", "to"])]
     at: Option<f64>,
 
     /// Show an animation from this time on, in seconds.
-    #[arg(long, value_name = "S", requires = "source")]
+    #[arg(long, value_name = "S")]
     from: Option<f64>,
 
     /// Show an animation up to this time, in seconds.
-    #[arg(long, value_name = "S", requires = "source")]
+    #[arg(long, value_name = "S")]
     to: Option<f64>,
 
     /// Pictures a second of an animation.
-    #[arg(long, value_name = "HZ", default_value_t = 12.0, requires = "source")]
+    #[arg(long, value_name = "HZ", default_value_t = 12.0)]
     rate: f64,
 }
 
@@ -55,20 +56,35 @@ struct Shown {
 }
 
 impl Flags {
-    pub(super) fn is_given(&self) -> bool {
-        self.source.is_some()
+    /// What is shown: the body `named`, with the source if there is one; or a recording of that name with its own body.
+    pub(super) fn asked(&self, named: Option<&str>) -> Result<RunOptions> {
+        let is_recording = |name: &&str| {
+            let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+            name.starts_with("sim:") || ending.is_some_and(|ending| RECORDINGS.contains(&&*ending))
+        };
+        let recording = named.filter(is_recording);
+        if let (Some(recording), Some(source)) = (recording, &self.source) {
+            return Err(Error::usage(format!("`{recording}` and --source {source}: give one of them")));
+        }
+        let sources: Vec<String> = recording.or(self.source.as_deref()).map(str::to_owned).into_iter().collect();
+        let given = [
+            ("--calibration", self.calibration.is_some()),
+            ("--at", self.at.is_some()),
+            ("--from", self.from.is_some()),
+            ("--to", self.to.is_some()),
+        ];
+        if let Some((flag, _)) = given.into_iter().find(|(_, given)| *given && sources.is_empty()) {
+            return Err(Error::usage("it is about a touch: give its recording with --source").at(flag));
+        }
+        let body = named.filter(|_| recording.is_none()).map(str::to_owned);
+        Ok(RunOptions { sources, body, calibration: self.calibration.clone(), ..RunOptions::default() })
     }
 
-    /// The files that are read, beside those of `read`.
-    pub(super) fn files(&self, read: FilesRead) -> FilesRead {
-        read.files(&self.calibration).sources(self.source.as_slice())
-    }
-
-    /// A PNG of `body`, which is called `name`, and the touch.
+    /// A PNG of `body` with the touch that is `asked` for.
     pub(super) fn draw(
         &self,
+        asked: &RunOptions,
         body: &Body,
-        name: &str,
         fields: &[Field],
         mut options: Options,
         ids: bool,
@@ -76,19 +92,13 @@ impl Flags {
         if !(self.rate > 0.0 && self.rate <= 100.0) {
             return Err(Error::usage(format!("--rate {} is not a rate of pictures; give up to 100 Hz", self.rate)));
         }
-        let Some(source) = &self.source else {
+        if asked.sources.is_empty() {
             let pressures = vec![Some(0.0); body.taxels.len()];
             let picture = TouchPicture::new(body, fields, &options, ids)?;
             let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", percepts: &[], t_s: None };
             return picture.png(&[picture.draw(&moment)?], 1.0);
-        };
-        let asked = RunOptions {
-            sources: vec![source.clone()],
-            body: Some(name.to_owned()),
-            calibration: self.calibration.clone(),
-            ..RunOptions::default()
-        };
-        let (shown, max_pressure, quantity) = self.shown(&asked, body, fields)?;
+        }
+        let (shown, max_pressure, quantity) = self.shown(asked, body, fields)?;
         let (factor, unit) = quantity.readable(max_pressure);
         let max_pressure = max_pressure * factor;
         if options.views.is_empty() {

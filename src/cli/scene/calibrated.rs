@@ -17,7 +17,7 @@ impl RunOptions {
         }
         let has_unit =
             |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
-        let is_placed = self.body.is_some() || self.export()?.is_none_or(|export| export.layout().is_placed());
+        let is_placed = self.body.is_some() || self.export_is_placed()?.unwrap_or(true);
         Ok(match (is_placed, calibration.is_some_and(has_unit)) {
             // Of sensors of which nobody says where they are.
             (false, _) => Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE,

@@ -4,7 +4,7 @@
 //!
 //! The unit of the pressures is not printed. It follows from the forces, where there are any; else it is kPa.
 
-use super::layout::{Cell, Grid, Layout, Panel, value};
+use super::layout::{Cell, Grid, Layout, Panel, next_value};
 use super::parser::{Parser, Rate};
 use super::text::{Separator, decoded, leading_number, metres};
 use crate::error::{Error, Result, failed};
@@ -156,7 +156,7 @@ impl Emed {
         picture.rows += 1;
         for (index, slot) in self.values[first..first + self.columns.len()].iter_mut().enumerate() {
             let what = || failed!("it has {index} of {} cells", self.columns.len());
-            *slot = value(words.next().ok_or_else(|| at(what()))?).map_err(at)?;
+            *slot = next_value(&mut words).ok_or_else(|| at(what()))?.map_err(at)?;
         }
         match (words.count(), self.has_forces) {
             (0, false) | (1, true) => Ok(()),

@@ -1,6 +1,6 @@
 //! What a recording says of its sensors: panels of cells, with places and areas where it has them.
 
-use super::text::Word;
+use super::text::{Cells, Word};
 use crate::error::{Result, failed};
 use crate::signal::{RawValue, UnitOfP};
 
@@ -131,4 +131,13 @@ pub(super) fn value(word: Word<'_>) -> Result<RawValue> {
         return Ok(RawValue::MISSING);
     }
     word.number().map(RawValue::new).ok_or_else(|| failed!("`{word}` is no number; correct the cell or leave it blank"))
+}
+
+/// The next of `cells` as such a value; `None` if there is none.
+#[inline]
+pub(super) fn next_value(cells: &mut Cells<'_>) -> Option<Result<RawValue>> {
+    match cells.plain_number() {
+        Some(number) => Some(Ok(RawValue::new(number))),
+        None => cells.next().map(value),
+    }
 }

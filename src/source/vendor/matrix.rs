@@ -1,7 +1,7 @@
 //! Plain matrices: a line for each frame with all its cells, row by row, and the time before them or not; or a block of rows
 //! for each frame, with whatever between blocks. What the file does not say is given: rows and columns, pitch, rate, unit.
 
-use super::layout::{Grid, Layout, value};
+use super::layout::{Grid, Layout, next_value};
 use super::parser::{Parser, Rate};
 use super::text::Separator;
 use crate::error::{Result, failed};
@@ -63,10 +63,10 @@ impl Matrix {
         to.clear();
         to.values.resize(count, RawValue::MISSING);
         for (index, slot) in to.values.iter_mut().enumerate() {
-            let word = cells.next().ok_or_else(|| failed!("it has {index} of {count} cells"))?;
-            *slot = value(word).map_err(|e| e.at(format!("cell {}", index + 1)))?;
+            let value = next_value(&mut cells).ok_or_else(|| failed!("it has {index} of {count} cells"))?;
+            *slot = value.map_err(|e| e.at(format!("cell {}", index + 1)))?;
         }
-        if let Some(more) = cells.find(|word| !word.is_empty()) {
+        if let Some(more) = cells.next_filled() {
             return Err(failed!("`{more}` stands after the last of {count} cells"));
         }
         to.t_s = self.rate.time_of(t_s, None)?;
@@ -79,10 +79,11 @@ impl Matrix {
         let first = (self.row * columns) as usize;
         let place = format!("row {}", self.row + 1);
         for (index, slot) in self.values[first..first + columns as usize].iter_mut().enumerate() {
-            let word = cells.next().ok_or_else(|| failed!("it has {index} of {columns} cells").at(&place))?;
-            *slot = value(word).map_err(|e| e.at(format!("{place}, column {}", index + 1)))?;
+            let value =
+                next_value(&mut cells).ok_or_else(|| failed!("it has {index} of {columns} cells").at(&place))?;
+            *slot = value.map_err(|e| e.at(format!("{place}, column {}", index + 1)))?;
         }
-        if let Some(more) = cells.find(|word| !word.is_empty()) {
+        if let Some(more) = cells.next_filled() {
             return Err(failed!("`{more}` stands after the last of {columns} columns").at(&place));
         }
         self.row += 1;

@@ -3,6 +3,7 @@
 mod body;
 mod emed;
 mod format;
+mod insoles;
 mod layout;
 mod lines;
 mod matrix;
@@ -23,6 +24,7 @@ pub use layout::{Cell, Layout, Panel};
 pub use options::VendorOptions;
 
 use self::emed::Emed;
+use self::insoles::Insoles;
 use self::layout::Grid;
 use self::lines::Lines;
 use self::matrix::Matrix;
@@ -227,12 +229,21 @@ fn parser(format: VendorFormat, separator: Separator, path: &Path, options: &Ven
             format.title()
         )));
     }
+    if format != VendorFormat::Pedar && options.layout.is_some() {
+        return Err(Error::usage(format!(
+            "--layout is for pedar, which does not say where its sensors are; leave it out for {}",
+            format.title()
+        )));
+    }
     Ok(match format {
         VendorFormat::Xsensor => Box::new(Xsensor::new(separator, rate, unit)),
         VendorFormat::Tekscan => Box::new(Tekscan::new(separator, rate, unit)),
         VendorFormat::Emed => Box::new(Emed::new(rate, unit)),
-        VendorFormat::Pedar => Box::new(NovelAsc::new(rate, unit, None)),
-        VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, places(path)?)),
+        VendorFormat::Pedar => {
+            let insoles = options.layout.as_deref().map(Insoles::load).transpose()?;
+            Box::new(NovelAsc::new(rate, unit, None, insoles))
+        }
+        VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, places(path)?, None)),
         VendorFormat::Matrix => {
             let [rows, columns] = grid.ok_or_else(|| {
                 Error::usage(

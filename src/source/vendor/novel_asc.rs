@@ -2,9 +2,10 @@
 //! frame: its time, then the pressures.
 //!
 //! Of pliance the places of the sensors stand after the rows ([`Places`]), so that such a file is read twice; of pedar they stand
-//! nowhere.
+//! nowhere, and may be given ([`Insoles`]).
 
-use super::layout::{Cell, Layout, MAX_CELLS, Panel, value};
+use super::insoles::Insoles;
+use super::layout::{Cell, Layout, MAX_CELLS, Panel, next_value};
 use super::novel_places::Places;
 use super::parser::{Parser, Rate};
 use super::text::{Separator, decoded};
@@ -17,6 +18,8 @@ pub(super) struct NovelAsc {
     unit: Option<UnitOfP>,
     /// What the first pass found.
     places: Option<Places>,
+    /// What was given beside the file.
+    insoles: Option<Insoles>,
     /// The sides that the header names.
     sides: [bool; 2],
     /// The sensors' numbers as the table is headed.
@@ -32,8 +35,8 @@ enum Place {
 }
 
 impl NovelAsc {
-    pub(super) fn new(rate: Rate, unit: Option<UnitOfP>, places: Option<Places>) -> Self {
-        Self { rate, unit, places, sides: [false; 2], sensors: Vec::new(), place: Place::Header }
+    pub(super) fn new(rate: Rate, unit: Option<UnitOfP>, places: Option<Places>, insoles: Option<Insoles>) -> Self {
+        Self { rate, unit, places, insoles, sides: [false; 2], sensors: Vec::new(), place: Place::Header }
     }
 
     fn header(&mut self, line: &[u8]) -> Result<()> {
@@ -58,6 +61,9 @@ impl NovelAsc {
             if let Some(places) = &self.places {
                 places.check(&self.sensors)?;
             }
+            if let Some(insoles) = &self.insoles {
+                self.panels().iter().try_for_each(|(name, sensors)| insoles.check(name, sensors))?;
+            }
             self.place = Place::Table;
         }
         Ok(())
@@ -80,8 +86,8 @@ impl NovelAsc {
         to.values.resize(self.sensors.len(), RawValue::MISSING);
         let count = self.sensors.len();
         for (index, slot) in to.values.iter_mut().enumerate() {
-            let word = words.next().ok_or_else(|| failed!("it has {index} of {count} pressures"))?;
-            *slot = value(word).map_err(|e| e.at(format!("sensor {}", self.sensors[index])))?;
+            let value = next_value(&mut words).ok_or_else(|| failed!("it has {index} of {count} pressures"))?;
+            *slot = value.map_err(|e| e.at(format!("sensor {}", self.sensors[index])))?;
         }
         if let Some(more) = words.next() {
             return Err(failed!("`{more}` stands after the last of {count} pressures"));
@@ -94,6 +100,14 @@ impl NovelAsc {
     fn ends(&self) -> Vec<usize> {
         let anew = (1..self.sensors.len()).filter(|&index| self.sensors[index] <= self.sensors[index - 1]);
         anew.chain([self.sensors.len()]).collect()
+    }
+
+    /// Each panel's name and the numbers of its sensors.
+    fn panels(&self) -> Vec<(String, &[u32])> {
+        let ends = self.ends();
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        let sensors = starts.zip(&ends).map(|(start, &end)| &self.sensors[start..end]);
+        self.names(ends.len()).into_iter().zip(sensors).collect()
     }
 
     fn names(&self, panels: usize) -> Vec<String> {
@@ -122,17 +136,19 @@ impl Parser for NovelAsc {
 
     fn layout(&self) -> Layout {
         let (mut panels, mut start, mut shift) = (Vec::new(), 0, 0_u32);
-        let ends = self.ends();
-        for (name, &end) in self.names(ends.len()).into_iter().zip(&ends) {
-            let numbers = &self.sensors[start..end];
-            let cell = |(index, &number): (usize, &u32)| {
-                let placed = self.places.as_ref().map(|places| places.cell(start + index));
-                Cell { id: shift.saturating_add(number), ..placed.unwrap_or_default() }
+        for (name, numbers) in self.panels() {
+            let place = |index: usize, number: u32| match (&self.places, &self.insoles) {
+                (Some(places), _) => places.cell(start + index),
+                (None, Some(insoles)) => insoles.cell(&name, number),
+                (None, None) => Cell::default(),
             };
+            let cell =
+                |(index, &number): (usize, &u32)| Cell { id: shift.saturating_add(number), ..place(index, number) };
             let cells: Vec<Cell> = numbers.iter().enumerate().map(cell).collect();
             shift = shift.saturating_add(numbers.iter().copied().max().unwrap_or(0));
-            panels.push(Panel { name, cells, is_placed: self.places.is_some(), ..Panel::default() });
-            start = end;
+            start += numbers.len();
+            let is_placed = self.places.is_some() || self.insoles.is_some();
+            panels.push(Panel { name, cells, is_placed, ..Panel::default() });
         }
         let mut layout = Layout { panels, unit: self.unit.unwrap_or(UnitOfP::KILOPASCAL) };
         if layout.panels.len() > 1 && layout.is_placed() {

@@ -1,5 +1,7 @@
 //! What is said of a recording beside what its file says.
 
+use std::path::PathBuf;
+
 use super::format::VendorFormat;
 use crate::error::{Error, Result};
 use crate::length::Length;
@@ -18,6 +20,8 @@ pub struct VendorOptions {
     pub pitch_m: Option<[f64; 2]>,
     /// The unit of the values, where the file does not say it.
     pub unit: Option<UnitOfP>,
+    /// A table of the sensors' places, for pedar: `id,x,y`, with `area` and `link` (`left`, `right`) where they are known.
+    pub layout: Option<PathBuf>,
 }
 
 impl VendorOptions {
@@ -59,6 +63,7 @@ impl VendorOptions {
             ("--grid", self.grid.is_some()),
             ("--pitch", self.pitch_m.is_some()),
             ("--unit", self.unit.is_some()),
+            ("--layout", self.layout.is_some()),
         ];
         match given.into_iter().find(|(_, given)| *given) {
             Some((flag, _)) => {

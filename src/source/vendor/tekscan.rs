@@ -101,6 +101,13 @@ impl Tekscan {
             Grid { rows: row + 1, columns, ..Grid::default() }.check()?;
         }
         for column in 0..columns {
+            if !is_first
+                && let Some(index) = self.map.get((row * columns + column) as usize).copied().flatten()
+                && let Some(number) = cells.plain_number()
+            {
+                self.values[index] = RawValue::new(number);
+                continue;
+            }
             let Some(word) = cells.next() else {
                 return Err(failed!("it has {column} of {columns} cells").at(format!("row {}", row + 1)));
             };
@@ -119,7 +126,7 @@ impl Tekscan {
                 _ => {}
             }
         }
-        match cells.find(|word| !word.is_empty()) {
+        match cells.next_filled() {
             Some(more) => {
                 Err(failed!("`{more}` stands after the last of {columns} columns").at(format!("row {}", row + 1)))
             }

@@ -4,7 +4,7 @@
 //! sensor, and how many cells each of its groups has and their area; from these comes the area of a cell, of which the width
 //! and height in the file have two digits only.
 
-use super::layout::{Grid, Layout, value};
+use super::layout::{Grid, Layout, next_value};
 use super::parser::{Parser, Rate};
 use super::text::{Cells, Separator, Word, in_parentheses, metres};
 use super::time::OfDay;
@@ -84,13 +84,13 @@ impl Xsensor {
         let start = first.unwrap_or_default() + (row * grid.columns) as usize;
         let values = &mut self.values[start..start + grid.columns as usize];
         for (slot, column) in values.iter_mut().zip(0..) {
-            let Some(word) = cells.next() else {
+            let Some(value) = next_value(&mut cells) else {
                 return Err(failed!("it has {column} of {} cells", grid.columns)
                     .at(format!("sensor `{name}`, row {}", row + 1)));
             };
-            *slot = value(word).map_err(|e| e.at(at(column)))?;
+            *slot = value.map_err(|e| e.at(at(column)))?;
         }
-        if let Some(more) = cells.find(|word| !word.is_empty()) {
+        if let Some(more) = cells.next_filled() {
             return Err(failed!("`{more}` stands after the last of its {} columns", grid.columns)
                 .at(format!("sensor `{name}`, row {}", row + 1)));
         }
@@ -221,6 +221,14 @@ impl Xsensor {
 impl Parser for Xsensor {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
+        // Most lines are rows of cells, and no keyword begins with a digit.
+        if line.first().is_some_and(u8::is_ascii_digit) {
+            match self.place {
+                Place::Table { sensor, row } => return self.row(sensor, row, cells).map(|()| false),
+                Place::Group => return Ok(false),
+                _ => {}
+            }
+        }
         let word = cells.clone().next();
         let Some(word) = word.filter(|_| !is_blank(line)) else { return Ok(false) };
         let keyword = |name: &str| word.is(name);

@@ -1,0 +1,131 @@
+//! Meshes of an MJCF, with their vertices in the order in which a tactile sensor counts them.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use roxmltree::Node;
+
+use super::builtin;
+use super::document::{Defaults, numbers, three};
+use crate::author::mesh::formats;
+use crate::author::mesh::triangles::Triangles;
+use crate::error::{Error, Result, failed};
+
+/// The name of the asset `node` and its mesh, as it stands in a geom, m.
+pub(super) fn read(
+    node: Node<'_, '_>,
+    defaults: &Defaults,
+    folder: &Path,
+    strips: bool,
+) -> Result<(String, Triangles)> {
+    let file = node.attribute("file");
+    let stem = || {
+        let stem = file.and_then(|file| Path::new(file).file_stem())?;
+        Some(stem.to_string_lossy().into_owned())
+    };
+    let name = node.attribute("name").map(str::to_owned).or_else(stem);
+    let name = name.ok_or_else(|| Error::failed("a <mesh> has neither a `name` nor a `file`"))?;
+    let get = |key: &str| defaults.get(node, key);
+    let mut mesh = match (file, node.attribute("builtin"), node.attribute("vertex")) {
+        (Some(file), ..) => {
+            let file = Path::new(file);
+            let file = if strips { file.file_name().map_or(file, Path::new) } else { file };
+            let path = folder.join(file);
+            of_file(&path).map_err(|e| e.at(path.display()))?
+        }
+        (_, Some(kind), _) => {
+            let params = node.attribute("params").map_or(Ok(Vec::new()), |text| numbers(node, "params", text))?;
+            builtin::make(kind, &params)?
+        }
+        (_, _, Some(text)) => inline(node, text)?,
+        // A plugin makes its surface; it has no vertices that are known here.
+        _ => Triangles::default(),
+    };
+    if let Some(text) = get("refpos") {
+        let origin = three(node, "refpos", text)?;
+        mesh.positions.iter_mut().for_each(|p| *p -= origin);
+    }
+    if let Some(text) = get("refquat") {
+        let &[w, x, y, z] = &numbers(node, "refquat", text)?[..] else {
+            return Err(failed!("`refquat` is `{text}`; write four numbers"));
+        };
+        let turn = DQuat::from_xyzw(x, y, z, w).normalize().inverse();
+        mesh.positions.iter_mut().for_each(|p| *p = turn * *p);
+    }
+    if let Some(text) = get("scale") {
+        let scale = three(node, "scale", text)?;
+        mesh.transform(&glam::DAffine3::from_scale(scale));
+    }
+    if !mesh.is_sound() {
+        return Err(failed!("mesh `{name}` has a corner that is no number or is not there"));
+    }
+    Ok((name, mesh))
+}
+
+/// The mesh at `path`, with the vertices that MuJoCo has: those of an `.obj` in its order, of others each place once.
+fn of_file(path: &Path) -> Result<Triangles> {
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
+        return Ok(shared(&formats::load(path, None)?.0));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::failed("no such file"),
+        _ => Error::failed(e.to_string()),
+    })?;
+    let mut mesh = Triangles::default();
+    for (line, number) in text.lines().zip(1..) {
+        let wrong = || failed!("it is not a valid line of an .obj file").at(format!("line {number}"));
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                let place: Option<Vec<f64>> = words.take(3).map(|word| word.parse().ok()).collect();
+                let place = place.filter(|place| place.len() == 3).ok_or_else(wrong)?;
+                mesh.positions.push(DVec3::from_slice(&place));
+            }
+            Some("f") => {
+                let count = mesh.positions.len() as i64;
+                // From 1 on, or back from the last one; what follows a slash is no place.
+                let index = |word: &str| -> Option<u32> {
+                    let index: i64 = word.split('/').next()?.parse().ok()?;
+                    u32::try_from(if index < 0 { count + index } else { index - 1 }).ok()
+                };
+                let corners: Option<Vec<u32>> = words.map(index).collect();
+                let corners = corners.filter(|corners| corners.len() >= 3).ok_or_else(wrong)?;
+                mesh.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+            }
+            _ => {}
+        }
+    }
+    Ok(mesh)
+}
+
+/// The vertices that stand in the file itself, and the faces if there are any.
+fn inline(node: Node<'_, '_>, text: &str) -> Result<Triangles> {
+    let coordinates = numbers(node, "vertex", text)?;
+    let faces = node.attribute("face").map_or(Ok(Vec::new()), |text| numbers(node, "face", text))?;
+    if coordinates.len() % 3 != 0 || faces.len() % 3 != 0 {
+        return Err(Error::failed("`vertex` and `face` have three numbers for each"));
+    }
+    Ok(Triangles {
+        positions: coordinates.chunks_exact(3).map(DVec3::from_slice).collect(),
+        triangles: faces.chunks_exact(3).map(|face| [face[0] as u32, face[1] as u32, face[2] as u32]).collect(),
+    })
+}
+
+/// The same mesh with one vertex at each place, in the order in which they come first.
+fn shared(mesh: &Triangles) -> Triangles {
+    let mut index_of: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut positions = Vec::new();
+    let own: Vec<u32> = mesh
+        .positions
+        .iter()
+        .map(|&p| {
+            *index_of.entry(p.as_vec3().to_array().map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                positions.push(p);
+                positions.len() as u32 - 1
+            })
+        })
+        .collect();
+    let triangles = mesh.triangles.iter().map(|triangle| triangle.map(|v| own[v as usize])).collect();
+    Triangles { positions, triangles }
+}

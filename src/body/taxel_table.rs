@@ -1,0 +1,211 @@
+//! Tables of taxels as CSV: a line for each, with its id, place and whatever else is known of it.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::Read;
+
+use glam::DVec3;
+
+use super::model::{Body, MAX_TAXEL_ID, Modality};
+use crate::error::{Error, Result, failed};
+
+/// The columns that a table may have, in the order in which they are written.
+const COLUMNS: [&str; 10] = ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality"];
+
+/// Maximum area of a taxel, m²; larger ones are in another unit.
+const MAX_TAXEL_AREA_M2: f64 = 1.0;
+
+/// A line of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TaxelRow {
+    /// Its line in the file, from 1.
+    pub line: u64,
+    /// The taxel's id.
+    pub id: u32,
+    /// The link in whose frame its place and normal are, if it is named.
+    pub link: Option<String>,
+    /// Its place, m; z is 0 where a flat table leaves it out.
+    pub position: DVec3,
+    /// Its outward unit normal, if given.
+    pub normal: Option<DVec3>,
+    /// Its area, m², if given.
+    pub area_m2: Option<f64>,
+    /// What it measures, if given.
+    pub modality: Option<Modality>,
+}
+
+/// Reads a table with the columns `id`, `x`, `y` and `z`, and optionally `link`, `nx`, `ny`, `nz`, `area` and `modality`; a
+/// `flat` one may leave out `z`. Ids are unique for each link if `flat`, else in all of the table.
+///
+/// # Errors
+/// It is no such table; with the line.
+pub fn read_taxel_table(reader: impl Read, flat: bool) -> Result<Vec<TaxelRow>> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
+    let broken = |e: &csv::Error| {
+        let row = e.position().map_or(0, csv::Position::line);
+        failed!("not a valid table: {e}; give the columns id,x,y,z").at(format!("line {row}"))
+    };
+    let header = reader.headers().map_err(|e| broken(&e))?.clone();
+    let columns = Columns::of(&header, flat)?;
+    let mut rows: Vec<TaxelRow> = Vec::new();
+    let mut seen = HashMap::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| broken(&e))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let row = columns.row(&record, line).map_err(|e| e.at(format!("line {line}")))?;
+        let scope = if flat { row.link.clone() } else { None };
+        if let Some(before) = seen.insert((scope, row.id), line) {
+            let what = failed!("id {} is on line {before} already; give each taxel its own", row.id);
+            return Err(what.at(format!("line {line}")));
+        }
+        rows.push(row);
+    }
+    if rows.is_empty() {
+        return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));
+    }
+    Ok(rows)
+}
+
+/// Where in a record each column is.
+struct Columns {
+    id: usize,
+    place: [Option<usize>; 3],
+    normal: Option<[usize; 3]>,
+    link: Option<usize>,
+    area: Option<usize>,
+    modality: Option<usize>,
+}
+
+impl Columns {
+    fn of(header: &csv::StringRecord, flat: bool) -> Result<Self> {
+        if let Some(unknown) = header.iter().find(|own| !COLUMNS.iter().any(|known| own.eq_ignore_ascii_case(known))) {
+            return Err(failed!(
+                "there is no column `{unknown}` in a table of taxels; it may have {}: rename or remove it",
+                COLUMNS.join(", ")
+            )
+            .at("line 1"));
+        }
+        let column = |name: &str| header.iter().position(|own| own.eq_ignore_ascii_case(name));
+        let needed = |name: &str| {
+            let all = if flat { "id, x, y" } else { "id, x, y, z" };
+            column(name).ok_or_else(|| {
+                failed!("there is no column `{name}`; the first line names {all} and optionally link and area")
+            })
+        };
+        let z = if flat { column("z") } else { Some(needed("z")?) };
+        let normal = match [column("nx"), column("ny"), column("nz")] {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            [None, None, None] => None,
+            _ => return Err(Error::failed("a normal has three columns, nx, ny and nz; add those that are missing")),
+        };
+        Ok(Self {
+            id: needed("id")?,
+            place: [Some(needed("x")?), Some(needed("y")?), z],
+            normal,
+            link: column("link"),
+            area: column("area"),
+            modality: column("modality"),
+        })
+    }
+
+    fn row(&self, record: &csv::StringRecord, line: u64) -> Result<TaxelRow> {
+        let cell = |column: usize| record.get(column).unwrap_or_default();
+        let given = |column: Option<usize>| column.map(cell).filter(|text| !text.is_empty());
+        let number = |column: usize| {
+            let number = cell(column).parse().ok().filter(|x: &f64| x.is_finite());
+            number.ok_or_else(|| failed!("`{}` is no coordinate; give metres", cell(column)))
+        };
+        let id = cell(self.id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID);
+        let id =
+            id.ok_or_else(|| failed!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(self.id)))?;
+        let [x, y, z] = self.place.map(|column| column.map_or(Ok(0.0), number));
+        let normal = match self.normal {
+            Some([x, y, z]) if [x, y, z].iter().any(|&column| !cell(column).is_empty()) => {
+                let normal = DVec3::new(number(x)?, number(y)?, number(z)?);
+                // What is a unit vector to the digits of single precision stays as it is written.
+                let is_unit = (normal.length_squared() - 1.0).abs() < 1e-6;
+                let unit = if is_unit { Some(normal) } else { normal.try_normalize() };
+                Some(unit.ok_or_else(|| Error::failed("its normal is zero; give a direction, or leave it blank"))?)
+            }
+            _ => None,
+        };
+        Ok(TaxelRow {
+            line,
+            id,
+            link: given(self.link).map(str::to_owned),
+            position: DVec3::new(x?, y?, z?),
+            normal,
+            area_m2: given(self.area).map(area_of).transpose()?,
+            modality: given(self.modality).map(modality_of).transpose()?,
+        })
+    }
+}
+
+fn area_of(text: &str) -> Result<f64> {
+    let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
+    area.ok_or_else(|| failed!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
+}
+
+fn modality_of(text: &str) -> Result<Modality> {
+    let other = text.strip_prefix("modality ").and_then(|code| code.parse().ok()).map(Modality::from_code);
+    let known = (0..3).map(Modality::from_code).find(|known| known.name().eq_ignore_ascii_case(text));
+    known.or(other).ok_or_else(|| failed!("there is no modality `{text}`; write pressure, temperature or proximity"))
+}
+
+/// The taxels of `body` as a table with all columns: places and normals in the frames of their links, an unknown area blank.
+#[must_use]
+pub fn taxel_table(body: &Body) -> String {
+    let mut text = COLUMNS.join(",") + "\n";
+    for taxel in &body.taxels {
+        let link = quoted(&body.links[taxel.link].name);
+        let _ = write!(text, "{},{link}", taxel.id);
+        for x in taxel.position_in_link.to_array().into_iter().chain(taxel.normal_in_link.to_array()) {
+            // −0 is 0.
+            let _ = write!(text, ",{}", x + 0.0);
+        }
+        let area = if taxel.area > 0.0 { taxel.area.to_string() } else { String::new() };
+        let _ = writeln!(text, ",{area},{}", taxel.modality.name());
+    }
+    text
+}
+
+/// A name as a cell, in quotation marks where commas or the like need them.
+fn quoted(name: &str) -> String {
+    let is_plain = !name.contains([',', '"', '\n', '\r', '#']) && name.trim() == name;
+    if is_plain { name.to_owned() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<TaxelRow>> {
+        read_taxel_table(text.as_bytes(), false)
+    }
+
+    #[test]
+    fn columns_may_come_in_any_order_and_be_left_out() {
+        let rows = read("Y,X,id,z,area\n2,1,7,3,1e-4\n0,0,8,0,\n").unwrap();
+        assert_eq!((rows[0].id, rows[0].position, rows[0].area_m2), (7, DVec3::new(1.0, 2.0, 3.0), Some(1e-4)));
+        assert_eq!((rows[1].line, rows[1].area_m2, &rows[1].link, rows[1].normal), (3, None, &None, None));
+        let rows = read("id,x,y,z,nx,ny,nz,modality,link\n1,0,0,0,0,0,2,proximity,\"a, b\"\n").unwrap();
+        let known = (rows[0].normal, rows[0].modality, rows[0].link.as_deref());
+        assert_eq!(known, (Some(DVec3::Z), Some(Modality::Proximity), Some("a, b")));
+        let flat = read_taxel_table("id,x,y,link\n1,0,0,left\n1,0,0,right\n".as_bytes(), true).unwrap();
+        assert_eq!((flat.len(), flat[1].position), (2, DVec3::ZERO));
+    }
+
+    #[test]
+    fn what_is_wrong_has_its_line() {
+        let why = |text: &str| read(text).unwrap_err().to_string();
+        assert!(why("id,x,y\n1,0,0\n").contains("no column `z`; the first line names id, x, y, z"));
+        assert!(why("id,x,y,z,weight\n").contains("line 1: there is no column `weight`"));
+        assert!(why("id,x,y,z,nx\n1,0,0,0,1\n").contains("three columns"));
+        assert!(why("id,x,y,z\n1,0,0,0\n1,0,0,0\n").contains("line 3: id 1 is on line 2 already"));
+        assert!(why("id,x,y,z\n1,0,zero,0\n").contains("line 2: `zero` is no coordinate"));
+        assert!(why("id,x,y,z,area\n1,0,0,0,25\n").contains("line 2: `25` is no area"));
+        assert!(why("id,x,y,z,nx,ny,nz\n1,0,0,0,0,0,0\n").contains("its normal is zero"));
+        assert!(why("id,x,y,z,modality\n1,0,0,0,taste\n").contains("no modality `taste`"));
+        assert!(why("id,x,y,z\n").contains("no rows"));
+    }
+}

@@ -1,0 +1,94 @@
+//! The first source of a run: what its content says that it is, found out once.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use somatic::source::{SourceSpec, VendorOptions, VendorSource};
+use somatic::{Error, Result};
+
+/// The source `text` as one of `kinds`, and what its content says that it is.
+pub(super) fn source_of(text: &str, kinds: Option<&[&str]>, options: &VendorOptions) -> Result<SourceSpec> {
+    let spec = match kinds {
+        Some(kinds) => SourceSpec::one_of(text, kinds),
+        None => text.parse(),
+    };
+    let spec = spec?.with_content(options);
+    if let SourceSpec::Vendor(path) = &spec
+        && path.exists()
+        && !path.is_file()
+        && !path.is_dir()
+    {
+        let what = "the file is read more than once, for its sensors and for its frames; save it first";
+        return Err(Error::usage(what).at(path.display()));
+    }
+    Ok(spec)
+}
+
+/// The first source of a run as it was found, so that an export's file is opened once for its sensors and its frames.
+#[derive(Clone, Default)]
+pub(super) struct FirstSource(Arc<Mutex<Option<Found>>>);
+
+/// A source, and the export that it is.
+pub(super) struct Found {
+    /// What was asked for.
+    text: String,
+    options: VendorOptions,
+    pub(super) spec: SourceSpec,
+    export: Option<Export>,
+}
+
+/// What an export says of itself, and its frames.
+pub(super) struct Export {
+    pub(super) body_name: String,
+    pub(super) body: Result<Vec<u8>>,
+    pub(super) calibration: Option<String>,
+    pub(super) is_placed: bool,
+    pub(super) path: PathBuf,
+    /// Until it is read.
+    pub(super) source: Option<Box<VendorSource>>,
+}
+
+impl FirstSource {
+    /// What `look` sees of the source `text`, which is found out once.
+    pub(super) fn look<T>(
+        &self,
+        text: &str,
+        options: VendorOptions,
+        look: impl FnOnce(&mut Found) -> Result<T>,
+    ) -> Result<T> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = match known.take() {
+            Some(found) if found.text == text && found.options == options => found,
+            _ => {
+                let spec = source_of(text, None, &options)?;
+                Found { text: text.to_owned(), options, spec, export: None }
+            }
+        };
+        look(known.insert(found))
+    }
+}
+
+impl fmt::Debug for FirstSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("FirstSource")
+    }
+}
+
+impl Found {
+    /// The export, opened if it is one.
+    pub(super) fn export(&mut self) -> Result<Option<&mut Export>> {
+        if let (SourceSpec::Vendor(path), None) = (&self.spec, &self.export) {
+            let source = VendorSource::open(path, &self.options)?;
+            self.export = Some(Export {
+                body_name: source.body_name(),
+                body: source.body(),
+                calibration: source.calibration(),
+                is_placed: source.layout().is_placed(),
+                path: path.clone(),
+                source: Some(Box::new(source)),
+            });
+        }
+        Ok(self.export.as_mut())
+    }
+}
