@@ -9,12 +9,13 @@ use std::process::{Command, Output};
 use self::skips::skip;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
-const RUN_ELSEWHERE: [&str; 16] = [
+const RUN_ELSEWHERE: [&str; 17] = [
     "cargo run --release -- view --open",
     "cargo run --release --example embed",
     "cargo run --example bodies",
     "cargo run --example bodies -- --check",
     "cargo install --path .",
+    "pip install ./python",
     "tests/run",
     "tests/run [arguments for cargo test]",
     ".ci/run",

@@ -1,0 +1,50 @@
+"""The bits of `Percepts.flags`."""
+
+from __future__ import annotations
+
+import enum
+import operator
+
+
+class Flags(enum.IntFlag):
+    """Why a quantity is absent or in doubt, and what was wrong with the input.
+
+    >>> import somatic_touch as st
+    >>> st.Flags.STILL | st.Flags.TIE
+    <Flags.TIE|STILL: 36>
+    """
+
+    NO_CONTACT = 1 << 0
+    ONE_TAXEL = 1 << 1
+    TIE = 1 << 2
+    COINCIDENT = 1 << 3
+    ISOTROPIC = 1 << 4
+    STILL = 1 << 5
+    SATURATED = 1 << 6
+    FAULTY_INPUT = 1 << 7
+    OUT_OF_RANGE = 1 << 8
+    INCOMPLETE = 1 << 9
+    NO_CHART = 1 << 10
+    NO_PREVIOUS = 1 << 11
+    BAD_DT = 1 << 12
+    STALE = 1 << 13
+    SEVERAL = 1 << 14
+    HELD = 1 << 16
+    JUMPED = 1 << 17
+    DRIFT_UNKNOWN = 1 << 18
+    NO_UNIT = 1 << 19
+    FEW_TAXELS = 1 << 20
+    OFF_FIELD = 1 << 21
+    POOR_FIT = 1 << 22
+    CURVED = 1 << 23
+    NO_SKIN = 1 << 24
+    NOISE_UNKNOWN = 1 << 25
+    UNSURE = 1 << 26
+
+    @classmethod
+    def _missing_(cls, value: object) -> object:
+        # NumPy's integers are none of Python's.
+        return super()._missing_(operator.index(value))  # type: ignore[arg-type]
+
+
+Flags.__module__ = "somatic_touch"

@@ -1,0 +1,92 @@
+"""Percepts of many recordings on one machine."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import concurrent.futures.process
+import multiprocessing
+import os
+import pathlib
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from . import Body, Calibration, Scene, SomaticError
+from ._jobs import Job, Report, outputs
+
+__all__ = ["Report", "percepts"]
+
+
+def _threads(count: int) -> None:
+    """Says how many threads the library may start in this process, before it has."""
+    os.environ["RAYON_NUM_THREADS"] = str(count)
+
+
+def _run(job: Job, recording: pathlib.Path, out: pathlib.Path) -> dict[str, Any]:
+    return job.run(recording, out)
+
+
+def percepts(
+    recordings: Iterable[str | os.PathLike[str]],
+    scene: Scene | dict[str, Any] | str | None,
+    out: str | os.PathLike[str],
+    *,
+    body: Body | str | None = None,
+    calibration: Calibration | str | None = None,
+    backend: str | None = "cpu",
+    all_fields: bool = False,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Report:
+    """Makes a table in Parquet of each recording, below the folder `out`, in `workers` processes (by default one a core).
+
+    A recording is one piece of work and never cut, as touches and filters have a state. A table appears when it is whole. One that is
+    there already, made of the same file by the same body, scene, calibration, backend and version, is left as it is, so that a job that
+    was ended goes on where it stopped. A damaged recording is a row of `Report.errors`. `progress` is called with how many recordings are
+    done, and of how many. A script guards its own start with ``if __name__ == "__main__":``, as all that start processes do.
+
+    >>> import pathlib, tempfile
+    >>> import somatic_touch as st, somatic_touch.batch
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> for name in "ab":
+    ...     _ = (folder / f"{name}.csv").write_text("t,0,1\\n0,1,2\\n0.1,3,4\\n")
+    >>> sensor = st.Body.grid(1, 2, 0.01)
+    >>> st.batch.percepts(folder.glob("*.csv"), {"outputs": "total"}, folder / "out", body=sensor, workers=1)
+    <Report: 2 done, 0 done before, 0 failed>
+    >>> st.batch.percepts(folder.glob("*.csv"), {"outputs": "total"}, folder / "out", body=sensor, workers=1)
+    <Report: 0 done, 2 done before, 0 failed>
+    """
+    job = Job.of(scene, body, calibration, backend, all_fields)
+    pairs = outputs(recordings, out)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    workers = min(workers or cores, len(pairs))
+    skipped = [(recording, table) for recording, table in pairs if recording.exists() and job.is_done(recording, table)]
+    todo = [pair for pair in pairs if pair not in skipped]
+    rows: list[dict[str, Any]] = []
+
+    def tell() -> None:
+        if progress is not None:
+            progress(len(skipped) + len(rows), len(pairs))
+
+    tell()
+    if workers == 1:
+        for recording, table in todo:
+            rows.append(job.run(recording, table))
+            tell()
+    elif todo:
+        # Large ones first, so that the last one to end is a small one.
+        todo.sort(key=lambda pair: -pair[0].stat().st_size if pair[0].exists() else 0)
+        pool = concurrent.futures.ProcessPoolExecutor(
+            workers, multiprocessing.get_context("spawn"), _threads, (max(1, cores // workers),)
+        )
+        try:
+            for done in concurrent.futures.as_completed([pool.submit(_run, job, *pair) for pair in todo]):
+                rows.append(done.result())
+                tell()
+        except concurrent.futures.process.BrokenProcessPool as error:
+            what = "a worker process was ended from outside; call again, and the job goes on where it stopped"
+            raise SomaticError(what) from error
+        finally:
+            pool.shutdown(cancel_futures=True)
+    order = {str(recording): index for index, (recording, _) in enumerate(pairs)}
+    rows.sort(key=lambda row: order[row["recording"]])
+    return Report(rows, [str(recording) for recording, _ in skipped])

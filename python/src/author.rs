@@ -1,0 +1,93 @@
+//! `author`: a skin on a mesh.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use somatic::author::mesh::MeshOptions;
+use somatic::author::{Recipe, mesh};
+use somatic::body::Original;
+use somatic::{Error, bundled};
+
+use crate::body::PyBody;
+use crate::error::{OrRaise, interrupted};
+use crate::threads::free;
+
+/// Puts a skin on a mesh, as `somatic author` does, and gives the body.
+///
+/// `shape` is a file (.glb, .gltf, .stl, .obj, .dae, .ply or .urdf) or a bundled body. Either `recipe`, the path of a file that
+/// docs/authoring.md describes; or `taxels`, how many, `spacing`, such as '8 mm', or both, on the nodes, meshes or links whose names match
+/// one of the globs `regions`. `unit` says what the file's numbers are: 'um', 'mm', 'cm' or 'm'. `progress` is called with the
+/// share that is done, 0 to 1.
+///
+/// >>> import somatic_touch as st
+/// >>> body = st.author("hand", taxels=60, seed=1)
+/// >>> len(body.taxels)
+/// 60
+#[pyfunction]
+#[pyo3(signature = (shape, recipe = None, *, taxels = None, spacing = None, regions = Vec::new(), seed = None, unit = None, progress = None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords")]
+pub(crate) fn author(
+    py: Python<'_>,
+    shape: PathBuf,
+    recipe: Option<PathBuf>,
+    taxels: Option<u64>,
+    spacing: Option<&str>,
+    regions: Vec<String>,
+    seed: Option<u64>,
+    unit: Option<&str>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<PyBody> {
+    let mut made = match &recipe {
+        Some(_) if taxels.is_some() || spacing.is_some() || !regions.is_empty() => {
+            Err(Error::usage("a recipe says what is placed where; leave taxels, spacing and regions out"))
+        }
+        Some(path) => Recipe::load(path),
+        None => Recipe::simple(taxels, spacing, &regions),
+    }
+    .and_then(|made| match (seed, unit) {
+        (Some(seed), _) => Ok(made.with_seed(seed)),
+        _ => Ok(made),
+    })
+    .or_raise(py)?;
+    if let Some(unit) = unit {
+        made = made.with_unit(unit).map_err(|e| e.at("unit")).or_raise(py)?;
+    }
+    let mut raised = None;
+    let done = free(py, || {
+        let file = open(&shape, &mut made)?;
+        let shown = |share: f64| {
+            if raised.is_some() {
+                return;
+            }
+            let heard = Python::attach(|py| {
+                py.check_signals()?;
+                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (share,)).map(drop))
+            });
+            raised = heard.err();
+        };
+        let authored = somatic::author::author(file, &made, shown)?;
+        let name = shape
+            .with_extension("glb")
+            .file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        PyBody::of_bytes(&name, authored.file.to_glb()?)
+    });
+    match raised {
+        Some(error) => Err(interrupted(Some(error))),
+        None => done.or_raise_of(py, &shape),
+    }
+}
+
+fn open(shape: &Path, recipe: &mut Recipe) -> somatic::Result<Original> {
+    if !shape.exists()
+        && let Some(name) = shape.to_str()
+        && let Some(bytes) = bundled::body(name)
+    {
+        return Original::from_bytes(name, bytes, None);
+    }
+    if mesh::is_mesh(shape) {
+        let options = MeshOptions { unit_m: recipe.take_unit(), ..MeshOptions::default() };
+        return mesh::open(shape, &options);
+    }
+    Original::open(shape)
+}

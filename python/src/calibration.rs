@@ -1,0 +1,72 @@
+//! `Calibration`.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use somatic::Calibration;
+
+use crate::body::PyBody;
+use crate::error::OrRaise;
+
+/// How one robot's sensors answer: baselines, gains, units, and which values to reject.
+///
+/// `text` is a file as docs/calibration.md describes it, made for `body`.
+///
+/// >>> import somatic_touch as st
+/// >>> body = st.Body.bundled("hand")
+/// >>> st.Calibration("[all]\ngain = 2\nunit = 'kPa'", body).quantity
+/// 'Pa'
+#[pyclass(module = "somatic_touch", name = "Calibration", frozen)]
+pub(crate) struct PyCalibration {
+    pub(crate) inner: Calibration,
+    /// As tables keep it.
+    pub(crate) text: String,
+    taxels: usize,
+}
+
+impl PyCalibration {
+    pub(crate) fn of_text(text: &str, body: &PyBody) -> somatic::Result<Self> {
+        let inner = Calibration::parse(text, &body.ids())?;
+        inner.check_body(&body.inner.name)?;
+        Ok(Self { taxels: inner.taxels.len(), inner, text: text.to_owned() })
+    }
+}
+
+#[pymethods]
+impl PyCalibration {
+    #[new]
+    fn new(py: Python<'_>, text: &str, body: &PyBody) -> PyResult<Self> {
+        Self::of_text(text, body).or_raise(py)
+    }
+
+    /// Reads the calibration file at `path`, made for `body`.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> st.Calibration.load("no-such.toml", st.Body.bundled("hand"))
+    /// Traceback (most recent call last):
+    ///     ...
+    /// somatic_touch.InputError: no-such.toml: no such file or directory
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf, body: &PyBody) -> PyResult<Self> {
+        let text = std::fs::read_to_string(&path).map_err(|e| somatic::Error::io(&path, &e)).or_raise_of(py, &path)?;
+        Self::of_text(&text, body).map_err(|e| e.at(path.display())).or_raise_of(py, &path)
+    }
+
+    /// What all taxels measure: 'Pa', 'N', 'count', or 'mixed'.
+    #[getter]
+    fn quantity(&self) -> &'static str {
+        let mut all = self.inner.taxels.iter().map(|taxel| taxel.quantity.symbol());
+        let first = all.next().unwrap_or("count");
+        if all.all(|other| other == first) { first } else { "mixed" }
+    }
+
+    /// The text of the file.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Calibration of {} taxels in {}>", self.taxels, self.quantity())
+    }
+}

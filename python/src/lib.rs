@@ -1,0 +1,55 @@
+//! The module `somatic_touch._native`: what the Python package has in Rust.
+
+mod arrays;
+mod author;
+mod body;
+mod calibration;
+mod engine;
+mod error;
+mod percepts;
+mod recording;
+mod runner;
+mod scene;
+mod session;
+mod simulation;
+mod sinks;
+mod stream;
+mod threads;
+mod touches;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+#[pyo3(name = "_native")]
+mod native {
+    use super::*;
+
+    #[pymodule_export]
+    use author::author;
+    #[pymodule_export]
+    use body::{PyBody, PyField};
+    #[pymodule_export]
+    use calibration::PyCalibration;
+    #[pymodule_export]
+    use engine::{PyEngine, PyState};
+    #[pymodule_export]
+    use percepts::PyPercepts;
+    #[pymodule_export]
+    use recording::{PyRecording, read};
+    #[pymodule_export]
+    use runner::{metadata, run};
+    #[pymodule_export]
+    use scene::PyScene;
+    #[pymodule_export]
+    use simulation::{PySimulation, simulate};
+    #[pymodule_export]
+    use sinks::write;
+    #[pymodule_export]
+    use touches::PyTouches;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        threads::note_process();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,324 @@
+//! `read`: what `somatic run` reads from files, as arrays.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use somatic::recording::{BODY, CALIBRATION, Reader};
+use somatic::signal::{Pose, UnitOfP};
+use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
+use somatic::{Error, Frame, RawValue, bundled};
+
+use crate::arrays::array;
+use crate::body::PyBody;
+use crate::calibration::PyCalibration;
+use crate::error::{OrRaise, usage};
+
+/// Frames that are read until Ctrl-C is heard.
+const FRAMES_BETWEEN: usize = 1 << 10;
+
+/// Frames in memory, with the body and the calibration that come with them.
+///
+/// >>> import somatic_touch as st
+/// >>> touch = st.read("hand")
+/// >>> touch
+/// <Recording bundled touch: 280 frames of 40 taxels in 5.58 s>
+/// >>> engine = touch.engine({"outputs": ["total"]}, backend="cpu")
+/// >>> engine.process(touch.t, touch.values)["total"].shape
+/// (280, 13)
+#[pyclass(module = "somatic_touch", name = "Recording", frozen)]
+pub(crate) struct PyRecording {
+    pub(crate) name: String,
+    pub(crate) frames: usize,
+    taxels: Vec<u32>,
+    t: Py<PyAny>,
+    values: Py<PyAny>,
+    mask: Py<PyAny>,
+    pose: Py<PyDict>,
+    body: Option<Py<PyBody>>,
+    calibration: Option<Py<PyCalibration>>,
+    losses: Vec<String>,
+    length_s: f64,
+}
+
+#[pymethods]
+impl PyRecording {
+    /// The times of its frames, float64 [frames], in seconds.
+    #[getter]
+    fn t(&self, py: Python<'_>) -> Py<PyAny> {
+        self.t.clone_ref(py)
+    }
+
+    /// Raw values, float32 [frames, taxels]: NaN where faulty, and a NaN that `Engine.process` knows where missing.
+    #[getter]
+    fn values(&self, py: Python<'_>) -> Py<PyAny> {
+        self.values.clone_ref(py)
+    }
+
+    /// Where a value is missing, bool [frames, taxels].
+    #[getter]
+    fn mask(&self, py: Python<'_>) -> Py<PyAny> {
+        self.mask.clone_ref(py)
+    }
+
+    /// The ids of its taxels, in the order of the values.
+    #[getter]
+    fn taxels(&self) -> Vec<u32> {
+        self.taxels.clone()
+    }
+
+    /// By link its poses in the world, float64 [frames, 7]: x, y, z in metres, and a quaternion qx, qy, qz, qw.
+    #[getter]
+    fn pose(&self, py: Python<'_>) -> Py<PyDict> {
+        self.pose.clone_ref(py)
+    }
+
+    /// The body that was given, or that comes with it.
+    #[getter]
+    fn body(&self, py: Python<'_>) -> Option<Py<PyBody>> {
+        self.body.as_ref().map(|body| body.clone_ref(py))
+    }
+
+    /// The calibration that comes with it.
+    #[getter]
+    fn calibration(&self, py: Python<'_>) -> Option<Py<PyCalibration>> {
+        self.calibration.as_ref().map(|calibration| calibration.clone_ref(py))
+    }
+
+    /// What of the file could not be read, a line each: a truncated row, a damaged part.
+    #[getter]
+    fn losses(&self) -> Vec<String> {
+        self.losses.clone()
+    }
+
+    /// An engine for its body and its taxels, under its calibration or another one.
+    #[pyo3(signature = (scene = None, calibration = None, backend = None, *, batch = 256))]
+    fn engine<'py>(
+        &self,
+        py: Python<'py>,
+        scene: Option<&Bound<'py, PyAny>>,
+        calibration: Option<Py<PyCalibration>>,
+        backend: Option<&str>,
+        batch: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Some(body) = &self.body else {
+            return Err(usage(py, format!("{}: it has no body; read it with body=", self.name)));
+        };
+        let own = || self.calibration.as_ref().map(|own| own.clone_ref(py));
+        let keys = PyDict::new(py);
+        keys.set_item("taxels", self.taxels.clone())?;
+        keys.set_item("batch", batch)?;
+        let class = py.get_type::<crate::engine::PyEngine>();
+        class.call((body, scene, calibration.or_else(own), backend), Some(&keys))
+    }
+
+    fn __len__(&self) -> usize {
+        self.frames
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Recording {}: {} frames of {} taxels in {:.2} s>",
+            self.name,
+            self.frames,
+            self.taxels.len(),
+            self.length_s
+        )
+    }
+}
+
+/// What a source delivered.
+#[derive(Default)]
+pub(crate) struct Frames {
+    t_s: Vec<f64>,
+    values: Vec<RawValue>,
+    /// By link: of each frame its pose, missing ones NaN.
+    poses: BTreeMap<String, Vec<f64>>,
+}
+
+impl Frames {
+    pub(crate) fn push(&mut self, frame: &Frame) {
+        let index = self.t_s.len();
+        self.t_s.push(frame.t_s);
+        self.values.extend_from_slice(&frame.values);
+        for (link, Pose { translation, rotation }) in &frame.pose {
+            let poses = self.poses.entry(link.clone()).or_default();
+            poses.resize(7 * index, f64::NAN);
+            poses.extend(translation.to_array().into_iter().chain(rotation.to_array()));
+        }
+    }
+
+    pub(crate) fn finish(
+        self,
+        py: Python<'_>,
+        name: String,
+        source: &dyn Source,
+        body: Option<Py<PyBody>>,
+        calibration: Option<Py<PyCalibration>>,
+    ) -> PyResult<PyRecording> {
+        let (frames, taxels) = (self.t_s.len(), source.taxels().to_vec());
+        let pose = PyDict::new(py);
+        for (link, mut poses) in self.poses {
+            poses.resize(7 * frames, f64::NAN);
+            pose.set_item(link, array(py, poses, &[frames, 7])?)?;
+        }
+        let mask = self.values.iter().map(|value| value.is_missing()).collect();
+        let values: Vec<f32> = bytemuck::cast_slice(&self.values).to_vec();
+        let length_s = self.t_s.last().zip(self.t_s.first()).map_or(0.0, |(last, first)| last - first);
+        Ok(PyRecording {
+            name,
+            frames,
+            t: array(py, self.t_s, &[frames])?,
+            values: array(py, values, &[frames, taxels.len()])?,
+            mask: array(py, mask, &[frames, taxels.len()])?,
+            taxels,
+            pose: pose.unbind(),
+            body,
+            calibration,
+            losses: source.losses(),
+            length_s,
+        })
+    }
+}
+
+/// All frames of `source`; Ctrl-C ends it.
+fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyResult<Frames> {
+    let mut frames = Frames::default();
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    loop {
+        for _ in 0..FRAMES_BETWEEN {
+            if !source.next_frame(&mut frame).or_raise_of(py, file)? {
+                return Ok(frames);
+            }
+            frames.push(&frame);
+        }
+        py.check_signals()?;
+    }
+}
+
+/// The body in the recording at `path`, and the text of its calibration.
+fn attached(path: &Path) -> somatic::Result<(Option<(String, Vec<u8>)>, Option<String>)> {
+    let mut reader = Reader::open(path)?;
+    let body = reader.attached().iter().find(|attached| attached.media_type == BODY).cloned();
+    let calibration = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
+    let body = body.map(|attached| Ok((attached.name.clone(), reader.bytes_of(&attached)?))).transpose()?;
+    let calibration = calibration.map(|attached| reader.bytes_of(&attached)).transpose()?;
+    let text = calibration.map(String::from_utf8).transpose();
+    Ok((body, text.map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?))
+}
+
+/// Opens the source and finds what comes with it: the source, its body, the text of its calibration.
+pub(crate) type Opened = (Box<dyn Source + Send>, Option<PyBody>, Option<String>);
+
+pub(crate) fn open(
+    spec: &SourceSpec,
+    body: Option<&PyBody>,
+    options: &VendorOptions,
+    cut: Cut,
+) -> somatic::Result<Opened> {
+    let (own, calibration) = match spec {
+        SourceSpec::Mcap(path) => attached(path)?,
+        SourceSpec::Vendor(path) => {
+            let export = VendorSource::open(path, options)?;
+            // Of another body than its own it would be refused by name.
+            let text = export.calibration().map(|text| match body {
+                None => text,
+                Some(_) => text.lines().filter(|line| !line.starts_with("body")).collect::<Vec<_>>().join("\n"),
+            });
+            (Some((export.body_name(), export.body()?)), text)
+        }
+        SourceSpec::Sim(_) => {
+            return Err(Error::usage("a simulation has a truth too; read it with `simulate`"));
+        }
+        SourceSpec::Csv(_) => (None, None),
+        _ => return Err(Error::usage("only files are read here; give live frames to `Engine.step`")),
+    };
+    // A recording's calibration is that of its body.
+    let calibration = calibration.filter(|_| body.is_none() || matches!(spec, SourceSpec::Vendor(_)));
+    let own = own.filter(|_| body.is_none()).map(|(name, bytes)| PyBody::of_bytes(&name, bytes)).transpose()?;
+    let ids = body.or(own.as_ref()).map(PyBody::ids).unwrap_or_default();
+    let (again, kept) = (spec.clone(), options.clone());
+    let open = move || again.open(&ids, &kept);
+    let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };
+    Ok((source, own, calibration))
+}
+
+/// Reads a recording from a file: CSV, MCAP, or a pressure system's export, as `somatic run --source` does.
+///
+/// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
+/// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
+/// after its start. The other keywords are those of docs/recordings-of-others.md.
+///
+/// >>> import somatic_touch as st
+/// >>> st.read("no-such.csv")
+/// Traceback (most recent call last):
+///     ...
+/// somatic_touch.InputError: no-such.csv: no such file or directory
+#[pyfunction]
+#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords")]
+pub(crate) fn read(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    body: Option<&Bound<'_, PyAny>>,
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    rate_hz: Option<f64>,
+    format: Option<&str>,
+    grid: Option<&str>,
+    pitch: Option<&str>,
+    unit: Option<&str>,
+) -> PyResult<PyRecording> {
+    let text = match source.extract::<String>() {
+        Ok(text) => text,
+        Err(_) => source.extract::<PathBuf>()?.display().to_string(),
+    };
+    let body = match body {
+        None => None,
+        Some(body) => Some(match body.extract::<String>() {
+            Ok(name) => Py::new(py, PyBody::bundled_or_file(&name).or_raise_of(py, Path::new(&name))?)?,
+            Err(_) => body
+                .cast::<PyBody>()
+                .map_err(|_| usage(py, "body should be a Body, or its file's name"))?
+                .clone()
+                .unbind(),
+        }),
+    };
+    let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
+    let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
+        let options = VendorOptions {
+            format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
+            rate_hz,
+            grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
+            pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
+            unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
+        };
+        let spec = text.parse::<SourceSpec>()?.with_content(&options);
+        Ok((options, spec))
+    };
+    if text == "hand" && body.is_none() {
+        let mut touch = CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None).or_raise(py)?;
+        let frames = gather(py, &mut touch, Path::new(""))?;
+        let body = Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?;
+        return frames.finish(py, "bundled touch".to_owned(), &touch, Some(body), None);
+    }
+    let (options, spec) = made().or_raise(py)?;
+    let given = body.as_ref().map(|body| body.get());
+    let file = spec.file().unwrap_or(Path::new("")).to_owned();
+    let (mut source, own, calibration) = open(&spec, given, &options, cut).or_raise_of(py, &file)?;
+    let frames = gather(py, &mut *source, &file)?;
+    let body = match (body, own) {
+        (Some(body), _) => Some(body),
+        (None, own) => own.map(|own| Py::new(py, own)).transpose()?,
+    };
+    let calibration = match (&body, calibration) {
+        (Some(body), Some(text)) => {
+            let made =
+                PyCalibration::of_text(&text, body.get()).map_err(|e| e.at("its own calibration").at(file.display()));
+            Some(Py::new(py, made.or_raise_of(py, &file)?)?)
+        }
+        _ => None,
+    };
+    frames.finish(py, file.display().to_string(), &*source, body, calibration)
+}

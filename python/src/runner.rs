@@ -1,0 +1,134 @@
+//! `run`: from a file to a file, without arrays in between.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use somatic::output::OutputPaths;
+use somatic::sink::{Flow, SinkSpec, TableWish};
+use somatic::source::{Cut, SourceSpec, VendorOptions};
+use somatic::{BackendKind, Engine, Error, Frame, Outputs};
+
+use crate::body::PyBody;
+use crate::calibration::PyCalibration;
+use crate::error::{OrRaise, interrupted};
+use crate::recording::open;
+use crate::scene::PyScene;
+use crate::session::Run;
+use crate::threads::free;
+
+/// Frames of a call.
+const BATCH: usize = 256;
+
+/// Turns a recording into a file of percepts, as `somatic run --source … --sink …` does, in bounded memory.
+///
+/// `source` and `sink` are paths or texts such as `mcap:FILE` and `parquet:FILE`; `body`, `scene`, `calibration` and `backend` as in
+/// `read` and `Engine`; what comes with the recording is used where nothing is given. `label` stands in the file's metadata as its
+/// source. `progress` is called with the number of frames done.
+///
+/// Gives the number of frames, and what of the source was lost, a line each.
+///
+/// >>> import pathlib, tempfile
+/// >>> import somatic_touch as st
+/// >>> folder = pathlib.Path(tempfile.mkdtemp())
+/// >>> _ = (folder / "touch.csv").write_text("t,0,1\n0,1,2\n0.1,3,4\n")
+/// >>> st.run(folder / "touch.csv", folder / "touch.parquet", body=st.Body.grid(1, 2, 0.01))
+/// {'frames': 2, 'losses': []}
+#[pyfunction]
+#[pyo3(signature = (source, sink, *, body = None, scene = None, calibration = None, backend = None, force = false, all_fields = false, label = None, progress = None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords")]
+pub(crate) fn run<'py>(
+    py: Python<'py>,
+    source: PathBuf,
+    sink: PathBuf,
+    body: Option<Bound<'py, PyBody>>,
+    scene: Option<&Bound<'py, PyAny>>,
+    calibration: Option<Bound<'py, PyCalibration>>,
+    backend: Option<&str>,
+    force: bool,
+    all_fields: bool,
+    label: Option<String>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let scene = PyScene::of_any(scene, py)?;
+    let scene = scene.get();
+    let backend = backend.map(str::parse::<BackendKind>).transpose().or_raise(py)?;
+    let options = VendorOptions::default();
+    let spec = source.display().to_string().parse::<SourceSpec>().or_raise(py)?.with_content(&options);
+    let sink: SinkSpec = sink.display().to_string().parse().or_raise(py)?;
+    let file = spec.file().unwrap_or(Path::new("")).to_owned();
+    let (given, calibration) = (body.as_ref().map(|body| body.get()), calibration.as_ref().map(|given| given.get()));
+    let mut raised = None;
+    let done = free(py, || {
+        let (mut source, own, text) = open(&spec, given, &options, Cut::WHOLE)?;
+        let body = given.or(own.as_ref());
+        let Some(body) = body else {
+            return Err(Error::usage("it has no body; give body=").at(file.display()));
+        };
+        let its_own = text.map(|text| PyCalibration::of_text(&text, body)).transpose()?;
+        let calibration = calibration.or(its_own.as_ref());
+        let mut engine = Engine::new(&body.inner, scene.options(calibration.map(|it| &it.inner), backend, BATCH)?)?;
+        engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(file.display()))?;
+        let text = calibration.map(|calibration| calibration.text.as_str());
+        let about = Run::new(&engine, &body.inner, &body.bytes, &scene.text, text);
+        let label = label.unwrap_or_else(|| file.display().to_string());
+        let session = about.session(&label, all_fields, true);
+        let touches = about.outputs.contains(Outputs::TOUCHES);
+        let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], TableWish { wide: false, touches })?;
+        let mut sink = target.open(&session)?;
+        let mut frames = vec![Frame::missing(0.0, source.taxels().len()); BATCH];
+        let mut count = 0;
+        loop {
+            let mut filled = 0;
+            while filled < BATCH && source.next_frame(&mut frames[filled])? {
+                filled += 1;
+            }
+            let (Flow::Open | Flow::Closed) = sink.write(engine.process(&frames[..filled])?)?;
+            count += filled;
+            let heard = Python::attach(|py| {
+                py.check_signals()?;
+                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (count,)).map(drop))
+            });
+            if let Err(error) = heard {
+                raised = Some(error);
+                return Ok(None);
+            }
+            if filled < BATCH {
+                break;
+            }
+        }
+        sink.finish()?;
+        Ok(Some((count, source.losses())))
+    });
+    match done.or_raise_of(py, &file)? {
+        None => Err(interrupted(raised)),
+        Some((frames, losses)) => {
+            let told = PyDict::new(py);
+            told.set_item("frames", frames)?;
+            told.set_item("losses", losses)?;
+            Ok(told)
+        }
+    }
+}
+
+/// What a file in Parquet says of itself, by key: which body, scene and calibration it was made with, from what.
+///
+/// >>> import somatic_touch as st
+/// >>> st.metadata("no.parquet")
+/// Traceback (most recent call last):
+///     ...
+/// somatic_touch.InputError: no.parquet: no such file or directory
+#[pyfunction]
+pub(crate) fn metadata<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    let file = std::fs::File::open(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
+    let read = ParquetRecordBatchReaderBuilder::try_new(file);
+    let read = read.map_err(|why| Error::failed(format!("this is no whole Parquet: {why}")).at(path.display()));
+    let told = PyDict::new(py);
+    let schema = Arc::clone(read.or_raise_of(py, &path)?.schema());
+    for (key, value) in schema.metadata() {
+        told.set_item(key, value)?;
+    }
+    Ok(told)
+}

@@ -1,0 +1,93 @@
+//! What percepts are of: what an engine's batches, tables and sinks have in common.
+
+use std::sync::Arc;
+
+use somatic::recording::CALIBRATION;
+use somatic::signal::Quantity;
+use somatic::sink::{FieldNames, RecordPart, Session};
+use somatic::{Body, Engine, Outputs, Plan, Precision};
+
+/// The run that percepts are of.
+pub(crate) struct Run {
+    pub(crate) body: Arc<Body>,
+    body_bytes: Arc<Vec<u8>>,
+    pub(crate) plan: Plan,
+    pub(crate) names: Vec<FieldNames>,
+    pub(crate) labels: Vec<String>,
+    pub(crate) outputs: Outputs,
+    pub(crate) precision: Precision,
+    pub(crate) backend: [String; 3],
+    scene: String,
+    calibration: Option<String>,
+    ids: Vec<u32>,
+}
+
+impl Run {
+    pub(crate) fn new(
+        engine: &Engine,
+        body: &Arc<Body>,
+        body_bytes: &Arc<Vec<u8>>,
+        scene: &str,
+        calibration: Option<&str>,
+    ) -> Self {
+        let plan = engine.plan().clone();
+        let (name, what, why) = engine.backend();
+        let labels = (0..plan.fields().len()).map(|field| plan.label(field)).collect();
+        let names = plan.fields().enumerate().map(|(index, (field, link))| {
+            let mark = plan.mark(index);
+            FieldNames {
+                field: field.to_owned(),
+                link: link.to_owned(),
+                letter: mark.receptor.map(|receptor| receptor.to_string()),
+                signal: mark.signal.map(|signal| signal.to_string()),
+            }
+        });
+        let names = names.collect();
+        Self {
+            names,
+            labels,
+            outputs: engine.percepts().outputs(),
+            precision: engine.percepts().precision(),
+            backend: [name.to_owned(), what, why.to_owned()],
+            ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
+            plan,
+            body: Arc::clone(body),
+            body_bytes: Arc::clone(body_bytes),
+            scene: scene.to_owned(),
+            calibration: calibration.map(str::to_owned),
+        }
+    }
+
+    /// What pressures are measured in; empty where fields differ.
+    pub(crate) fn unit(&self) -> &'static str {
+        self.plan.common_quantity().map_or("", Quantity::symbol)
+    }
+
+    /// What sinks and tables are told; `source` is what people call the input.
+    pub(crate) fn session<'a>(&'a self, source: &'a str, all_fields: bool, attached: bool) -> Session<'a> {
+        let mut files = Vec::new();
+        if attached {
+            let text =
+                |name: &str, text: &str| (name.to_owned(), "application/toml".to_owned(), text.as_bytes().to_vec());
+            files.push((self.body.name.clone(), somatic::recording::BODY.to_owned(), self.body_bytes.to_vec()));
+            files.push(text("scene.toml", &self.scene));
+            files.extend(self.calibration.as_deref().map(|calibration| text(CALIBRATION, calibration)));
+        }
+        Session {
+            names: self.names.clone(),
+            all_fields,
+            outputs: self.outputs,
+            is_double: self.precision == Precision::F64,
+            p_unit: self.unit(),
+            header: false,
+            taxels: &self.ids,
+            body: Some(&self.body),
+            attached: files,
+            parts: vec![RecordPart::Percepts],
+            plan: Some(&self.plan),
+            source,
+            backend: [&self.backend[0], &self.backend[1], &self.backend[2]],
+            wiring: None,
+        }
+    }
+}

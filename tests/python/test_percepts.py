@@ -1,0 +1,180 @@
+"""Percepts equal the command's, to the bit."""
+
+from __future__ import annotations
+
+import csv
+import json
+import pathlib
+
+import numpy as np
+import pytest
+from conftest import DATA, ROOT, pressed
+
+import somatic_touch as st
+
+ALL = (
+    "total,peak,active,area,centroid,position,normal,orientation,axis,anisotropy,displacement,direction,distance,"
+    "radial_distance,speed,radial_speed,filtered_displacement,filtered_direction,filtered_speed,touches"
+).split(",")
+
+
+def compare(p: st.Percepts, text: str) -> int:
+    """Compares percepts with NDJSON of all fields; gives how many numbers were equal."""
+    compared = 0
+    lines = [json.loads(line) for line in text.splitlines()]
+    assert len(lines) == len(p.t)
+    touches = p.touches
+    touch_rows = iter(zip(touches.id, touches.total, touches.active, touches.centroid, touches.position, strict=True))
+    for index, line in enumerate(lines):
+        assert line["t"] == p.t[index]
+        assert [field["field"] for field in line["fields"]] == p.fields
+        for number, field in enumerate(line["fields"]):
+            assert field["contact"] == p.contact[index, number]
+            flags = [flag.name.lower() for flag in st.Flags(p.flags[index, number])]
+            assert flags == field["flags"]
+            for name in p.keys():
+                column, present = p[name], p.present(name)
+                assert present[index, number] == (name in field), (index, name)
+                got = column[index, number]
+                if name in field:
+                    assert np.array_equal(got, np.asarray(field[name], column.dtype)), (index, name)
+                    compared += 1
+                elif column.dtype.kind == "f":
+                    assert np.isnan(got).all()
+            for touch in field.get("touches", []):
+                identity, total, active, centroid, position = next(touch_rows)
+                assert (identity, active) == (touch["id"], touch["active"])
+                assert np.float32(total) == np.float32(touch["total"])
+                assert np.array_equal(np.float32(centroid), np.float32(touch.get("centroid", [np.nan] * 2)), equal_nan=True)
+                assert np.array_equal(np.float32(position), np.float32(touch["position"]))
+                compared += 1
+    assert next(touch_rows, None) is None
+    return compared
+
+
+@pytest.mark.parametrize("backend", ["reference", "cpu"])
+def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
+    text = somatic("run", "--quiet", "--backend", backend, "--outputs", ",".join(ALL), "--all-fields", "--sink", "-")
+    p = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
+    assert compare(p, text) > 10_000
+    assert p["total"].dtype == (np.float64 if backend == "reference" else np.float32)
+    # The comparison itself can fail.
+    other = touch.values.copy()
+    other[250] = other[251]
+    changed = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, other)
+    with pytest.raises(AssertionError):
+        compare(changed, text)
+
+
+@pytest.mark.parametrize("backend", ["reference", "cpu"])
+def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
+    mat = st.Body.grid(13, 7, 0.01, name="sheet", regions=(3, 2))
+    mat.save(tmp_path / "sheet.glb")
+    t, values = pressed(mat, 90)
+    with (tmp_path / "touch.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["t", *mat.taxels["id"]])
+        rows.writerows([[time, *row] for time, row in zip(t, values.tolist(), strict=True)])
+    text = somatic(
+        "run", "--quiet", "--body", tmp_path / "sheet.glb", "--source", tmp_path / "touch.csv", "--backend", backend,
+        "--outputs", ",".join(ALL), "--all-fields", "--sink", "-",
+    )
+    p = st.Engine(mat, {"outputs": ALL}, backend=backend).process(t, values)
+    assert compare(p, text) > 5_000
+    read = st.read(tmp_path / "touch.csv", body=str(tmp_path / "sheet.glb"))
+    assert np.array_equal(read.values, values) and np.array_equal(read.t, t)
+
+
+@pytest.mark.parametrize("backend", ["reference", "cpu"])
+def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: str) -> None:
+    grasps = sorted((DATA / "recordings" / "icub_grasp").glob("*.csv"))
+    if not grasps:
+        pytest.skip(f"no grasps in {DATA}")
+    body = st.Body.grid(5, 12, 0.004, name="fingers", regions=(5, 1))
+    body.save(tmp_path / "fingers.glb")
+    calibration = "[all]\nbaseline = 245\ninvert = true\ndead_band = 4\n"
+    (tmp_path / "fingers.toml").write_text(calibration)
+    compared = 0
+    for grasp in grasps[:4]:
+        text = somatic(
+            "run", "--quiet", "--body", tmp_path / "fingers.glb", "--source", grasp, "--backend", backend,
+            "--calibration", tmp_path / "fingers.toml", "--outputs", ",".join(ALL), "--all-fields", "--sink", "-",
+        )
+        recording = st.read(grasp, body=body)
+        engine = recording.engine({"outputs": ALL}, st.Calibration(calibration, body), backend)
+        compared += compare(engine.process(recording.t, recording.values), text)
+    assert compared > 500
+
+
+@pytest.mark.parametrize("backend", ["reference", "cpu"])
+def test_percepts_do_not_depend_on_the_cut(touch: st.Recording, backend: str) -> None:
+    whole = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
+    for cut in (1, 7, 64):
+        engine = touch.engine({"outputs": ALL}, backend=backend)
+        parts = [
+            engine.process(touch.t[start : start + cut], touch.values[start : start + cut])
+            for start in range(0, len(touch), cut)
+        ]
+        for name in whole:
+            assert np.array_equal(np.concatenate([part[name] for part in parts]), whole[name], equal_nan=True), name
+        assert [part.first_frame for part in parts] == list(range(0, len(touch), cut))
+    steps = touch.engine({"outputs": ALL}, backend=backend)
+    for index in range(100):
+        p = steps.step(touch.t[index], touch.values[index])
+        assert np.array_equal(p["centroid"][0], whole["centroid"][index], equal_nan=True)
+
+
+def test_a_scene_file_gives_what_the_command_gives(somatic, touch: st.Recording) -> None:
+    path = ROOT / "examples" / "scenes" / "palm.toml"
+    text = somatic("run", path, "--quiet", "--backend", "cpu", "--all-fields", "--sink", "-")
+    p = touch.engine(st.Scene.load(path), backend="cpu").process(touch.t, touch.values)
+    lines = [json.loads(line) for line in text.splitlines()]
+    assert [field["field"] for field in lines[0]["fields"]] == p.fields
+    got = [[field.get("centroid", [np.nan] * 2) for field in line["fields"]] for line in lines]
+    assert np.array_equal(np.float32(got), p["centroid"], equal_nan=True)
+
+
+def test_missing_and_faulty_values(hand: st.Body) -> None:
+    engine = st.Engine(hand, {"outputs": ["total"]}, backend="cpu")
+    values = np.ones((1, 40), np.float32)
+    values[0, 16] = np.nan
+    mask = np.zeros((1, 40), bool)
+    mask[0, 17] = True
+    back = engine.fields.index("hand/back")
+    flags = lambda *arguments: st.Flags(engine.process([0.0], *arguments).flags[0, back])  # noqa: E731
+    assert st.Flags.FAULTY_INPUT in flags(values)
+    assert st.Flags.INCOMPLETE not in flags(values)
+    assert st.Flags.INCOMPLETE in flags(values, mask)
+    assert st.Flags.INCOMPLETE in flags(np.ones((1, 40)), mask[0])
+    assert flags(np.ones((1, 40))) & (st.Flags.INCOMPLETE | st.Flags.FAULTY_INPUT) == 0
+
+
+def test_poses(hand: st.Body) -> None:
+    engine = st.Engine(hand, {"outputs": ["position", "normal"]}, backend="cpu")
+    values = np.ones((3, 40), np.float32)
+    still = engine.process([0, 1, 2], values)
+    moved = engine.process([3, 4, 5], values, pose={"hand": [1, 2, 3, 0, 0, 0, 1]})
+    assert not still.in_world.any() and moved.in_world.all()
+    # Where the anchor is the link that is posed; the others hang on it as at rest.
+    back = engine.fields.index("hand/back")
+    assert np.allclose((moved["position"] - still["position"])[:, back], [1, 2, 3])
+    each = np.tile(np.array([0, 0, 0, 0, 0, 0, 1.0]), (3, 1))
+    each[:, 0] = [0, 1, 2]
+    moving = engine.process([6, 7, 8], values, pose={"hand": each})
+    assert np.allclose((moving["position"] - still["position"])[:, back, 0], [0, 1, 2])
+
+
+def test_values_without_a_copy_are_read_where_they_are(touch: st.Recording) -> None:
+    # What is converted first gives the same percepts.
+    wanted = touch.engine(backend="cpu").process(touch.t, touch.values)
+    values = np.where(touch.mask, np.float32(0), touch.values)
+    for other in (values.astype(np.float64), values.astype(np.uint16), np.asfortranarray(values), values[::-1][::-1]):
+        got = touch.engine(backend="cpu").process(touch.t, other, touch.mask)
+        assert np.array_equal(got["total"], wanted["total"])
+
+
+def test_units(hand: st.Body) -> None:
+    p = st.Engine(hand, calibration=st.Calibration("[all]\nunit = 'kPa'", hand), backend="cpu").step(0, [1] * 40)
+    assert (p.unit("total"), p.unit("force"), p.unit("centroid"), p.unit("anisotropy")) == ("Pa", "N", "m", "1")
+    assert p["peak"].max() == 1000
+    assert st.Engine(hand, backend="cpu").step(0, [1] * 40).unit("total") == "count"
