@@ -1,17 +1,17 @@
 //! What ordinary touches tell of a skin: every taxel's gain, and how wide the layer makes a contact.
 //!
 //! A touch that moves over the skin is felt by other taxels in each frame. Where a fit of the contact explains them all but one,
-//! that one's gain is off. Contacts are fitted under the gains found so far ([`crate::stage::footprint`]), each taxel's gain is
+//! that one's gain is off. Contacts are fitted under the gains found so far (`docs/footprint.md`), each taxel's gain is
 //! moved to what makes it agree with the contacts that pressed it, and both are repeated:
 //!
 //! ln γᵢ ← ln γᵢ + Σ w ln(Pᵢ/mᵢ) / (Σ w + 1/s²), w = 1/((σᵢ/mᵢ)² + e²), of the touches that press taxel i
 //!
-//! with m what the contact makes it feel, σ its noise, e = [`MODEL`] what the model is off by and s = [`SPREAD`] how far gains are
+//! with m what the contact makes it feel, σ its noise, e = 0.1 what the model is off by and s = 0.2 how far gains are
 //! taken to be apart. Residuals over 2e count less (Huber).
 //!
 //! **Not to be known** from touches alone: the gain of the whole, as any is explained by harder touches; a slope of gains over a field, as
 //! it is explained by touches a little beside; one that grows with the square of the distance, as it makes a Gaussian another Gaussian,
-//! wider or narrower. These are taken off what is found ([`UNKNOWABLE`]). Nor are the gain of a taxel that nothing touched, and
+//! wider or narrower. These are taken off what is found. Nor are the gain of a taxel that nothing touched, and
 //! the layer's σ apart from the contacts' own size: the width that is found explains both together, and is what fits need.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -272,6 +272,7 @@ def read(
     grid: str | None = None,
     pitch: str | None = None,
     unit: str | None = None,
+    layout: _Path | None = None,
 ) -> Recording: ...
 def simulate(
     simulation: _Path, *, body: Body | None = None, seed: int | None = None

@@ -256,7 +256,7 @@ pub(crate) fn open(
 ///     ...
 /// somatic_touch.InputError: no-such.csv: no such file or directory
 #[pyfunction]
-#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None))]
+#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn read(
     py: Python<'_>,
@@ -269,6 +269,7 @@ pub(crate) fn read(
     grid: Option<&str>,
     pitch: Option<&str>,
     unit: Option<&str>,
+    layout: Option<PathBuf>,
 ) -> PyResult<PyRecording> {
     let text = match source.extract::<String>() {
         Ok(text) => text,
@@ -293,6 +294,7 @@ pub(crate) fn read(
             grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
             pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
             unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
+            layout,
         };
         let spec = text.parse::<SourceSpec>()?.with_content(&options);
         Ok((options, spec))

@@ -250,7 +250,7 @@ fn rounding(report: &Report, way: CallMode, all: bool) -> String {
         report.ties
     );
     let headings = ["µs", "p99", "mm: rms", "p99", "worst", "°: rms", "p99", "worst", "combination"];
-    let mut table = plain(headings.into_iter(), 0..8);
+    let mut table = plain(headings, 0..8);
     for row in rows.iter().filter(|row| all || is_best(row)) {
         let mut cells = vec![number(row.p50_us), number(row.p99_us)];
         for errors in [&row.centroid_mm, &row.orientation_deg] {

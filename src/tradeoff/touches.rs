@@ -98,7 +98,7 @@ impl SimulatedTouches {
                 (most.div_ceil(2) + 1) as f64 / RATE_HZ,
                 sensors.keys,
             );
-            let mut source = SimulatedSource::on_body_where_it_can("touches", &text, body.clone())?;
+            let mut source = SimulatedSource::on_body_where_possible("touches", &text, body.clone())?;
             frames.taxels = source.taxels().to_vec();
             let mut frame = Frame::missing(0.0, frames.taxels.len());
             let start_s = frames.frames.last().map_or(0.0, |last: &Frame| last.t_s + 1.0 / RATE_HZ);

@@ -9,8 +9,11 @@ use somatic::{
 use crate::batches::{bits, recording};
 use crate::common::backends;
 
-/// A block of `frames`: times, values and poses.
-fn flat(frames: &[Frame]) -> (Vec<f64>, Vec<RawValue>, Vec<(String, Vec<Pose>)>) {
+/// Times, values and poses by link.
+type Flattened = (Vec<f64>, Vec<RawValue>, Vec<(String, Vec<Pose>)>);
+
+/// A block of `frames`.
+fn flat(frames: &[Frame]) -> Flattened {
     let values = frames.iter().flat_map(|frame| frame.values.iter().copied()).collect();
     let links = frames[0].pose.iter().enumerate();
     let poses = links.map(|(at, (link, _))| (link.clone(), frames.iter().map(|frame| frame.pose[at].1).collect()));

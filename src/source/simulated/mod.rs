@@ -126,7 +126,7 @@ impl SimulatedSource {
     ///
     /// # Errors
     /// As [`SimulatedSource::open`], but for those touches.
-    pub(crate) fn on_body_where_it_can(name: &str, text: &str, body: Body) -> Result<Self> {
+    pub fn on_body_where_possible(name: &str, text: &str, body: Body) -> Result<Self> {
         let text = Text(text);
         text.parse().and_then(|file| Self::new(name, text, &file, body, WrongTouch::LeaveOut)).map_err(|e| e.at(name))
     }
