@@ -44,11 +44,10 @@ pub(crate) fn author(
         Some(path) => Recipe::load(path),
         None => Recipe::simple(taxels, spacing, &regions),
     }
-    .and_then(|made| match (seed, unit) {
-        (Some(seed), _) => Ok(made.with_seed(seed)),
-        _ => Ok(made),
-    })
     .or_raise(py)?;
+    if let Some(seed) = seed {
+        made = made.with_seed(seed);
+    }
     if let Some(unit) = unit {
         made = made.with_unit(unit).map_err(|e| e.at("unit")).or_raise(py)?;
     }

@@ -304,7 +304,7 @@ impl PyBody {
     #[getter]
     fn triangles(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let triangles = self.inner.triangles_at_rest();
-        let corners = triangles.iter().flat_map(|(_, corners)| corners.iter().flat_map(|corner| corner.to_array()));
+        let corners = triangles.iter().flat_map(|(_, corners)| corners.iter().flat_map(glam::DVec3::to_array));
         array(py, corners.collect::<Vec<f64>>(), &[triangles.len(), 3, 3])
     }
 
@@ -314,6 +314,7 @@ impl PyBody {
         format!("<Body {name}: {} taxels in {} fields on {} link{s}>", taxels.len(), fields.len(), links.len())
     }
 
+    #[expect(clippy::type_complexity, reason = "pickle's own form: a function and its arguments")]
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<u8>))> {
         let body = slf.get();
         Ok((slf.get_type().getattr("_of_bytes")?, (body.inner.name.clone(), body.bytes.to_vec())))

@@ -148,9 +148,7 @@ impl PyPercepts {
     /// <Flags.NO_CONTACT: 1>
     #[getter]
     fn flags(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.once(py, "flags", || {
-            array(py, self.inner.all_flags().iter().map(|flags| flags.bits()).collect(), &self.shape())
-        })
+        self.once(py, "flags", || array(py, self.inner.all_flags().iter().map(Flags::bits).collect(), &self.shape()))
     }
 
     /// Whether each field is touched, bool [frames, fields].

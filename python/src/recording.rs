@@ -197,8 +197,11 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
     }
 }
 
+/// A body's name and file.
+type NamedBytes = (String, Vec<u8>);
+
 /// The body in the recording at `path`, and the text of its calibration.
-fn attached(path: &Path) -> somatic::Result<(Option<(String, Vec<u8>)>, Option<String>)> {
+fn attached(path: &Path) -> somatic::Result<(Option<NamedBytes>, Option<String>)> {
     let mut reader = Reader::open(path)?;
     let body = reader.attached().iter().find(|attached| attached.media_type == BODY).cloned();
     let calibration = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
@@ -306,7 +309,7 @@ pub(crate) fn read(
         return frames.finish(py, "bundled touch".to_owned(), &touch, Some(body), None);
     }
     let (options, spec) = made().or_raise(py)?;
-    let given = body.as_ref().map(|body| body.get());
+    let given = body.as_ref().map(Py::get);
     let file = spec.file().unwrap_or(Path::new("")).to_owned();
     let (mut source, own, calibration) = open(&spec, given, &options, cut).or_raise_of(py, &file)?;
     let frames = gather(py, &mut *source, &file)?;

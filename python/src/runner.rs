@@ -58,7 +58,7 @@ pub(crate) fn run<'py>(
     let spec = source.display().to_string().parse::<SourceSpec>().or_raise(py)?.with_content(&options);
     let sink: SinkSpec = sink.display().to_string().parse().or_raise(py)?;
     let file = spec.file().unwrap_or(Path::new("")).to_owned();
-    let (given, calibration) = (body.as_ref().map(|body| body.get()), calibration.as_ref().map(|given| given.get()));
+    let (given, calibration) = (body.as_ref().map(Bound::get), calibration.as_ref().map(Bound::get));
     let mut raised = None;
     let done = free(py, || {
         let (mut source, own, text) = open(&spec, given, &options, Cut::WHOLE)?;

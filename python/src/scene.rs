@@ -17,7 +17,7 @@ use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Recepto
 use crate::error::{OrRaise, usage};
 
 /// Keys of scene files that say where frames come from and go to, and how a run is shown: the command's.
-const OF_THE_COMMAND: [&str; 29] = [
+const OF_THE_COMMAND: [&str; 30] = [
     "accuracy",
     "all_fields",
     "allow_host",
@@ -31,6 +31,7 @@ const OF_THE_COMMAND: [&str; 29] = [
     "from_s",
     "grid",
     "header",
+    "layout",
     "live_rate_hz",
     "loop",
     "orientation",
@@ -293,7 +294,7 @@ fn refuse_the_commands(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
             format!("accuracy: `{wish}` is measured by the command: `somatic tradeoff --write`; give knobs here");
         return Err(usage(py, what));
     }
-    match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key.as_str())) {
+    match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key)) {
         Some(key) => Err(usage(py, format!("`{key}` is for the command; leave it out of this scene"))),
         None => Ok(()),
     }
@@ -353,7 +354,7 @@ impl PyScene {
     fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
         let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
         let mut table: toml::Table = parse_toml(&text).map_err(|e| e.at(path.display())).or_raise_of(py, &path)?;
-        table.retain(|key, _| key == "accuracy" || !OF_THE_COMMAND.iter().any(|other| key == *other));
+        table.retain(|key, _| key == "accuracy" || !OF_THE_COMMAND.contains(&key));
         Self::of_table(py, &table)
     }
 
