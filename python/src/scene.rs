@@ -294,7 +294,7 @@ fn refuse_the_commands(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
             format!("accuracy: `{wish}` is measured by the command: `somatic tradeoff --write`; give knobs here");
         return Err(usage(py, what));
     }
-    match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key)) {
+    match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key.as_str())) {
         Some(key) => Err(usage(py, format!("`{key}` is for the command; leave it out of this scene"))),
         None => Ok(()),
     }
