@@ -25,8 +25,7 @@ use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
 use crate::percept::Outputs;
 use crate::scene::{Knobs, Plan, Scene};
-use crate::signal::{Calibration, Frame, Letter, Quantity};
-use crate::stage::calibrate::{self, UNUSABLE};
+use crate::signal::{Calibration, Frame, Letter};
 use crate::stage::footprint::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
 
 /// Gains are taken to differ by about this share.
@@ -169,25 +168,7 @@ fn observed(plan: &Plan, field: usize, frame: &Frame, value_of: &[Option<usize>]
         return None;
     }
     let taxels: Vec<usize> = plan.taxels_of(field).collect();
-    let taxel = |member: usize| {
-        let slot = plan.members_of(of)[member].slot as usize;
-        let (channel, curve) = (plan.channel_of(slot), plan.curve_of(slot));
-        let calibration = &plan.calibrations[channel];
-        let value = frame.values[value_of[taxels[member]]?];
-        let pressure = calibrate::reference(value, calibration, curve);
-        if pressure.status & UNUSABLE != 0 {
-            return None;
-        }
-        let by = if of.quantity == Quantity::Pascal { plan.areas[channel] } else { 1.0 };
-        let number = value.number()?;
-        Some(Taxel {
-            place_m: of.places[member].truncate() * f64::from(of.unit_m),
-            area_m2: plan.areas[channel],
-            pressure: by * pressure.value.max(0.0),
-            threshold: by * calibrate::threshold(calibration, curve),
-            sigma: calibration.noise.map(|noise| by * calibrate::sigma(number, noise, calibration, curve)),
-        })
-    };
+    let taxel = |member: usize| plan.pressed_taxel(of, member, frame.values[value_of[taxels[member]]?]);
     let all: Vec<Option<Taxel>> = (0..of.count).map(taxel).collect();
     let is_pressed = |member: &usize| all[*member].is_some_and(|taxel| taxel.pressure > 0.0);
     let pressed: Vec<usize> = (0..of.count).filter(is_pressed).collect();

@@ -9,8 +9,6 @@ use crate::backend::RawBatch;
 use crate::backend::cpu::footprint::fit_all;
 use crate::percept::{Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
-use crate::signal::Quantity;
-use crate::stage::calibrate::{self, UNUSABLE};
 use crate::stage::footprint::{Footprint, Layer, Taxel, Touch};
 use crate::stage::touches::Found;
 
@@ -28,35 +26,18 @@ pub(super) fn strongest(
         let own: Vec<u32> = touch.members().collect();
         let around = own.iter().flat_map(|&member| &field.beside[member as usize]).copied();
         let members: BTreeSet<u32> = own.iter().copied().chain(around).collect();
-        members.into_iter().filter_map(|member| taxel(plan, field, raw, frame, member as usize)).collect::<Vec<_>>()
+        members
+            .into_iter()
+            .filter_map(|member| {
+                let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
+                plan.pressed_taxel(field, member, raw.rows.value(frame, plan.channel_of(slot)))
+            })
+            .collect::<Vec<_>>()
     };
     let total = |taxels: &Vec<Taxel>| taxels.iter().map(|taxel| taxel.pressure).sum::<f64>();
     // The first of those that are equal.
     let strongest = found.iter().map(taxels).rev().max_by(|a, b| total(a).total_cmp(&total(b)))?;
     (total(&strongest) > 0.0).then(|| Touch::new(&strongest, layer))
-}
-
-/// What member `member` of `field` feels in a frame, if that can be used.
-fn taxel(plan: &Plan, field: &PlanField, raw: &RawBatch<'_>, frame: usize, member: usize) -> Option<Taxel> {
-    let slot = plan.members_of(field)[member].slot as usize;
-    let (channel, curve) = (plan.channel_of(slot), plan.curve_of(slot));
-    let (value, calibration) = (raw.rows.value(frame, channel), &plan.calibrations[channel]);
-    let pressure = calibrate::reference(value, calibration, curve);
-    if pressure.status & UNUSABLE != 0 {
-        return None;
-    }
-    let number = value.number()?;
-    // What a soft onset has taken off, the contact has pressed with all the same.
-    let taken_off = plan.onset(channel).threshold;
-    // Contacts press with a force.
-    let by = if field.quantity == Quantity::Pascal { plan.areas[channel] } else { 1.0 };
-    Some(Taxel {
-        place_m: field.places[member].truncate() * f64::from(field.unit_m),
-        area_m2: plan.areas[channel],
-        pressure: if pressure.value > 0.0 { by * (pressure.value + taken_off) } else { 0.0 },
-        threshold: by * (plan.feels_from[slot] + taken_off),
-        sigma: calibration.noise.map(|noise| by * calibrate::sigma(number, noise, calibration, curve)),
-    })
 }
 
 /// Fits the touches that wait, and puts what comes of it into their cells.

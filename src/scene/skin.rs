@@ -3,9 +3,9 @@
 use super::OrientationBy;
 use super::plan::{Plan, PlanField};
 use crate::percept::Flags;
-use crate::signal::{Receptor, SkinResponse};
-use crate::stage::calibrate;
-use crate::stage::footprint::{Layer, STEPS};
+use crate::signal::{Quantity, RawValue, Receptor, SkinResponse};
+use crate::stage::calibrate::{self, UNUSABLE};
+use crate::stage::footprint::{Layer, STEPS, Taxel};
 
 /// A chart that is off by more than this share of a distance between neighbours is too far from flat to fit a contact in: it
 /// would be off by as much as the layer's σ where that is a tenth wrong.
@@ -39,6 +39,31 @@ impl PlanField {
 }
 
 impl Plan {
+    /// What member `member` of `field` feels where it reads `value`, as fits of contacts take it, if that can be used.
+    pub(crate) fn pressed_taxel(&self, field: &PlanField, member: usize, value: RawValue) -> Option<Taxel> {
+        let slot = self.members_of(field)[member].slot as usize;
+        let (channel, curve) = (self.channel_of(slot), self.curve_of(slot));
+        let calibration = &self.calibrations[channel];
+        let pressure = calibrate::reference(value, calibration, curve);
+        if pressure.status & UNUSABLE != 0 {
+            return None;
+        }
+        let number = value.number()?;
+        // What a soft onset has taken off, the contact has pressed with all the same.
+        let taken_off = self.onset(channel).threshold;
+        // Contacts press with a force.
+        let by = if field.quantity == Quantity::Pascal { self.areas[channel] } else { 1.0 };
+        let noted = self.feels_from.get(slot).copied();
+        let feels_from = noted.unwrap_or_else(|| calibrate::threshold(calibration, curve));
+        Some(Taxel {
+            place_m: field.places[member].truncate() * f64::from(field.unit_m),
+            area_m2: self.areas[channel],
+            pressure: if pressure.value > 0.0 { by * (pressure.value + taken_off) } else { 0.0 },
+            threshold: by * (feels_from + taken_off),
+            sigma: calibration.noise.map(|noise| by * calibrate::sigma(number, noise, calibration, curve)),
+        })
+    }
+
     /// Notes from when on each slot's taxel feels anything, where contacts are fitted.
     pub(super) fn note_what_is_felt(&mut self) {
         if self.stages().footprint {

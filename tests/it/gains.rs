@@ -53,8 +53,9 @@ fn frames(source: &mut SimulatedSource) -> (Vec<Frame>, Vec<DVec2>) {
     (frames, places)
 }
 
-fn estimated(body: &Body, source: &mut SimulatedSource) -> SkinEstimate {
-    let calibration = Calibration::parse(&source.calibration(), &ids(body)).unwrap();
+fn estimated(body: &Body, source: &mut SimulatedSource, onset: &str) -> SkinEstimate {
+    let text = source.calibration().replace("[all]\n", &format!("[all]\nonset = \"{onset}\"\n"));
+    let calibration = Calibration::parse(&text, &ids(body)).unwrap();
     let mut survey = SkinSurvey::new(body, calibration, &[], source.taxels()).unwrap();
     survey.add(&frames(source).0).unwrap();
     survey.finish(&mut |_| true).unwrap()
@@ -109,7 +110,7 @@ fn gains_are_found_from_a_finger_that_wanders() {
     let body = grid();
     for layer in LAYERS {
         let mut source = SimulatedSource::on_body("finger", &wandering(layer, 120, 1), body.clone()).unwrap();
-        let estimate = estimated(&body, &mut source);
+        let estimate = estimated(&body, &mut source, "hard");
         let gains = source.gains().to_vec();
         let [before, after] = off(&estimate, &gains);
         let told = estimate.gains.iter().flatten().count();
@@ -133,5 +134,20 @@ fn gains_are_found_from_a_finger_that_wanders() {
         assert!(before > 0.15 && after < 0.05, "{layer:?}: {before} {after}");
         // Gains of 3 % make places a few hundredths of a millimetre worse, where noise is that low.
         assert!(own.0 < none.0 / 3.0 && own.1 == known.1 && known.0 < own.0, "{layer:?}: {none:?} {own:?} {known:?}");
+    }
+}
+
+#[test]
+fn what_a_soft_onset_takes_off_is_no_gain() {
+    let body = grid();
+    let mut source = SimulatedSource::on_body("finger", &wandering("", 120, 1), body.clone()).unwrap();
+    let hard = estimated(&body, &mut source, "hard");
+    source.seek(0);
+    let soft = estimated(&body, &mut source, "soft");
+    // Contacts press with all of it; the same taxels are pressed, so that the same numbers come out but for rounding.
+    for (hard, soft) in hard.gains.iter().zip(&soft.gains) {
+        let off = hard.zip(*soft).map(|(hard, soft)| hard / soft - 1.0);
+        assert_eq!(hard.is_some(), soft.is_some());
+        assert!(off.is_none_or(|off| off.abs() < 1e-6), "{off:?}");
     }
 }
