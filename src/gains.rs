@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use crate::backend::BackendKind;
-use crate::backend::cpu::footprint::fit_all;
+use crate::backend::cpu::footprint::fit_each;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
@@ -208,13 +208,13 @@ fn estimate(
     }
     for round in 0..ROUNDS {
         let fitted: Vec<Touch> = touches.iter().map(|touch| touch.under(&gains, sigma_m)).collect();
-        let fits = fit_all(&fitted.iter().collect::<Vec<_>>());
+        let explained = fit_each(&fitted.iter().collect::<Vec<_>>(), |touch, fits| touch.explained(fits?));
         let (mut weights, mut sums) = (vec![0.0; taxels], vec![0.0; taxels]);
         let (mut widths, mut squares) = (Vec::new(), (0.0, 0.0));
         pressed.fill(0);
         used = 0;
-        for ((observed, touch), fits) in touches.iter().zip(&fitted).zip(&fits) {
-            let Some(explained) = fits.as_ref().and_then(|fits| touch.explained(fits)) else { continue };
+        for (observed, explained) in touches.iter().zip(explained) {
+            let Some(explained) = explained else { continue };
             used += 1;
             widths.push(explained.width_m);
             let most = explained.felt.iter().copied().fold(0.0, f64::max);

@@ -32,6 +32,7 @@ mod columns;
 mod contact_kind;
 mod export;
 mod flags;
+mod footprint;
 mod keep;
 mod presence;
 
@@ -43,6 +44,7 @@ pub(crate) use columns::{Component, Host, Store};
 pub use contact_kind::ContactKind;
 pub use export::ColumnValues;
 pub use flags::Flags;
+pub use footprint::{Footprint, FootprintSigma};
 
 /// The arithmetic that made the numbers, and so the digits worth printing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,4 +68,8 @@ pub struct Touch {
     pub centroid: Option<[f64; 2]>,
     /// The same point on the surface, as [`Percept::position`] and in the same frame, m.
     pub position: [f64; 3],
+    /// What presses, where an output of the footprint was asked for and it has one.
+    pub footprint: Option<Footprint>,
+    /// Why the footprint, or a part of it, is absent.
+    pub flags: Flags,
 }

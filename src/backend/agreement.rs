@@ -484,7 +484,15 @@ mod tests {
 
     #[test]
     fn a_touch_that_is_not_there_fails() {
-        let touch = Touch { id: 1, total: 10.0, active: 3, centroid: Some([0.1, 0.2]), position: [0.0; 3] };
+        let touch = Touch {
+            id: 1,
+            total: 10.0,
+            active: 3,
+            centroid: Some([0.1, 0.2]),
+            position: [0.0; 3],
+            footprint: None,
+            flags: Flags::empty(),
+        };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
         let limit =

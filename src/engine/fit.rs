@@ -3,79 +3,120 @@
 //! It starts from the raw values in double precision, whatever the backend: which taxels are one touch is the backend's to say,
 //! what they feel is the same on all.
 
-use std::collections::BTreeSet;
-
 use crate::backend::RawBatch;
-use crate::backend::cpu::footprint::fit_all;
-use crate::percept::{Host, Outputs, Percepts};
+use crate::backend::cpu::footprint::fit_each;
+use crate::parallel;
+use crate::percept::{Column, Flags, Footprint, Outputs, Percepts, Store};
 use crate::scene::{Plan, PlanField};
-use crate::stage::footprint::{Footprint, Layer, Taxel, Touch};
+use crate::stage::footprint::{Taxel, Touch};
 use crate::stage::touches::Found;
 
-/// A touch that waits to be fitted, and its cell.
-pub(super) type Waiting = (usize, Touch);
+/// Cells whose touches one thread makes ready at a time: some microseconds of work.
+const CELLS: usize = 32;
 
-/// The touch of `found` with the most pressure, as the fit takes it: its taxels and those beside them that can be used.
-pub(super) fn strongest(
-    plan: &Plan,
-    (field, layer): (&PlanField, &Layer),
-    (raw, frame): (&RawBatch<'_>, usize),
-    found: &[Found],
-) -> Option<Touch> {
-    let taxels = |touch: &Found| {
-        let own: Vec<u32> = touch.members().collect();
-        let around = own.iter().flat_map(|&member| &field.beside[member as usize]).copied();
-        let members: BTreeSet<u32> = own.iter().copied().chain(around).collect();
-        members
-            .into_iter()
-            .filter_map(|member| {
-                let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
-                plan.pressed_taxel(field, member, raw.rows.value(frame, plan.channel_of(slot)))
-            })
-            .collect::<Vec<_>>()
-    };
-    let total = |taxels: &Vec<Taxel>| taxels.iter().map(|taxel| taxel.pressure).sum::<f64>();
-    // The first of those that are equal.
-    let strongest = found.iter().map(taxels).rev().max_by(|a, b| total(a).total_cmp(&total(b)))?;
-    (total(&strongest) > 0.0).then(|| Touch::new(&strongest, layer))
+/// A cell whose touches wait to be fitted.
+#[derive(Clone, Debug)]
+pub(super) struct Waiting {
+    field: usize,
+    cell: usize,
+    /// The frame in the raw batch.
+    offset: usize,
+    /// Of each of its touches the members and those beside them.
+    touches: Vec<Vec<u32>>,
 }
 
-/// Fits the touches that wait, and puts what comes of it into their cells.
-pub(super) fn all(plan: &Plan, waiting: &mut Vec<Waiting>, percepts: &mut Percepts) {
+/// A touch of a cell that can be fitted.
+struct Ready {
+    /// Its index among the cell's.
+    index: usize,
+    total: f64,
+    touch: Touch,
+}
+
+impl Waiting {
+    /// The touches `found` in field `number`, which is `field`.
+    pub(super) fn new(field: &PlanField, (number, cell, offset): (usize, usize, usize), found: &[Found]) -> Self {
+        let around = |touch: &Found| {
+            let mut members: Vec<u32> = touch.members().collect();
+            for at in 0..members.len() {
+                members.extend_from_slice(&field.beside[members[at] as usize]);
+            }
+            members.sort_unstable();
+            members.dedup();
+            members
+        };
+        Self { field: number, cell, offset, touches: found.iter().map(around).collect() }
+    }
+
+    /// Its touches as the fit takes them, of those taxels that can be used; only the one with the most pressure unless `all` are
+    /// asked for.
+    fn ready(&self, plan: &Plan, raw: &RawBatch<'_>, all: bool) -> Vec<Ready> {
+        let field = &plan.fields[self.field];
+        let Ok(layer) = &field.layer else { return Vec::new() };
+        let taxel = |&member: &u32| {
+            let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
+            plan.pressed_taxel(field, member, raw.rows.value(self.offset, plan.channel_of(slot)))
+        };
+        let taxels_of = |(index, members): (usize, &Vec<u32>)| {
+            let taxels: Vec<Taxel> = members.iter().filter_map(taxel).collect();
+            (index, taxels.iter().map(|taxel| taxel.pressure).sum(), taxels)
+        };
+        let mut touches: Vec<(usize, f64, Vec<Taxel>)> = self.touches.iter().enumerate().map(taxels_of).collect();
+        if !all {
+            // The first of those that are equal.
+            let strongest = touches.into_iter().rev().max_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
+            touches = strongest.into_iter().collect();
+        }
+        touches.retain(|(_, total, _)| *total > 0.0);
+        let ready = |(index, total, taxels): (usize, f64, Vec<Taxel>)| Ready {
+            index,
+            total,
+            touch: Touch::new(&taxels, layer),
+        };
+        touches.into_iter().map(ready).collect()
+    }
+}
+
+/// Fits the touches that wait, all of them where separate touches are asked for; puts what comes of the one with the most pressure
+/// into its cell, and of each into the table of touches.
+pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, waiting: &mut Vec<Waiting>, percepts: &mut Percepts) {
     if waiting.is_empty() {
         return;
     }
-    let touches: Vec<&Touch> = waiting.iter().map(|(_, touch)| touch).collect();
-    let fits = fit_all(&touches);
-    for ((cell, touch), fits) in waiting.drain(..).zip(fits) {
-        let (footprint, flags) = touch.conclude(fits.as_ref());
-        percepts.flags[cell] |= flags;
+    let every = plan.outputs.contains(Outputs::TOUCHES);
+    let mut ready: Vec<Vec<Ready>> = waiting.iter().map(|_| Vec::new()).collect();
+    let cells = waiting.chunks(CELLS).zip(ready.chunks_mut(CELLS));
+    parallel::for_each(parallel::threads().min(cells.len()), cells, |(waiting, ready)| {
+        for (waiting, ready) in waiting.iter().zip(ready) {
+            *ready = waiting.ready(plan, raw, every);
+        }
+    });
+    let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();
+    let mut fitted = fit_each(&touches, Touch::conclude).into_iter();
+    for (waiting, ready) in waiting.drain(..).zip(&ready) {
+        let mut strongest: Option<(f64, Option<Footprint>, Flags)> = None;
+        for (Ready { index, total, .. }, (footprint, flags)) in ready.iter().zip(&mut fitted) {
+            if strongest.is_none_or(|(most, ..)| *total > most) {
+                strongest = Some((*total, footprint, flags));
+            }
+            if let Some(touch) = percepts.touches_mut(waiting.cell).get_mut(*index) {
+                (touch.footprint, touch.flags) = (footprint, flags);
+            }
+        }
+        let Some((_, footprint, flags)) = strongest else { continue };
+        percepts.flags[waiting.cell] |= flags;
         if let Some(footprint) = footprint {
-            put(plan, &footprint, cell, percepts);
+            put(plan, &footprint, waiting.cell, percepts);
         }
     }
 }
 
 fn put(plan: &Plan, footprint: &Footprint, cell: usize, percepts: &mut Percepts) {
-    let sigma = footprint.sigma;
-    let place = |place: glam::DVec2| [place.x, place.y];
-    let scalar = |value: f64| [value, 0.0];
-    let (is_whole, is_long) = (footprint.force.is_some(), footprint.angle.is_some());
-    let columns = [
-        (Host::FootprintKind, Some(scalar(f64::from(footprint.kind as u8)))),
-        (Host::FootprintPlace, Some(place(footprint.place))),
-        (Host::FootprintPlaceSigma, sigma.map(|sigma| place(sigma.place))),
-        (Host::FootprintForce, footprint.force.map(scalar)),
-        (Host::FootprintForceSigma, sigma.filter(|_| is_whole).map(|sigma| scalar(sigma.force))),
-        (Host::FootprintAngle, footprint.angle.map(scalar)),
-        (Host::FootprintAngleSigma, sigma.filter(|_| is_long).map(|sigma| scalar(sigma.angle))),
-        (Host::FootprintWidth, Some(scalar(footprint.width))),
-        (Host::FootprintLength, footprint.length.map(scalar)),
-    ];
-    for (host, components) in columns {
-        let Some(components) = components else { continue };
-        let column = host.column();
-        percepts.add_present(cell, column.output & plan.outputs & Outputs::FOOTPRINT);
-        percepts.set_host(host, cell, &components[..column.components]);
+    for column in (plan.outputs & Outputs::FOOTPRINT).columns() {
+        let &Column { output, components: count, store: Store::Host(host), .. } = column else { continue };
+        if let Some(components) = footprint.components(host) {
+            percepts.add_present(cell, output);
+            percepts.set_host(host, cell, &components[..count]);
+        }
     }
 }

@@ -116,11 +116,11 @@ impl Post<'_> {
                 let found = self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
                 match &field.layer {
                     _ if !stages.footprint || found.is_empty() => {}
-                    Ok(layer) => {
-                        let touch = fit::strongest(self.plan, (field, layer), (raw, offset), found);
-                        state.waiting.extend(touch.map(|touch| (cell, touch)));
+                    Ok(_) => state.waiting.push(fit::Waiting::new(field, (number, cell, offset), found)),
+                    Err(reason) => {
+                        percepts.flags[cell] |= *reason;
+                        percepts.touches_mut(cell).iter_mut().for_each(|touch| touch.flags |= *reason);
                     }
-                    Err(reason) => percepts.flags[cell] |= *reason,
                 }
             }
             if stages.filter && field.charted {
@@ -132,13 +132,13 @@ impl Post<'_> {
         }
         if self.cadence.is_some() {
             // The next frame may keep this one's.
-            fit::all(self.plan, &mut state.waiting, percepts);
+            fit::all(self.plan, raw, &mut state.waiting, percepts);
         }
     }
 
     /// Completes the frames of `raw`, and keeps the last percepts of a call, where the next call may need them.
     pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &mut Percepts, state: &mut PostState) {
-        fit::all(self.plan, &mut state.waiting, percepts);
+        fit::all(self.plan, raw, &mut state.waiting, percepts);
         if self.cadence.is_some() && raw.frames > 0 {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);
@@ -251,6 +251,8 @@ impl Post<'_> {
                 active: touch.active,
                 centroid: field.charted.then(|| place.truncate().to_array()),
                 position: on_skin(place).to_array(),
+                footprint: None,
+                flags: Flags::empty(),
             }
         }));
         percepts.add_present(cell, Outputs::TOUCHES & self.plan.outputs);

@@ -286,6 +286,13 @@ impl Percepts {
         self.touch_ends.push(self.touches.len() as u32);
     }
 
+    /// The touches of a cell that have been added.
+    pub(crate) fn touches_mut(&mut self, cell: usize) -> &mut [Touch] {
+        let Some(&end) = self.touch_ends.get(cell) else { return &mut [] };
+        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
+        &mut self.touches[start as usize..end as usize]
+    }
+
     #[cfg(test)]
     pub(crate) fn change_first_touch(&mut self, cell: usize, change: impl Fn(&mut Touch)) {
         let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };

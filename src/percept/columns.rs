@@ -338,8 +338,12 @@ columns! {
     FOOTPRINT_ANGLE_SIGMA 27 footprint_angle_sigma: f64, Radian, Number, footprint, parts [] host [FootprintAngleSigma];
     #[doc = "The standard deviation of its pressure across, at the sensors, m."]
     FOOTPRINT_WIDTH 28 footprint_width: f64, Metre, Number, footprint, parts [] host [FootprintWidth];
+    #[doc = "The standard deviation of the width, m."]
+    FOOTPRINT_WIDTH_SIGMA 33 footprint_width_sigma: f64, Metre, Number, footprint, parts [] host [FootprintWidthSigma];
     #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
     FOOTPRINT_LENGTH 29 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
+    #[doc = "The standard deviation of the length, m."]
+    FOOTPRINT_LENGTH_SIGMA 34 footprint_length_sigma: f64, Metre, Number, footprint, parts [] host [FootprintLengthSigma];
     #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
     TOTAL_SIGMA 30 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
     #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]

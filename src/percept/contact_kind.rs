@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// What kind of contact presses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(into = "&'static str")]
 pub enum ContactKind {
     /// Something round: a fingertip, a ball.
     Point,
@@ -19,4 +19,21 @@ pub enum ContactKind {
 impl ContactKind {
     /// All of them, in the order of their numbers in columns.
     pub const ALL: [Self; 4] = [Self::Point, Self::Line, Self::Segment, Self::Blob];
+
+    /// As data files spell it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Line => "line",
+            Self::Segment => "segment",
+            Self::Blob => "blob",
+        }
+    }
+}
+
+impl From<ContactKind> for &'static str {
+    fn from(kind: ContactKind) -> Self {
+        kind.name()
+    }
 }

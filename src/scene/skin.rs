@@ -4,7 +4,7 @@ use super::OrientationBy;
 use super::plan::{Plan, PlanField};
 use crate::percept::Flags;
 use crate::signal::{Quantity, RawValue, Receptor, SkinResponse};
-use crate::stage::calibrate::{self, UNUSABLE};
+use crate::stage::calibrate::{self, Felt};
 use crate::stage::footprint::{Layer, STEPS, Taxel};
 
 /// A chart that is off by more than this share of a distance between neighbours is too far from flat to fit a contact in: it
@@ -44,11 +44,7 @@ impl Plan {
         let slot = self.members_of(field)[member].slot as usize;
         let (channel, curve) = (self.channel_of(slot), self.curve_of(slot));
         let calibration = &self.calibrations[channel];
-        let pressure = calibrate::reference(value, calibration, curve);
-        if pressure.status & UNUSABLE != 0 {
-            return None;
-        }
-        let number = value.number()?;
+        let Felt { pressure, sigma } = calibrate::felt(value, calibration, curve)?;
         // What a soft onset has taken off, the contact has pressed with all the same.
         let taken_off = self.onset(channel).threshold;
         // Contacts press with a force.
@@ -58,9 +54,9 @@ impl Plan {
         Some(Taxel {
             place_m: field.places[member].truncate() * f64::from(field.unit_m),
             area_m2: self.areas[channel],
-            pressure: if pressure.value > 0.0 { by * (pressure.value + taken_off) } else { 0.0 },
+            pressure: if pressure > 0.0 { by * (pressure + taken_off) } else { 0.0 },
             threshold: by * (feels_from + taken_off),
-            sigma: calibration.noise.map(|noise| by * calibrate::sigma(number, noise, calibration, curve)),
+            sigma: sigma.map(|sigma| by * sigma),
         })
     }
 

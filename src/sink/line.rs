@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
+use crate::percept::{COLUMNS, Flags, Footprint, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -50,7 +50,7 @@ impl LineWriter {
 
     /// Appends the frame `frame` of the batch to `line`.
     pub(super) fn write(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
-        let Self { heads, flags, all_fields } = self;
+        let Self { heads, all_fields, .. } = self;
         line.extend_from_slice(b"{\"t\":");
         print(line, &percepts.t_s(frame));
         line.extend_from_slice(b",\"frame\":");
@@ -68,21 +68,64 @@ impl LineWriter {
             print(line, &percept.contact);
             print_quantities(line, &percept, percepts.precision());
             if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
-                print_touches(line, percepts.touches(frame, percept.field));
+                self.write_touches(percepts.touches(frame, percept.field), percepts.outputs(), line);
             }
-            line.extend_from_slice(b",\"flags\":[");
-            let mut first = true;
-            for (_, name) in flags.iter().filter(|(flag, _)| percept.flags.contains(*flag)) {
-                if !std::mem::take(&mut first) {
-                    line.push(b',');
-                }
-                line.push(b'"');
-                line.extend_from_slice(name.as_bytes());
-                line.push(b'"');
-            }
-            line.extend_from_slice(b"]}");
+            self.write_flags(percept.flags, line);
+            line.push(b'}');
         }
         line.extend_from_slice(b"]}");
+    }
+
+    fn write_flags(&self, own: Flags, line: &mut Vec<u8>) {
+        key(line, "flags");
+        line.push(b'[');
+        for (index, (_, name)) in self.flags.iter().filter(|(flag, _)| own.contains(*flag)).enumerate() {
+            line.extend_from_slice(if index == 0 { b"\"" } else { b",\"" });
+            line.extend_from_slice(name.as_bytes());
+            line.push(b'"');
+        }
+        line.push(b']');
+    }
+
+    fn write_touches(&self, touches: &[Touch], outputs: Outputs, line: &mut Vec<u8>) {
+        let footprint = outputs & Outputs::FOOTPRINT;
+        key(line, "touches");
+        line.push(b'[');
+        for (index, touch) in touches.iter().enumerate() {
+            line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+            print(line, &touch.id);
+            key(line, "total");
+            print(line, &touch.total);
+            key(line, "active");
+            print(line, &touch.active);
+            if let Some(centroid) = touch.centroid {
+                key(line, "centroid");
+                print(line, &centroid);
+            }
+            key(line, "position");
+            print(line, &touch.position);
+            if let Some(fitted) = &touch.footprint {
+                print_footprint(line, fitted, footprint);
+            }
+            if !footprint.is_empty() {
+                self.write_flags(touch.flags, line);
+            }
+            line.push(b'}');
+        }
+        line.push(b']');
+    }
+}
+
+fn print_footprint(line: &mut Vec<u8>, footprint: &Footprint, outputs: Outputs) {
+    for column in outputs.columns() {
+        let Store::Host(host) = column.store else { continue };
+        let Some(components) = footprint.components(host) else { continue };
+        key(line, column.name);
+        match column.components {
+            _ if column.unit == Unit::Kind => print(line, &footprint.kind),
+            1 => print(line, &components[0]),
+            count => print(line, &&components[..count]),
+        }
     }
 }
 
@@ -113,27 +156,6 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
             }
         }
     }
-}
-
-fn print_touches(line: &mut Vec<u8>, touches: &[Touch]) {
-    key(line, "touches");
-    line.push(b'[');
-    for (index, touch) in touches.iter().enumerate() {
-        line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
-        print(line, &touch.id);
-        key(line, "total");
-        print(line, &touch.total);
-        key(line, "active");
-        print(line, &touch.active);
-        if let Some(centroid) = touch.centroid {
-            key(line, "centroid");
-            print(line, &centroid);
-        }
-        key(line, "position");
-        print(line, &touch.position);
-        line.push(b'}');
-    }
-    line.push(b']');
 }
 
 fn key(line: &mut Vec<u8>, name: &str) {

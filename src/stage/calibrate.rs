@@ -61,18 +61,15 @@ pub(crate) struct Table<'a> {
 /// What is right, in f64; `curve` is the taxel's.
 pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Pressure {
     let unusable = |flag: Flags| Pressure { status: flag.bits() | UNUSABLE, ..Pressure::default() };
-    if raw.is_missing() {
-        return unusable(Flags::INCOMPLETE);
-    }
-    let Some(value) = raw.number() else { return unusable(Flags::FAULTY_INPUT) };
-    if taxel.mask || value.abs() > HUGE {
-        return unusable(Flags::FAULTY_INPUT);
-    }
+    let value = match usable(raw, taxel) {
+        Ok(value) => value,
+        Err(flag) => return unusable(flag),
+    };
     let mut flags = Flags::empty();
     if value < taxel.raw_range[0].into() || value > taxel.raw_range[1].into() {
         flags |= Flags::OUT_OF_RANGE;
     }
-    let nothing = value != 0.0 && value.abs() < TINY;
+    let nothing = is_tiny(value);
     let value = if nothing { 0.0 } else { value };
     let pressure = response(value, taxel, curve);
     let bound = bound(value, taxel, curve.rounded, pressure);
@@ -81,7 +78,7 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_
         apart > 0.0 && (pressure - threshold).abs() <= apart
     };
     let near_in_size = |size: f64| near(size.copysign(pressure));
-    let tiny = pressure != 0.0 && pressure.abs() < TINY;
+    let tiny = is_tiny(pressure);
     let mut flags_in_doubt = Flags::empty();
     if near_in_size(TINY) {
         flags_in_doubt |= Flags::FAULTY_INPUT;
@@ -106,6 +103,41 @@ pub(crate) fn reference(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_
     Pressure { value: if over { pressure } else { 0.0 }, status: flags.bits(), bound, in_doubt, flags_in_doubt }
 }
 
+/// The number of a raw value, or why it cannot be used.
+fn usable(raw: RawValue, taxel: &TaxelCalibration) -> Result<f64, Flags> {
+    if raw.is_missing() {
+        return Err(Flags::INCOMPLETE);
+    }
+    raw.number().filter(|value| !taxel.mask && value.abs() <= HUGE).ok_or(Flags::FAULTY_INPUT)
+}
+
+fn is_tiny(number: f64) -> bool {
+    number != 0.0 && number.abs() < TINY
+}
+
+/// What a fit takes from a taxel: the P of [`reference`] without its bound, and σ of P.
+pub(crate) struct Felt {
+    pub(crate) pressure: f64,
+    /// Where the noise of raw values is known.
+    pub(crate) sigma: Option<f64>,
+}
+
+/// What a fit takes from a taxel that reads `raw`; none where that cannot be used.
+pub(crate) fn felt(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<Felt> {
+    let value = usable(raw, taxel).ok()?;
+    let value = if is_tiny(value) { 0.0 } else { value };
+    let here = response(value, taxel, curve);
+    if here.abs() > HUGE {
+        return None;
+    }
+    let pressure = if !is_tiny(here) && here > taxel.dead_band { here } else { 0.0 };
+    let sigma = taxel.noise.map(|noise| {
+        let [less, more] = [-noise, noise].map(|off| response(value + off, taxel, curve));
+        sigma_between(less, here, more)
+    });
+    Some(Felt { pressure, sigma })
+}
+
 /// P at a raw value, whatever the dead band.
 pub(crate) fn response(value: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
     let above = value - taxel.baseline;
@@ -116,6 +148,11 @@ pub(crate) fn response(value: f64, taxel: &TaxelCalibration, curve: Table<'_>) -
 /// sensor may begin to feel with a step, or else on the other, as it may feel no more than so much.
 pub(crate) fn sigma(value: f64, noise: f64, taxel: &TaxelCalibration, curve: Table<'_>) -> f64 {
     let [less, here, more] = [-noise, 0.0, noise].map(|off| response(value + off, taxel, curve));
+    sigma_between(less, here, more)
+}
+
+/// The same from the P of one σ less, of the raw value and of one σ more.
+fn sigma_between(less: f64, here: f64, more: f64) -> f64 {
     let (up, down) = (less.max(more) - here, here - less.min(more));
     if up > 0.0 { up } else { down }
 }
@@ -305,5 +342,30 @@ mod tests {
         let far = knots_of(&[[-16_777_216.0, 0.0], [-16_777_215.0, 1.0], [0.0, 2.0]]);
         let p = reference(RawValue::new(0.75), &taxel, far.table());
         assert!((p.value - 0.75).abs() < 1e-6 && p.bound > 0.25, "{p:?}");
+    }
+
+    #[test]
+    fn a_fit_takes_the_pressures_of_the_reference() {
+        let knots = knots_of(&[[0.0, 100.0], [16.0, 90.0], [20.0, 10.0], [255.0, 0.0]]);
+        let plain =
+            TaxelCalibration { baseline: 3.0, gain: 0.5, dead_band: 2.0, noise: Some(1.5), ..Default::default() };
+        let masked = TaxelCalibration { mask: true, ..plain.clone() };
+        let curve = TaxelCalibration { dead_band: 2.0, noise: Some(1.0), ..Default::default() };
+        let raws = [-2.0, 0.0, 1e-30, 3.0, 7.0, 7.1, 16.0, 19.5, 208.0, 1e17, 1e30, f64::NAN, f64::INFINITY];
+        let mut compared = 0;
+        for (taxel, table) in [(&plain, Table::default()), (&masked, Table::default()), (&curve, knots.table())] {
+            for raw in raws.map(RawValue::new).into_iter().chain([RawValue::MISSING]) {
+                let right = reference(raw, taxel, table);
+                let felt = felt(raw, taxel, table);
+                assert_eq!(felt.is_some(), right.status & UNUSABLE == 0, "{raw:?}");
+                if let (Some(felt), Some(number), Some(noise)) = (felt, raw.number(), taxel.noise) {
+                    let number = if is_tiny(number) { 0.0 } else { number };
+                    let sigma = Some(sigma(number, noise, taxel, table));
+                    assert_eq!((felt.pressure, felt.sigma), (right.value, sigma), "{raw:?}");
+                    compared += 1;
+                }
+            }
+        }
+        assert_eq!(compared, 20);
     }
 }

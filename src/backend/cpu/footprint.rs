@@ -1,7 +1,5 @@
 //! footprint in lanes: eight touches abreast, each with the bits that it has alone; see [`crate::stage::footprint`].
 
-use std::sync::Mutex;
-
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x8, mask64x8};
 
@@ -14,32 +12,45 @@ const ABREAST: usize = 8;
 /// So many touches are fitted faster abreast than one after the other.
 const FASTER_ABREAST: usize = 3;
 
-/// Of each of `touches` the fits of all kinds; none where it has too few taxels for any.
-pub(crate) fn fit_all(touches: &[&Touch]) -> Vec<Option<Fits<f64>>> {
-    fit_all_with(Level::new(), touches)
+/// Fits all kinds to each of `touches`, on all cores, and gives what `of` makes of each touch and its fits: none where it has too few
+/// taxels for any.
+pub(crate) fn fit_each<T: Send>(touches: &[&Touch], of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync) -> Vec<T> {
+    fit_each_with(Level::new(), touches, of)
 }
 
-pub(crate) fn fit_all_with(level: Level, touches: &[&Touch]) -> Vec<Option<Fits<f64>>> {
-    let mut started: Vec<(usize, &Touch, Start<f64>)> =
-        touches.iter().enumerate().filter_map(|(index, touch)| Some((index, *touch, touch.start()?))).collect();
-    let mut fits: Vec<Option<Fits<f64>>> = touches.iter().map(|_| None).collect();
-    if started.len() < FASTER_ABREAST {
-        for (index, touch, start) in started {
-            fits[index] = Some(fit(touch.sensors(), &start));
-        }
-        return fits;
+fn fit_each_with<T: Send>(
+    level: Level,
+    touches: &[&Touch],
+    of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
+) -> Vec<T> {
+    if touches.len() < FASTER_ABREAST {
+        let fitted = |touch: &&Touch| touch.start().map(|start| fit(touch.sensors(), &start));
+        return touches.iter().map(|touch| of(touch, fitted(touch).as_ref())).collect();
     }
     // Those with as many taxels side by side: the others wait for the one with most.
-    started.sort_by_key(|(_, touch, start)| (start.is_long, touch.sensors().len()));
-    let groups = started.len().div_ceil(ABREAST);
-    let made = Mutex::new(&mut fits);
-    parallel::for_each(parallel::threads().min(groups), started.chunks(ABREAST), |group| {
-        let lanes = with_widest!(level, simd => abreast(simd, group));
-        if let Ok(mut fits) = made.lock() {
-            group.iter().zip(lanes).for_each(|((index, ..), lane)| fits[*index] = Some(lane));
+    let mut order: Vec<usize> = (0..touches.len()).collect();
+    order.sort_by_key(|&index| (touches[index].is_long(), touches[index].sensors().len()));
+    let mut made: Vec<Option<T>> = order.iter().map(|_| None).collect();
+    let groups = order.chunks(ABREAST).zip(made.chunks_mut(ABREAST));
+    parallel::for_each(parallel::threads().min(groups.len()), groups, |(group, made)| {
+        let started: Vec<(usize, &Touch, Start<f64>)> = group
+            .iter()
+            .enumerate()
+            .filter_map(|(at, &index)| Some((at, touches[index], touches[index].start()?)))
+            .collect();
+        if !started.is_empty() {
+            let lanes = with_widest!(level, simd => abreast(simd, &started));
+            for (&(at, touch, _), fits) in started.iter().zip(&lanes) {
+                made[at] = Some(of(touch, Some(fits)));
+            }
+        }
+        for (&index, made) in group.iter().zip(made) {
+            made.get_or_insert_with(|| of(touches[index], None));
         }
     });
-    fits
+    let mut places: Vec<usize> = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(at, &index)| places[index] = at);
+    places.into_iter().filter_map(|at| made[at].take()).collect()
 }
 
 /// The fits of up to eight touches.
@@ -77,6 +88,11 @@ impl<S: Simd> Real for f64x8<S> {
     }
 
     #[inline(always)]
+    fn ln(self) -> Self {
+        Self::simd_from(self.simd, std::array::from_fn(|lane| libm::log(self[lane])))
+    }
+
+    #[inline(always)]
     fn is_below(self, other: Self) -> Self::Mask {
         self.simd_lt(other)
     }
@@ -98,7 +114,8 @@ mod tests {
 
     use super::super::lanes::levels;
     use super::*;
-    use crate::stage::footprint::{Footprint, Layer, Taxel};
+    use crate::percept::Footprint;
+    use crate::stage::footprint::{Layer, Taxel};
 
     const LAYER: Layer = Layer { sigma_m: 2e-3, gain_spread: 0.05, reach_m: 4e-3, steps: 6 };
 
@@ -122,23 +139,24 @@ mod tests {
         (0..61).map(touch).collect()
     }
 
-    fn concluded(touches: &[Touch], fits: &[Option<Fits<f64>>]) -> Vec<Option<Footprint>> {
-        touches.iter().zip(fits).map(|(touch, fits)| touch.conclude(fits.as_ref()).0).collect()
+    fn concluded(level: Level, touches: &[Touch]) -> Vec<Option<Footprint>> {
+        fit_each_with(level, &touches.iter().collect::<Vec<_>>(), |touch, fits| touch.conclude(fits).0)
     }
 
     #[test]
     fn lanes_have_the_bits_of_one_touch_alone_on_every_level() {
         let touches = touches(LAYER);
-        let borrowed: Vec<&Touch> = touches.iter().collect();
-        let alone: Vec<_> =
-            touches.iter().map(|touch| touch.start().map(|start| fit(touch.sensors(), &start))).collect();
-        let right = concluded(&touches, &alone);
+        let alone = |touch: &Touch| {
+            let fits = touch.start().map(|start| fit(touch.sensors(), &start));
+            touch.conclude(fits.as_ref()).0
+        };
+        let right: Vec<_> = touches.iter().map(alone).collect();
         assert!(right.iter().flatten().count() > 40, "{}", right.iter().flatten().count());
         for level in levels() {
-            assert_eq!(concluded(&touches, &fit_all_with(level, &borrowed)), right, "{level:?}");
+            assert_eq!(concluded(level, &touches), right, "{level:?}");
         }
         // Negative control: another layer has other bits.
         let others = self::touches(Layer { sigma_m: 2.000_001e-3, ..LAYER });
-        assert_ne!(concluded(&others, &fit_all(&others.iter().collect::<Vec<_>>())), right);
+        assert_ne!(concluded(Level::new(), &others), right);
     }
 }

@@ -13,7 +13,7 @@ use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use sha2::{Digest as _, Sha256};
 
 use super::{Row, TableColumn, TableType, ValueOf, percept_columns, rows, touch_columns, touch_rows};
-use crate::percept::{Flags, Percepts};
+use crate::percept::{ContactKind, Flags, Percepts};
 use crate::sink::{FieldNames, Session};
 
 /// Makes record batches of percepts: a row per frame and field in contact, or per separate touch.
@@ -175,11 +175,18 @@ impl Builder {
                     ValueOf::Field => Some(name.field.clone()),
                     ValueOf::Link => Some(name.link.clone()),
                     ValueOf::Letter => name.letter.clone(),
-                    _ => name.signal.clone(),
+                    ValueOf::Signal => name.signal.clone(),
+                    _ => None,
                 };
-                let world = (column.value == ValueOf::Link).then(|| "world".to_owned());
+                let others: Vec<&str> = match column.value {
+                    ValueOf::Link => vec!["world"],
+                    ValueOf::Output(..) | ValueOf::TouchFootprint(..) => {
+                        ContactKind::ALL.map(ContactKind::name).to_vec()
+                    }
+                    _ => Vec::new(),
+                };
                 let (mut words, mut key_of) = (Vec::new(), HashMap::new());
-                for word in names.iter().filter_map(word).chain(world) {
+                for word in names.iter().filter_map(word).chain(others.into_iter().map(str::to_owned)) {
                     key_of.entry(word.clone()).or_insert_with(|| {
                         words.push(word);
                         words.len() as i32 - 1
@@ -198,17 +205,11 @@ impl Builder {
             Self::U32(values) => values.append_option(row.whole(value).map(|number| number as u32)),
             Self::Bool(values) => values.append_value(row.is_touched()),
             Self::Word { keys, key_of, .. } => {
-                let name = &words.names[row.field];
-                let word = match value {
-                    ValueOf::Field => Some(name.field.as_str()),
-                    ValueOf::Link => Some(row.link(&words.names)),
-                    ValueOf::Letter => name.letter.as_deref(),
-                    _ => name.signal.as_deref(),
-                };
+                let word = row.word(value, &words.names);
                 keys.append_option(word.and_then(|word| key_of.get(word).copied()));
             }
             Self::Words(lists) => {
-                let own = row.percepts.flags(row.frame, row.field);
+                let own = row.flags();
                 for (_, name) in words.flags.iter().filter(|(flag, _)| own.contains(*flag)) {
                     lists.values().append_value(name);
                 }

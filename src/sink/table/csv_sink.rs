@@ -170,20 +170,13 @@ impl CsvFile {
             (TableType::U64 | TableType::U32, _) => print(text, row.whole(value).as_ref()),
             (_, ValueOf::Contact) => print(text, Some(&row.is_touched())),
             (_, ValueOf::Flags) => {
-                let own = row.percepts.flags(row.frame, row.field);
+                let own = row.flags();
                 for (index, (_, name)) in flags.iter().filter(|(flag, _)| own.contains(*flag)).enumerate() {
                     text.extend_from_slice(if index == 0 { b"" } else { BETWEEN_WORDS.as_bytes() });
                     text.extend_from_slice(name.as_bytes());
                 }
             }
-            (_, ValueOf::Link) => return self.writer.write_field(row.link(names)),
-            (_, ValueOf::Letter) => {
-                return self.writer.write_field(names[row.field].letter.as_deref().unwrap_or_default());
-            }
-            (_, ValueOf::Signal) => {
-                return self.writer.write_field(names[row.field].signal.as_deref().unwrap_or_default());
-            }
-            _ => return self.writer.write_field(&names[row.field].field),
+            _ => return self.writer.write_field(row.word(value, names).unwrap_or_default()),
         }
         self.writer.write_field(&self.text)
     }

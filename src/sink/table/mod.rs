@@ -17,7 +17,7 @@ pub use parquet_sink::ParquetSink;
 pub(super) use touches_path::touches_path;
 
 use super::{FieldNames, Session};
-use crate::percept::{Column, Outputs, Percepts, Touch, Unit};
+use crate::percept::{Column, ContactKind, Flags, Host, Outputs, Percepts, Store, Touch, Unit};
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +88,7 @@ enum ValueOf {
     TouchActive,
     TouchCentroid(usize),
     TouchPosition(usize),
+    TouchFootprint(Host, usize),
 }
 
 impl TableColumn {
@@ -160,19 +161,33 @@ pub fn percept_columns(session: &Session<'_>) -> Vec<TableColumn> {
 
 /// A column for each component of the outputs.
 fn output_columns(session: &Session<'_>) -> Vec<TableColumn> {
+    columns_of(session.outputs, session, ValueOf::Output)
+}
+
+/// A column for each component of `outputs`, where `value` says that it is.
+fn columns_of(
+    outputs: Outputs,
+    session: &Session<'_>,
+    value: impl Fn(&'static Column, usize) -> ValueOf,
+) -> Vec<TableColumn> {
     let of = |column: &'static Column| {
-        let kind = match column.unit {
-            _ if column.output == Outputs::ACTIVE => TableType::U32,
-            _ if column.is_double() || session.is_double => TableType::F64,
-            _ => TableType::F32,
-        };
+        let (kind, value) = (kind_of(column, session), &value);
         let unit = unit_of(column.unit, session);
         suffixes(column.components).iter().enumerate().map(move |(component, suffix)| {
             let name = if suffix.is_empty() { column.name.to_owned() } else { format!("{}_{suffix}", column.name) };
-            TableColumn::new(&name, &unit, kind, column.help, ValueOf::Output(column, component)).or_absent()
+            TableColumn::new(&name, &unit, kind, column.help, value(column, component)).or_absent()
         })
     };
-    session.outputs.columns().flat_map(of).collect()
+    outputs.columns().flat_map(of).collect()
+}
+
+fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
+    match column.unit {
+        Unit::Kind => TableType::Word,
+        _ if column.output == Outputs::ACTIVE => TableType::U32,
+        _ if column.is_double() || session.is_double => TableType::F64,
+        _ => TableType::F32,
+    }
 }
 
 /// The columns of a session's separate touches, one row each.
@@ -199,6 +214,15 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
             "The same point on the surface.",
             ValueOf::TouchPosition(component),
         ));
+    }
+    let footprint = session.outputs & Outputs::FOOTPRINT;
+    columns.extend(columns_of(footprint, session, |column, component| match column.store {
+        Store::Host(host) => ValueOf::TouchFootprint(host, component),
+        _ => ValueOf::Output(column, component),
+    }));
+    if !footprint.is_empty() {
+        let help = "Why its footprint, or a part of it, is absent; docs/footprint.md.";
+        columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
     }
     columns
 }
@@ -239,6 +263,7 @@ impl Row<'_> {
             ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
             ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
             ValueOf::TouchPosition(component) => self.touch.map(|touch| touch.position[component]),
+            ValueOf::TouchFootprint(host, component) => Some(self.touch?.footprint?.components(host)?[component]),
             _ => None,
         }
     }
@@ -251,6 +276,23 @@ impl Row<'_> {
             ValueOf::Output(..) => self.float(value).map(|number| number as u64),
             _ => None,
         }
+    }
+
+    /// The word in a column of words; none where it is absent.
+    fn word<'n>(&self, value: ValueOf, names: &'n [FieldNames]) -> Option<&'n str> {
+        let name = &names[self.field];
+        match value {
+            ValueOf::Field => Some(&name.field),
+            ValueOf::Link => Some(self.link(names)),
+            ValueOf::Letter => name.letter.as_deref(),
+            ValueOf::Signal => name.signal.as_deref(),
+            _ => self.float(value).and_then(|kind| ContactKind::ALL.get(kind as usize)).map(|kind| kind.name()),
+        }
+    }
+
+    /// Those of the touch in a table of touches.
+    fn flags(&self) -> Flags {
+        self.touch.map_or_else(|| self.percepts.flags(self.frame, self.field), |touch| touch.flags)
     }
 
     fn is_touched(&self) -> bool {

@@ -3,12 +3,12 @@
 use glam::DVec2;
 
 use super::descent::{Fitted, STEPS, descend};
-use super::kinds::{Blob, Contact, Kind as _, Line, Point, Segment};
+use super::kinds::{Blob, Contact, Kind, Line, Point, Segment};
 use super::objective::Sensor;
 use super::real::Real;
 use super::shape::{Parameter, Shape};
 use super::touch::{Start, Touch};
-use crate::percept::{ContactKind, Flags};
+use crate::percept::{ContactKind, Flags, Footprint, FootprintSigma};
 use crate::stage::angle;
 
 /// What a parameter costs: two more lower χ² by over twice as much in one touch of a hundred by chance, e^−PENALTY.
@@ -30,8 +30,8 @@ pub(crate) struct Fits<R> {
 #[inline(always)]
 pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
     let (gains, steps) = (start.gain_variance, start.steps);
-    let point = descend::<R, Point, 4>(sensors, gains, start.point, steps);
-    let line = descend::<R, Line, 4>(sensors, gains, start.line, steps);
+    let point = descend::<R, Point, 4>(sensors, gains, with_force::<R, Point, 4>(sensors, start.point), steps);
+    let line = descend::<R, Line, 4>(sensors, gains, with_force::<R, Line, 4>(sensors, start.line), steps);
     let mut long = None;
     if start.is_long {
         // As much force as the line has on the segment's length.
@@ -39,10 +39,24 @@ pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
         let segment = Shape { force, length: start.half_length, ..line.shape };
         long = Some([
             descend::<R, Segment, 6>(sensors, gains, segment, steps),
-            descend::<R, Blob, 6>(sensors, gains, start.blob, steps),
+            descend::<R, Blob, 6>(sensors, gains, with_force::<R, Blob, 6>(sensors, start.blob), steps),
         ]);
     }
     Fits { point, line, long }
+}
+
+/// `shape`, which has a force of 1, with the force that explains the pressed sensors best.
+#[inline(always)]
+fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape: Shape<R>) -> Shape<R> {
+    let (contact, zero) = (Contact::of(&shape), shape.force.all(0.0));
+    let (mut both, mut own) = (zero, shape.force.all(f64::MIN_POSITIVE));
+    for sensor in sensors {
+        let (felt, _) = M::felt(&contact, sensor.at, sensor.margin);
+        let felt = R::choose(zero.is_below(sensor.pressed), felt, zero);
+        both = both + R::choose(zero.is_below(sensor.pressed), felt * sensor.pressure, zero);
+        own = own + felt * felt;
+    }
+    Shape { force: (both / own).at_least(f64::MIN_POSITIVE).ln(), ..shape }
 }
 
 impl<R: Copy> Fits<R> {
@@ -71,30 +85,6 @@ fn mapped<R: Copy, T, const K: usize>(fitted: &Fitted<R, K>, of: impl Fn(R) -> T
         ahead: of(ahead),
         covariance: covariance.map(|row| row.map(of)),
     }
-}
-
-/// A contact in the field's chart, in metres and the unit of P.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Footprint {
-    pub(crate) kind: ContactKind,
-    pub(crate) place: DVec2,
-    /// Absent where it goes on beyond the sensors.
-    pub(crate) force: Option<f64>,
-    pub(crate) angle: Option<f64>,
-    /// The standard deviation of its pressure across, at the sensors.
-    pub(crate) width: f64,
-    /// Of a segment; of a blob the standard deviation along.
-    pub(crate) length: Option<f64>,
-    /// Standard deviations, where the noise of the sensors is known.
-    pub(crate) sigma: Option<Sigma>,
-}
-
-/// Standard deviations of a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Sigma {
-    pub(crate) place: DVec2,
-    pub(crate) force: f64,
-    pub(crate) angle: f64,
 }
 
 /// The fit of one kind.
@@ -209,22 +199,27 @@ impl Touch {
         let sides = DVec2::new(-along.y, along.x);
         // Of a line only what it is off across.
         let place_variance = sides * sides * across + along * along * lengthwise + 2.0 * sides * along * best.shared;
-        let sigma = Sigma {
-            place: place_variance.max(DVec2::ZERO).map(f64::sqrt) * self.unit_m,
-            force: force * best.variance(Parameter::Force).sqrt(),
-            angle: best.variance(Parameter::Turn).sqrt(),
-        };
+        // Of what has a logarithm as its parameter the standard deviation is a share.
+        let share_of = |parameter: Parameter| best.variance(parameter).sqrt();
         let length = match best.kind {
             ContactKind::Point | ContactKind::Line => None,
             ContactKind::Segment => is_whole.then_some(2.0 * half * self.unit_m),
             ContactKind::Blob => Some(half * self.unit_m),
         };
+        let width = libm::exp(width) * self.unit_m;
+        let sigma = FootprintSigma {
+            place: (place_variance.max(DVec2::ZERO).map(f64::sqrt) * self.unit_m).to_array(),
+            force: force * share_of(Parameter::Force),
+            angle: best.variance(Parameter::Turn).sqrt(),
+            width: width * share_of(Parameter::Width),
+            length: length.unwrap_or(0.0) * share_of(Parameter::Length),
+        };
         let footprint = Footprint {
             kind: best.kind,
-            place: place * self.unit_m + self.origin,
+            place: (place * self.unit_m + self.origin).to_array(),
             force: is_whole.then_some(force),
             angle: (best.kind != ContactKind::Point).then(|| angle::of_line(along.x, along.y)),
-            width: libm::exp(width) * self.unit_m,
+            width,
             length,
             sigma: self.has_noise.then_some(sigma),
         };

@@ -35,7 +35,7 @@ mod real;
 mod shape;
 mod touch;
 
-pub(crate) use choice::{Fits, Footprint, fit};
+pub(crate) use choice::{Fits, fit};
 pub(crate) use descent::STEPS;
 pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;

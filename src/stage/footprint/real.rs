@@ -21,6 +21,8 @@ pub(crate) trait Real:
     fn all(self, value: f64) -> Self;
     fn sqrt(self) -> Self;
     fn abs(self) -> Self;
+    /// The natural logarithm, by `libm`.
+    fn ln(self) -> Self;
     fn is_below(self, other: Self) -> Self::Mask;
     fn choose(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Added to a whole number n within ±1000, it has n's sum with an exponent's bias in its last bits.
@@ -131,6 +133,11 @@ impl Real for f64 {
     #[inline(always)]
     fn abs(self) -> Self {
         self.abs()
+    }
+
+    #[inline(always)]
+    fn ln(self) -> Self {
+        libm::log(self)
     }
 
     #[inline(always)]

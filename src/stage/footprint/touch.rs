@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::kinds::{Blob, Contact, Kind, Line, Point};
+use super::kinds::{Blob, Kind as _, Point};
 use super::objective::Sensor;
 use super::real::Real;
 use super::shape::Shape;
@@ -51,7 +51,7 @@ pub(crate) struct Touch {
     pub(super) steps: usize,
 }
 
-/// Where the descents of a touch start.
+/// Where the descents of a touch start, but for their forces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Start<R> {
     pub(crate) point: Shape<R>,
@@ -121,6 +121,11 @@ impl Touch {
         }
     }
 
+    /// Whether there are taxels enough for segments and blobs.
+    pub(crate) fn is_long(&self) -> bool {
+        self.pressed > Blob::FREE.len()
+    }
+
     pub(crate) fn sensors(&self) -> &[Sensor<f64>] {
         &self.sensors
     }
@@ -172,26 +177,14 @@ impl Touch {
         let shape = |along, width: f64, length: f64| Shape { place: [0.0; 2], along, force: 0.0, width, length };
         let axis = [libm::cos(turn), libm::sin(turn)];
         (self.pressed > Point::FREE.len()).then(|| Start {
-            point: self.with_force::<Point, 4>(shape([1.0, 0.0], spread(mean), 0.0)),
-            line: self.with_force::<Line, 4>(shape(axis, spread(mean - apart), 0.0)),
-            blob: self.with_force::<Blob, 6>(shape(axis, spread(mean - apart), spread(mean + apart))),
+            point: shape([1.0, 0.0], spread(mean), 0.0),
+            line: shape(axis, spread(mean - apart), 0.0),
+            blob: shape(axis, spread(mean - apart), spread(mean + apart)),
             // An even line has a variance of h²/3.
             half_length: libm::log((6.0 * apart).sqrt().max(SHORTEST_HALF)),
             gain_variance: self.gain_spread * self.gain_spread,
             steps: self.steps,
-            is_long: self.pressed > Blob::FREE.len(),
+            is_long: self.is_long(),
         })
-    }
-
-    /// `shape` with the force that explains the pressed taxels best.
-    fn with_force<M: Kind<K>, const K: usize>(&self, shape: Shape<f64>) -> Shape<f64> {
-        let contact = Contact::of(&shape);
-        let (mut both, mut own) = (0.0, f64::MIN_POSITIVE);
-        for sensor in self.sensors.iter().filter(|sensor| sensor.pressed > 0.0) {
-            let (felt, _) = M::felt(&contact, sensor.at, sensor.margin);
-            both += felt * sensor.pressure;
-            own += felt * felt;
-        }
-        Shape { force: libm::log((both / own).max(f64::MIN_POSITIVE)), ..shape }
     }
 }

@@ -1,0 +1,109 @@
+//! Every separate touch of a field has a footprint of its own.
+
+use glam::DVec2;
+use somatic::source::{SimulatedSource, Source};
+use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percepts, Scene};
+
+use crate::common::Flat;
+
+/// Two balls on a grid of 5 mm, one pressed harder than the other, that wander about their own places.
+const TWO_BALLS: &str = "rate_hz = 20\nduration_s = 5\n[skin]\nthickness_m = 0.004\n[sensor]\nkind = \"ideal\"\nnoise_sigma = 0.01\n\
+    [[touch]]\nname = \"left\"\non = \"grid\"\nindenter = \"ball\"\nradius_m = 0.0127\nhold = { newton = 3 }\n\
+    path = [[-0.022, -0.004], [-0.018, 0.005]]\ntimes_s = [0, 5]\n\
+    [[touch]]\nname = \"right\"\non = \"grid\"\nindenter = \"ball\"\nradius_m = 0.0127\nhold = { newton = 6 }\n\
+    path = [[0.018, 0.003], [0.023, -0.006]]\ntimes_s = [0, 5]\n";
+
+fn grid() -> Body {
+    let places: Vec<[f64; 2]> =
+        (-8..=8).flat_map(|i| (-8..=8).map(move |j| [f64::from(i) * 5e-3, f64::from(j) * 5e-3])).collect();
+    let mut body = Flat::new(&places).field("grid", None, 0..places.len() as u32).surface(0.5).body();
+    body.taxels.iter_mut().for_each(|taxel| taxel.area = 2.5e-5);
+    body
+}
+
+/// The percepts of the two balls, and where each was in each frame.
+fn pressed(outputs: Outputs, backend: BackendKind, skin: bool) -> (Percepts, Vec<[DVec2; 2]>) {
+    let body = grid();
+    let mut source = SimulatedSource::on_body("two-balls", TWO_BALLS, body.clone()).unwrap();
+    let mut calibration = source.calibration();
+    if !skin {
+        calibration.truncate(calibration.find("\n[skin]").unwrap());
+    }
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = Calibration::parse(&calibration, &ids).unwrap();
+    let scene = Scene::default().outputs(outputs).fields(["grid"]);
+    let options = Options::default().scene(scene).calibration(calibration).backend(backend).batch(256);
+    let mut engine = Engine::new(&body, options).unwrap();
+    engine.set_channels(source.taxels()).unwrap();
+    let (mut frames, mut truths) = (Vec::new(), Vec::new());
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    while source.next_frame(&mut frame).unwrap() {
+        truths.push([0, 1].map(|ball| DVec2::from_array(source.truth()[ball].uv.unwrap())));
+        frames.push(frame.clone());
+    }
+    (engine.process(&frames).unwrap().clone(), truths)
+}
+
+#[test]
+fn each_touch_has_its_own_footprint_and_the_field_that_of_the_strongest() {
+    let (percepts, truths) = pressed(Outputs::all(), BackendKind::Cpu, true);
+    let (mut centroids, mut fits) = (Vec::new(), Vec::new());
+    for (frame, truth) in truths.iter().enumerate() {
+        let touches = percepts.touches(frame, 0);
+        assert_eq!(touches.len(), 2, "frame {frame}");
+        for touch in touches {
+            let Some(footprint) = touch.footprint else {
+                assert!(!touch.flags.is_empty(), "{touch:?}");
+                continue;
+            };
+            let centroid = DVec2::from_array(touch.centroid.unwrap());
+            let nearest = truth.iter().copied().min_by(|a, b| a.distance(centroid).total_cmp(&b.distance(centroid)));
+            centroids.push(centroid.distance(nearest.unwrap()));
+            fits.push(DVec2::from_array(footprint.place).distance(nearest.unwrap()));
+        }
+        let strongest = touches.iter().max_by(|a, b| a.total.total_cmp(&b.total)).unwrap();
+        let percept = percepts.get(frame, 0);
+        assert_eq!(strongest.footprint.map(|footprint| footprint.place), percept.footprint_place);
+        assert_eq!(strongest.footprint.and_then(|footprint| footprint.force), percept.footprint_force);
+        assert!(percept.flags.contains(Flags::SEVERAL | strongest.flags), "{percept:?}");
+    }
+    let rms = |errors: &[f64]| 1e3 * (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    println!("{} of 200 touches: centroid {:.3} mm, fit {:.3} mm", fits.len(), rms(&centroids), rms(&fits));
+    assert!(
+        fits.len() > 180 && rms(&fits) < 0.65 * rms(&centroids),
+        "{} {} {}",
+        fits.len(),
+        rms(&fits),
+        rms(&centroids)
+    );
+}
+
+#[test]
+fn touches_have_the_same_footprints_on_every_backend() {
+    let outputs = Outputs::TOUCHES | Outputs::FOOTPRINT_PLACE | Outputs::FOOTPRINT_FORCE;
+    let of = |backend| {
+        let (percepts, _) = pressed(outputs, backend, true);
+        (0..percepts.frames())
+            .flat_map(|frame| percepts.touches(frame, 0).to_vec())
+            .map(|t| t.footprint)
+            .collect::<Vec<_>>()
+    };
+    let right = of(BackendKind::Reference);
+    assert!(right.iter().flatten().count() > 180);
+    for backend in crate::common::backends() {
+        assert_eq!(of(backend), right, "{backend:?}");
+    }
+}
+
+#[test]
+fn a_touch_without_a_footprint_says_why() {
+    let (percepts, truths) = pressed(Outputs::TOUCHES | Outputs::FOOTPRINT, BackendKind::Cpu, false);
+    for frame in 0..truths.len() {
+        for touch in percepts.touches(frame, 0) {
+            assert!(touch.footprint.is_none() && touch.flags == Flags::NO_SKIN, "{touch:?}");
+        }
+    }
+    // Where none is asked for there is nothing to say.
+    let (percepts, _) = pressed(Outputs::TOUCHES, BackendKind::Cpu, true);
+    assert!(percepts.touches(5, 0).iter().all(|touch| touch.footprint.is_none() && touch.flags.is_empty()));
+}
