@@ -35,6 +35,7 @@ mod flags;
 mod footprint;
 mod keep;
 mod presence;
+mod typed;
 
 pub use batch::Percepts;
 pub(crate) use batch::{Components, Values};

@@ -78,9 +78,25 @@ def table(path):
     return len(pandas.read_csv(path, sep=r"\s+", skiprows=skip, header=None, engine="c"))
 
 
+def first_table(path):
+    """The frames of a pliance .asc by pandas: the first of its tables."""
+    import pandas
+
+    data = path.read_bytes()
+    begin = data.index(b"\n", data.index(b"time[")) + 1
+    skip, rows = data.count(b"\n", 0, begin), data.count(b"\n", begin, data.index(b"MPP", begin))
+    return len(pandas.read_csv(path, sep=r"\s+", skiprows=skip, nrows=rows, header=None, engine="c"))
+
+
 def longer(path, to, megabytes):
     """`path` with its frames repeated, at `to`."""
     data = path.read_bytes()
+    if b"electrical:" in data:
+        begin = data.index(b"\n", data.index(b"time[")) + 1
+        end = data.rindex(b"\n", 0, data.index(b"MPP")) + 1
+        body = data[begin:end]
+        to.write_bytes(data[:begin] + body * max(1, int(megabytes * 1e6 / len(body))) + data[end:])
+        return
     begin = {".csv": b"FRAME," if b"SENSELS" in data else b"Frame ", ".lst": b"\t\t\t\tPage", ".asc": b"\n     "}[path.suffix]
     at = data.index(begin)
     head, body = data[:at], data[at:].rstrip()
@@ -101,7 +117,7 @@ def main():
     arguments.add_argument("--megabytes", type=float, default=30)
     arguments.add_argument("--rounds", type=int, default=3)
     arguments = arguments.parse_args()
-    peers = [("xsensor*.csv", xsensor, 10), ("iscan*.csv", tekscan, 10), ("emed*.lst", emed, 10), ("pedar*.asc", table, 3)]
+    peers = [("xsensor*.csv", xsensor, 10), ("iscan*.csv", tekscan, 10), ("emed*.lst", emed, 10), ("pedar*.asc", table, 3), ("pliance*.asc", first_table, 3)]
     print(f"{'file':<24}{'MB':>6}{'frames':>9}{'Python, s':>11}{'somatic, s':>12}{'times':>7}{'wanted':>8}")
     for pattern, peer, wanted in peers:
         for path in arguments.folder.glob(pattern):

@@ -7,6 +7,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 use serde::Serialize;
 
+use super::typed::Typed;
 use super::{ContactKind, Flags};
 
 /// An output as data.
@@ -97,53 +98,6 @@ pub(crate) enum Store {
     Backend(&'static [Component]),
     /// Side by side, in double precision on every backend.
     Host(Host),
-}
-
-/// The type of a percept's quantity, made of its components.
-pub(super) trait Typed {
-    fn of(components: [f64; 3]) -> Self;
-    fn components(self) -> [f64; 3];
-}
-
-impl Typed for f64 {
-    fn of([value, ..]: [f64; 3]) -> Self {
-        value
-    }
-
-    fn components(self) -> [f64; 3] {
-        [self, 0.0, 0.0]
-    }
-}
-
-impl Typed for u32 {
-    fn of([value, ..]: [f64; 3]) -> Self {
-        value as Self
-    }
-
-    fn components(self) -> [f64; 3] {
-        [self.into(), 0.0, 0.0]
-    }
-}
-
-impl Typed for ContactKind {
-    fn of([value, ..]: [f64; 3]) -> Self {
-        Self::ALL[(value as usize).min(Self::ALL.len() - 1)]
-    }
-
-    fn components(self) -> [f64; 3] {
-        [f64::from(self as u8), 0.0, 0.0]
-    }
-}
-
-/// Two or three.
-impl<const N: usize> Typed for [f64; N] {
-    fn of(components: [f64; 3]) -> Self {
-        std::array::from_fn(|index| components[index])
-    }
-
-    fn components(self) -> [f64; 3] {
-        std::array::from_fn(|index| self.get(index).copied().unwrap_or(0.0))
-    }
 }
 
 /// Makes, of one row an output, what is typed: the outputs' bits, the percept's fields, and where numbers are kept.

@@ -1,6 +1,6 @@
 //! What presses, as a fit found it.
 
-use super::columns::Typed as _;
+use super::typed::Typed as _;
 use super::{ContactKind, Host};
 
 /// A contact in a field's chart, as the footprint's outputs have it (`docs/footprint.md`).

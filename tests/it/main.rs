@@ -15,6 +15,7 @@ mod extremes;
 mod filter;
 mod firmware;
 mod footprint;
+mod footprint_cells;
 mod footprints_of_touches;
 mod gains;
 mod gate;

@@ -210,44 +210,6 @@ test("other percepts in a recording are marked", async () => {
   );
 });
 
-test("a page that may not draw, as in a hidden tab, takes two frames, and then the newest", async () => {
-  const server = await view();
-  const page = await browser.newPage();
-  // A browser without a screen hides no tab: this is what it does to one.
-  await page.addInitScript(() => {
-    const { requestAnimationFrame: request } = window;
-    const waiting = [];
-    window.requestAnimationFrame = (draw) =>
-      document.hidden ? waiting.push(draw) : request.call(window, draw);
-    let hidden = false;
-    Object.defineProperty(document, "hidden", { get: () => hidden });
-    window.hide = (is) => {
-      hidden = is;
-      document.dispatchEvent(new Event("visibilitychange"));
-      if (!is) waiting.splice(0).forEach((draw) => request.call(window, draw));
-    };
-  });
-  await page.goto(server.url);
-  await page.waitForFunction(() => window.somatic?.model.frame?.seq > 5, null, { timeout: 60000 });
-  await page.evaluate(() => window.hide(true));
-  await page.waitForTimeout(500);
-  const drawn = () =>
-    page.evaluate(() => ({ seq: window.somatic.model.frame.seq, t: window.somatic.model.frame.t }));
-  const before = await drawn();
-  await page.waitForTimeout(2000);
-  assert.equal((await drawn()).seq, before.seq, "nothing comes while nothing is drawn");
-  assert.equal(await page.evaluate(() => window.somatic.model.connection.state), "open");
-  await page.evaluate(() => window.hide(false));
-  await page.waitForFunction((seq) => window.somatic.model.frame.seq > seq + 5, before.seq, {
-    timeout: 30000,
-  });
-  const after = await drawn();
-  const missed = Math.round((after.t - before.t) / 0.02);
-  assert.ok(missed < 0 || missed > after.seq - before.seq + 50, "what was missed is skipped, not shown late");
-  await page.close();
-  await server.stop();
-});
-
 test("a browser without WebGL 2 says what to do", async () => {
   const server = await view();
   const page = await browser.newPage();

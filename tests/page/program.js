@@ -8,6 +8,12 @@ import { after, before } from "node:test";
 import { chromium } from "playwright-core";
 
 export const SOMATIC = process.env.SOMATIC ?? "somatic";
+/** How the browser is started. */
+export const LAUNCH = {
+  executablePath: process.env.CHROMIUM,
+  headless: true,
+  args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"],
+};
 const PICTURES = process.env.PICTURES;
 export const folder = mkdtempSync(join(tmpdir(), "somatic-browser-"));
 const started = new Set();
@@ -16,9 +22,7 @@ export let browser;
 
 before(async () => {
   browser = await chromium.launchPersistentContext(join(folder, "profile"), {
-    executablePath: process.env.CHROMIUM,
-    headless: true,
-    args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"],
+    ...LAUNCH,
     viewport: { width: 1280, height: 720 },
     colorScheme: "dark",
   });

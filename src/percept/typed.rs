@@ -1,0 +1,50 @@
+//! Quantities as their components and back.
+
+use super::ContactKind;
+
+/// The type of a percept's quantity, made of its components.
+pub(super) trait Typed {
+    fn of(components: [f64; 3]) -> Self;
+    fn components(self) -> [f64; 3];
+}
+
+impl Typed for f64 {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        value
+    }
+
+    fn components(self) -> [f64; 3] {
+        [self, 0.0, 0.0]
+    }
+}
+
+impl Typed for u32 {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        value as Self
+    }
+
+    fn components(self) -> [f64; 3] {
+        [self.into(), 0.0, 0.0]
+    }
+}
+
+impl Typed for ContactKind {
+    fn of([value, ..]: [f64; 3]) -> Self {
+        Self::ALL[(value as usize).min(Self::ALL.len() - 1)]
+    }
+
+    fn components(self) -> [f64; 3] {
+        [f64::from(self as u8), 0.0, 0.0]
+    }
+}
+
+/// Two or three.
+impl<const N: usize> Typed for [f64; N] {
+    fn of(components: [f64; 3]) -> Self {
+        std::array::from_fn(|index| components[index])
+    }
+
+    fn components(self) -> [f64; 3] {
+        std::array::from_fn(|index| self.get(index).copied().unwrap_or(0.0))
+    }
+}
