@@ -74,3 +74,14 @@ pub struct Touch {
     /// Why the footprint, or a part of it, is absent.
     pub flags: Flags,
 }
+
+impl Touch {
+    /// The quantity of `column`, an output of the footprint, its components first, if it is present.
+    #[must_use]
+    pub fn value(&self, column: &Column) -> Option<[f64; 3]> {
+        match column.store {
+            Store::Host(host) => self.footprint?.components(host),
+            _ => None,
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Footprint, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
+use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -104,9 +104,7 @@ impl LineWriter {
             }
             key(line, "position");
             print(line, &touch.position);
-            if let Some(fitted) = &touch.footprint {
-                print_footprint(line, fitted, footprint);
-            }
+            print_footprint(line, touch, footprint);
             if !footprint.is_empty() {
                 self.write_flags(touch.flags, line);
             }
@@ -116,13 +114,12 @@ impl LineWriter {
     }
 }
 
-fn print_footprint(line: &mut Vec<u8>, footprint: &Footprint, outputs: Outputs) {
+fn print_footprint(line: &mut Vec<u8>, touch: &Touch, outputs: Outputs) {
     for column in outputs.columns() {
-        let Store::Host(host) = column.store else { continue };
-        let Some(components) = footprint.components(host) else { continue };
+        let Some(components) = touch.value(column) else { continue };
         key(line, column.name);
         match column.components {
-            _ if column.unit == Unit::Kind => print(line, &footprint.kind),
+            _ if column.unit == Unit::Kind => print(line, &touch.footprint.map(|footprint| footprint.kind)),
             1 => print(line, &components[0]),
             count => print(line, &&components[..count]),
         }

@@ -66,6 +66,29 @@ def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
         compare(changed, text)
 
 
+def test_touches_have_footprints_of_their_own(somatic) -> None:
+    rod = ROOT / "examples/simulations/turn.toml"
+    outputs = ["touches", "footprint_kind", "footprint_place", "footprint_angle", "footprint_angle_sigma"]
+    scene = {"outputs": outputs, "fields": "hand/back"}
+    command = ["run", "--quiet", "--source", f"sim:{rod}", "--fields", "hand/back", "--backend", "cpu"]
+    text = somatic(*command, "--outputs", ",".join(outputs), "--sink", "-")
+    simulated = st.simulate(rod)
+    recording = simulated.recording
+    touches = recording.engine(scene, backend="cpu").process(recording.t, recording.values).touches
+    rows = [touch for line in map(json.loads, text.splitlines()) for field in line["fields"] for touch in field["touches"]]
+    assert len(rows) == len(touches) > 150
+    told = 0
+    for index, row in enumerate(rows):
+        assert [flag.name.lower() for flag in st.Flags(touches.flags[index])] == row["flags"]
+        for name in ["footprint_place", "footprint_angle", "footprint_angle_sigma"]:
+            got = touches[name][index]
+            assert np.array_equal(got, row[name]) if name in row else np.isnan(got).all()
+            told += name in row
+    assert told > 400
+    with pytest.raises(st.UsageError, match="footprint_width"):
+        touches["footprint_width"]
+
+
 @pytest.mark.parametrize("backend", ["reference", "cpu"])
 def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     mat = st.Body.grid(13, 7, 0.01, name="sheet", regions=(3, 2))

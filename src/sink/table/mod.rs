@@ -17,7 +17,7 @@ pub use parquet_sink::ParquetSink;
 pub(super) use touches_path::touches_path;
 
 use super::{FieldNames, Session};
-use crate::percept::{Column, ContactKind, Flags, Host, Outputs, Percepts, Store, Touch, Unit};
+use crate::percept::{Column, ContactKind, Flags, Outputs, Percepts, Touch, Unit};
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ enum ValueOf {
     TouchActive,
     TouchCentroid(usize),
     TouchPosition(usize),
-    TouchFootprint(Host, usize),
+    TouchFootprint(&'static Column, usize),
 }
 
 impl TableColumn {
@@ -216,10 +216,7 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
         ));
     }
     let footprint = session.outputs & Outputs::FOOTPRINT;
-    columns.extend(columns_of(footprint, session, |column, component| match column.store {
-        Store::Host(host) => ValueOf::TouchFootprint(host, component),
-        _ => ValueOf::Output(column, component),
-    }));
+    columns.extend(columns_of(footprint, session, ValueOf::TouchFootprint));
     if !footprint.is_empty() {
         let help = "Why its footprint, or a part of it, is absent; docs/footprint.md.";
         columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
@@ -263,7 +260,7 @@ impl Row<'_> {
             ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
             ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
             ValueOf::TouchPosition(component) => self.touch.map(|touch| touch.position[component]),
-            ValueOf::TouchFootprint(host, component) => Some(self.touch?.footprint?.components(host)?[component]),
+            ValueOf::TouchFootprint(column, component) => Some(self.touch?.value(column)?[component]),
             _ => None,
         }
     }
