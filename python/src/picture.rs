@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use somatic::OutputPath;
 
 use crate::body::PyBody;
@@ -54,12 +54,10 @@ impl PyPicture {
         dtype: Option<&Bound<'py, PyAny>>,
         copy: Option<bool>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let pixels = self.pixels.bind(py);
-        match (dtype, copy) {
-            (Some(dtype), _) => pixels.call_method1("astype", (dtype,)),
-            (None, Some(true)) => pixels.call_method0("copy"),
-            (None, _) => Ok(pixels.clone()),
-        }
+        let keys = PyDict::new(py);
+        keys.set_item("dtype", dtype)?;
+        keys.set_item("copy", copy)?;
+        py.import("numpy")?.call_method("array", (&self.pixels,), Some(&keys))
     }
 
     fn _repr_png_<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {

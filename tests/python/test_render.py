@@ -63,6 +63,8 @@ def test_a_picture_is_an_array(hand: st.Body, tmp_path: pathlib.Path) -> None:
     copy = np.array(picture)
     assert copy.ctypes.data != array.ctypes.data and copy.flags.writeable and np.array_equal(copy, array)
     assert np.asarray(picture, np.float32).dtype == np.float32
+    with pytest.raises(ValueError):
+        np.array(picture, np.float32, copy=False)
     path = tmp_path / "hand.png"
     picture.save(path)
     with pytest.raises(st.SomaticError, match="it exists"):
