@@ -98,6 +98,16 @@ impl PyEngine {
         PyPercepts::new(percepts, Arc::clone(&self.run))
     }
 
+    /// The values of `frames` frames, where Python has them if they can be read there.
+    fn held<'py>(
+        &self,
+        values: &Bound<'py, PyAny>,
+        mask: Option<&Bound<'py, PyAny>>,
+        frames: usize,
+    ) -> PyResult<Values<'py>> {
+        self::values(values, mask, &[frames, self.width], "[frames, taxels]")
+    }
+
     /// Refuses a call whose percepts have no room, which would end the process.
     fn check_room(&self, frames: usize) -> PyResult<()> {
         let numbers: usize = self.run.outputs.columns().map(|column| 8 * column.components).sum();
@@ -175,7 +185,7 @@ impl PyEngine {
     ) -> PyResult<PyPercepts> {
         let t = times(t)?;
         let t_s = t.as_slice()?;
-        let held = self::values(values, mask, &[t_s.len(), self.width], "[frames, taxels]")?;
+        let held = self.held(values, mask, t_s.len())?;
         let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
         self.check_room(t_s.len())?;
         let block = FrameBlock { t_s, values: held.slice(), poses: &moved };
@@ -242,6 +252,12 @@ impl PyEngine {
         done.or_raise(py).map(|percepts| self.wrap(percepts))
     }
 
+    /// The address at which `process` reads these values: that of the array itself where nothing is converted. For tests.
+    #[pyo3(signature = (values, mask = None))]
+    fn _reads_at(&self, values: &Bound<'_, PyAny>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
+        Ok(self.held(values, mask, values.len()?)?.slice().as_ptr().addr())
+    }
+
     /// The state after the frames so far, so that a recording can be entered here again: see `restore`.
     ///
     /// >>> import numpy as np
@@ -285,7 +301,7 @@ impl PyEngine {
         }
         let t = times(t)?;
         let t_s = t.as_slice()?;
-        let held = self::values(values, mask, &[t_s.len(), self.width], "[frames, taxels]")?;
+        let held = self.held(values, mask, t_s.len())?;
         let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
         let mut sum = Agreement::default();
         let before = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;

@@ -15,6 +15,10 @@ ROOT = pathlib.Path(__file__).parents[2]
 DATA = pathlib.Path(os.environ.get("SOMATIC_DATA", ROOT.parent / "shared" / "data"))
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "once: on one Python, as another one makes no difference: the library, or a job of minutes")
+
+
 @pytest.fixture(scope="session")
 def command() -> pathlib.Path:
     """The command, built from the same tree."""

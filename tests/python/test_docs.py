@@ -48,6 +48,7 @@ def test_there_are_examples() -> None:
 EXAMPLES = sorted((ROOT / "python" / "examples").glob("*.py"))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("path", [path for path in EXAMPLES if path.stem not in ("grasps",)], ids=lambda path: path.stem)
 def test_an_example_runs(path, tmp_path) -> None:
     done = subprocess.run([sys.executable, path], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
@@ -55,6 +56,7 @@ def test_an_example_runs(path, tmp_path) -> None:
     assert done.stdout
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("page", ["README.md", "docs/python.md"])  # many-recordings.md starts processes: test_batch.py
 def test_a_page_shows_code_that_runs(page: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
