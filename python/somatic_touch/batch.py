@@ -7,6 +7,7 @@ import concurrent.futures.process
 import multiprocessing
 import os
 import pathlib
+import signal
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -16,13 +17,33 @@ from ._jobs import Job, Report, outputs
 __all__ = ["Report", "percepts"]
 
 
-def _threads(count: int) -> None:
-    """Says how many threads the library may start in this process, before it has."""
-    os.environ["RAYON_NUM_THREADS"] = str(count)
+_is_at_work = False
+
+
+def _start(threads: int) -> None:
+    """Prepares a worker: how many threads the library may start in it, and how it ends."""
+    os.environ["RAYON_NUM_THREADS"] = str(threads)
+    # A terminal sends Ctrl-C to all processes; this one's end is up to the one that asks for percepts.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _stop)
+
+
+def _stop(number: int, frame: object) -> None:
+    if _is_at_work:
+        raise KeyboardInterrupt
+    os._exit(128 + number)
 
 
 def _run(job: Job, recording: pathlib.Path, out: pathlib.Path) -> dict[str, Any]:
-    return job.run(recording, out)
+    global _is_at_work
+    _is_at_work = True
+    try:
+        return job.run(recording, out)
+    except KeyboardInterrupt:
+        # The half table is gone. Others wait in this process's queue, and nobody wants them.
+        os._exit(128 + signal.SIGTERM)
+    finally:
+        _is_at_work = False
 
 
 def percepts(
@@ -42,7 +63,7 @@ def percepts(
     A recording is one piece of work and never cut, as touches and filters have a state. A table appears when it is whole. One that is
     there already, made of the same file by the same body, scene, calibration, backend and version, is left as it is, so that a job that
     was ended goes on where it stopped. A damaged recording is a row of `Report.errors`. `progress` is called with how many recordings are
-    done, and of how many. A script guards its own start with ``if __name__ == "__main__":``, as all that start processes do.
+    done, and of how many. Ctrl-C gives up what is under way and leaves no half table. A script guards its own start with ``if __name__ == "__main__":``, as all that start processes do.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st, somatic_touch.batch
@@ -75,8 +96,9 @@ def percepts(
     elif todo:
         # Large ones first, so that the last one to end is a small one.
         todo.sort(key=lambda pair: -pair[0].stat().st_size if pair[0].exists() else 0)
+        others = set(multiprocessing.active_children())
         pool = concurrent.futures.ProcessPoolExecutor(
-            workers, multiprocessing.get_context("spawn"), _threads, (max(1, cores // workers),)
+            workers, multiprocessing.get_context("spawn"), _start, (max(1, cores // workers),)
         )
         try:
             for done in concurrent.futures.as_completed([pool.submit(_run, job, *pair) for pair in todo]):
@@ -85,6 +107,11 @@ def percepts(
         except concurrent.futures.process.BrokenProcessPool as error:
             what = "a worker process was ended from outside; call again, and the job goes on where it stopped"
             raise SomaticError(what) from error
+        except BaseException:
+            # Ctrl-C, or an error of `progress`: recordings under way are given up.
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.terminate()
+            raise
         finally:
             pool.shutdown(cancel_futures=True)
     order = {str(recording): index for index, (recording, _) in enumerate(pairs)}

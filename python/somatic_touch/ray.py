@@ -54,7 +54,12 @@ def percepts(
     # Large ones first, so that the last one to end is a small one.
     order = sorted(range(len(pairs)), key=lambda index: -pairs[index][0].stat().st_size if pairs[index][0].exists() else 0)
     running = {index: task.remote(shared, *map(os.path.abspath, pairs[index]), num_cpus) for index in order}
-    told: list[dict[str, Any] | None] = ray.get([running[index] for index in range(len(pairs))])
+    try:
+        told: list[dict[str, Any] | None] = ray.get([running[index] for index in range(len(pairs))])
+    except KeyboardInterrupt:
+        for reference in running.values():
+            ray.cancel(reference)
+        raise
     rows = [row for row in told if row is not None]
     failed = {row["out"] for row in rows if row["error"] is not None}
     tables = [path for path in (os.path.abspath(table) for _, table in pairs) if path not in failed]

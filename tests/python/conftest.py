@@ -15,6 +15,10 @@ ROOT = pathlib.Path(__file__).parents[2]
 DATA = pathlib.Path(os.environ.get("SOMATIC_DATA", ROOT.parent / "shared" / "data"))
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "once: on one Python, as another one makes no difference: the library, or a job of minutes")
+
+
 @pytest.fixture(scope="session")
 def command() -> pathlib.Path:
     """The command, built from the same tree."""
@@ -35,6 +39,23 @@ def somatic(command: pathlib.Path):
         return done.stdout
 
     return run
+
+
+def without_gpu(error: st.SomaticError) -> None:
+    """Skips a test of the GPU where there is none, unless there must be one."""
+    if os.environ.get("SOMATIC_REQUIRE_GPU") == "1":
+        pytest.fail(f"SOMATIC_REQUIRE_GPU is set: {error}")
+    pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def gpu() -> str:
+    """The backend of that name, where it works."""
+    try:
+        return st.Engine(st.Body.bundled("hand"), backend="gpu").backend
+    except st.SomaticError as error:
+        without_gpu(error)
+        raise
 
 
 @pytest.fixture

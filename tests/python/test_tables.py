@@ -103,6 +103,7 @@ def test_a_file_is_written_as_it_is_computed(touch: st.Recording, tmp_path: path
         st.write([1], tmp_path / "none.csv")
 
 
+@pytest.mark.once
 def test_recordings(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
     path = tmp_path / "touch.mcap"
     somatic("run", "--quiet", "--body", "hand", "--source", ROOT / "bodies" / "touch.csv", "--sink", f"mcap:{path}")
@@ -125,6 +126,7 @@ def test_recordings(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> Non
     assert caught.value.file == str(bad) and caught.value.place and "oops" in str(caught.value)
 
 
+@pytest.mark.once
 def test_exports(tmp_path: pathlib.Path) -> None:
     insoles = st.read(ROOT / "examples" / "exports" / "insoles.csv")
     assert insoles.body is not None and insoles.calibration is not None and insoles.calibration.quantity in ("Pa", "N")
@@ -136,6 +138,7 @@ def test_exports(tmp_path: pathlib.Path) -> None:
     assert mat.values.shape == (2, 12) and mat.t.tolist() == [0, 0.02]
 
 
+@pytest.mark.once
 def test_simulations(somatic, tmp_path: pathlib.Path) -> None:
     rod = ROOT / "examples" / "simulations" / "rod.toml"
     somatic("simulate", rod, "-o", tmp_path / "rod.csv")
@@ -157,6 +160,7 @@ def test_simulations(somatic, tmp_path: pathlib.Path) -> None:
         st.simulate("no.toml")
 
 
+@pytest.mark.once
 def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
     body = st.Body.bundled("humanoid")
     told = json.loads(somatic("inspect", "humanoid", "--json"))
@@ -175,6 +179,8 @@ def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
     somatic("author", "humanoid", "--taxels", 200, "--seed", 3, "-o", tmp_path / "skin.glb")
     skin.save(tmp_path / "mine.glb")
     assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "skin.glb").read_bytes()
+    again = st.Body.load(tmp_path / "mine.glb")
+    assert np.array_equal(again.taxels, skin.taxels) and list(again.fields) == list(skin.fields) and again.links == skin.links
     shares: list[float] = []
     st.author("hand", spacing="6 mm", progress=shares.append)
     assert shares and 0 <= min(shares) <= max(shares) <= 1
@@ -184,6 +190,7 @@ def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
         st.Body.bundled("hnad")  # type: ignore[arg-type]
 
 
+@pytest.mark.once
 def test_a_robot_of_others_is_dressed() -> None:
     meshes = DATA / "meshes"
     found = sorted(meshes.glob("**/*.stl")) if meshes.is_dir() else []
