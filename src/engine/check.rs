@@ -276,7 +276,7 @@ mod tests {
                 let [under, over] = around(right, bound, false);
                 let under = if name == "touches.position" { right + 0.5 * bound } else { under };
                 hold(name, [under, over], &|percepts, value| {
-                    percepts.change_first_touch(cell, |touch| put(touch, value));
+                    put(&mut percepts.touches_mut(cell)[0], value);
                 });
             }
             // What has no bound differs by the least that it can.
@@ -284,8 +284,8 @@ mod tests {
                 ("active", |p| p.active[0] += 1),
                 ("flags", |p| p.flags[0] ^= Flags::SATURATED),
                 ("contact", |p| p.flags[0] ^= Flags::NO_CONTACT),
-                ("touches", |p| p.change_first_touch(0, |touch| touch.id += 1)),
-                ("touches", |p| p.change_first_touch(0, |touch| touch.active += 1)),
+                ("touches", |p| p.touches_mut(0)[0].id += 1),
+                ("touches", |p| p.touches_mut(0)[0].active += 1),
             ];
             for (name, change) in choices {
                 let mut percepts = compared.engine.percepts.clone();

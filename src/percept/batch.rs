@@ -1,5 +1,6 @@
 //! A batch of percepts, in columns.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
@@ -271,10 +272,14 @@ impl Percepts {
     /// [`Outputs::TOUCHES`] was asked for.
     #[must_use]
     pub fn touches(&self, frame: usize, field: usize) -> &[Touch] {
-        let cell = frame * self.fields + field;
-        let Some(&end) = self.touch_ends.get(cell) else { return &[] };
+        &self.touches[self.touches_of(frame * self.fields + field)]
+    }
+
+    /// Where the touches of a cell stand; none have been added for a later one.
+    fn touches_of(&self, cell: usize) -> Range<usize> {
+        let Some(&end) = self.touch_ends.get(cell) else { return 0..0 };
         let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
-        &self.touches[start as usize..end as usize]
+        start as usize..end as usize
     }
 
     /// Adds the touches of the next cell, if they are asked for; cells are filled in their order.
@@ -288,15 +293,8 @@ impl Percepts {
 
     /// The touches of a cell that have been added.
     pub(crate) fn touches_mut(&mut self, cell: usize) -> &mut [Touch] {
-        let Some(&end) = self.touch_ends.get(cell) else { return &mut [] };
-        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
-        &mut self.touches[start as usize..end as usize]
-    }
-
-    #[cfg(test)]
-    pub(crate) fn change_first_touch(&mut self, cell: usize, change: impl Fn(&mut Touch)) {
-        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
-        change(&mut self.touches[start as usize]);
+        let of_cell = self.touches_of(cell);
+        &mut self.touches[of_cell]
     }
 
     /// All percepts of the batch's frame `frame`, in field order.
