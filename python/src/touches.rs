@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 use somatic::sink::TableKind;
-use somatic::{Outputs, Percepts, Touch};
+use somatic::{Percepts, Touch};
 
 use crate::arrays::array;
 use crate::error::usage;
@@ -109,7 +109,7 @@ impl PyTouches {
     /// An output of each touch's own footprint, such as `touches["footprint_place"]`, float64 [touches] or [touches, components];
     /// NaN where it is absent. `footprint_kind` is 0 for a point, 1 for a line, 2 for a segment and 3 for a blob.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
-        let asked = self.percepts.outputs() & Outputs::FOOTPRINT;
+        let asked = self.percepts.outputs().of_each_touch();
         let Some(column) = asked.columns().find(|column| column.name == name) else {
             let names: Vec<&str> = asked.columns().map(|column| column.name).collect();
             let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };

@@ -141,7 +141,7 @@ pub(super) struct RunOptions {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
-    /// Measure the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
+    /// Measure footprint_speed (0.2 s without this) and the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
     /// --filter-window, of which the high end still counts. 0.2 is steady where few sensors feel a touch.
     #[arg(long, help_heading = COMPUTED, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "filter_over_s")]

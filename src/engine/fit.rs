@@ -6,13 +6,29 @@
 use crate::backend::RawBatch;
 use crate::backend::cpu::footprint::fit_each;
 use crate::parallel;
-use crate::percept::{Column, Flags, Footprint, Outputs, Percepts, Store};
+use crate::percept::{Column, Flags, Footprint, Host, Outputs, Percepts, Store};
 use crate::scene::{Plan, PlanField};
-use crate::stage::footprint::{Taxel, Touch};
+use crate::stage::footprint::{OVER_S, Taxel, Touch, Trail};
 use crate::stage::touches::Found;
 
 /// Cells whose touches one thread makes ready at a time: some microseconds of work.
 const CELLS: usize = 32;
+
+/// What is kept for fits, from frame to frame and until a batch is complete.
+#[derive(Clone, Debug)]
+pub(super) struct FitState {
+    /// Touches of the frames at hand that are still to be fitted.
+    pub(super) waiting: Vec<Waiting>,
+    /// By field, where its contact was.
+    trails: Vec<Trail>,
+}
+
+impl FitState {
+    /// The state before the first frame.
+    pub(super) fn initial(fields: usize) -> Self {
+        Self { waiting: Vec::new(), trails: vec![Trail::default(); fields] }
+    }
+}
 
 /// A cell whose touches wait to be fitted.
 #[derive(Clone, Debug)]
@@ -21,8 +37,8 @@ pub(super) struct Waiting {
     cell: usize,
     /// The frame in the raw batch.
     offset: usize,
-    /// Of each of its touches the members and those beside them.
-    touches: Vec<Vec<u32>>,
+    /// Of each of its touches the identity, and the members with those beside them.
+    touches: Vec<(u64, Vec<u32>)>,
 }
 
 /// A touch of a cell that can be fitted.
@@ -43,7 +59,7 @@ impl Waiting {
             }
             members.sort_unstable();
             members.dedup();
-            members
+            (touch.id, members)
         };
         Self { field: number, cell, offset, touches: found.iter().map(around).collect() }
     }
@@ -57,7 +73,7 @@ impl Waiting {
             let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
             plan.pressed_taxel(field, member, raw.rows.value(self.offset, plan.channel_of(slot)))
         };
-        let taxels_of = |(index, members): (usize, &Vec<u32>)| {
+        let taxels_of = |(index, (_, members)): (usize, &(u64, Vec<u32>))| {
             let taxels: Vec<Taxel> = members.iter().filter_map(taxel).collect();
             (index, taxels.iter().map(|taxel| taxel.pressure).sum(), taxels)
         };
@@ -79,10 +95,11 @@ impl Waiting {
 
 /// Fits the touches that wait, all of them where separate touches are asked for; puts what comes of the one with the most pressure
 /// into its cell, and of each into the table of touches.
-pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, waiting: &mut Vec<Waiting>, percepts: &mut Percepts) {
-    if waiting.is_empty() {
+pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, state: &mut FitState, percepts: &mut Percepts) {
+    if state.waiting.is_empty() {
         return;
     }
+    let waiting = std::mem::take(&mut state.waiting);
     let every = plan.outputs.contains(Outputs::TOUCHES);
     let mut ready: Vec<Vec<Ready>> = waiting.iter().map(|_| Vec::new()).collect();
     let cells = waiting.chunks(CELLS).zip(ready.chunks_mut(CELLS));
@@ -93,26 +110,50 @@ pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, waiting: &mut Vec<Waiting>, p
     });
     let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();
     let mut fitted = fit_each(&touches, Touch::conclude).into_iter();
-    for (waiting, ready) in waiting.drain(..).zip(&ready) {
-        let mut strongest: Option<(f64, Option<Footprint>, Flags)> = None;
+    for (waiting, ready) in waiting.iter().zip(&ready) {
+        let mut strongest: Option<(f64, usize, Option<Footprint>, Flags)> = None;
         for (Ready { index, total, .. }, (footprint, flags)) in ready.iter().zip(&mut fitted) {
             if strongest.is_none_or(|(most, ..)| *total > most) {
-                strongest = Some((*total, footprint, flags));
+                strongest = Some((*total, *index, footprint, flags));
             }
             if let Some(touch) = percepts.touches_mut(waiting.cell).get_mut(*index) {
                 (touch.footprint, touch.flags) = (footprint, flags);
             }
         }
-        let Some((_, footprint, flags)) = strongest else { continue };
+        let Some((_, index, footprint, flags)) = strongest else { continue };
         percepts.flags[waiting.cell] |= flags;
         if let Some(footprint) = footprint {
             put(plan, &footprint, waiting.cell, percepts);
+            if plan.outputs.intersects(Outputs::FOOTPRINT_MOTION) {
+                let (touch, _) = waiting.touches[index];
+                put_motion(plan, (waiting, touch), &footprint, &mut state.trails[waiting.field], percepts);
+            }
         }
     }
 }
 
+/// Puts the motion of a cell's touch since it was fitted before.
+fn put_motion(
+    plan: &Plan,
+    (waiting, touch): (&Waiting, u64),
+    footprint: &Footprint,
+    trail: &mut Trail,
+    percepts: &mut Percepts,
+) {
+    let (cell, over_s) = (waiting.cell, plan.fields[waiting.field].filter.over_s.unwrap_or(OVER_S));
+    let t_s = percepts.t_s[cell / plan.fields.len()];
+    match trail.follow(over_s, t_s, touch, footprint) {
+        Ok(moved) => {
+            percepts.add_present(cell, plan.outputs & Outputs::FOOTPRINT_MOTION);
+            percepts.set_host(Host::FootprintDisplacement, cell, &moved.displacement.to_array());
+            percepts.set_host(Host::FootprintSpeed, cell, &[moved.speed]);
+        }
+        Err(why) => percepts.flags[cell] |= why,
+    }
+}
+
 fn put(plan: &Plan, footprint: &Footprint, cell: usize, percepts: &mut Percepts) {
-    for column in (plan.outputs & Outputs::FOOTPRINT).columns() {
+    for column in plan.outputs.of_each_touch().columns() {
         let &Column { output, components: count, store: Store::Host(host), .. } = column else { continue };
         if let Some(components) = footprint.components(host) {
             percepts.add_present(cell, output);

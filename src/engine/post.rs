@@ -18,8 +18,7 @@ pub(super) struct PostState {
     pub(super) fields: Vec<PostFieldState>,
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
-    /// Touches of the frames at hand that are still to be fitted.
-    pub(super) waiting: Vec<fit::Waiting>,
+    pub(super) fits: fit::FitState,
 }
 
 /// The same of one field.
@@ -37,7 +36,7 @@ pub(super) struct PostFieldState {
 impl PostState {
     /// The state before the first frame.
     pub(super) fn initial(fields: usize) -> Self {
-        Self { fields: vec![PostFieldState::default(); fields], last: None, waiting: Vec::new() }
+        Self { fields: vec![PostFieldState::default(); fields], last: None, fits: fit::FitState::initial(fields) }
     }
 }
 
@@ -116,7 +115,7 @@ impl Post<'_> {
                 let found = self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
                 match &field.layer {
                     _ if !stages.footprint || found.is_empty() => {}
-                    Ok(_) => state.waiting.push(fit::Waiting::new(field, (number, cell, offset), found)),
+                    Ok(_) => state.fits.waiting.push(fit::Waiting::new(field, (number, cell, offset), found)),
                     Err(reason) => {
                         percepts.flags[cell] |= *reason;
                         percepts.touches_mut(cell).iter_mut().for_each(|touch| touch.flags |= *reason);
@@ -132,13 +131,13 @@ impl Post<'_> {
         }
         if self.cadence.is_some() {
             // The next frame may keep this one's.
-            fit::all(self.plan, raw, &mut state.waiting, percepts);
+            fit::all(self.plan, raw, &mut state.fits, percepts);
         }
     }
 
     /// Completes the frames of `raw`, and keeps the last percepts of a call, where the next call may need them.
     pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &mut Percepts, state: &mut PostState) {
-        fit::all(self.plan, raw, &mut state.waiting, percepts);
+        fit::all(self.plan, raw, &mut state.fits, percepts);
         if self.cadence.is_some() && raw.frames > 0 {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);

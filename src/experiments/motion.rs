@@ -135,8 +135,6 @@ fn cell(values: &[f64], by: f64) -> String {
 const WAYS: [&str; 6] = ["frame by frame", "over 0.1 s", "over 0.2 s", "Kalman", "soft, over 0.2 s", "fit, over 0.2 s"];
 /// The last of them, whose places are absent where a touch is not explained.
 const FIT: usize = 5;
-/// Frames in the difference's time.
-const OVER_FRAMES: usize = (OVER_S * RATE_HZ) as usize;
 /// What the sensors' noise and the layer are, for fits.
 const SKIN: &str = "noise = 1.04\n[skin]\nsigma_m = 0.004\n";
 
@@ -186,7 +184,7 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
     let dead_band = if onset == "soft" { THRESHOLD } else { 0.5 * THRESHOLD };
     let keys = format!("[all]\nsensor = \"fsr\"\ntap = 38\ndead_band = {dead_band}\nonset = \"{onset}\"\n{SKIN}");
     let scene = Scene::default()
-        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED | Outputs::FOOTPRINT_PLACE)
+        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED | Outputs::FOOTPRINT_MOTION)
         .filter(MotionFilter::default().over_s(OVER_S))
         .fields(vec!["hand/back".to_owned()]);
     let calibration = Calibration::parse(&keys, &ids)?;
@@ -206,23 +204,26 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
     Ok(runs)
 }
 
+/// The velocity of a displacement with this speed.
+fn velocity(displacement: Option<[f64; 2]>, speed: Option<f64>) -> Option<[f64; 2]> {
+    let (displacement, speed) = displacement.zip(speed)?;
+    let length = libm::hypot(displacement[0], displacement[1]);
+    Some(if length > 0.0 { displacement.map(|part| part * speed / length) } else { [0.0; 2] })
+}
+
 /// Adds what every way makes of a run.
 fn judge(run: &Run, across: Option<[f64; 2]>, is_soft: bool, errors: &mut [Errors; 6], speeds: &mut Vec<f64>) {
     let mut filter = Kalman::with_lag(OVER_S / 2.0, 1.0 / RATE_HZ);
     for (index, (t_s, percept, right)) in run.iter().enumerate() {
         let tracked = filter.follow(percept.centroid);
         let Some(now) = percept.centroid.filter(|_| *t_s >= WARM_UP_S) else { continue };
-        let since = |frames: usize, now: [f64; 2], place: fn(&Percept) -> Option<[f64; 2]>| {
+        let over = |frames: usize| {
             let (before_s, then, _) = &run[index.checked_sub(frames)?];
-            let then = place(then)?;
+            let then = then.centroid?;
             Some([0, 1].map(|axis| (now[axis] - then[axis]) / (t_s - before_s)))
         };
-        let over = |frames: usize| since(frames, now, |percept| percept.centroid);
-        let fitted = percept.footprint_place.and_then(|now| since(OVER_FRAMES, now, |then| then.footprint_place));
-        let steady = percept.filtered_displacement.zip(percept.filtered_speed).map(|(step, speed)| {
-            let length = libm::hypot(step[0], step[1]);
-            if length > 0.0 { step.map(|part| part * speed / length) } else { [0.0; 2] }
-        });
+        let steady = velocity(percept.filtered_displacement, percept.filtered_speed);
+        let fitted = velocity(percept.footprint_displacement, percept.footprint_speed);
         let ways: Vec<(usize, Option<[f64; 2]>)> = if is_soft {
             vec![(4, steady)]
         } else {

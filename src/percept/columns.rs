@@ -298,6 +298,10 @@ columns! {
     FOOTPRINT_LENGTH 29 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
     #[doc = "The standard deviation of the length, m."]
     FOOTPRINT_LENGTH_SIGMA 34 footprint_length_sigma: f64, Metre, Number, footprint, parts [] host [FootprintLengthSigma];
+    #[doc = "How far its place has moved in --filter-over (0.2 s), (Δu, Δv), m; of a line across it."]
+    FOOTPRINT_DISPLACEMENT 35 footprint_displacement: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintDisplacement];
+    #[doc = "The length of that over its time, m/s."]
+    FOOTPRINT_SPEED 36 footprint_speed: f64, MetrePerSecond, Number, footprint, parts [] host [FootprintSpeed];
     #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
     TOTAL_SIGMA 30 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
     #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]
@@ -325,6 +329,9 @@ impl Outputs {
     /// What presses, fitted under the skin's own response.
     pub const FOOTPRINT: Self = Self::of_stage("footprint");
 
+    /// Motion of fitted contacts, which has a memory: of a field, not of each of its touches.
+    pub const FOOTPRINT_MOTION: Self = Self::FOOTPRINT_DISPLACEMENT.union(Self::FOOTPRINT_SPEED);
+
     /// What the stage *motion* gives.
     pub const MOTION: Self = Self::of_stage("motion");
 
@@ -349,6 +356,12 @@ impl Outputs {
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
+    }
+
+    /// Those that each separate touch has for itself.
+    #[must_use]
+    pub const fn of_each_touch(self) -> Self {
+        self.intersection(Self::FOOTPRINT).difference(Self::FOOTPRINT_MOTION)
     }
 
     /// The columns of these outputs, in the table's order.

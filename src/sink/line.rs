@@ -88,7 +88,7 @@ impl LineWriter {
     }
 
     fn write_touches(&self, touches: &[Touch], outputs: Outputs, line: &mut Vec<u8>) {
-        let footprint = outputs & Outputs::FOOTPRINT;
+        let footprint = outputs.of_each_touch();
         key(line, "touches");
         line.push(b'[');
         for (index, touch) in touches.iter().enumerate() {

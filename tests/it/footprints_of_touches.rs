@@ -107,3 +107,44 @@ fn a_touch_without_a_footprint_says_why() {
     let (percepts, _) = pressed(Outputs::TOUCHES, BackendKind::Cpu, true);
     assert!(percepts.touches(5, 0).iter().all(|touch| touch.footprint.is_none() && touch.flags.is_empty()));
 }
+
+#[test]
+fn the_speed_of_a_rod_is_that_of_its_fits() {
+    let body = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
+    // Across itself, at 45°, at 10 mm/s.
+    let text = "rate_hz = 50\nduration_s = 1.6\n[skin]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\ntap = 38\nnoise_sigma = 1\n\
+                [[touch]]\non = \"hand/back\"\nindenter = \"rod\"\nradius_m = 0.0127\nlength_m = 0.05\nangle_deg = 45\n\
+                hold = { newton = 30 }\npath = [[0.0057, -0.0057], [-0.0057, 0.0057]]\ntimes_s = [0, 1.6]\n";
+    let mut source = SimulatedSource::on_body("rod", text, body.clone()).unwrap();
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = Calibration::parse(&source.calibration(), &ids).unwrap();
+    let filter = somatic::scene::MotionFilter::default().over_s(0.2);
+    let outputs = Outputs::FOOTPRINT_MOTION | Outputs::FILTERED_SPEED;
+    let scene = Scene::default().outputs(outputs).filter(filter).fields(["hand/back"]);
+    let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(16);
+    let mut engine = Engine::new(&body, options).unwrap();
+    engine.set_channels(source.taxels()).unwrap();
+    let (mut fits, mut centroids) = (Vec::new(), Vec::new());
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    let mut young = 0;
+    while source.next_frame(&mut frame).unwrap() {
+        let percept = engine.process_one(&frame).unwrap().get(0, 0);
+        let off = |speed: f64| (speed / 0.01008 - 1.0).powi(2);
+        fits.extend(percept.footprint_speed.map(off));
+        centroids.extend(percept.filtered_speed.map(off));
+        // Motion is over 0.2 s: there is none yet in the first ten frames.
+        young += usize::from(
+            percept.footprint_speed.is_none() && percept.flags.intersects(Flags::HELD | Flags::NO_PREVIOUS),
+        );
+        let [u, v] = percept.footprint_displacement.unwrap_or([-1.0, 1.0]);
+        assert!((u + v).abs() < 0.1 * (v - u), "it moves across itself: {percept:?}");
+    }
+    let rms = |squares: &[f64]| 100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    println!(
+        "speed over 0.2 s: centroids {:.1} %, {} fits {:.1} %, {young} young",
+        rms(&centroids),
+        fits.len(),
+        rms(&fits)
+    );
+    assert!(fits.len() > 60 && rms(&fits) < 4.0 && rms(&fits) < 0.4 * rms(&centroids) && young >= 10);
+}

@@ -40,7 +40,12 @@ impl RunOptions {
             ("--filter-time", self.filter_time.is_some()),
             ("--filter-over", self.filter_over.is_some()),
         ];
-        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !outputs.intersects(Outputs::FILTERED)) {
+        // Fitted contacts have motion over a time, too.
+        let measured = |flag: &str| match flag {
+            "--filter-over" => outputs.intersects(Outputs::FILTERED | Outputs::FOOTPRINT_MOTION),
+            _ => outputs.intersects(Outputs::FILTERED),
+        };
+        if let Some((flag, _)) = given.iter().find(|(flag, given)| *given && !measured(flag)) {
             return Err(Error::usage(format!(
                 "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
             )));

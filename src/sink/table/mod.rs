@@ -215,7 +215,7 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
             ValueOf::TouchPosition(component),
         ));
     }
-    let footprint = session.outputs & Outputs::FOOTPRINT;
+    let footprint = session.outputs.of_each_touch();
     columns.extend(columns_of(footprint, session, ValueOf::TouchFootprint));
     if !footprint.is_empty() {
         let help = "Why its footprint, or a part of it, is absent; docs/footprint.md.";

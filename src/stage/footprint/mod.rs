@@ -34,9 +34,11 @@ mod objective;
 mod real;
 mod shape;
 mod touch;
+mod trail;
 
 pub(crate) use choice::{Fits, fit};
 pub(crate) use descent::STEPS;
 pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};
+pub(crate) use trail::{OVER_S, Trail};
