@@ -153,17 +153,17 @@ fn main() {
     };
     for count in [1_000, 10_000, 100_000] {
         let widest = 2.0 * widest_radius(area, count);
-        let placed = timed(|| place_evenly(&positions, &triangles, count, 1, &mut |_| {}).unwrap());
+        let placed = timed(|| place_evenly(&positions, &triangles, count, 1, &mut |_| true).unwrap());
         report("evenly, in widest spacings", placed, widest);
         let spacing = 0.75 * widest;
         let fitted = report(
             "apart, in given spacings",
-            timed(|| place_apart(&positions, &triangles, spacing, 1, &mut |_| {}).unwrap()),
+            timed(|| place_apart(&positions, &triangles, spacing, 1, &mut |_| true).unwrap()),
             spacing,
         );
         println!("  {:.3} of what would fit at most", (spacing / (2.0 * widest_radius(area, fitted))).powi(2));
         let density = |p: &Placed| (4.0 * p.point.position.z).exp();
-        let placed = timed(|| place_by_density(&positions, &triangles, count, 1, density, &mut |_| {}).unwrap());
+        let placed = timed(|| place_by_density(&positions, &triangles, count, 1, density, &mut |_| true).unwrap());
         report("by a density of e⁸:1, in widest even spacings", placed, widest);
     }
 }

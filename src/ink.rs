@@ -44,7 +44,7 @@ pub(crate) fn png(pixels: &[u8], size: [u32; 2]) -> Result<Vec<u8>> {
 /// An animated PNG of `frames`, each of `size` and shown for `frame_s` seconds, over and over. Of each only what differs from
 /// the one before is stored.
 #[cfg(feature = "gpu")]
-pub(crate) fn animated_png(frames: &[Vec<u8>], size: [u32; 2], frame_s: f64) -> Result<Vec<u8>> {
+pub(crate) fn animated_png(frames: &[&[u8]], size: [u32; 2], frame_s: f64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
@@ -56,7 +56,7 @@ pub(crate) fn animated_png(frames: &[Vec<u8>], size: [u32; 2], frame_s: f64) -> 
     for (index, frame) in frames.iter().enumerate() {
         let [left, top, width, height] = match index.checked_sub(1) {
             None => [0, 0, size[0], size[1]],
-            Some(before) => difference(&frames[before], frame, size),
+            Some(before) => difference(frames[before], frame, size),
         };
         // The place of the frame before may not suit this one's size.
         let reset = writer.reset_frame_position();

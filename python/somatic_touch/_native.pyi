@@ -12,14 +12,17 @@ __all__ = [
     "EngineState",
     "Field",
     "Percepts",
+    "Picture",
     "Recording",
     "Scene",
     "Simulation",
     "Touches",
+    "View",
     "__version__",
     "author",
     "metadata",
     "read",
+    "render",
     "run",
     "simulate",
     "write",
@@ -28,6 +31,7 @@ __all__ = [
 __version__: str
 
 _Backend: TypeAlias = Literal["auto", "reference", "cpu", "gpu"]
+_View: TypeAlias = Literal["front", "back", "left", "right", "top", "bottom", "three-quarter", "all"]
 _Pose: TypeAlias = dict[str, npt.ArrayLike]
 _Path: TypeAlias = str | os.PathLike[str]
 _Bools: TypeAlias = npt.NDArray[np.bool_]
@@ -158,6 +162,7 @@ class Engine:
         mask: npt.ArrayLike | None = None,
         pose: _Pose | None = None,
     ) -> _Verified: ...
+    def view(self, listen: str | None = None, *, allow_hosts: Sequence[str] = ...) -> View: ...
     def _reads_at(self, values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> int: ...
     def state(self) -> EngineState: ...
     def restore(self, state: EngineState) -> None: ...
@@ -225,6 +230,16 @@ class Touches:
     def __len__(self) -> int: ...
 
 @final
+class Picture:
+    @property
+    def pixels(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    def save(self, path: _Path, *, force: bool = False) -> None: ...
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]: ...
+    def _repr_png_(self) -> bytes: ...
+
+@final
 class Recording:
     @property
     def t(self) -> _Doubles: ...
@@ -262,6 +277,16 @@ class Simulation:
     def forces(self) -> _Doubles: ...
     def __len__(self) -> int: ...
 
+@final
+class View:
+    @property
+    def url(self) -> str: ...
+    @property
+    def viewers(self) -> int: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> View: ...
+    def __exit__(self, kind: object, raised: object, traceback: object, /) -> None: ...
+
 def read(
     source: _Path,
     *,
@@ -275,6 +300,21 @@ def read(
     unit: str | None = None,
     layout: _Path | None = None,
 ) -> Recording: ...
+def render(
+    what: Body | Recording,
+    *,
+    at_s: float | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    rate_hz: float = 12.0,
+    calibration: Calibration | None = None,
+    views: Sequence[_View] = ...,
+    fields: Sequence[str] = ...,
+    uv: str | None = None,
+    look_at: str | None = None,
+    ids: bool = False,
+    size: int | tuple[int, int] = ...,
+) -> Picture: ...
 def simulate(
     simulation: _Path, *, body: Body | None = None, seed: int | None = None
 ) -> Simulation: ...

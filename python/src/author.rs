@@ -1,12 +1,13 @@
 //! `author`: a skin on a mesh.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use somatic::author::mesh::MeshOptions;
 use somatic::author::{Recipe, mesh};
 use somatic::body::Original;
-use somatic::{Error, bundled};
+use somatic::{Body, Error, bundled};
 
 use crate::body::PyBody;
 use crate::error::{OrRaise, interrupted};
@@ -55,21 +56,20 @@ pub(crate) fn author(
     let done = free(py, || {
         let file = open(&shape, &mut made)?;
         let shown = |share: f64| {
-            if raised.is_some() {
-                return;
-            }
             let heard = Python::attach(|py| {
                 py.check_signals()?;
                 progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (share,)).map(drop))
             });
             raised = heard.err();
+            raised.is_none()
         };
-        let authored = somatic::author::author(file, &made, shown)?;
+        let authored = somatic::author::author_while(file, &made, shown)?;
         let name = shape
             .with_extension("glb")
             .file_name()
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        PyBody::of_bytes(&name, authored.file.to_glb()?)
+        let bytes = Arc::new(authored.file.to_glb()?);
+        Ok(PyBody { inner: Arc::new(Body { name, ..authored.body }), bytes })
     });
     match raised {
         Some(error) => Err(interrupted(Some(error))),

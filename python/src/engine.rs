@@ -1,13 +1,16 @@
 //! `Engine`: frames in, percepts out, without Python's lock.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use somatic::page::Listen;
 use somatic::signal::FrameBlock;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
 
+use crate::agreement::told;
 use crate::arrays::{Values, poses, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
@@ -15,7 +18,9 @@ use crate::error::{OrRaise, interrupted, usage};
 use crate::percepts::PyPercepts;
 use crate::scene::PyScene;
 use crate::session::Run;
+use crate::state::PyState;
 use crate::threads::free;
+use crate::view::{Page, PyView};
 
 /// Values of a call from which on it is made in parts, between which Ctrl-C is heard.
 const LONG: usize = 1 << 20;
@@ -43,6 +48,8 @@ const LENT: usize = 4;
 pub(crate) struct PyEngine {
     inner: Mutex<Inner>,
     run: Arc<Run>,
+    /// The ids of a frame's values.
+    channels: Vec<u32>,
     /// The values of a frame.
     width: usize,
 }
@@ -51,6 +58,8 @@ struct Inner {
     engine: Engine,
     /// Batches that were given to Python, whose memory is used again when nobody needs them.
     lent: Vec<Arc<Percepts>>,
+    /// What shows them in a browser.
+    page: Option<Arc<Page>>,
 }
 
 impl Inner {
@@ -64,6 +73,13 @@ impl Inner {
         }
         self.lent.push(Arc::clone(&percepts));
         percepts
+    }
+
+    /// Shows the last frame of a call that began at `began`, where somebody looks.
+    fn show(&self, block: &FrameBlock<'_>, began: Instant) {
+        if let Some(page) = &self.page {
+            page.show(&self.engine, block, began);
+        }
     }
 }
 
@@ -135,9 +151,9 @@ impl PyEngine {
         let engine = made.or_raise(py)?;
         let text = calibration.map(|calibration| calibration.text.as_str());
         let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &scene.text, text));
-        let width = taxels.map_or(body.inner.taxels.len(), |taxels| taxels.len());
-        let inner = Mutex::new(Inner { engine, lent: Vec::new() });
-        Ok(Self { inner, run, width })
+        let channels = taxels.unwrap_or_else(|| body.ids());
+        let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
+        Ok(Self { inner, run, width: channels.len(), channels })
     }
 
     /// Turns frames into percepts, in order.
@@ -175,7 +191,9 @@ impl PyEngine {
         let block = FrameBlock { t_s, values: held.slice(), poses: &moved };
         if block.values.len() < LONG && progress.is_none() {
             let done = self.without_python(py, |inner| {
+                let began = Instant::now();
                 inner.engine.process_block(&block)?;
+                inner.show(&block, began);
                 Ok(inner.take())
             });
             return done.or_raise(py).map(|percepts| self.wrap(percepts));
@@ -190,7 +208,11 @@ impl PyEngine {
                 .map_err(|error| raised = Some(error))
                 .is_ok()
             };
+            let began = Instant::now();
             let is_whole = inner.engine.process_block_while(&block, go_on)?.is_some();
+            if is_whole {
+                inner.show(&block, began);
+            }
             Ok(is_whole.then(|| inner.take()))
         });
         match done.or_raise(py)? {
@@ -222,7 +244,9 @@ impl PyEngine {
         let moved = pose.map(|pose| poses(pose, 1)).transpose()?.unwrap_or_default();
         let block = FrameBlock { t_s: &[t], values: held.slice(), poses: &moved };
         let done = self.without_python(py, |inner| {
+            let began = Instant::now();
             inner.engine.process_block(&block)?;
+            inner.show(&block, began);
             Ok(inner.take())
         });
         done.or_raise(py).map(|percepts| self.wrap(percepts))
@@ -280,8 +304,12 @@ impl PyEngine {
         let held = self.held(values, mask, t_s.len())?;
         let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
         let mut sum = Agreement::default();
+        let before = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;
         for first in (0..t_s.len()).step_by(256) {
-            py.check_signals()?;
+            if let Err(raised) = py.check_signals() {
+                self.without_python(py, |inner| inner.engine.restore(&before)).or_raise(py)?;
+                return Err(raised);
+            }
             let frame = |index: usize| Frame {
                 t_s: t_s[index],
                 values: held.slice()[index * self.width..][..self.width].to_vec(),
@@ -291,23 +319,32 @@ impl PyEngine {
             let part = self.without_python(py, |inner| inner.engine.process_and_compare(&frames).map(|(_, part)| part));
             sum.merge(part.or_raise(py)?);
         }
-        let quantities = PyDict::new(py);
-        for (name, of) in &sum.quantities {
-            let made = PyDict::new(py);
-            made.set_item("compared", of.compared)?;
-            made.set_item("agreeing", of.agreeing)?;
-            made.set_item("too_close", of.too_close)?;
-            made.set_item("worst_error", of.worst_error)?;
-            made.set_item("worst_share", of.worst_share)?;
-            quantities.set_item(name, made)?;
-        }
-        let found = PyDict::new(py);
-        found.set_item("agrees", sum.holds())?;
-        found.set_item("percepts", sum.percepts)?;
-        found.set_item("failed", sum.failed)?;
-        found.set_item("failures", &sum.failures)?;
-        found.set_item("quantities", quantities)?;
-        Ok(found)
+        told(py, &sum)
+    }
+
+    /// Shows in a browser what it computes from now on, on the page of docs/view.md: after each call its last frame.
+    ///
+    /// Open `url` of the `View` that it gives; it is served until it is closed. `listen` is HOST:PORT, where port 0 is any free one,
+    /// by default 127.0.0.1:7879 or the next free port, which this machine alone reaches. Others need one of the names `allow_hosts`.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> engine = st.Engine(st.Body.bundled("hand"), backend="cpu")
+    /// >>> with engine.view("127.0.0.1:0") as view:
+    /// ...     p = engine.step(0.0, [0] * 40)
+    /// ...     view.url[:17], view.viewers
+    /// ('http://127.0.0.1:', 0)
+    #[pyo3(signature = (listen = None, *, allow_hosts = Vec::new()))]
+    fn view(&self, py: Python<'_>, listen: Option<&str>, allow_hosts: Vec<String>) -> PyResult<PyView> {
+        let listen = Listen::new(listen, &allow_hosts).or_raise(py)?;
+        let started = self.without_python(py, |inner| {
+            if inner.page.as_ref().is_some_and(|page| page.is_open()) {
+                return Err(Error::usage("this engine is shown already; close its other view"));
+            }
+            let page = Arc::new(Page::start(&listen, &inner.engine, &self.run.body, &self.channels)?);
+            inner.page = Some(Arc::clone(&page));
+            Ok(page)
+        });
+        started.or_raise(py).map(PyView::new)
     }
 
     /// The names of the fields, in the order of the percepts' second axis.
@@ -348,20 +385,5 @@ impl PyEngine {
             run.names.len(),
             self.width
         )
-    }
-}
-
-/// What an engine's next percepts depend on beside the next frames.
-#[pyclass(module = "somatic_touch", name = "EngineState", frozen)]
-pub(crate) struct PyState {
-    inner: somatic::EngineState,
-}
-
-#[pymethods]
-impl PyState {
-    /// The number of frames that were processed before it.
-    #[getter]
-    fn frames(&self) -> u64 {
-        self.inner.frames()
     }
 }

@@ -38,6 +38,12 @@ pub(crate) fn usage(py: Python<'_>, message: impl Into<String>) -> PyErr {
     USAGE.error(py, message.into(), None, None)
 }
 
+/// The exception for what this wheel or this machine cannot do.
+#[cfg(not(feature = "gpu"))]
+pub(crate) fn failed(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    FAILED.error(py, message.into(), None, None)
+}
+
 /// The exception for `error`, which is about the file `file` if there is one.
 pub(crate) fn raised(py: Python<'_>, error: &somatic::Error, file: Option<&Path>) -> PyErr {
     let file = file.map(|file| file.display().to_string());

@@ -1,21 +1,27 @@
 //! The module `somatic_touch._native`: what the Python package has in Rust.
 
+mod agreement;
 mod arrays;
 mod author;
 mod body;
 mod calibration;
+#[cfg(feature = "gpu")]
+mod drawing;
 mod engine;
 mod error;
 mod percepts;
+mod picture;
 mod recording;
 mod runner;
 mod scene;
 mod session;
 mod simulation;
 mod sinks;
+mod state;
 mod stream;
 mod threads;
 mod touches;
+mod view;
 
 use pyo3::prelude::*;
 
@@ -31,9 +37,11 @@ mod native {
     #[pymodule_export]
     use calibration::PyCalibration;
     #[pymodule_export]
-    use engine::{PyEngine, PyState};
+    use engine::PyEngine;
     #[pymodule_export]
     use percepts::PyPercepts;
+    #[pymodule_export]
+    use picture::{PyPicture, render};
     #[pymodule_export]
     use recording::{PyRecording, read};
     #[pymodule_export]
@@ -45,7 +53,11 @@ mod native {
     #[pymodule_export]
     use sinks::write;
     #[pymodule_export]
+    use state::PyState;
+    #[pymodule_export]
     use touches::PyTouches;
+    #[pymodule_export]
+    use view::PyView;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -14,6 +14,7 @@ use crate::arrays::array;
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, usage};
+use crate::threads::free;
 
 /// Frames that are read until Ctrl-C is heard.
 const FRAMES_BETWEEN: usize = 1 << 10;
@@ -31,13 +32,13 @@ const FRAMES_BETWEEN: usize = 1 << 10;
 pub(crate) struct PyRecording {
     pub(crate) name: String,
     pub(crate) frames: usize,
-    taxels: Vec<u32>,
-    t: Py<PyAny>,
-    values: Py<PyAny>,
+    pub(crate) taxels: Vec<u32>,
+    pub(crate) t: Py<PyAny>,
+    pub(crate) values: Py<PyAny>,
     mask: Py<PyAny>,
     pose: Py<PyDict>,
-    body: Option<Py<PyBody>>,
-    calibration: Option<Py<PyCalibration>>,
+    pub(crate) body: Option<Py<PyBody>>,
+    pub(crate) calibration: Option<Py<PyCalibration>>,
     losses: Vec<String>,
     length_s: f64,
 }
@@ -187,11 +188,17 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
     let mut frames = Frames::default();
     let mut frame = Frame::missing(0.0, source.taxels().len());
     loop {
-        for _ in 0..FRAMES_BETWEEN {
-            if !source.next_frame(&mut frame).or_raise_of(py, file)? {
-                return Ok(frames);
+        let read = free(py, || {
+            for _ in 0..FRAMES_BETWEEN {
+                if !source.next_frame(&mut frame)? {
+                    return Ok(false);
+                }
+                frames.push(&frame);
             }
-            frames.push(&frame);
+            Ok(true)
+        });
+        if !read.or_raise_of(py, file)? {
+            return Ok(frames);
         }
         py.check_signals()?;
     }

@@ -12,7 +12,7 @@ use somatic::{BackendKind, Engine, Error, Frame, Outputs};
 
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
-use crate::error::{OrRaise, interrupted};
+use crate::error::{OrRaise, interrupted, usage};
 use crate::recording::open;
 use crate::scene::PyScene;
 use crate::session::Run;
@@ -57,6 +57,9 @@ pub(crate) fn run<'py>(
     let options = VendorOptions::default();
     let spec = source.display().to_string().parse::<SourceSpec>().or_raise(py)?.with_content(&options);
     let sink: SinkSpec = sink.display().to_string().parse().or_raise(py)?;
+    if matches!(sink, SinkSpec::Page(_)) {
+        return Err(usage(py, "a page shows live frames; see `Engine.view`, or run `somatic view` on the recording"));
+    }
     let file = spec.file().unwrap_or(Path::new("")).to_owned();
     let (given, calibration) = (body.as_ref().map(Bound::get), calibration.as_ref().map(Bound::get));
     let mut raised = None;

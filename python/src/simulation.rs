@@ -11,6 +11,10 @@ use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::OrRaise;
 use crate::recording::{Frames, PyRecording};
+use crate::threads::free;
+
+/// Frames that are simulated until Ctrl-C is heard.
+const FRAMES_BETWEEN: usize = 1 << 6;
 
 /// A simulated touch: its frames, and what is true of them.
 #[pyclass(module = "somatic_touch", name = "Simulation", frozen)]
@@ -31,14 +35,23 @@ impl PySimulation {
         let (mut rows, mut forces, mut index) = (Vec::new(), Vec::new(), 0);
         let mut frame = somatic::Frame::missing(0.0, source.taxels().len());
         let mut frames = Frames::default();
-        while source.next_frame(&mut frame).or_raise(py)? {
-            frames.push(&frame);
-            rows.extend(source.truth().iter().map(|truth| Row { frame: index, truth: truth.clone() }));
-            forces.extend_from_slice(source.forces_newton());
-            index += 1;
-            if index % 256 == 0 {
-                py.check_signals()?;
+        loop {
+            let computed = free(py, || {
+                for _ in 0..FRAMES_BETWEEN {
+                    if !source.next_frame(&mut frame)? {
+                        return Ok(false);
+                    }
+                    frames.push(&frame);
+                    rows.extend(source.truth().iter().map(|truth| Row { frame: index, truth: truth.clone() }));
+                    forces.extend_from_slice(source.forces_newton());
+                    index += 1;
+                }
+                Ok(true)
+            });
+            if !computed.or_raise(py)? {
+                break;
             }
+            py.check_signals()?;
         }
         let calibration = PyCalibration::of_text(&source.calibration(), &body).or_raise(py)?;
         let width = source.taxels().len();

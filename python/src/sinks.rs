@@ -43,6 +43,9 @@ pub(crate) fn write(
         Err(_) => sink.extract::<PathBuf>()?.display().to_string(),
     };
     let spec: SinkSpec = text.parse().or_raise(py)?;
+    if matches!(spec, SinkSpec::Page(_)) {
+        return Err(usage(py, "a page shows frames too; see `Engine.view`"));
+    }
     if wide && !matches!(spec, SinkSpec::Csv(_)) {
         return Err(usage(py, "wide is for a table in CSV; name a sink csv:FILE"));
     }

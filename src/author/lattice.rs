@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::grid::Grid;
-use super::placed::{Placed, Progress, SurfacePoint, same_side};
+use super::placed::{Placed, Progress, SurfacePoint, report_progress, same_side};
 use super::rest_surface::RestSurface;
 use crate::body::{NONE, SurfaceIndex, Topology, area_vector, next};
 use crate::error::{Error, Result, failed};
@@ -59,14 +59,14 @@ impl Lattice {
         let map = self.map(topology, start, &near)?;
         let extent = extent(&map, &near);
         let cells = self.cells(extent)?;
-        progress(0.3);
+        report_progress(progress, 0.3)?;
         let [from, u, v, _] = map.frame();
         let cell_area = self.pitch_m * self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
         let mut found: Vec<(f64, Placed)> = Vec::new();
         let count = cells.len();
         for (index, cell) in cells.into_iter().enumerate() {
             if index.is_multiple_of(512) {
-                progress(0.3 + 0.7 * index as f64 / count as f64);
+                report_progress(progress, 0.3 + 0.7 * index as f64 / count as f64)?;
             }
             let length = cell.length();
             let direction = if length > 0.0 { (u * cell.x + v * cell.y) / length } else { u };

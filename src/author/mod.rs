@@ -9,7 +9,7 @@
 //!
 //! // A sheet of 0.2 m × 0.1 m with 50 taxels on it.
 //! let corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)].map(|(x, y)| DVec3::new(x, y, 0.0));
-//! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1, &mut |_| {})?;
+//! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1, &mut |_| true)?;
 //! let shared: f64 = placed.iter().map(|p| p.point.area).sum();
 //! assert!(placed.len() == 50 && (shared - 0.02).abs() < 1e-9);
 //! # Ok::<(), somatic::Error>(())
@@ -53,6 +53,6 @@ pub use placed::{Placed, Progress, SurfacePoint};
 pub use recipe::Recipe;
 pub use refresh::refresh;
 pub use sheet::{GridOrder, Sheet, SheetCell, SheetGrid, author_sheets, sheets};
-pub use skin::{Authored, PlaceReport, author};
+pub use skin::{Authored, PlaceReport, author, author_while};
 pub use skin_weights::{blend_skinning, heaviest_four};
 pub use table_body::author_csv_skin;

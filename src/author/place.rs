@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, same_side};
+use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, report_progress, same_side};
 use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
 use super::scatter::Pieces;
 use crate::body::point_tree;
@@ -30,11 +30,11 @@ pub fn widest_radius(area: f64, count: usize) -> f64 {
 ///
 /// `positions` are in metres and `triangles` counter-clockwise seen from outside. Points with normals over 90° apart are
 /// no neighbours, so that both sides of a thin part get points. The points are in the order of the triangles; `seed`
-/// selects one of many equally good placements. `progress` gets the share that is done.
+/// selects one of many equally good placements. `progress` gets the share that is done, and says whether to go on.
 ///
 /// # Errors
 /// `count` is 0 or over 4 million, a triangle has a vertex that does not exist, or the triangles have no finite, positive
-/// area.
+/// area; or `progress` ended it.
 pub fn place_evenly(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -46,7 +46,7 @@ pub fn place_evenly(
     let pieces = Pieces::whole(positions, triangles)?;
     let samples = pieces.scatter(OVERSAMPLING * count, seed);
     let reaches = vec![2.0 * widest_radius(pieces.weight(), count); samples.len()];
-    Ok(eliminate(&samples, &reaches, count, progress))
+    eliminate(&samples, &reaches, count, progress)
 }
 
 /// As [`place_evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
@@ -69,7 +69,7 @@ pub(super) fn evenly_apart(
     }
     let area: f64 = packed.iter().map(|placed| placed.point.area).sum();
     let reaches = vec![(2.0 * widest_radius(area, count)).max(2.0 * spacing_m); packed.len()];
-    Ok(Ok(eliminate(&packed, &reaches, count, progress)))
+    eliminate(&packed, &reaches, count, progress).map(Ok)
 }
 
 /// Places exactly `count` points, as [`place_evenly`] does, in proportion to `density`, which may be 0 and need not be
@@ -98,7 +98,7 @@ pub fn place_by_density(
         if density > 0.0 { (2.0 * widest_radius(pieces.weight() / density, count)).min(widest) } else { widest }
     };
     let reaches: Vec<f64> = samples.iter().map(reach_at).collect();
-    Ok(eliminate(&samples, &reaches, count, progress))
+    eliminate(&samples, &reaches, count, progress)
 }
 
 /// Places as many points as it can with neighbours at least `spacing_m` apart: about two thirds of the densest packing of
@@ -130,8 +130,8 @@ pub fn place_apart(
     let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
     let reaches = vec![spacing_m; samples.len()];
     let crowd = SampleNeighbours::new(&samples, &reaches, |_, _| ());
-    progress(0.5);
-    let kept = pack(&crowd, samples.len(), &mut |share| progress(0.5 + 0.5 * share));
+    report_progress(progress, 0.5)?;
+    let kept = pack(&crowd, samples.len(), &mut |share| progress(0.5 + 0.5 * share))?;
     Ok(share_area(&samples, &kept, &crowd))
 }
 
@@ -146,7 +146,7 @@ fn check_count(count: usize) -> Result<()> {
 }
 
 /// Eliminates all but `count` samples; each gets its share of the area.
-fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Vec<Placed> {
+fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Result<Vec<Placed>> {
     let ratio = count as f64 / samples.len() as f64;
     // Distances far below the final spacing all get the same weight.
     let closest = 1.0 - ratio * ratio.sqrt();
@@ -156,9 +156,9 @@ fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Prog
         let fourth = squared * squared;
         fourth * fourth
     });
-    progress(0.5);
-    let kept = eliminate_crowded(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share));
-    share_area(samples, &kept, &crowd)
+    report_progress(progress, 0.5)?;
+    let kept = eliminate_crowded(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share))?;
+    Ok(share_area(samples, &kept, &crowd))
 }
 
 /// The kept samples, each with the area of the samples nearest to it on its side.
@@ -245,7 +245,7 @@ mod tests {
     fn points_are_as_many_as_asked_and_keep_their_distance() {
         let (positions, triangles) = sheet(7, false);
         for (count, seed) in [(1, 1), (2, 1), (100, 1), (100, 2), (600, 3)] {
-            let placed = place_evenly(&positions, &triangles, count, seed, &mut |_| {}).unwrap();
+            let placed = place_evenly(&positions, &triangles, count, seed, &mut |_| true).unwrap();
             assert_eq!(placed.len(), count);
             let spacing = least_spacing(&placed);
             assert!(spacing >= 0.65 * 2.0 * widest_radius(1.0, count), "{count} points, seed {seed}: {spacing} m");
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn a_placement_repeats_and_the_seed_changes_it() {
         let (positions, triangles) = sheet(3, false);
-        let place = |seed| place_evenly(&positions, &triangles, 80, seed, &mut |_| {}).unwrap();
+        let place = |seed| place_evenly(&positions, &triangles, 80, seed, &mut |_| true).unwrap();
         assert_eq!(place(5), place(5));
         assert_ne!(place(5), place(6));
     }
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn both_sides_of_a_thin_sheet_get_their_own() {
         let (positions, triangles) = sheet(5, true);
-        let placed = place_evenly(&positions, &triangles, 400, 9, &mut |_| {}).unwrap();
+        let placed = place_evenly(&positions, &triangles, 400, 9, &mut |_| true).unwrap();
         let front: Vec<&Placed> = placed.iter().filter(|p| p.point.normal.z > 0.0).collect();
         assert!((190..=210).contains(&front.len()), "{} of 400 in front", front.len());
         assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(2.0, 400));
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn areas_share_the_surface_and_points_lie_on_their_triangles() {
         let (positions, triangles) = sheet(4, false);
-        let placed = place_evenly(&positions, &triangles, 120, 4, &mut |_| {}).unwrap();
+        let placed = place_evenly(&positions, &triangles, 120, 4, &mut |_| true).unwrap();
         let sum: f64 = placed.iter().map(|p| p.point.area).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum} m²");
         assert!(placed.iter().all(|p| (0.2 / 120.0..3.0 / 120.0).contains(&p.point.area)));
@@ -304,7 +304,7 @@ mod tests {
         let (upright, others) = sheet(6, false);
         positions.extend(upright.into_iter().map(|p| DVec3::new(0.0, p.y, -p.x)));
         triangles.extend(others.into_iter().map(|[a, b, c]| [first + a, first + c, first + b]));
-        let placed = place_evenly(&positions, &triangles, 300, 2, &mut |_| {}).unwrap();
+        let placed = place_evenly(&positions, &triangles, 300, 2, &mut |_| true).unwrap();
         let mut least = f64::INFINITY;
         for (i, a) in placed.iter().enumerate() {
             least = placed[..i].iter().map(|b| a.point.position.distance(b.point.position)).fold(least, f64::min);
@@ -321,7 +321,7 @@ mod tests {
             p if p.x > 0.5 => 9.0,
             _ => 1.0,
         };
-        let placed = place_by_density(&positions, &triangles, 1000, 3, density, &mut |_| {}).unwrap();
+        let placed = place_by_density(&positions, &triangles, 1000, 3, density, &mut |_| true).unwrap();
         assert_eq!(placed.len(), 1000);
         let (right, left): (Vec<Placed>, Vec<Placed>) = placed.iter().partition(|p| p.point.position.x > 0.5);
         assert!(placed.iter().all(|p| p.point.position.y <= 0.75));
@@ -334,7 +334,7 @@ mod tests {
         assert!((area - 0.375).abs() < 0.02, "{area} m²");
 
         let why = |density: f64| {
-            place_by_density(&positions, &triangles, 9, 3, |_| density, &mut |_| {}).unwrap_err().to_string()
+            place_by_density(&positions, &triangles, 9, 3, |_| density, &mut |_| true).unwrap_err().to_string()
         };
         assert!(why(-1.0).contains("density") && why(f64::NAN).contains("NaN") && why(0.0).contains("everywhere"));
     }
@@ -342,7 +342,7 @@ mod tests {
     #[test]
     fn a_density_that_is_the_same_everywhere_is_no_density() {
         let (positions, triangles) = sheet(4, false);
-        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5, &mut |_| {}).unwrap();
+        let placed = place_by_density(&positions, &triangles, 300, 3, |_| 7.5, &mut |_| true).unwrap();
         assert!(least_spacing(&placed) >= 0.65 * 2.0 * widest_radius(1.0, 300));
         let area: f64 = placed.iter().map(|p| p.point.area).sum();
         assert!((area - 1.0).abs() < 1e-9, "{area} m²");
@@ -352,7 +352,7 @@ mod tests {
     fn with_a_spacing_as_many_as_fit_keep_it() {
         let (positions, triangles) = sheet(5, true);
         for (spacing, seed) in [(0.05, 1), (0.05, 2), (0.3, 1), (3.0, 1)] {
-            let placed = place_apart(&positions, &triangles, spacing, seed, &mut |_| {}).unwrap();
+            let placed = place_apart(&positions, &triangles, spacing, seed, &mut |_| true).unwrap();
             assert!(least_spacing(&placed) >= spacing, "{} m", least_spacing(&placed));
             // Nobody fits in between: every place on the sheet has one within the spacing, but for the samples' own
             // distance, of which there are nine for each disk of the densest packing.
@@ -364,16 +364,17 @@ mod tests {
             let covered = placed.len() as f64 * std::f64::consts::PI * spacing * spacing / 4.0 / 2.0;
             assert!(spacing > 0.1 || covered > 0.547, "{covered}");
         }
-        let why = |spacing: f64| place_apart(&positions, &triangles, spacing, 1, &mut |_| {}).unwrap_err().to_string();
+        let why =
+            |spacing: f64| place_apart(&positions, &triangles, spacing, 1, &mut |_| true).unwrap_err().to_string();
         assert!(why(0.0).contains("spacing") && why(f64::NAN).contains("spacing") && why(1e-6).contains("metres"));
     }
 
     #[test]
     fn what_has_no_surface_gets_no_taxels() {
         let (positions, triangles) = sheet(1, false);
-        assert!(place_evenly(&positions, &triangles, 0, 1, &mut |_| {}).is_err());
-        assert!(place_evenly(&positions, &[], 5, 1, &mut |_| {}).is_err());
-        assert!(place_evenly(&positions, &[[0, 0, 1]], 5, 1, &mut |_| {}).is_err());
-        assert!(place_evenly(&positions, &[[0, 1, 9]], 5, 1, &mut |_| {}).is_err());
+        assert!(place_evenly(&positions, &triangles, 0, 1, &mut |_| true).is_err());
+        assert!(place_evenly(&positions, &[], 5, 1, &mut |_| true).is_err());
+        assert!(place_evenly(&positions, &[[0, 0, 1]], 5, 1, &mut |_| true).is_err());
+        assert!(place_evenly(&positions, &[[0, 1, 9]], 5, 1, &mut |_| true).is_err());
     }
 }

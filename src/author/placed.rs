@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::error::{Error, Result};
+
 /// cos 90° with a tolerance for rounding: the two faces at a box's edge are neighbours, those of a sharper edge are not.
 const MIN_NORMAL_COSINE: f64 = -1e-9;
 
@@ -40,5 +42,10 @@ pub(super) fn points_on_same_side(a: &SurfacePoint, b: &SurfacePoint) -> bool {
     a.normal.dot(b.normal) > MIN_NORMAL_COSINE
 }
 
-/// Called with the share of the work that is done.
-pub type Progress<'a> = &'a mut dyn FnMut(f64);
+/// Called with the share of the work that is done; says whether to go on.
+pub type Progress<'a> = &'a mut dyn FnMut(f64) -> bool;
+
+/// Calls `progress`; an error where it says to stop.
+pub(super) fn report_progress(progress: Progress<'_>, share: f64) -> Result<()> {
+    if progress(share) { Ok(()) } else { Err(Error::failed("stopped before all taxels were placed")) }
+}

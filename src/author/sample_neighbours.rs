@@ -7,7 +7,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::grid::{Grid, GridPoint};
-use super::placed::{Placed, Progress, same_side};
+use super::placed::{Placed, Progress, report_progress, same_side};
+use crate::error::Result;
 
 /// Samples per unit of parallel work.
 const CHUNK: usize = 4096;
@@ -112,7 +113,7 @@ pub(super) fn eliminate_crowded(
     samples: usize,
     count: usize,
     progress: Progress<'_>,
-) -> Vec<usize> {
+) -> Result<Vec<usize>> {
     let mut weights: Vec<f64> = (0..samples).map(|i| crowd.of(i).iter().map(|(_, w)| w).sum()).collect();
     let mut alive = vec![true; samples];
     let mut heap: BinaryHeap<u64> = weights.iter().enumerate().map(|(i, &weight)| priority(weight, i)).collect();
@@ -130,17 +131,21 @@ pub(super) fn eliminate_crowded(
         alive[sample] = false;
         left -= 1;
         if left.is_multiple_of(CHUNK) {
-            progress((samples - left) as f64 / (samples - count) as f64);
+            report_progress(progress, (samples - left) as f64 / (samples - count) as f64)?;
         }
         for &(j, weight) in crowd.of(sample) {
             weights[j as usize] -= weight;
         }
     }
-    (0..samples).filter(|&i| alive[i]).collect()
+    Ok((0..samples).filter(|&i| alive[i]).collect())
 }
 
 /// Selects samples of which no two are neighbours, always the one that blocks the fewest others. Returns ascending indices.
-pub(super) fn pack<T: Copy + Send>(crowd: &SampleNeighbours<T>, samples: usize, progress: Progress<'_>) -> Vec<usize> {
+pub(super) fn pack<T: Copy + Send>(
+    crowd: &SampleNeighbours<T>,
+    samples: usize,
+    progress: Progress<'_>,
+) -> Result<Vec<usize>> {
     let mut free: Vec<usize> = (0..samples).map(|i| crowd.of(i).len()).collect();
     let mut open = vec![true; samples];
     // By the number of free neighbours; an outdated entry has a newer one in a lower bucket.
@@ -163,7 +168,7 @@ pub(super) fn pack<T: Copy + Send>(crowd: &SampleNeighbours<T>, samples: usize, 
         kept.push(sample);
         settled += 1;
         if kept.len().is_multiple_of(CHUNK) {
-            progress(settled as f64 / samples as f64);
+            report_progress(progress, settled as f64 / samples as f64)?;
         }
         for &(gone, _) in crowd.of(sample) {
             if !std::mem::replace(&mut open[gone as usize], false) {
@@ -181,5 +186,5 @@ pub(super) fn pack<T: Copy + Send>(crowd: &SampleNeighbours<T>, samples: usize, 
         }
     }
     kept.sort_unstable();
-    kept
+    Ok(kept)
 }

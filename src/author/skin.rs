@@ -8,7 +8,7 @@ use super::group::{FilePaint, Grouper, Grouping, group as group_by};
 use super::lattice::Lattice;
 use super::origin::Origin;
 use super::place::{evenly_apart, nearest_on_its_side, place_apart, place_by_density, place_evenly};
-use super::placed::{Placed, Progress, SurfacePoint};
+use super::placed::{Placed, Progress, SurfacePoint, report_progress};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{PlaceSpec, Placement, Recipe, shown};
 use super::refresh::refresh;
@@ -60,7 +60,18 @@ pub struct PlaceReport {
 ///
 /// # Errors
 /// The file is no valid body, or the recipe requests something that it does not have or cannot hold; with the place.
-pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)) -> Result<Authored> {
+pub fn author(file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)) -> Result<Authored> {
+    author_while(file, recipe, |share| {
+        progress(share);
+        true
+    })
+}
+
+/// The same until `go_on`, which gets the share that is done, says to stop.
+///
+/// # Errors
+/// As [`author`]; or `go_on` has ended it.
+pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f64) -> bool) -> Result<Authored> {
     if let Some((unit, metres)) = &recipe.unit {
         file.set_unit(unit, *metres)?;
     }
@@ -80,7 +91,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     if body.surfaces.is_empty() && !recipe.places.is_empty() {
         return Err(Error::failed("it has no triangles to place taxels on; export a mesh").at(file.name()));
     }
-    progress(PROGRESS_OPENED);
+    report_progress(&mut go_on, PROGRESS_OPENED)?;
     let mut notes = std::mem::take(&mut file.notes);
     if !body.taxels.is_empty() {
         notes.append(&mut body.findings);
@@ -116,7 +127,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
             return Err(place.at.wrong(what));
         }
         let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
-        let tick = &mut |done: f64| progress(PROGRESS_OPENED + share * (index as f64 + done));
+        let tick = &mut |done: f64| go_on(PROGRESS_OPENED + share * (index as f64 + done));
         let filled = place_taxels(&rest_surface, &region, place, recipe.seed_of(place), &mut notes, tick);
         let filled = filled.map_err(|e| place.at.put(e))?;
         let last = u64::from(place.first_id) + filled.len() as u64;
@@ -134,7 +145,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
         seated.extend(filled.iter().zip(&own).map(seat));
         reports.push(report(&rest_surface, place, own, &filled, &seated[first..]));
     }
-    progress(PROGRESS_PLACED);
+    report_progress(&mut go_on, PROGRESS_PLACED)?;
     let addition = taxel_nodes(&file, &rest_surface, seated);
     drop(regions);
     file.add(&addition);
@@ -143,7 +154,7 @@ pub fn author(mut file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)
     notes.extend(more);
     notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
-    progress(0.95);
+    report_progress(&mut go_on, 0.95)?;
     let (body, _) = file.read()?;
     Ok(Authored { file, body, places: reports, notes })
 }

@@ -118,16 +118,16 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     let options = Options { size: arguments.size.0, views, fields, look_at: arguments.look_at.clone() };
     let picture = match &arguments.uv {
         None if !asked.sources.is_empty() || arguments.ids => {
-            arguments.touched.draw(&asked, &body, &set.fields, options, arguments.ids)?
+            arguments.touched.draw(&asked, &body, &set.fields, &options, arguments.ids)?
         }
-        None => picture::of_body(&body, &set.fields, &options)?,
+        None => picture::of_body(&body, &set.fields, &options)?.png()?,
         Some(name) => {
             let charted = match set.fields.iter().position(|field| field.name == *name) {
                 Some(index) => index,
                 // A glob will do where it names one, and what is wrong with it is said the same way.
                 None => named(std::slice::from_ref(name))?[0],
             };
-            picture::of_chart(&body, &set.fields, charted, &options)?
+            picture::of_chart(&body, &set.fields, charted, &options)?.png()?
         }
     };
     output.write(&picture)?;

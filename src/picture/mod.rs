@@ -2,7 +2,9 @@
 //! software adapter, without a window.
 
 mod colour;
+mod drawn;
 mod labels;
+mod moments;
 mod shape;
 mod touch;
 mod view;
@@ -11,6 +13,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
+pub use drawn::Picture;
+pub use moments::{Moments, Times};
 pub use touch::{Moment, TouchPicture};
 pub use view::View;
 
@@ -22,7 +26,6 @@ use crate::backend::gpu::raster::{self, Corner, Drawing};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::field::Field;
-use crate::ink;
 
 /// Minimum width of a picture, pixels, for its title.
 const MIN_WIDTH: u32 = 240;
@@ -42,14 +45,14 @@ pub struct Options {
     pub look_at: Option<String>,
 }
 
-/// A PNG of `body` and its `fields`, which may be none.
+/// A picture of `body` and its `fields`, which may be none.
 ///
 /// A taxel in several of the fields has a slice of each colour; one in none is pale. Up to twelve fields have their own
 /// colours and are named; of more, neighbouring fields differ.
 ///
 /// # Errors
 /// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
-pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
+pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Picture> {
     let dots = Dots::of(body);
     let shown = FieldColours::of(fields, &options.fields, &dots);
     let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
@@ -66,7 +69,7 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u
     }
     labels.bar(arrangement.scale);
     labels.draw(&mut pixels, *size)?;
-    ink::png(&pixels, *size)
+    Ok(Picture { size: *size, pixels })
 }
 
 /// A body's surface, discs and views, at their places in a picture.
@@ -154,13 +157,13 @@ fn look_at(body: &Body, fields: &[Field], name: &str) -> Result<Vec<usize>> {
     Err(Error::usage(format!("there is no field or link `{name}` with taxels{hint}")).at(&body.name))
 }
 
-/// A PNG of the chart of field `index` of `fields`: members at their (u, v), +u to the right.
+/// A picture of the chart of field `index` of `fields`: members at their (u, v), +u to the right.
 ///
 /// Colours are those of its children, unless `options` has others.
 ///
 /// # Errors
 /// As [`of_body`]; or the field has no chart.
-pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) -> Result<Vec<u8>> {
+pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) -> Result<Picture> {
     let [width, height] = checked(options.size)?;
     let field = &fields[index];
     let chart = field
@@ -220,7 +223,7 @@ pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) 
     labels.axes(origin);
     labels.bar(arrangement.scale);
     labels.draw(&mut pixels, drawing.size)?;
-    ink::png(&pixels, drawing.size)
+    Ok(Picture { size: drawing.size, pixels })
 }
 
 /// Views of `points` above a legend of `key` in a picture of at most `size`, and the picture's size.

@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PALETTE, PAPER, linear};
 use super::labels::{INK, Labels};
-use super::{Options, Prepared, stem};
+use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
 use crate::body::Body;
 use crate::colours::pressure_colours;
@@ -63,28 +63,11 @@ impl<'a> TouchPicture<'a> {
         Ok(Self { body, fields, prepared, ids })
     }
 
-    /// Width and height, pixels.
-    #[must_use]
-    pub fn size(&self) -> [u32; 2] {
-        self.prepared.size
-    }
-
-    /// A PNG of pictures that [`TouchPicture::draw`] drew; animated where there are several, each shown for `frame_s` seconds.
-    ///
-    /// # Errors
-    /// There are too many, or none.
-    pub fn png(&self, pictures: &[Vec<u8>], frame_s: f64) -> Result<Vec<u8>> {
-        match pictures {
-            [picture] => ink::png(picture, self.size()),
-            pictures => ink::animated_png(pictures, self.size(), frame_s),
-        }
-    }
-
-    /// The pixels of a picture of `moment`, three bytes each, row by row.
+    /// A picture of `moment`.
     ///
     /// # Errors
     /// As [`super::of_body`].
-    pub fn draw(&self, moment: &Moment<'_>) -> Result<Vec<u8>> {
+    pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
         let Prepared { size, middle, arrangement, dots, views, .. } = &self.prepared;
         let colours = pressure_colours();
         let colour = |pressure: &Option<f64>| match pressure {
@@ -110,7 +93,7 @@ impl<'a> TouchPicture<'a> {
         }
         labels.draw(&mut pixels, *size)?;
         self.mark(moment, &mut pixels)?;
-        Ok(pixels)
+        Ok(Picture { size: *size, pixels })
     }
 
     /// Draws the marks of the percepts, and ids.

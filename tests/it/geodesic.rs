@@ -195,17 +195,17 @@ fn real_and_hostile_meshes_are_survived() {
                 (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
             let topology = Topology::new(&corners, &triangles);
             assert_eq!(topology.triangles.len() + topology.flaws.degenerate + topology.flaws.doubled, triangles.len());
-            let Ok(placed) = place_evenly(&topology.positions, &topology.triangles, 120, 1, &mut |_| {}) else {
+            let Ok(placed) = place_evenly(&topology.positions, &topology.triangles, 120, 1, &mut |_| true) else {
                 continue;
             };
             assert_eq!(placed.len(), 120);
             surfaces += 1;
             let area: f64 = placed.iter().map(|placed| placed.point.area).sum();
             let spacing = (area / 120.0).sqrt();
-            let apart = place_apart(&topology.positions, &topology.triangles, spacing, 1, &mut |_| {}).unwrap();
+            let apart = place_apart(&topology.positions, &topology.triangles, spacing, 1, &mut |_| true).unwrap();
             assert!(!apart.is_empty());
             let density = |placed: &somatic::author::Placed| 1.0 + placed.point.normal.y;
-            let _ = place_by_density(&topology.positions, &topology.triangles, 50, 1, density, &mut |_| {});
+            let _ = place_by_density(&topology.positions, &topology.triangles, 50, 1, density, &mut |_| true);
             body.taxels = placed
                 .iter()
                 .zip(0..)

@@ -484,7 +484,7 @@ fn real_and_hostile_meshes_are_grouped_or_named() {
             if corners.iter().any(|p| !p.is_finite()) {
                 continue;
             }
-            let Ok(placed) = place_evenly(&corners, &triangles, 150, 1, &mut |_| {}) else { continue };
+            let Ok(placed) = place_evenly(&corners, &triangles, 150, 1, &mut |_| true) else { continue };
             body.taxels = placed
                 .iter()
                 .zip(0..)

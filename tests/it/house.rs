@@ -37,7 +37,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("page", vec!["error", "percept", "signal", "body", "stage", "scene", "colours"]),
         ("sink", vec!["error", "output", "percept", "signal", "body", "scene", "recording", "page"]),
         ("ink", vec!["error"]),
-        ("picture", vec!["error", "percept", "body", "field", "backend", "ink", "colours"]),
+        ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
         ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
     ])

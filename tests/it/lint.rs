@@ -242,7 +242,7 @@ fn the_far_side_of_a_sheet_is_not_seen() {
 fn twenty_thousand_taxels_are_looked_at_in_time() {
     let mut plate = Plate::flat();
     let positions: Vec<DVec3> = plate.mesh.positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect();
-    let placed = place_evenly(&positions, &plate.mesh.triangles, 20_000, 1, &mut |_| {}).unwrap();
+    let placed = place_evenly(&positions, &plate.mesh.triangles, 20_000, 1, &mut |_| true).unwrap();
     let model = plate.taxels[0].clone();
     let taxel = |(id, placed): (u32, &Placed)| Taxel { id, position_in_link: placed.point.position, ..model.clone() };
     plate.taxels = (0..).zip(&placed).map(taxel).collect();

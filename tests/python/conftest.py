@@ -41,6 +41,23 @@ def somatic(command: pathlib.Path):
     return run
 
 
+def without_gpu(error: st.SomaticError) -> None:
+    """Skips a test of the GPU where there is none, unless there must be one."""
+    if os.environ.get("SOMATIC_REQUIRE_GPU") == "1":
+        pytest.fail(f"SOMATIC_REQUIRE_GPU is set: {error}")
+    pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def gpu() -> str:
+    """The backend of that name, where it works."""
+    try:
+        return st.Engine(st.Body.bundled("hand"), backend="gpu").backend
+    except st.SomaticError as error:
+        without_gpu(error)
+        raise
+
+
 @pytest.fixture
 def hand() -> st.Body:
     return st.Body.bundled("hand")

@@ -52,7 +52,11 @@ def compare(p: st.Percepts, text: str) -> int:
     return compared
 
 
-@pytest.mark.parametrize("backend", ["reference", "cpu"])
+@pytest.fixture(params=["reference", "cpu", "gpu"])
+def backend(request) -> str:
+    return request.getfixturevalue("gpu") if request.param == "gpu" else request.param
+
+
 def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
     text = somatic("run", "--quiet", "--backend", backend, "--outputs", ",".join(ALL), "--all-fields", "--sink", "-")
     p = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
@@ -66,7 +70,6 @@ def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
         compare(changed, text)
 
 
-@pytest.mark.parametrize("backend", ["reference", "cpu"])
 def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     mat = st.Body.grid(13, 7, 0.01, name="sheet", regions=(3, 2))
     mat.save(tmp_path / "sheet.glb")
@@ -85,7 +88,6 @@ def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     assert np.array_equal(read.values, values) and np.array_equal(read.t, t)
 
 
-@pytest.mark.parametrize("backend", ["reference", "cpu"])
 def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     grasps = sorted((DATA / "recordings" / "icub_grasp").glob("*.csv"))
     if not grasps:
@@ -106,7 +108,6 @@ def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     assert compared > 500
 
 
-@pytest.mark.parametrize("backend", ["reference", "cpu"])
 def test_percepts_do_not_depend_on_the_cut(touch: st.Recording, backend: str) -> None:
     whole = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
     for cut in (1, 7, 64):

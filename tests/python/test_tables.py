@@ -179,6 +179,8 @@ def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
     somatic("author", "humanoid", "--taxels", 200, "--seed", 3, "-o", tmp_path / "skin.glb")
     skin.save(tmp_path / "mine.glb")
     assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "skin.glb").read_bytes()
+    again = st.Body.load(tmp_path / "mine.glb")
+    assert np.array_equal(again.taxels, skin.taxels) and list(again.fields) == list(skin.fields) and again.links == skin.links
     shares: list[float] = []
     st.author("hand", spacing="6 mm", progress=shares.append)
     assert shares and 0 <= min(shares) <= max(shares) <= 1

@@ -1,0 +1,129 @@
+//! What `render` draws, by the command's own renderer.
+
+use pyo3::prelude::*;
+use somatic::field::FieldSet;
+use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPicture, View};
+use somatic::scene::{Coordinates, choose_fields};
+use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
+
+use crate::arrays::{array, values};
+use crate::error::{OrRaise, interrupted};
+use crate::picture::{PyPicture, Wish};
+use crate::recording::PyRecording;
+use crate::threads::free;
+
+/// Frames that are computed until Ctrl-C is heard.
+const FRAMES_BETWEEN: usize = 1 << 8;
+
+pub(crate) fn draw(py: Python<'_>, wish: Wish<'_>) -> PyResult<PyPicture> {
+    let mut raised = None;
+    let times = match (wish.at_s, wish.from_s, wish.to_s) {
+        (Some(t_s), ..) => Times::At(t_s),
+        (None, None, None) => Times::MostPressed,
+        (None, from_s, to_s) => Times::Span {
+            from_s: from_s.unwrap_or(f64::NEG_INFINITY),
+            to_s: to_s.unwrap_or(f64::INFINITY),
+            rate_hz: wish.rate_hz,
+        },
+    };
+    let read = wish.recording.map(|recording| Read::of(py, recording)).transpose()?;
+    let drawn = free(py, || {
+        let pictures = wish.pictures(read.as_ref(), times, &mut raised)?;
+        let png = Picture::animation(&pictures, times.picture_s())?;
+        Ok::<_, Error>((pictures, png))
+    });
+    let (pictures, png) = match drawn {
+        Err(_) if raised.is_some() => return Err(interrupted(raised)),
+        drawn => drawn.or_raise(py)?,
+    };
+    let (count, size) = (pictures.len(), pictures.first().map_or([0; 2], |first| first.size));
+    let [width, height] = size.map(|side| side as usize);
+    let opaque =
+        |picture: &Picture| picture.pixels.as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX]).collect();
+    let pixels: Vec<[u8; 4]> = pictures.iter().flat_map::<Vec<[u8; 4]>, _>(opaque).collect();
+    let shape = [count, height, width, 4];
+    let pixels = array(py, pixels.into_flattened(), if count == 1 { &shape[1..] } else { &shape })?;
+    Ok(PyPicture { size, count, pixels, png })
+}
+
+/// A recording's frames, for code without Python's lock.
+struct Read {
+    name: String,
+    taxels: Vec<u32>,
+    t_s: Vec<f64>,
+    values: Vec<somatic::RawValue>,
+}
+
+impl Read {
+    fn of(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
+        let t_s = crate::arrays::times(recording.t.bind(py))?.as_slice()?.to_vec();
+        let shape = [t_s.len(), recording.taxels.len()];
+        let values = values(recording.values.bind(py), None, &shape, "[frames, taxels]")?.slice().to_vec();
+        Ok(Self { name: recording.name.clone(), taxels: recording.taxels.clone(), t_s, values })
+    }
+
+    /// Its frames; an error ends it where Python raised something.
+    fn frames<'a>(&'a self, raised: &'a mut Option<PyErr>) -> impl Iterator<Item = somatic::Result<Frame>> + 'a {
+        let width = self.taxels.len();
+        self.t_s.iter().enumerate().map(move |(index, &t_s)| {
+            if index % FRAMES_BETWEEN == 0 && !goes_on(raised) {
+                return Err(Error::failed("interrupted"));
+            }
+            Ok(Frame { t_s, values: self.values[index * width..][..width].to_vec(), pose: Vec::new() })
+        })
+    }
+}
+
+/// Whether to go on: what Python raises for a signal is kept.
+fn goes_on(raised: &mut Option<PyErr>) -> bool {
+    *raised = Python::attach(|py| py.check_signals()).err();
+    raised.is_none()
+}
+
+impl Wish<'_> {
+    fn pictures(&self, read: Option<&Read>, times: Times, raised: &mut Option<PyErr>) -> somatic::Result<Vec<Picture>> {
+        let body = &*self.body.inner;
+        let mut views = Vec::new();
+        for name in &self.views {
+            match name.as_str() {
+                "all" => views.extend(View::ALL),
+                name => views.push(name.parse().map_err(|e: Error| e.at("views"))?),
+            }
+        }
+        let set = FieldSet::new(body)?;
+        let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
+        let chosen = if self.fields.is_empty() { Vec::new() } else { named(&self.fields)? };
+        let options = Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone() };
+        if let Some(read) = read {
+            let options_of_engine = somatic::Options::default()
+                .scene(Scene::default().outputs(Outputs::USUAL).coordinates(Coordinates::Anchor))
+                .backend(BackendKind::Cpu)
+                .batch(1);
+            let options_of_engine = match self.calibration {
+                Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
+                None => options_of_engine,
+            };
+            let mut engine = Engine::new(body, options_of_engine)?;
+            engine.set_channels(&read.taxels)?;
+            let frames = read.frames(raised);
+            let moments = Moments::of(&mut engine, body, &set.fields, times, &read.name, frames)?;
+            return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
+        }
+        let picture = match &self.uv {
+            None if self.ids => {
+                let pressures = vec![Some(0.0); body.taxels.len()];
+                let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", percepts: &[], t_s: None };
+                TouchPicture::new(body, &set.fields, &options, true)?.draw(&moment)?
+            }
+            None => picture::of_body(body, &set.fields, &options)?,
+            Some(name) => {
+                let charted = match set.fields.iter().position(|field| field.name == *name) {
+                    Some(index) => index,
+                    None => named(std::slice::from_ref(name))?[0],
+                };
+                picture::of_chart(body, &set.fields, charted, &options)?
+            }
+        };
+        Ok(vec![picture])
+    }
+}
