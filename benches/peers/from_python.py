@@ -3,9 +3,9 @@
 
     benches/peers/run --only python [--quick] [--rounds N]
 
-`somatic bench` makes the sensors, the fields and the values, and writes them down; all contestants compute centroids and
-orientations of those, and it is checked that they agree. The Rust call is the one that `somatic bench` measures, in turns with the others. "With columns"
-is what a peer returns too: two arrays by frame and field. "Import" is what `import somatic_touch` adds to `import numpy`
+`somatic bench` makes the sensors, the fields and the values, and writes them down. All contestants compute centroids and orientations of
+those, and must agree. The Rust call is what `somatic bench` measures, in turns with the others. "With columns" is what a peer returns too: two
+arrays by frame and field. The import is timed as what `import somatic_touch` adds to `import numpy` in a process of its own.
 """
 
 from __future__ import annotations
