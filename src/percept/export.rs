@@ -21,7 +21,7 @@ impl Percepts {
         if !self.outputs().contains(column.output) {
             return None;
         }
-        let is_there = |cell: usize| self.present(cell).contains(column.output);
+        let is_there = self.presence_of(column.output);
         let cells = self.frames() * self.fields;
         Some(match (column.store, &self.values) {
             (Store::Active, _) => {
@@ -48,7 +48,7 @@ impl Percepts {
 
     /// By frame and field, whether the quantity of `output` is present.
     pub fn presence(&self, output: Outputs) -> impl ExactSizeIterator<Item = bool> + '_ {
-        (0..self.frames() * self.fields).map(move |cell| self.present(cell).contains(output))
+        (0..self.frames() * self.fields).map(self.presence_of(output))
     }
 
     /// By frame and field, why quantities are absent, or in doubt.
@@ -71,10 +71,28 @@ fn side_by_side<T: Copy>(
     is_there: impl Fn(usize) -> bool,
     absent: T,
 ) -> Vec<T> {
-    let mut values = Vec::with_capacity(cells * parts.len());
-    for cell in 0..cells {
-        let there = is_there(cell);
-        values.extend(parts.iter().map(|&part| if there { kept[part][cell] } else { absent }));
+    match *parts {
+        [a] => rows([a], kept, cells, is_there, absent),
+        [a, b] => rows([a, b], kept, cells, is_there, absent),
+        [a, b, c] => rows([a, b, c], kept, cells, is_there, absent),
+        _ => (0..cells)
+            .flat_map(|cell| {
+                let there = is_there(cell);
+                parts.iter().map(move |&part| if there { kept[part][cell] } else { absent })
+            })
+            .collect(),
     }
-    values
+}
+
+/// [`side_by_side`] of a number of components that the compiler knows: in two thirds of the time.
+fn rows<T: Copy, const N: usize>(
+    parts: [Component; N],
+    kept: &Components<T>,
+    cells: usize,
+    is_there: impl Fn(usize) -> bool,
+    absent: T,
+) -> Vec<T> {
+    let columns = parts.map(|part| &kept[part][..cells]);
+    let row = |cell| if is_there(cell) { columns.map(|column| column[cell]) } else { [absent; N] };
+    (0..cells).map(row).collect::<Vec<[T; N]>>().into_flattened()
 }

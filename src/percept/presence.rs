@@ -26,6 +26,14 @@ impl Percepts {
         Outputs::from_bits_truncate(u64::from(self.present[cell]) | u64::from(high) << LOW)
     }
 
+    /// Whether a cell holds `output`, which is one quantity.
+    pub(super) fn presence_of(&self, output: Outputs) -> impl Fn(usize) -> bool + Copy + '_ {
+        // One of the two words has its bit.
+        let (words, bit) =
+            if output.low() != 0 { (&self.present, output.low()) } else { (&self.present_high, output.high()) };
+        move |cell| words.get(cell).is_some_and(|word| word & bit != 0)
+    }
+
     /// Makes `outputs` what a cell holds.
     pub(crate) fn set_present(&mut self, cell: usize, outputs: Outputs) {
         self.present[cell] = outputs.low();
