@@ -9,6 +9,7 @@ Recordings are CSV, and MCAP that `somatic convert` (--somatic) makes of it. Way
 from __future__ import annotations
 
 import argparse
+import os
 import pathlib
 import shutil
 import statistics
@@ -62,6 +63,8 @@ def main() -> None:
         (kind, f"pool of {workers}"): lambda kind=kind, workers=workers: pool(kind, workers) for kind in paths for workers in (1, 2)
     }
     if asked.ray:
+        # Ray gives its workers way to everything else on the machine; the pool does not.
+        os.environ["RAY_worker_niceness"] = "0"
         import ray
         from ray.cluster_utils import Cluster
 
