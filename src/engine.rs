@@ -166,6 +166,7 @@ impl Engine {
             links: Links {
                 posed: scene.coordinates == Coordinates::World,
                 index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
+                names: body.links.iter().map(|link| link.name.clone()).collect(),
                 parent: body.links.iter().map(|link| link.parent).collect(),
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
             },

@@ -88,6 +88,7 @@ pub mod picture;
 pub mod plot;
 #[cfg(feature = "mcap")]
 pub mod recording;
+pub mod robot;
 pub mod scene;
 pub mod signal;
 pub mod sink;

@@ -40,6 +40,7 @@ class Flags(enum.IntFlag):
     NO_SKIN = 1 << 24
     NOISE_UNKNOWN = 1 << 25
     UNSURE = 1 << 26
+    STALE_POSE = 1 << 27
 
     @classmethod
     def _missing_(cls, value: object) -> object:

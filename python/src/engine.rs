@@ -314,6 +314,7 @@ impl PyEngine {
                 t_s: t_s[index],
                 values: held.slice()[index * self.width..][..self.width].to_vec(),
                 pose: moved.iter().map(|(link, poses)| (link.clone(), poses[index])).collect(),
+                ..Frame::default()
             };
             let frames: Vec<Frame> = (first..t_s.len().min(first + 256)).map(frame).collect();
             let part = self.without_python(py, |inner| inner.engine.process_and_compare(&frames).map(|(_, part)| part));

@@ -88,6 +88,7 @@ impl Run {
             source,
             backend: [&self.backend[0], &self.backend[1], &self.backend[2]],
             wiring: None,
+            ..Session::default()
         }
     }
 }

@@ -17,6 +17,7 @@ impl FilesRead {
     pub(super) fn of(asked: &RunOptions, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
+        let named = named.chain(asked.joints.as_deref()).chain(asked.joint_states.as_deref());
         Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
     }
 

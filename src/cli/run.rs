@@ -152,6 +152,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             (Box::new(source) as Box<dyn Source + Send>, Some(live))
         }
     };
+    let source = asked.jointed(source, &body)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     if asked.backend.unwrap_or_default() == BackendKind::Auto && !asked.quiet {
         let (name, what, why) = engine.backend();
@@ -186,6 +187,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         source: &input.name,
         backend: [backend, &device, settled.why.as_deref().unwrap_or(why)],
         wiring: wiring.as_ref(),
+        ros_time: asked.ros_time.unwrap_or_default(),
     };
     if arguments.describe {
         print(&describe(&sinks, &session, arguments.wide)?)?;

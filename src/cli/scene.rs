@@ -5,23 +5,25 @@ mod calibrated;
 mod check;
 mod deserialize;
 mod flags;
+mod joints;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use somatic::author::mesh::Up;
 use somatic::error::parse_toml;
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
-use somatic::sink::{RecordPart, SinkSpec};
+use somatic::sink::{RecordPart, RosTime, SinkSpec};
 use somatic::source::{SourceSpec, VendorFormat};
 use somatic::{BackendKind, Body, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
 pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
-use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS};
+use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
@@ -44,7 +46,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, page[:HOST:PORT] for browsers, or -
+    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, page[:HOST:PORT] for browsers, or -
     /// for NDJSON on standard output; may be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
@@ -228,6 +230,38 @@ pub(super) struct RunOptions {
     #[serde(rename = "board_rate_hz")]
     pub(super) board_rate: Option<f64>,
 
+    /// The robot's URDF: joint states, which frames carry or --joint-states has, say where links are. Needs --up.
+    #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
+    pub(super) joints: Option<PathBuf>,
+
+    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON [default: those in the frames].
+    #[arg(long, help_heading = ROBOT, value_name = "FILE")]
+    pub(super) joint_states: Option<PathBuf>,
+
+    /// The axis that points up in the URDF: z in nearly all. The body's is y, as in glTF.
+    #[arg(long, help_heading = ROBOT, value_parser = one_of::<Up>(Up::WORDS))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = Up::WORDS))]
+    pub(super) up: Option<Up>,
+
+    /// How much later the clock of --joint-states stamps an instant than that of the frames, in seconds [default: 0].
+    #[arg(long, help_heading = ROBOT, value_name = "S", allow_hyphen_values = true)]
+    #[serde(rename = "joints_delay_s")]
+    pub(super) joints_delay: Option<f64>,
+
+    /// The age of a joint's last state from which on positions stay in links, flagged stale_pose, in seconds [default:
+    /// 0.1].
+    #[arg(long, help_heading = ROBOT, value_name = "S")]
+    #[serde(rename = "joints_max_age_s")]
+    pub(super) joints_max_age: Option<f64>,
+
+    /// The times of ROS messages: those of the frames (recording), or this computer's when the first frame comes and as the
+    /// frames go on (wall) [default: recording].
+    #[arg(long, help_heading = ROBOT, value_name = "TIME", value_parser = one_of::<RosTime>(RosTime::WORDS))]
+    #[serde(deserialize_with = "word")]
+    #[schemars(with = "Option<String>", extend("enum" = RosTime::WORDS))]
+    pub(super) ros_time: Option<RosTime>,
+
     #[command(flatten)]
     #[schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")]
     pub(super) accuracy: Accuracy,
@@ -294,6 +328,8 @@ impl RunOptions {
         asked.calibration = asked.calibration.map(|file| folder.join(file));
         asked.wiring = asked.wiring.map(|file| folder.join(file));
         asked.layout = asked.layout.map(|file| folder.join(file));
+        asked.joints = asked.joints.map(|file| folder.join(file));
+        asked.joint_states = asked.joint_states.map(|file| folder.join(file));
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
@@ -314,6 +350,7 @@ impl RunOptions {
                 SinkSpec::Csv(file) => *sink = format!("csv:{}", there(&file)),
                 SinkSpec::Parquet(file) => *sink = format!("parquet:{}", there(&file)),
                 SinkSpec::Mcap(file) => *sink = format!("mcap:{}", there(&file)),
+                SinkSpec::Ros2Mcap(folder) => *sink = format!("ros2-mcap:{}", there(&folder)),
                 _ => {}
             }
         }
@@ -335,7 +372,7 @@ impl RunOptions {
             };
         }
         let asked = merged! {
-            values: body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
+            values: ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
                 coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet

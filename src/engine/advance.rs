@@ -7,7 +7,7 @@ use super::Engine;
 use super::cadence::step;
 use super::check::Check;
 use super::input::{GoOn, Input};
-use super::post::{Post, flag_stale};
+use super::post::{Post, flag_stale, flag_stale_poses};
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
 use crate::signal::RawValue;
@@ -55,6 +55,7 @@ impl Engine {
         }
         for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
             flag_stale(&self.plan, self.intake.stale(), percepts);
+            flag_stale_poses(&self.links, frames, percepts);
         }
         self.frames_done += frames.len() as u64;
         Ok(true)

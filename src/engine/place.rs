@@ -23,6 +23,7 @@ pub(super) struct Links {
     /// Whether poses are heeded.
     pub(super) posed: bool,
     pub(super) index_of: HashMap<String, usize>,
+    pub(super) names: Vec<String>,
     pub(super) parent: Vec<Option<usize>>,
     pub(super) world_from_link: Vec<DAffine3>,
 }
@@ -154,7 +155,7 @@ impl Links {
     fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
         let mut at = Some(link);
         while let Some(ancestor) = at {
-            let posed = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&ancestor));
+            let posed = frame.pose.iter().find(|(name, _)| *name == self.names[ancestor]);
             if let Some((_, pose)) = posed {
                 let world_from_ancestor = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
                 let ancestor_from_link = self.world_from_link[ancestor].inverse() * self.world_from_link[link];

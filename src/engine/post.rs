@@ -64,6 +64,18 @@ pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Perce
     }
 }
 
+/// Flags the touched fields of `frames` whose poses are missing because joints are late, where poses are heeded.
+pub(super) fn flag_stale_poses(links: &Links, frames: &[Frame], percepts: &mut Percepts) {
+    let fields = percepts.fields();
+    for (frame, _) in frames.iter().enumerate().filter(|(_, frame)| links.posed && frame.has_stale_pose) {
+        for flags in &mut percepts.flags[frame * fields..][..fields] {
+            if !flags.contains(Flags::NO_CONTACT) {
+                *flags |= Flags::STALE_POSE;
+            }
+        }
+    }
+}
+
 impl Post<'_> {
     /// Puts the centroids of `frames`, which stand in `percepts` from frame `first` on, on the skin, where that is wanted.
     pub(super) fn place(&self, frames: &[Frame], first: usize, percepts: &mut Percepts) {

@@ -173,7 +173,7 @@ impl Shape {
         let mut random = Random::new(!self.seed);
         let mut value = || RawValue::new(FULL * (1.0 - random.unit()));
         let frame = |index| (index as f64 * STEP_S, (0..self.sensors).map(|_| value()).collect());
-        (0..self.frames).map(frame).map(|(t_s, values)| Frame { t_s, values, pose: Vec::new() }).collect()
+        (0..self.frames).map(frame).map(|(t_s, values)| Frame { t_s, values, ..Frame::default() }).collect()
     }
 
     /// Moves `frames` on in time by a call, so that the next call goes on where the one before ended.

@@ -137,7 +137,7 @@ impl Series {
             for (signal, frames) in Signal::ALL.iter().zip(&mut self.signals) {
                 let values = counts.iter().map(|&counts| RawValue::new(signal.value(counts))).collect();
                 let t_s = frame.t_s + f64::from(self.runs) * BETWEEN_RUNS_S;
-                frames.push(Frame { t_s, values, pose: Vec::new() });
+                frames.push(Frame { t_s, values, ..Frame::default() });
             }
             let forces_newton = source.forces_newton().to_vec();
             let truth = source.truth().first().cloned();

@@ -113,7 +113,7 @@ impl Bench {
 
     fn frame(&self, t_s: f64, values: [f64; 5]) -> Frame {
         let value = |value: f64| if value == -9.0 { RawValue::STALE } else { RawValue::new(value) };
-        Frame { t_s, values: values.map(value).to_vec(), pose: Vec::new() }
+        Frame { t_s, values: values.map(value).to_vec(), ..Frame::default() }
     }
 
     /// Through the engine, and over to the server's side.
@@ -227,6 +227,7 @@ fn book() -> Book {
         t_s: 0.07,
         values: vec![RawValue::MISSING, RawValue::FAULTY, RawValue::STALE, RawValue::new(3.0), RawValue::new(1.0)],
         pose: vec![("arm".to_owned(), pose)],
+        ..Frame::default()
     };
     bench.process(&[posed]);
     add_frame(&mut book, &mut bench, &mut viewer, "posed, and what is wrong with taxels");

@@ -67,6 +67,8 @@ bitflags! {
         const NOISE_UNKNOWN = 1 << 25;
         /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.
         const UNSURE = 1 << 26;
+        /// The states of the joints that move the field are missing or too old: its position and normal are in the link.
+        const STALE_POSE = 1 << 27;
     }
 }
 

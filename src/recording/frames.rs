@@ -24,6 +24,19 @@ pub(super) struct FrameMessage {
     poses: Vec<LinkPose>,
     #[prost(uint32, repeated, tag = "6")]
     stale: Vec<u32>,
+    #[prost(message, repeated, tag = "7")]
+    joints: Vec<JointPosition>,
+    #[prost(bool, tag = "8")]
+    has_stale_pose: bool,
+}
+
+/// `somatic.JointPosition`.
+#[derive(Clone, PartialEq, prost::Message)]
+struct JointPosition {
+    #[prost(string, tag = "1")]
+    joint: String,
+    #[prost(double, tag = "2")]
+    position: f64,
 }
 
 /// `somatic.LinkPose`.
@@ -50,7 +63,11 @@ pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
         pose: vec![p.x, p.y, p.z, q.x, q.y, q.z, q.w],
     };
     let poses = frame.pose.iter().map(pose).collect();
-    let mut message = FrameMessage { t: Some(frame.t_s), poses, stale, ..FrameMessage::default() };
+    let joint = |(joint, position): &(String, f64)| JointPosition { joint: joint.clone(), position: *position };
+    let joints = frame.joints.iter().map(joint).collect();
+    let has_stale_pose = frame.has_stale_pose;
+    let mut message =
+        FrameMessage { t: Some(frame.t_s), poses, stale, joints, has_stale_pose, ..FrameMessage::default() };
     let bytes = if 2 * missing.len() > values.len() {
         message.present = indices(false);
         let present = values.iter().filter(|value| !value.is_missing());
@@ -127,6 +144,14 @@ impl FrameMessage {
             let pose = Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw) };
             frame.pose.push((link.clone(), pose));
         }
+        frame.joints.clear();
+        for JointPosition { joint, position } in &self.joints {
+            if !position.is_finite() {
+                return None;
+            }
+            frame.joints.push((joint.clone(), *position));
+        }
+        frame.has_stale_pose = self.has_stale_pose;
         Some(())
     }
 }
@@ -154,11 +179,9 @@ mod tests {
         let pose = ("[a-z/é]{0,9}", prop::array::uniform7(-1e3..1e3_f64)).prop_map(|(link, [x, y, z, a, b, c, d])| {
             (link, Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(a, b, c, d) })
         });
-        (-1e12..1e12_f64, values, prop::collection::vec(pose, 0..3)).prop_map(|(t_s, values, pose)| Frame {
-            t_s,
-            values,
-            pose,
-        })
+        let joints = prop::collection::vec(("[a-z]{0,9}", -9.0..9.0_f64), 0..3);
+        (-1e12..1e12_f64, values, prop::collection::vec(pose, 0..3), joints, any::<bool>())
+            .prop_map(|(t_s, values, pose, joints, has_stale_pose)| Frame { t_s, values, pose, joints, has_stale_pose })
     }
 
     proptest! {

@@ -3,6 +3,7 @@
 //! `docs/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
 //! read record by record here, so that a damaged one gives what is whole in it and memory stays bounded.
 
+mod bag;
 mod entries;
 mod frames;
 mod percepts;
@@ -15,6 +16,7 @@ mod survey;
 mod unpack;
 mod view;
 
+pub(crate) use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
 pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;

@@ -79,13 +79,14 @@ const ENUMERATIONS: [Enumeration; 3] = [
 ];
 
 /// The messages of [`super::frames`].
-const SOMATIC: [Message; 3] = [
+const SOMATIC: [Message; 4] = [
     (
         "Frame",
         "double t 1; repeated float values 2; repeated uint32 missing 3; repeated uint32 present 4; repeated LinkPose poses 5; \
-         repeated uint32 stale 6",
+         repeated uint32 stale 6; repeated JointPosition joints 7; bool has_stale_pose 8",
     ),
     ("LinkPose", "string link 1; repeated double pose 2"),
+    ("JointPosition", "string joint 1; double position 2"),
     ("Field", "google.protobuf.Timestamp timestamp 1; double total 2; double area 3"),
 ];
 

@@ -110,6 +110,16 @@ pub struct Frame {
     /// Poses of links by name, if the frame has them: world_from_link.
     #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "as_map")]
     pub pose: Vec<(String, Pose)>,
+    /// Positions of joints by name (rad, or m for prismatic ones), if the frame has them.
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "positions_as_map")]
+    pub joints: Vec<(String, f64)>,
+    /// Whether poses are missing because the joints' states are missing or too old.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub has_stale_pose: bool,
+}
+
+fn positions_as_map<S: Serializer>(joints: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(joints.iter().map(|(joint, position)| (joint, position)))
 }
 
 fn as_map<S: Serializer>(pose: &[(String, Pose)], serializer: S) -> Result<S::Ok, S::Error> {
@@ -120,13 +130,15 @@ impl Frame {
     /// A frame at `t_s` in which all of `taxels` values are missing.
     #[must_use]
     pub fn missing(t_s: f64, taxels: usize) -> Self {
-        Self { t_s, values: vec![RawValue::MISSING; taxels], pose: Vec::new() }
+        Self { t_s, values: vec![RawValue::MISSING; taxels], ..Self::default() }
     }
 
-    /// Makes every value missing and drops the pose, keeping the allocations.
+    /// Makes every value missing and drops poses and joints, keeping the allocations.
     pub fn clear(&mut self) {
         self.values.fill(RawValue::MISSING);
         self.pose.clear();
+        self.joints.clear();
+        self.has_stale_pose = false;
     }
 }
 
@@ -138,7 +150,7 @@ mod tests {
     fn a_frame_is_json() {
         let pose = Pose { translation: DVec3::X, rotation: DQuat::IDENTITY };
         let values = vec![RawValue::new(0.1), RawValue::MISSING, RawValue::STALE, RawValue::FAULTY];
-        let frame = Frame { t_s: 0.5, values, pose: vec![("arm".to_owned(), pose)] };
+        let frame = Frame { t_s: 0.5, values, pose: vec![("arm".to_owned(), pose)], ..Frame::default() };
         let expected = r#"{"t":0.5,"values":[0.1,null,"stale","faulty"],"pose":{"arm":[1.0,0.0,0.0,0.0,0.0,0.0,1.0]}}"#;
         assert_eq!(serde_json::to_string(&frame).unwrap(), expected);
     }

@@ -187,7 +187,7 @@ mod tests {
 
     fn frame(t_s: f64, values: &[Option<f64>]) -> Frame {
         let values = values.iter().map(|v| v.map_or(RawValue::MISSING, RawValue::new)).collect();
-        Frame { t_s, values, pose: Vec::new() }
+        Frame { t_s, values, ..Frame::default() }
     }
 
     fn take(intake: &mut Intake, frame: &Frame) -> Vec<RawValue> {

@@ -9,6 +9,8 @@ mod ndjson;
 mod page;
 #[cfg(feature = "mcap")]
 mod recorded;
+#[cfg(feature = "mcap")]
+mod ros2;
 mod spec;
 mod table;
 #[cfg(feature = "mcap")]
@@ -19,6 +21,8 @@ pub use ndjson::NdjsonSink;
 pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
+#[cfg(feature = "mcap")]
+pub use ros2::{Ros2BagSink, RosTime};
 pub use spec::{SinkSpec, SinkTarget, TableWish};
 #[cfg(feature = "parquet")]
 pub use table::ParquetSink;
@@ -169,6 +173,9 @@ pub struct Session<'a> {
     pub backend: [&'a str; 3],
     /// Which taxel is on which channel of which board.
     pub wiring: Option<&'a Wiring>,
+    /// Which times messages of ROS have.
+    #[cfg(feature = "mcap")]
+    pub ros_time: RosTime,
 }
 
 /// A part of a recording.

@@ -8,8 +8,7 @@ use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
 use crate::output::{OutputPath, OutputPaths};
 
-const FORMS: &str =
-    "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, page[:HOST:PORT], or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, page[:HOST:PORT], or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,6 +22,8 @@ pub enum SinkSpec {
     Parquet(PathBuf),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
+    /// `ros2-mcap:FOLDER`: a bag of ROS 2.
+    Ros2Mcap(PathBuf),
     /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
     Page(Option<String>),
     /// `-`: NDJSON on standard output.
@@ -42,20 +43,21 @@ impl FromStr for SinkSpec {
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
-            "ndjson" | "csv" | "parquet" | "mcap" if rest.is_empty() => {
+            "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" if rest.is_empty() => {
                 bad(format!("nothing follows `{kind}:`; {FORMS}"))
             }
             "ndjson" => Ok(Self::Ndjson(rest.into())),
             "csv" => Ok(Self::Csv(rest.into())),
             "parquet" => Ok(Self::Parquet(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
+            "ros2-mcap" => Ok(Self::Ros2Mcap(rest.into())),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
             _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
             _ if ending("csv") => Ok(Self::Csv(text.into())),
             _ if ending("parquet") => Ok(Self::Parquet(text.into())),
             _ if ending("mcap") => Ok(Self::Mcap(text.into())),
-            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "page"]) {
+            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "page"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -104,6 +106,16 @@ impl SinkSpec {
                 SinkTarget::Parquet { percepts: outputs.add(path)?, touches: touches_of(path, outputs)? }
             }
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
+            #[cfg(feature = "mcap")]
+            Self::Ros2Mcap(path) => {
+                let file_name = bag_file_name(path);
+                let names = [file_name.as_str(), crate::recording::BAG_METADATA];
+                SinkTarget::Ros2Mcap { folder: outputs.add_folder(path, names)?, file_name }
+            }
+            #[cfg(not(feature = "mcap"))]
+            Self::Ros2Mcap(path) => {
+                return Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(path.display()));
+            }
             Self::Stdout => {
                 outputs.add_standard_output()?;
                 SinkTarget::Stdout
@@ -136,6 +148,14 @@ pub enum SinkTarget {
     },
     /// A recording in MCAP.
     Mcap(OutputPath),
+    /// A bag of ROS 2.
+    #[cfg(feature = "mcap")]
+    Ros2Mcap {
+        /// The bag's folder.
+        folder: crate::output::OutputFolder,
+        /// What its MCAP is called.
+        file_name: String,
+    },
     /// A page for browsers.
     #[cfg(feature = "page")]
     Page(crate::page::Listen),
@@ -177,6 +197,10 @@ impl SinkTarget {
             #[cfg(feature = "page")]
             Self::Page(listen) => Ok(Box::new(super::PageSink::start(&listen, session)?)),
             #[cfg(feature = "mcap")]
+            Self::Ros2Mcap { folder, file_name } => {
+                Ok(Box::new(super::Ros2BagSink::create(folder, &file_name, session)?))
+            }
+            #[cfg(feature = "mcap")]
             Self::Mcap(output) => Ok(Box::new(super::RecordingSink::create(output, session)?)),
             #[cfg(not(feature = "mcap"))]
             Self::Mcap(output) => {
@@ -184,6 +208,13 @@ impl SinkTarget {
             }
         }
     }
+}
+
+/// What the MCAP of the bag at `path` is called: as the folder, with the number that ROS 2 counts files by.
+#[cfg(feature = "mcap")]
+fn bag_file_name(path: &Path) -> String {
+    let stem = path.file_name().map_or_else(|| "bag".to_owned(), |name| name.to_string_lossy().into_owned());
+    format!("{stem}_0.mcap")
 }
 
 #[cfg(test)]
@@ -199,6 +230,8 @@ mod tests {
         assert_eq!(parsed("ndjson:a/b"), SinkSpec::Ndjson("a/b".into()));
         assert_eq!(parsed("a.ndjson"), SinkSpec::Ndjson("a.ndjson".into()));
         assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
+        assert_eq!(parsed("ros2-mcap:bag"), SinkSpec::Ros2Mcap("bag".into()));
+        assert_eq!(bag_file_name(Path::new("some/bag")), "bag_0.mcap");
         let why = |text: &str| {
             let error = text.parse::<SinkSpec>().unwrap_err();
             assert!(error.is_usage());

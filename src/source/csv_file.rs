@@ -82,7 +82,7 @@ mod tests {
             let ids: Vec<u32> = (0..values.len() as u32).collect();
             let mut values: Vec<RawValue> = values.into_iter().map(|value| RawValue::new(value.into())).collect();
             values[0] = RawValue::MISSING;
-            let frame = Frame { t_s, values, pose: Vec::new() };
+            let frame = Frame { t_s, values, ..Frame::default() };
             let mut file = CsvFile::create(OutputPath::new(&path, false, &[]).unwrap(), &ids).unwrap();
             file.frame(&frame).unwrap();
             file.finish().unwrap();

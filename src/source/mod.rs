@@ -4,6 +4,7 @@
 
 mod csv;
 mod csv_file;
+mod joint_states;
 mod ndjson;
 #[cfg(feature = "serial")]
 mod ports;
@@ -19,6 +20,7 @@ mod vendor;
 
 pub use self::csv::CsvSource;
 pub use csv_file::CsvFile;
+pub use joint_states::{JointPosition, JointStates};
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "serial")]
 pub use ports::{PortSummary, serial_ports};

@@ -1,5 +1,5 @@
 //! Live frames as NDJSON, one line each:
-//! `{"t":s,"values":{"<taxel id>":raw},"pose":{"<link>":[x,y,z,qx,qy,qz,qw]}}`.
+//! `{"t":s,"values":{"<taxel id>":raw},"pose":{"<link>":[x,y,z,qx,qy,qz,qw]},"joints":{"<joint>":position}}`.
 //!
 //! A taxel that is absent or `null` is missing; `"nan"` and `"inf"` are faulty values. A taxel that the body does not
 //! have is named once, and its values are skipped and counted. Lines are parsed directly into the frame.
@@ -183,7 +183,7 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        let (mut has_time, mut has_values, mut has_pose) = (false, false, false);
+        let (mut has_time, mut has_values, mut has_pose, mut has_joints) = (false, false, false, false);
         while let Some(key) = map.next_key_seed(Parse(KeyVisitor))? {
             let seen = match key {
                 Key::Time => {
@@ -198,6 +198,10 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
                 Key::Pose => {
                     map.next_value_seed(Parse(PosesVisitor { poses: &mut self.frame.pose }))?;
                     &mut has_pose
+                }
+                Key::Joints => {
+                    map.next_value_seed(Parse(JointsVisitor { joints: &mut self.frame.joints }))?;
+                    &mut has_joints
                 }
             };
             if std::mem::replace(seen, true) {
@@ -216,6 +220,7 @@ enum Key {
     Time,
     Values,
     Pose,
+    Joints,
 }
 
 impl fmt::Display for Key {
@@ -224,6 +229,7 @@ impl fmt::Display for Key {
             Self::Time => "t",
             Self::Values => "values",
             Self::Pose => "pose",
+            Self::Joints => "joints",
         })
     }
 }
@@ -234,7 +240,7 @@ impl Visitor<'_> for KeyVisitor {
     type Value = Key;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("`t`, `values` or `pose`")
+        f.write_str("`t`, `values`, `pose` or `joints`")
     }
 
     fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<Key, E> {
@@ -242,7 +248,10 @@ impl Visitor<'_> for KeyVisitor {
             "t" => Ok(Key::Time),
             "values" => Ok(Key::Values),
             "pose" => Ok(Key::Pose),
-            other => Err(E::custom(format!("a frame has no `{other}`; its keys are `t`, `values` and `pose`"))),
+            "joints" => Ok(Key::Joints),
+            other => {
+                Err(E::custom(format!("a frame has no `{other}`; its keys are `t`, `values`, `pose` and `joints`")))
+            }
         }
     }
 }
@@ -359,6 +368,32 @@ impl<'de> Visitor<'de> for PosesVisitor<'_> {
     }
 }
 
+struct JointsVisitor<'a> {
+    joints: &'a mut Vec<(String, f64)>,
+}
+
+impl<'de> Visitor<'de> for JointsVisitor<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("positions by joint, {\"<joint>\":number}")
+    }
+
+    fn visit_unit<E>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some((joint, position)) = map.next_entry::<String, f64>()? {
+            if self.joints.iter().any(|(known, _)| *known == joint) {
+                return Err(A::Error::custom(format!("joint `{joint}` appears twice; give it once")));
+            }
+            self.joints.push((joint, position));
+        }
+        Ok(())
+    }
+}
+
 struct PoseVisitor<'a> {
     link: &'a str,
 }
@@ -446,6 +481,17 @@ mod tests {
         assert!(pose("1,2,3,0,0,0,1e4").contains("length 1e4"));
         assert!(pose("1,2,3,0,0,0,null").contains("null"));
         assert!(why("{\"t\":0,\"pose\":{\"a\":[0,0,0,0,0,0,1],\"a\":[0,0,0,0,0,0,1]}}\n").contains("twice"));
+    }
+
+    #[test]
+    fn a_frame_may_carry_joints() {
+        let (frames, _) =
+            read("{\"t\":0,\"joints\":{\"wrist\":0.5,\"slide\":-1}}\n{\"t\":1,\"joints\":null}\n").unwrap();
+        assert_eq!(frames[0].joints, [("wrist".to_owned(), 0.5), ("slide".to_owned(), -1.0)]);
+        assert!(frames[1].joints.is_empty());
+        assert!(why("{\"t\":0,\"joints\":{\"a\":1,\"a\":1}}\n").contains("joint `a` appears twice"));
+        assert!(why("{\"t\":0,\"joints\":[1]}\n").contains("positions by joint"));
+        assert!(why("{\"t\":0,\"joints\":{\"a\":null}}\n").contains("line 1"));
     }
 
     #[test]

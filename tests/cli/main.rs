@@ -27,6 +27,8 @@ mod random;
 mod recording;
 #[cfg(feature = "gpu")]
 mod render;
+mod robots;
+mod ros2;
 mod run;
 #[cfg(unix)]
 mod serial;

@@ -603,7 +603,7 @@ fn what_is_stale_is_stale_in_a_recording() {
             39 => RawValue::MISSING,
             _ => RawValue::new((index * 7 + value) as f64),
         };
-        Frame { t_s: index as f64 / 50.0, values: (0..ids.len()).map(value).collect(), pose: Vec::new() }
+        Frame { t_s: index as f64 / 50.0, values: (0..ids.len()).map(value).collect(), ..Frame::default() }
     };
     let kept: Vec<Frame> = (0..300).map(frames_of).collect();
     kept.iter().for_each(|frame| recorder.frame(frame).unwrap());

@@ -156,7 +156,7 @@ fn percepts_do_not_depend_on_the_order_of_channels() {
     let mixed_ids: Vec<u32> = order.iter().map(|&i| ids[i]).collect();
     let mixed: Vec<Frame> = frames
         .iter()
-        .map(|f| Frame { t_s: f.t_s, values: order.iter().map(|&i| f.values[i]).collect(), pose: Vec::new() })
+        .map(|f| Frame { t_s: f.t_s, values: order.iter().map(|&i| f.values[i]).collect(), ..Frame::default() })
         .collect();
     for kind in backends() {
         let straight = run(&body, kind, &frames, 10, None);

@@ -150,5 +150,5 @@ pub fn engine(body: &Body, kind: BackendKind) -> Engine {
 }
 
 pub fn frame(t_s: f64, values: &[f64]) -> Frame {
-    Frame { t_s, values: values.iter().map(|&v| RawValue::new(v)).collect(), pose: Vec::new() }
+    Frame { t_s, values: values.iter().map(|&v| RawValue::new(v)).collect(), ..Frame::default() }
 }

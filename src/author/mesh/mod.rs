@@ -19,9 +19,13 @@ pub use options::{Geometry, MeshOptions, Up};
 pub use urdf_skin::author_urdf_skin;
 pub use urdf_text::urdf_of_skin;
 
+pub(crate) use options::y_up_from;
+pub(crate) use urdf::order;
+pub(crate) use urdf_file::{JointMotion, Robot, RobotJoint};
+
 use std::path::{Path, PathBuf};
 
-use self::options::{ending, y_up_from};
+use self::options::ending;
 
 use crate::body::{Glb, Original};
 use crate::error::{Error, Result};
@@ -40,7 +44,7 @@ pub fn is_mesh(path: &Path) -> bool {
 pub fn files(path: &Path, options: &MeshOptions) -> Vec<PathBuf> {
     let mut files = vec![path.to_owned()];
     if ending(path) == "urdf"
-        && let Ok(robot) = urdf_file::Robot::load(path, options)
+        && let Ok(robot) = Robot::load(path, options)
     {
         files.extend(robot.mesh_files());
     }

@@ -7,13 +7,14 @@ use glam::{DAffine3, DQuat};
 
 use crate::error::{Result, failed};
 
-/// The axis that points up in a mesh's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// y, as in glTF.
-    Y,
-    /// z, as in URDF and most CAD programs.
-    Z,
+words! {"axis that points up",
+    /// The axis that points up in a mesh's file.
+    Up {
+        /// y, as in glTF.
+        Y = "y",
+        /// z, as in URDF and most CAD programs.
+        Z = "z",
+    }
 }
 
 /// The geometry of a URDF that taxels are put on.
@@ -51,7 +52,7 @@ pub(super) fn check_unit(metres: f64) -> Result<f64> {
 }
 
 /// Turns what points up in a file to y.
-pub(super) fn y_up_from(up: Up) -> DAffine3 {
+pub(crate) fn y_up_from(up: Up) -> DAffine3 {
     match up {
         Up::Y => DAffine3::IDENTITY,
         Up::Z => DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),

@@ -7,7 +7,7 @@ use glam::DAffine3;
 
 use super::options::{MeshOptions, Up, y_up_from};
 use super::triangles::Triangles;
-use super::urdf_file::{Robot, RobotLink, ShapeKind};
+use super::urdf_file::{Robot, RobotJoint, RobotLink, ShapeKind};
 use super::{formats, shapes};
 use crate::body::Glb;
 use crate::error::{Error, Result, failed};
@@ -63,7 +63,7 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<(Glb, Triangles, BTreeMap<S
 }
 
 /// The links, a parent before its children, each with the joint to its parent.
-fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&super::urdf_file::RobotJoint>)>> {
+pub(crate) fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint>)>> {
     let mut names = BTreeSet::new();
     for link in &robot.links {
         if !names.insert(link.name.as_str()) {

@@ -10,16 +10,16 @@ use crate::error::{Error, Result, failed};
 
 /// The parts of a URDF that make its shape.
 #[derive(Debug)]
-pub(super) struct Robot {
-    pub(super) links: Vec<RobotLink>,
-    pub(super) joints: Vec<RobotJoint>,
+pub(crate) struct Robot {
+    pub(crate) links: Vec<RobotLink>,
+    pub(crate) joints: Vec<RobotJoint>,
     /// Its tactile sensors, by the extension `<sensor><tactile>`.
     pub(super) sensors: Vec<RobotSensor>,
 }
 
 #[derive(Debug)]
-pub(super) struct RobotLink {
-    pub(super) name: String,
+pub(crate) struct RobotLink {
+    pub(crate) name: String,
     pub(super) shapes: Vec<Shape>,
 }
 
@@ -40,12 +40,40 @@ pub(super) enum ShapeKind {
 }
 
 #[derive(Debug)]
-pub(super) struct RobotJoint {
-    pub(super) parent: String,
-    pub(super) child: String,
+pub(crate) struct RobotJoint {
+    pub(crate) name: String,
+    pub(crate) parent: String,
+    pub(crate) child: String,
     /// At rest.
-    pub(super) parent_from_child: DAffine3,
-    pub(super) line: u32,
+    pub(crate) parent_from_child: DAffine3,
+    pub(crate) motion: JointMotion,
+    /// The joint that it follows, if any.
+    pub(crate) mimic: Option<JointMimic>,
+    pub(crate) line: u32,
+}
+
+/// How a joint moves its child, along or around a unit axis in the child's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum JointMotion {
+    Fixed,
+    /// `continuous` joints have no limits.
+    Revolute {
+        axis: DVec3,
+        is_continuous: bool,
+    },
+    Prismatic {
+        axis: DVec3,
+    },
+    /// `floating` and `planar`: more than one number says where the child is.
+    Free,
+}
+
+/// `<mimic>`: a joint's position is `multiplier` · that of `joint` + `offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct JointMimic {
+    pub(crate) joint: String,
+    pub(crate) multiplier: f64,
+    pub(crate) offset: f64,
 }
 
 /// A tactile sensor: taxels on a link.
@@ -77,10 +105,24 @@ impl Robot {
     ///
     /// # Errors
     /// It is no URDF, or a xacro, or names a package that is not given; with the line.
-    pub(super) fn load(path: &Path, options: &MeshOptions) -> Result<Self> {
+    pub(crate) fn load(path: &Path, options: &MeshOptions) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
         let read = Reader { folder: path.parent().unwrap_or(Path::new("")), options, text: &text };
         read.robot(path).map_err(|e| e.at(path.display()))
+    }
+
+    /// Reads links and joints alone of the URDF at `path`.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub(crate) fn load_joints(path: &Path) -> Result<Self> {
+        Self::load(path, &MeshOptions { geometry: Geometry::None, ..MeshOptions::default() })
+    }
+
+    /// The same of a URDF in `text`.
+    pub(crate) fn joints_of(text: &str) -> Result<Self> {
+        let options = MeshOptions { geometry: Geometry::None, ..MeshOptions::default() };
+        Reader { folder: Path::new(""), options: &options, text }.robot(Path::new(""))
     }
 
     /// The meshes that it names.
@@ -183,10 +225,57 @@ impl Reader<'_> {
     fn joint(&self, node: Node<'_, '_>) -> Result<RobotJoint> {
         let link = |tag: &str| self.child(node, tag).and_then(|child| self.attribute(child, "link").map(str::to_owned));
         Ok(RobotJoint {
+            name: node.attribute("name").unwrap_or_default().to_owned(),
             parent: link("parent")?,
             child: link("child")?,
             parent_from_child: self.origin(node)?,
+            motion: self.motion(node)?,
+            mimic: node
+                .children()
+                .find(|child| child.has_tag_name("mimic"))
+                .map(|node| self.mimic(node))
+                .transpose()?,
             line: self.line(node),
+        })
+    }
+
+    fn motion(&self, node: Node<'_, '_>) -> Result<JointMotion> {
+        let axis = || {
+            let own = node.children().find(|child| child.has_tag_name("axis")).map(|axis| {
+                let text = self.attribute(axis, "xyz")?;
+                let unit = self.vector(axis, "xyz", text)?.try_normalize();
+                unit.ok_or_else(|| self.at(axis, format!("the axis `{text}` has no direction")))
+            });
+            own.unwrap_or(Ok(DVec3::X))
+        };
+        // Authoring needs no type; kinematics then does not know how the child moves.
+        match node.attribute("type").unwrap_or("floating") {
+            "fixed" => Ok(JointMotion::Fixed),
+            "revolute" => Ok(JointMotion::Revolute { axis: axis()?, is_continuous: false }),
+            "continuous" => Ok(JointMotion::Revolute { axis: axis()?, is_continuous: true }),
+            "prismatic" => Ok(JointMotion::Prismatic { axis: axis()? }),
+            "floating" | "planar" => Ok(JointMotion::Free),
+            other => Err(self.at(
+                node,
+                format!(
+                    "a joint of type `{other}`; a URDF has fixed, revolute, continuous, prismatic, floating and planar"
+                ),
+            )),
+        }
+    }
+
+    fn mimic(&self, node: Node<'_, '_>) -> Result<JointMimic> {
+        let number = |name: &str, usual: f64| match node.attribute(name) {
+            None => Ok(usual),
+            Some(text) => {
+                let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+                number.ok_or_else(|| self.at(node, format!("`{name}` is `{text}`; write a number")))
+            }
+        };
+        Ok(JointMimic {
+            joint: self.attribute(node, "joint")?.to_owned(),
+            multiplier: number("multiplier", 1.0)?,
+            offset: number("offset", 0.0)?,
         })
     }
 

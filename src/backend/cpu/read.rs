@@ -258,7 +258,7 @@ mod tests {
                 .map(|frame| Frame {
                     t_s: 0.0,
                     values: (0..channels + 9).map(|place| value(frame, place)).collect(),
-                    pose: Vec::new(),
+                    ..Frame::default()
                 })
                 .collect();
             let backwards: Vec<u32> = (0..channels as u32).rev().collect();

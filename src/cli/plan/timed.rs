@@ -19,7 +19,7 @@ pub(in crate::cli) fn pressed(taxels: usize, batch: usize) -> Vec<Frame> {
     let frames = batch.max((VALUES / taxels.max(1)).clamp(2, 64));
     let value = |index: usize, frame: usize| RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64);
     let values = |frame| (0..taxels).map(|index| value(index, frame)).collect();
-    let frame = |frame: usize| Frame { t_s: frame as f64 * 0.01, values: values(frame), pose: Vec::new() };
+    let frame = |frame: usize| Frame { t_s: frame as f64 * 0.01, values: values(frame), ..Frame::default() };
     (0..frames).map(frame).collect()
 }
 

@@ -10,6 +10,7 @@ use somatic::Error;
 pub(super) const COMPUTED: &str = "What is computed";
 pub(super) const RECORDINGS: &str = "Recordings";
 pub(in crate::cli) const LIVE: &str = "Live";
+pub(super) const ROBOT: &str = "Robot";
 pub(super) const ACCURACY: &str = "Accuracy and speed";
 pub(super) const OUTPUT: &str = "Output";
 

@@ -1,0 +1,73 @@
+//! Joints that move the body's links.
+
+use somatic::robot::{JointOptions, JointedSource, Kinematics};
+use somatic::source::{JointStates, Source};
+use somatic::{Body, Error, Result};
+
+use super::RunOptions;
+use crate::cli::stdio::say;
+
+impl RunOptions {
+    pub(super) fn check_joints(&self) -> Result<()> {
+        let refuse = |what: &str| Err(Error::usage(what));
+        let given = [
+            ("--joint-states", self.joint_states.is_some()),
+            ("--up", self.up.is_some()),
+            ("--joints-delay", self.joints_delay.is_some()),
+            ("--joints-max-age", self.joints_max_age.is_some()),
+        ];
+        if self.joints.is_none() {
+            return match given.into_iter().find(|(_, given)| *given) {
+                Some((flag, _)) => {
+                    Err(Error::usage(format!("{flag} is for a robot's joints; add --joints robot.urdf")))
+                }
+                None => Ok(()),
+            };
+        }
+        if self.up.is_none() {
+            return refuse("--joints needs to know which axis points up in the URDF; add --up z, or --up y");
+        }
+        if self.joint_states.is_none() && self.sources != ["-"] && !self.sources.iter().any(|s| is_mcap(s)) {
+            return refuse(
+                "frames of this source carry no joint states; give a recording of them: --joint-states FILE, a CSV under \
+                 t,<joint>,... or NDJSON",
+            );
+        }
+        if self.joint_states.is_some() && self.repeat.is_some() {
+            return refuse("--loop lets the time of frames go on, and --joint-states ends; leave one of them out");
+        }
+        if self.joints_delay.is_some() && self.joint_states.is_none() {
+            return refuse("--joints-delay is for --joint-states; states in frames have the frame's own time");
+        }
+        if let Some(delay) = self.joints_delay.filter(|delay| !delay.is_finite()) {
+            return Err(Error::usage(format!("--joints-delay {delay} is not a time span; give seconds")));
+        }
+        if let Some(age) = self.joints_max_age.filter(|age| age.is_nan() || *age < 0.0) {
+            return Err(Error::usage(format!("--joints-max-age {age} is not a time span; give seconds from 0")));
+        }
+        Ok(())
+    }
+
+    /// `source`, with poses of the links of `body` where joints are asked for.
+    pub(in crate::cli) fn jointed(
+        &self,
+        source: Box<dyn Source + Send>,
+        body: &Body,
+    ) -> Result<Box<dyn Source + Send>> {
+        let (Some(urdf), Some(up)) = (&self.joints, self.up) else { return Ok(source) };
+        let robot = Kinematics::load(urdf)?;
+        let mut options = JointOptions::new(up);
+        options.states = self.joint_states.as_ref().map(JointStates::open).transpose()?;
+        options.delay_s = self.joints_delay.unwrap_or(options.delay_s);
+        options.max_age_s = self.joints_max_age.unwrap_or(options.max_age_s);
+        let jointed = JointedSource::new(source, robot, body, options).map_err(|e| e.at(urdf.display()))?;
+        if !self.quiet {
+            say(&format!("{}: {}", urdf.display(), jointed.summary()));
+        }
+        Ok(Box::new(jointed))
+    }
+}
+
+fn is_mcap(source: &str) -> bool {
+    source.starts_with("mcap:") || source.to_ascii_lowercase().ends_with(".mcap")
+}

@@ -1,0 +1,209 @@
+//! A source whose frames get poses of links from joint states.
+
+use std::time::Instant;
+
+use glam::{DAffine3, DQuat};
+
+use super::kinematics::Kinematics;
+use super::matching::LinkMatches;
+use crate::author::mesh::{Up, y_up_from};
+use crate::body::Body;
+use crate::error::{Error, Result, failed};
+use crate::signal::{Frame, Pose};
+use crate::source::{JointPosition, JointStates, Source};
+
+/// How joint states are used.
+#[derive(Clone, Debug)]
+pub struct JointOptions {
+    /// The axis that points up in the URDF.
+    pub up: Up,
+    /// Joint states in a recording of their own; without it, those that frames carry.
+    pub states: Option<JointStates>,
+    /// How much later the joints' clock stamps an instant than the frames' clock, s.
+    pub delay_s: f64,
+    /// The age of a joint's last state from which on it is too old, s.
+    pub max_age_s: f64,
+}
+
+/// The default of [`JointOptions::max_age_s`].
+const DEFAULT_MAX_AGE_S: f64 = 0.1;
+
+impl JointOptions {
+    /// Joint states that frames carry, for a URDF of which axis `up` points up.
+    #[must_use]
+    pub fn new(up: Up) -> Self {
+        Self { up, states: None, delay_s: 0.0, max_age_s: DEFAULT_MAX_AGE_S }
+    }
+}
+
+/// Frames of another source, with poses of links from joint states.
+///
+/// A frame's own pose of a link stands, and what hangs on that link goes from there: so a floating base is given. Where a
+/// joint that moves a link with taxels has no state, or an old one, the frame has no poses and [`Frame::has_stale_pose`].
+pub struct JointedSource {
+    source: Box<dyn Source + Send>,
+    robot: Kinematics,
+    matches: LinkMatches,
+    world_from_root: DAffine3,
+    options: JointOptions,
+    /// By joint, its index in the recording of states.
+    recorded: Vec<Option<usize>>,
+    /// By joint, the last state that a frame has carried, with its time, s.
+    carried: Vec<Option<(f64, f64)>>,
+    positions: Vec<Option<JointPosition>>,
+    poses: Vec<Option<DAffine3>>,
+    was_stale: bool,
+    notices: Vec<String>,
+}
+
+impl JointedSource {
+    /// Gives the frames of `source` poses of the links of `body`, as `robot` moves them.
+    ///
+    /// # Errors
+    /// As [`LinkMatches::new`]; or a recording of states lacks a joint that moves a link with taxels.
+    pub fn new(source: Box<dyn Source + Send>, robot: Kinematics, body: &Body, options: JointOptions) -> Result<Self> {
+        let matches = LinkMatches::new(&robot, body, options.up)?;
+        let index_in = |states: &JointStates| robot.joint_names().map(|name| states.joint_index(name)).collect();
+        let recorded: Vec<Option<usize>> = options.states.as_ref().map_or_else(Vec::new, index_in);
+        if let Some(states) = &options.states {
+            let missing = matches.needed.iter().find(|(joint, _)| recorded[*joint].is_none());
+            if let Some((joint, link)) = missing {
+                let name = robot.joint_names().nth(*joint).unwrap_or_default();
+                return Err(failed!("no state has joint `{name}`, which moves `{link}`; add it").at(states.name()));
+            }
+        }
+        let joints = robot.joint_names().len();
+        Ok(Self {
+            source,
+            world_from_root: y_up_from(options.up),
+            matches,
+            options,
+            recorded,
+            carried: vec![None; joints],
+            positions: vec![None; joints],
+            poses: Vec::new(),
+            was_stale: false,
+            notices: Vec::new(),
+            robot,
+        })
+    }
+
+    /// Which links the joints move, in a line.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        self.matches.summary()
+    }
+
+    /// Fills in where each joint is at the time of `frame`.
+    fn find_positions(&mut self, frame: &Frame) -> Result<()> {
+        for (name, position) in &frame.joints {
+            match self.robot.joint_names().position(|known| known == name) {
+                Some(joint) => self.carried[joint] = Some((frame.t_s, *position)),
+                // One that mimics another, or is fixed, adds nothing.
+                None if self.robot.has_joint(name) => {}
+                None => {
+                    let near = crate::error::nearest(name, self.robot.joint_names());
+                    let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                    return Err(Error::failed(format!("at {} s: the URDF has no joint `{name}`{hint}", frame.t_s)));
+                }
+            }
+        }
+        for joint in 0..self.positions.len() {
+            self.positions[joint] = match &self.options.states {
+                Some(states) => self.recorded[joint].and_then(|recorded| {
+                    states.at(recorded, frame.t_s + self.options.delay_s, self.robot.is_continuous(joint))
+                }),
+                None => self.carried[joint].map(|(t_s, position)| JointPosition { position, age_s: frame.t_s - t_s }),
+            };
+        }
+        Ok(())
+    }
+
+    fn put_poses(&mut self, frame: &mut Frame) -> Result<()> {
+        self.find_positions(frame)?;
+        let max_age_s = self.options.max_age_s;
+        let known = |joint: usize| self.positions[joint].filter(|found| (0.0..=max_age_s).contains(&found.age_s));
+        let late = self.matches.needed.iter().find(|(joint, _)| known(*joint).is_none());
+        frame.has_stale_pose = late.is_some();
+        if late.is_some() != self.was_stale {
+            self.notices.push(match late {
+                Some((joint, link)) => {
+                    let name = self.robot.joint_names().nth(*joint).unwrap_or_default();
+                    let age = self.positions[*joint].map_or("no state so far".to_owned(), |found| {
+                        format!("its last state is {:.3} s old", found.age_s)
+                    });
+                    format!(
+                        "at {} s: joint `{name}`, which moves `{link}`: {age}; positions are in links from here on",
+                        frame.t_s
+                    )
+                }
+                None => format!("at {} s: every joint has a state; positions are in the world from here on", frame.t_s),
+            });
+            self.was_stale = late.is_some();
+        }
+        if frame.has_stale_pose {
+            frame.pose.clear();
+            return Ok(());
+        }
+        let names: Vec<&str> = self.robot.link_names().collect();
+        let given = |link: usize| {
+            let own = frame.pose.iter().find(|(name, _)| name == names[link]);
+            own.map(|(_, pose)| Some(DAffine3::from_rotation_translation(pose.rotation, pose.translation)))
+        };
+        let position_of = |joint: usize| known(joint).map(|found| found.position);
+        self.robot.poses_into(position_of, given, &self.world_from_root, &mut self.poses);
+        // What the URDF does not know goes on to the engine, which knows the body's links.
+        frame.pose.retain(|(name, _)| !names.contains(&name.as_str()));
+        for (link, name) in &self.matches.matched {
+            if let Some(world_from_link) = self.poses[*link] {
+                let rotation = DQuat::from_mat3(&world_from_link.matrix3).normalize();
+                frame.pose.push((name.clone(), Pose { translation: world_from_link.translation, rotation }));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Source for JointedSource {
+    fn taxels(&self) -> &[u32] {
+        self.source.taxels()
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        if !self.source.next_frame(frame)? {
+            return Ok(false);
+        }
+        self.put_poses(frame)?;
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.source.progress()
+    }
+
+    fn skip_to(&mut self, t_s: f64) {
+        self.source.skip_to(t_s);
+    }
+
+    fn report_stale(&mut self) {
+        self.source.report_stale();
+    }
+
+    fn has_stale(&self) -> bool {
+        self.source.has_stale()
+    }
+
+    fn read_at(&mut self) -> Option<Instant> {
+        self.source.read_at()
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        let mut notices = self.source.notices();
+        notices.append(&mut self.notices);
+        notices
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.source.losses()
+    }
+}

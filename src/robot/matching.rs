@@ -1,0 +1,123 @@
+//! Which links of a body a URDF moves, and whether the two agree at rest.
+
+use glam::{DAffine3, DQuat};
+
+use super::kinematics::Kinematics;
+use crate::author::mesh::{Up, y_up_from};
+use crate::body::Body;
+use crate::error::{Error, Result, failed};
+
+/// How far apart URDF and body may have a link at rest, m.
+pub const MAX_REST_DISTANCE_M: f64 = 1e-3;
+/// How far they may have it turned against each other, rad.
+pub const MAX_REST_ANGLE_RAD: f64 = 0.01;
+
+/// The links that a URDF and a body have in common, by name.
+#[derive(Clone, Debug)]
+pub struct LinkMatches {
+    /// Index in the URDF, and the name.
+    pub(super) matched: Vec<(usize, String)>,
+    /// Links of the body that the URDF does not have.
+    unmatched: Vec<String>,
+    /// The joints that move a link with taxels, each with such a link.
+    pub(super) needed: Vec<(usize, String)>,
+    /// How many links of the URDF the body does not have.
+    not_in_body: usize,
+}
+
+impl LinkMatches {
+    /// Matches the links of `robot`, of which axis `up` points up, with those of `body`.
+    ///
+    /// # Errors
+    /// They have no link in common; or with every joint at 0, a link is over [`MAX_REST_DISTANCE_M`] or
+    /// [`MAX_REST_ANGLE_RAD`] from where the body has it.
+    pub fn new(robot: &Kinematics, body: &Body, up: Up) -> Result<Self> {
+        let mut matched = Vec::new();
+        for (index, name) in robot.link_names().enumerate() {
+            if body.link_index(name).is_some() {
+                matched.push((index, name.to_owned()));
+            }
+        }
+        let is_matched = |name: &str| matched.iter().any(|(_, known)| known == name);
+        if matched.is_empty() {
+            let some: Vec<&str> = body.links.iter().take(3).map(|link| link.name.as_str()).collect();
+            return Err(failed!(
+                "none of its links is called as one of body `{}`, whose links are {} and so on; author the body from this \
+                 URDF, or name its nodes as the URDF does",
+                body.name,
+                some.join(", ")
+            ));
+        }
+        let unmatched =
+            body.links.iter().filter(|link| !is_matched(&link.name)).map(|link| link.name.clone()).collect();
+        let mut needed: Vec<(usize, String)> = Vec::new();
+        for taxel in &body.taxels {
+            // A link that the URDF does not have moves with the nearest above it that it has.
+            let mut at = Some(taxel.link);
+            while let Some(link) = at {
+                if let Some((index, name)) = matched.iter().find(|(_, name)| *name == body.links[link].name) {
+                    for joint in robot.joints_above(*index) {
+                        if needed.iter().all(|(known, _)| *known != joint) {
+                            needed.push((joint, name.clone()));
+                        }
+                    }
+                    break;
+                }
+                at = body.links[link].parent;
+            }
+        }
+        let not_in_body = robot.link_names().len() - matched.len();
+        let matches = Self { matched, unmatched, needed, not_in_body };
+        matches.check_rest(robot, body, up)?;
+        Ok(matches)
+    }
+
+    fn check_rest(&self, robot: &Kinematics, body: &Body, up: Up) -> Result<()> {
+        let Some((name, distance_m, angle_rad)) = self.farthest(robot, body, up) else { return Ok(()) };
+        let other = if up == Up::Z { Up::Y } else { Up::Z };
+        let what_to_do = if self.farthest(robot, body, other).is_none() {
+            format!("with --up {other} they agree")
+        } else {
+            "author the body from this URDF, or put its links where the URDF has them".to_owned()
+        };
+        Err(Error::failed(format!(
+            "with all joints at 0, link `{name}` is {:.1} mm and {:.1}° from where body `{}` has it, and {} mm and {:.1}° are \
+             allowed; {what_to_do}",
+            distance_m * 1e3,
+            angle_rad.to_degrees(),
+            body.name,
+            MAX_REST_DISTANCE_M * 1e3,
+            MAX_REST_ANGLE_RAD.to_degrees(),
+        )))
+    }
+
+    /// The first link that does not agree at rest, its distance (m) and angle (rad).
+    fn farthest(&self, robot: &Kinematics, body: &Body, up: Up) -> Option<(&str, f64, f64)> {
+        let rest = robot.rest_poses(&y_up_from(up));
+        self.matched.iter().find_map(|(index, name)| {
+            let of_body = &body.links[body.link_index(name)?].world_from_link;
+            let distance_m = rest[*index].translation.distance(of_body.translation);
+            let angle_rad = rotation(&rest[*index]).angle_between(rotation(of_body));
+            let agrees = distance_m <= MAX_REST_DISTANCE_M && angle_rad <= MAX_REST_ANGLE_RAD;
+            (!agrees).then_some((name.as_str(), distance_m, angle_rad))
+        })
+    }
+
+    /// What is matched and what is not, in a line.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let all = self.matched.len() + self.unmatched.len();
+        let mut text = format!("{} of the body's {all} links are in the URDF", self.matched.len());
+        if !self.unmatched.is_empty() {
+            text += &format!("; not {}: they keep their places on the links above them", self.unmatched.join(", "));
+        }
+        if self.not_in_body > 0 {
+            text += &format!("; {} links of the URDF are not in the body", self.not_in_body);
+        }
+        text
+    }
+}
+
+fn rotation(pose: &DAffine3) -> DQuat {
+    DQuat::from_mat3(&pose.matrix3)
+}

@@ -1,0 +1,31 @@
+//! Robots: joints that move a body's links, and the messages that robots exchange.
+//!
+//! [`Kinematics`] turns joint positions into poses of links, [`JointedSource`] does so for every frame of a source:
+//!
+//! ```
+//! use somatic::robot::Kinematics;
+//!
+//! let urdf = r#"<robot name="r"><link name="arm"/><link name="hand"/>
+//!   <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/>
+//!     <origin xyz="0.3 0 0"/><axis xyz="0 0 1"/></joint></robot>"#;
+//! let robot = Kinematics::from_urdf("r", urdf)?;
+//! let poses = robot.link_poses(&[std::f64::consts::FRAC_PI_2]);
+//! let (hand, arm_from_hand) = poses.iter().find(|(link, _)| *link == "hand").unwrap();
+//! assert_eq!((*hand, arm_from_hand.translation.x), ("hand", 0.3));
+//! # Ok::<(), somatic::Error>(())
+//! ```
+
+#[cfg(feature = "meshes")]
+mod jointed_source;
+#[cfg(feature = "meshes")]
+mod kinematics;
+#[cfg(feature = "meshes")]
+mod matching;
+pub mod messages;
+
+#[cfg(feature = "meshes")]
+pub use jointed_source::{JointOptions, JointedSource};
+#[cfg(feature = "meshes")]
+pub use kinematics::Kinematics;
+#[cfg(feature = "meshes")]
+pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};

@@ -1,0 +1,98 @@
+//! Touched fields as markers with ids that stay.
+
+use glam::{DQuat, DVec3};
+
+use super::places::{WORLD, header, quaternion, vector, z_up_from_y_up};
+use crate::percept::{Percept, Percepts};
+use crate::robot::messages::{Color, Marker, MarkerArray, Point, Pose};
+
+/// Types and actions of `visualization_msgs/Marker`.
+const ARROW: i32 = 0;
+const SPHERE: i32 = 2;
+const ADD: i32 = 0;
+const DELETE: i32 = 2;
+
+/// Diameter of the sphere of a touch without an area, m.
+const DEFAULT_DIAMETER_M: f64 = 0.01;
+/// Length of the arrow along a touch's normal, and the diameters of its shaft and head, m.
+const ARROW_M: [f64; 3] = [0.04, 0.004, 0.008];
+const COLOUR: Color = Color { r: 1.0, g: 0.55, b: 0.1, a: 0.9 };
+
+/// Makes the markers of each frame.
+pub(super) struct Touches {
+    /// By field, its name and the link of its anchor.
+    fields: Vec<(String, String)>,
+    /// By field, whether its sphere and its arrow are shown.
+    shown: Vec<[bool; 2]>,
+}
+
+impl Touches {
+    pub(super) fn new(fields: Vec<(String, String)>) -> Self {
+        Self { shown: vec![[false; 2]; fields.len()], fields }
+    }
+
+    /// The markers of a frame: those of touched fields, and the ends of those that are no longer touched. `None` where there
+    /// are neither.
+    pub(super) fn message(&mut self, time_ns: u64, percepts: &Percepts, frame: usize) -> Option<MarkerArray> {
+        let mut shows = vec![[false; 2]; self.fields.len()];
+        let mut markers = Vec::new();
+        for percept in percepts.touched(frame) {
+            let Some(position) = percept.position.map(DVec3::from) else { continue };
+            shows[percept.field] = [true, percept.normal.is_some()];
+            markers.push(self.sphere(time_ns, &percept, position));
+            markers.extend(percept.normal.map(|normal| self.arrow(time_ns, &percept, position, normal.into())));
+        }
+        for (field, (shows, shown)) in shows.iter().zip(&self.shown).enumerate() {
+            for part in (0..2).filter(|&part| shown[part] && !shows[part]) {
+                let (name, link) = &self.fields[field];
+                let (ns, id) = (name.clone(), id(field, part));
+                markers.push(Marker { header: header(time_ns, link), ns, id, action: DELETE, ..Marker::default() });
+            }
+        }
+        self.shown = shows;
+        (!markers.is_empty()).then_some(MarkerArray { markers })
+    }
+
+    fn marker(&self, time_ns: u64, percept: &Percept, part: usize, position: DVec3, turn: DQuat) -> Marker {
+        let (name, link) = &self.fields[percept.field];
+        let world = z_up_from_y_up();
+        let (position, turn) = if percept.in_world { (world * position, world * turn) } else { (position, turn) };
+        Marker {
+            header: header(time_ns, if percept.in_world { WORLD } else { link }),
+            ns: name.clone(),
+            id: id(percept.field, part),
+            action: ADD,
+            pose: Pose {
+                position: Point { x: position.x, y: position.y, z: position.z },
+                orientation: quaternion(turn.normalize()),
+            },
+            color: COLOUR,
+            // It moves with its link until the next message.
+            frame_locked: !percept.in_world,
+            ..Marker::default()
+        }
+    }
+
+    fn sphere(&self, time_ns: u64, percept: &Percept, position: DVec3) -> Marker {
+        let area_m2 = percept.area.filter(|&area| area > 0.0);
+        let diameter_m = area_m2.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt());
+        let marker = self.marker(time_ns, percept, 0, position, DQuat::IDENTITY);
+        Marker { r#type: SPHERE, scale: vector(DVec3::splat(diameter_m)), ..marker }
+    }
+
+    fn arrow(&self, time_ns: u64, percept: &Percept, position: DVec3, normal: DVec3) -> Marker {
+        let marker = self.marker(
+            time_ns,
+            percept,
+            1,
+            position,
+            DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X)),
+        );
+        Marker { r#type: ARROW, scale: vector(ARROW_M.into()), ..marker }
+    }
+}
+
+/// The id of a field's sphere (0) or arrow (1): the same from onset to release, and in every run of the same scene.
+fn id(field: usize, part: usize) -> i32 {
+    i32::try_from(2 * field + part).unwrap_or(i32::MAX)
+}

@@ -1,0 +1,248 @@
+//! Robots whose joints move: poses of links from joint states, and percepts in the world.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use glam::{DAffine3, DQuat, DVec3};
+use serde_json::Value;
+use somatic::robot::Kinematics;
+
+use super::python::python_with;
+use super::random::Random;
+use super::skips::skip;
+use super::{done, fails, file, frames, stderr, text_of};
+
+const URDF: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm.urdf");
+const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm-touch.csv");
+const STATES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm-joints.csv");
+
+/// A folder with the arm's body, and its path.
+fn arm() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("arm.glb");
+    done(&["author", "--urdf-skin", URDF, "-o", text_of(&body)]);
+    (folder, body)
+}
+
+/// Percepts of `lines` on standard input, and what was said.
+fn run_lines(body: &Path, lines: &str, flags: &[&str]) -> (Vec<Value>, String) {
+    let (_folder, input) = file("frames.ndjson", lines);
+    let run = Command::new(env!("CARGO_BIN_EXE_somatic"))
+        .args(["run", "--body", text_of(body), "--source", "-", "--backend", "reference"])
+        .args(flags)
+        .stdin(Stdio::from(std::fs::File::open(input).unwrap()))
+        .output()
+        .unwrap();
+    assert!(run.status.success(), "{}", stderr(&run));
+    (frames(&String::from_utf8_lossy(&run.stdout)), stderr(&run))
+}
+
+/// The place of the first touched field of a frame, and the link that it is in.
+fn place(frame: &Value) -> (DVec3, String) {
+    let field = &frame["fields"][0];
+    let number = |axis: usize| field["position"][axis].as_f64().unwrap_or_else(|| panic!("{frame}"));
+    (DVec3::new(number(0), number(1), number(2)), field["link"].as_str().unwrap().to_owned())
+}
+
+fn has_flag(frame: &Value, flag: &str) -> bool {
+    frame["fields"][0]["flags"].as_array().unwrap().iter().any(|known| known == flag)
+}
+
+#[test]
+fn links_are_where_pinocchio_and_yourdfpy_have_them() {
+    const CONFIGURATIONS: usize = 1000;
+    let python = match python_with("kinematics", "import pinocchio, yourdfpy") {
+        Ok(python) => python,
+        Err(why) => return skip("KINEMATICS", why),
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/kinematics/compare.py");
+    let run = |arguments: &[&str]| {
+        let output = Command::new(&python).arg(script).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (names, numbers) = (folder.path().join("names.json"), folder.path().join("numbers"));
+    for (robot, joints, links) in [("panda", 8, 13), ("icub", 32, 56), ("tiago", 48, 78)] {
+        let urdf = run(&["where", robot]).trim().to_owned();
+        let kinematics = Kinematics::load(&urdf).unwrap();
+        assert_eq!((kinematics.joint_names().len(), kinematics.link_names().len()), (joints, links), "{robot}");
+        let listed = serde_json::json!({
+            "joints": kinematics.joint_names().collect::<Vec<_>>(), "links": kinematics.link_names().collect::<Vec<_>>()
+        });
+        std::fs::write(&names, listed.to_string()).unwrap();
+        let compare = |configurations: usize, off_rad: f64| -> Value {
+            let mut random = Random::new(1);
+            let mut bytes = Vec::new();
+            for _ in 0..configurations {
+                let mut positions: Vec<f64> = (0..joints).map(|_| 6.0 * (random.unit() - 0.5)).collect();
+                let told = positions.clone();
+                positions[1] += off_rad;
+                let poses = kinematics.link_poses(&positions);
+                let rows = poses.iter().flat_map(|(_, pose)| {
+                    let rows = pose.matrix3.transpose();
+                    [0, 1, 2].into_iter().flat_map(move |row| {
+                        let [x, y, z] = rows.col(row).to_array();
+                        [x, y, z, pose.translation[row]]
+                    })
+                });
+                bytes.extend(told.into_iter().chain(rows).flat_map(f64::to_le_bytes));
+            }
+            std::fs::write(&numbers, bytes).unwrap();
+            serde_json::from_str(&run(&["compare", &urdf, text_of(&names), text_of(&numbers)])).unwrap()
+        };
+        let (right, wrong) = (compare(CONFIGURATIONS, 0.0), compare(3, 1.0_f64.to_radians()));
+        for library in ["pinocchio", "yourdfpy"] {
+            assert_eq!(right[library]["configurations"], CONFIGURATIONS);
+            let largest = |of: &Value| of[library]["largest"].as_f64().unwrap();
+            eprintln!("{robot}, {library}: {:e} m", largest(&right));
+            assert!(largest(&right) < 1e-9, "{robot}: {right}");
+            assert!(largest(&wrong) > 1e-3, "{robot}: a joint off by 1° is not seen: {wrong}");
+        }
+    }
+}
+
+#[test]
+fn joints_in_frames_put_percepts_into_the_world() {
+    let (_folder, body) = arm();
+    let line = |t: f64, joints: &str| format!("{{\"t\":{t},\"values\":{{\"11\":5}}{joints}}}\n");
+    let straight = ",\"joints\":{\"shoulder\":0,\"elbow\":0,\"grip\":0.01}";
+    // The shoulder turns x to −z, the elbow x to y.
+    let bent = ",\"joints\":{\"shoulder\":1.5707963267948966,\"elbow\":1.5707963267948966,\"grip\":0}";
+    let based = format!("{bent},\"pose\":{{\"base\":[10,0,0,0,0,0,1]}}");
+    let lines =
+        [line(0.0, straight), line(0.05, ""), line(0.1, bent), line(0.15, &based), line(0.9, ""), line(1.0, straight)];
+    let (found, said) = run_lines(&body, &lines.concat(), &["--joints", URDF, "--up", "z"]);
+    assert!(said.contains("5 of the body's") && said.contains("links are in the URDF"), "{said}");
+    // Taxel 11 on the fore arm: row 2, column 3 of the array.
+    let in_link = run_lines(&body, &line(0.0, ""), &[]).0;
+    let (in_link, link) = place(&in_link[0]);
+    assert_eq!(link, "fore_arm");
+    assert!(in_link.distance(DVec3::new(0.07, 0.015, 0.02)) < 1e-6, "{in_link}");
+    // By hand, in the URDF's own axes; then turned to y up.
+    let y_up = |p: DVec3| DVec3::new(p.x, p.z, -p.y);
+    let when_straight = y_up(DVec3::new(0.3, 0.0, 0.12) + in_link);
+    let shoulder =
+        DAffine3::from_rotation_translation(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2), DVec3::Z * 0.12);
+    let elbow =
+        DAffine3::from_rotation_translation(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), DVec3::X * 0.3);
+    let in_base = (shoulder * elbow).transform_point3(in_link);
+    // A base that is posed is where that says, axes and all.
+    let expected = [when_straight, when_straight, y_up(in_base), in_base + DVec3::X * 10.0, in_link, when_straight];
+    for ((frame, expected), at) in found.iter().zip(expected).zip(0..) {
+        let (position, link) = place(frame);
+        let is_late = at == 4;
+        assert_eq!(
+            (link.as_str(), has_flag(frame, "stale_pose")),
+            (if is_late { "fore_arm" } else { "world" }, is_late),
+            "{at}"
+        );
+        assert!(position.distance(expected) < 1e-6, "frame {at}: {position}, not {expected}");
+    }
+    assert_eq!(found.len(), 6);
+    assert!(said.contains("at 0.9 s: joint `elbow`") || said.contains("at 0.9 s: joint `shoulder`"), "{said}");
+    assert!(said.contains("0.750 s old") && said.contains("at 1 s: every joint has a state"), "{said}");
+    // Who asks for the anchor gets it, and no flag.
+    let flags = ["--joints", URDF, "--up", "z", "--coordinates", "anchor"];
+    let anchored = run_lines(&body, &lines.concat(), &flags).0;
+    assert!(anchored.iter().all(|frame| place(frame).1 == "fore_arm" && !has_flag(frame, "stale_pose")));
+}
+
+#[test]
+fn states_of_a_recording_are_interpolated_to_the_frames_time() {
+    let (folder, body) = arm();
+    let touch = folder.path().join("touch.csv");
+    std::fs::write(&touch, "t,11\n0,5\n0.025,5\n0.1,5\n0.5,5\n").unwrap();
+    let states = folder.path().join("states.csv");
+    let run = |text: &str, flags: &[&str]| {
+        std::fs::write(&states, text).unwrap();
+        let all = [
+            &["run", "--backend", "reference", "--body", text_of(&body), "--source", text_of(&touch), "--joints", URDF]
+                [..],
+            &["--joint-states", text_of(&states), "--up", "z", "--sink", "-"],
+            flags,
+        ];
+        frames(&done(&all.concat()))
+            .iter()
+            .map(|frame| (place(frame).0, has_flag(frame, "stale_pose")))
+            .collect::<Vec<_>>()
+    };
+    let turned = |angle: f64| {
+        let [x, y, z] = [0.07, 0.015, 0.02];
+        let (sin, cos) = angle.sin_cos();
+        // Turned around the elbow's z, then to y up.
+        DVec3::new(0.3 + cos * x - sin * y, 0.12 + z, -(sin * x + cos * y))
+    };
+    let states_text = "t,elbow,shoulder,grip\n-0.05,-1,0,0\n0.05,1,0,0\n0.1,1,0,0\n";
+    let found = run(states_text, &[]);
+    for ((position, is_late), angle) in found.iter().zip([0.0, 0.5, 1.0]) {
+        assert!(!is_late && position.distance(turned(angle)) < 1e-6, "{position} is not {}", turned(angle));
+    }
+    assert!(found[3].1, "the last state is 0.4 s old");
+    // The joints' clock stamps an instant 25 ms later.
+    let delayed = run(states_text, &["--joints-delay", "0.025", "--joints-max-age", "1"]);
+    assert!(delayed[0].0.distance(turned(0.5)) < 1e-6 && !delayed[3].1, "{delayed:?}");
+    // A grip that no state has moves no taxel.
+    assert_eq!(run("t,elbow,shoulder\n-0.05,-1,0\n0.05,1,0\n0.1,1,0\n", &[]), found);
+}
+
+#[test]
+fn poses_of_a_recording_with_joints_are_replayed_without_the_urdf() {
+    let (folder, body) = arm();
+    let recording = folder.path().join("arm.mcap");
+    let jointed = ["--joints", URDF, "--joint-states", STATES, "--up", "z"];
+    let flags = ["run", "--backend", "reference", "--body", text_of(&body), "--source", TOUCH, "--sink", "-"];
+    let first = done(&[&flags[..], &jointed, &["--sink", text_of(&recording)]].concat());
+    let again = done(&["run", "--backend", "reference", "--source", text_of(&recording), "--sink", "-"]);
+    assert!(first == again && first.contains("\"link\":\"world\""));
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_in_one_line() {
+    let (folder, body) = arm();
+    let run = |code: i32, flags: &[&str]| {
+        let why = fails(code, &[&["run", "--body", text_of(&body), "--source", TOUCH][..], flags].concat());
+        assert_eq!(why.lines().count(), 1, "{why}");
+        why
+    };
+    assert!(run(2, &["--joints", URDF, "--joint-states", STATES]).contains("add --up z, or --up y"));
+    assert!(run(2, &["--up", "z"]).contains("add --joints robot.urdf"));
+    assert!(run(2, &["--joints", URDF, "--up", "z"]).contains("--joint-states FILE"));
+    let wrong_up = run(1, &["--joints", URDF, "--joint-states", STATES, "--up", "y"]);
+    assert!(wrong_up.contains("arm.urdf: with all joints at 0, link `base` is 0.0 mm and 90.0°"), "{wrong_up}");
+    assert!(wrong_up.contains("with --up z they agree"), "{wrong_up}");
+    // A link that has been moved by 2 mm is seen, and one by 0.5 mm is not.
+    let moved = |origin: &str| {
+        let text = std::fs::read_to_string(URDF).unwrap();
+        let mut path = folder.path().join("moved");
+        path.set_extension(format!("{}.urdf", origin.replace(' ', "_")));
+        std::fs::write(&path, text.replace("<origin xyz=\"0.3 0 0\"/>", &format!("<origin xyz=\"{origin}\"/>")))
+            .unwrap();
+        path
+    };
+    let far = run(1, &["--joints", text_of(&moved("0.302 0 0")), "--joint-states", STATES, "--up", "z"]);
+    assert!(far.contains("link `fore_arm` is 2.0 mm and 0.0° from where body"), "{far}");
+    let near = moved("0.3005 0 0");
+    done(&[
+        "run",
+        "--body",
+        text_of(&body),
+        "--source",
+        TOUCH,
+        "--joints",
+        text_of(&near),
+        "--joint-states",
+        STATES,
+        "--up",
+        "z",
+    ]);
+    let states = folder.path().join("states.csv");
+    std::fs::write(&states, "t,shoulder\n0,0\n").unwrap();
+    let lacking = run(1, &["--joints", URDF, "--joint-states", text_of(&states), "--up", "z"]);
+    assert!(lacking.contains("states.csv: no state has joint `elbow`, which moves `fore_arm`"), "{lacking}");
+    let jointed = ["--joints", URDF, "--joint-states", STATES, "--up", "z"];
+    let other = fails(1, &[&["run", "--body", "hand", "--source", TOUCH][..], &jointed].concat());
+    assert!(other.contains("none of its links is called as one of body `hand`"), "{other}");
+    let looped = ["--joints", URDF, "--up", "z", "--joint-states", STATES, "--loop=2"];
+    assert!(run(2, &looped).contains("--loop lets the time"));
+}

@@ -1,0 +1,317 @@
+//! Messages and bags of ROS 2, as other programs read them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+use somatic::robot::messages::{
+    Byte, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Marker, MarkerArray, Message, PointCloud2,
+    PointField, TfMessage, Time, TransformStamped, Wrench, WrenchStamped,
+};
+
+use super::python::python_with;
+use super::skips::skip;
+use super::{done, fails, file, files_in, frames, stderr, text_of};
+
+const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
+
+/// What `tests/ros2/read.py` prints, or `None` where it cannot be run.
+fn read(arguments: &[&str]) -> Option<Result<Value, String>> {
+    let works = "import cyclonedds.idl, mcap_ros2.reader, rosbags.rosbag2";
+    let python = match python_with("ros2", works) {
+        Ok(python) => python,
+        Err(why) => {
+            skip("ROS2", why);
+            return None;
+        }
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ros2/read.py");
+    let output = Command::new(python).arg(script).args(arguments).output().unwrap();
+    let said = || serde_json::from_slice(&output.stdout).unwrap();
+    Some(if output.status.success() { Ok(said()) } else { Err(stderr(&output)) })
+}
+
+fn header(frame_id: &str) -> Header {
+    Header { stamp: Time::from_ns(1_700_000_000_123_456_789), frame_id: frame_id.to_owned() }
+}
+
+fn told<M: Message>(message: &M) -> Value {
+    let bytes: String = message.to_cdr().iter().map(|byte| format!("{byte:02x}")).collect();
+    json!({"type": M::TYPE, "hash": M::HASH, "definition": M::definition(), "bytes": bytes})
+}
+
+/// A message of every type for each of these texts, whose lengths put all that follows at every alignment.
+fn messages() -> Vec<Value> {
+    let mut all = Vec::new();
+    for text in ["", "a", "ab", "abc", "abcd", "abcde", "touché", "a longer text of 27 letters"] {
+        let text = || text.to_owned();
+        all.push(told(&PointCloud2 {
+            header: header(&text()),
+            height: 1,
+            width: 3,
+            fields: vec![PointField { name: text(), offset: 4, datatype: 7, count: 1 }; 2],
+            is_bigendian: false,
+            point_step: 1,
+            row_step: 3,
+            data: vec![1, 2, 255],
+            is_dense: true,
+        }));
+        let marker = Marker {
+            header: header(&text()),
+            ns: text(),
+            id: -7,
+            text: text(),
+            frame_locked: true,
+            ..Marker::default()
+        };
+        all.push(told(&MarkerArray {
+            markers: vec![marker.clone(), Marker { ns: "b".to_owned(), action: 2, ..marker }],
+        }));
+        let mut wrench = Wrench::default();
+        (wrench.force.x, wrench.torque.z) = (-1.5, 1e-300);
+        all.push(told(&WrenchStamped { header: header(&text()), wrench }));
+        let status = DiagnosticStatus {
+            level: Byte(1),
+            name: text(),
+            message: "lost".to_owned(),
+            hardware_id: text(),
+            values: vec![KeyValue { key: text(), value: "3".to_owned() }, KeyValue::default()],
+        };
+        all.push(told(&DiagnosticArray { header: header(&text()), status: vec![status.clone(), status] }));
+        let mut transform =
+            TransformStamped { header: header("world"), child_frame_id: text(), ..TransformStamped::default() };
+        (transform.transform.translation.y, transform.transform.rotation.w) = (0.25, 1.0);
+        all.push(told(&TfMessage { transforms: vec![transform.clone(), transform] }));
+        let names = vec![text(), "wrist".to_owned(), text()];
+        all.push(told(&JointState {
+            header: header(""),
+            name: names,
+            position: vec![0.5, -2.0],
+            ..JointState::default()
+        }));
+    }
+    all
+}
+
+#[test]
+fn three_decoders_read_every_message_and_write_the_same_bytes() {
+    let given = messages();
+    let (_folder, path) = file("messages.json", &Value::from(given.clone()).to_string());
+    let Some(read) = read(&["messages", text_of(&path)]) else { return };
+    let read = read.unwrap();
+    assert_eq!(read.as_array().unwrap().len(), given.len());
+    for (found, given) in read.as_array().unwrap().iter().zip(&given) {
+        assert_eq!(found["type"], given["type"]);
+        let decoders = found["decoders"].as_object().unwrap();
+        assert_eq!(decoders.len(), 3);
+        for (decoder, what) in decoders {
+            assert_eq!(what["same_bytes"], true, "{decoder}: {found}\n{given}");
+            assert_eq!(what["values"], decoders["by_rosbags"]["values"], "{decoder}");
+        }
+        assert!(found["hash"] == true && found["hash_of_definition"] == true, "{found}");
+    }
+    // What was written is what is read.
+    let values = |index: usize| &read[index]["decoders"]["by_cyclonedds"]["values"];
+    assert_eq!(values(7)["markers"][0]["ns"], "a");
+    assert_eq!((&values(7)["markers"][1]["action"], &values(7)["markers"][0]["id"]), (&2.into(), &(-7).into()));
+    assert_eq!(values(36)["data"], json!([1, 2, 255]));
+    assert_eq!(values(36)["header"]["frame_id"], "touché");
+    assert_eq!(values(36)["header"]["stamp"], json!({"sec": 1_700_000_000, "nanosec": 123_456_789}));
+    assert_eq!(values(2)["wrench"]["torque"]["z"], 1e-300);
+    assert_eq!(values(4)["transforms"][1]["transform"]["translation"]["y"], 0.25);
+}
+
+#[test]
+fn one_digit_that_is_flipped_is_seen() {
+    let flip = |text: &mut String, at: usize| {
+        let other = if &text[at..=at] == "1" { "2" } else { "1" };
+        text.replace_range(at..=at, other);
+    };
+    let mut given = messages()[2..4].to_vec();
+    let wrench = given[0].clone();
+    for (message, key) in given.iter_mut().zip(["hash", "definition"]) {
+        let mut text = message[key].as_str().unwrap().to_owned();
+        // A digit of the hash; a letter of a field's name.
+        let at = if key == "hash" { text.len() - 1 } else { text.find("string message").unwrap() + 8 };
+        flip(&mut text, at);
+        message[key] = text.into();
+    }
+    // A digit of the last number.
+    let mut other = wrench.clone();
+    let mut bytes = other["bytes"].as_str().unwrap().to_owned();
+    let last = bytes.len() - 1;
+    flip(&mut bytes, last);
+    other["bytes"] = bytes.into();
+    given.extend([wrench, other]);
+    let (_folder, path) = file("messages.json", &Value::from(given).to_string());
+    let Some(read) = read(&["messages", text_of(&path)]) else { return };
+    let read = read.unwrap();
+    assert!(read[0]["hash"] == false && read[0]["hash_of_definition"] == false, "{}", read[0]);
+    assert!(read[1]["hash"] == true && read[1]["hash_of_definition"] == false, "{}", read[1]);
+    for decoder in ["by_rosbags", "by_mcap_ros2", "by_cyclonedds"] {
+        assert_ne!(read[2]["decoders"][decoder]["values"], read[3]["decoders"][decoder]["values"], "{decoder}");
+    }
+}
+
+/// The arm's run with joints: its flags, where the body is, and the folder.
+fn arm_run() -> (tempfile::TempDir, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("arm.glb");
+    let at = |name: &str| format!("{ROBOT}/{name}");
+    done(&["author", "--urdf-skin", &at("arm.urdf"), "-o", text_of(&body)]);
+    let (touch, urdf, states, calibration) =
+        (at("arm-touch.csv"), at("arm.urdf"), at("arm-joints.csv"), at("arm-calibration.toml"));
+    let flags = [
+        "run",
+        "--body",
+        text_of(&body),
+        "--source",
+        &touch,
+        "--joints",
+        &urdf,
+        "--joint-states",
+        &states,
+        "--up",
+        "z",
+        "--calibration",
+        &calibration,
+        "--backend",
+        "reference",
+        "--sink",
+        "-",
+    ];
+    let flags = flags.map(str::to_owned).to_vec();
+    (folder, flags)
+}
+
+fn with<'a>(flags: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
+    flags.iter().map(String::as_str).chain(more.iter().copied()).collect()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
+    let (folder, flags) = arm_run();
+    let bag = folder.path().join("touch bag");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    let percepts = frames(&done(&with(&flags, &["--sink", &sink])));
+    assert_eq!(files_in(&bag), ["metadata.yaml", "touch bag_0.mcap"]);
+    let Some(read) = read(&["bag", text_of(&bag)]) else { return };
+    let read = read.unwrap();
+    let topics = read["topics"].as_object().unwrap();
+    assert!(topics.values().all(|topic| topic["hash"] == true), "{topics:?}");
+    let count = |topic: &str| topics[topic]["count"].as_u64().unwrap();
+    assert_eq!(count("/somatic/taxels/fore_arm"), 101);
+    assert_eq!(count("/tf"), 101);
+    let messages = read["messages"].as_array().unwrap();
+    assert_eq!((&read["count"], &read["by_mcap_ros2"]), (&messages.len().into(), &messages.len().into()));
+    assert!(read["times_ns"].as_array().unwrap().is_sorted_by_key(|time| time.as_u64().unwrap()));
+    assert_eq!((&read["start_ns"], &read["duration_ns"]), (&0.into(), &2_000_000_001_u64.into()));
+
+    // By time and name, the sphere of each touched field; its turn makes z of y.
+    let mut spheres = BTreeMap::new();
+    let mut deleted = 0;
+    let mut forces = BTreeMap::new();
+    for message in messages {
+        let (topic, time_ns, values) = (message[0].as_str().unwrap(), message[1].as_u64().unwrap(), &message[2]);
+        if topic == "/somatic/touches" {
+            for marker in values["markers"].as_array().unwrap() {
+                assert_eq!(marker["header"]["stamp"]["sec"].as_u64().unwrap(), time_ns / 1_000_000_000);
+                deleted += usize::from(marker["action"] == 2);
+                if marker["type"] == 2 && marker["action"] == 0 {
+                    spheres.insert((time_ns, marker["ns"].as_str().unwrap().to_owned()), marker);
+                }
+            }
+        } else if let Some(field) = topic.strip_prefix("/somatic/wrench/") {
+            assert_eq!(values["header"]["frame_id"], "fore_arm");
+            forces.insert((time_ns, field.to_owned()), values["wrench"].clone());
+        }
+    }
+    let mut compared = 0;
+    for frame in &percepts {
+        let time_ns = (number(&frame["t"]) * 1e9).round() as u64;
+        for field in frame["fields"].as_array().unwrap() {
+            let name = field["field"].as_str().unwrap().to_owned();
+            let marker = spheres.remove(&(time_ns, name.clone())).unwrap_or_else(|| panic!("{name} at {time_ns}"));
+            assert_eq!((&field["link"], &marker["header"]["frame_id"]), (&"world".into(), &"world".into()));
+            let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
+            let place = &marker["pose"]["position"];
+            for (theirs, ours) in [("x", x), ("y", -z), ("z", y)].map(|(axis, ours)| (number(&place[axis]), ours)) {
+                assert!((theirs - ours).abs() < 1e-12, "{name} at {time_ns}: {place}");
+            }
+            // The skin is flat and points to z: its pull is −z, the force's size that of the percept.
+            if let Some(wrench) = forces.get(&(time_ns, name)) {
+                let (force, told) = (&wrench["force"], number(&field["force"]));
+                assert!(
+                    (number(&force["z"]) + told).abs() <= 1e-12 * told.abs() && number(&force["x"]).abs() < 1e-9,
+                    "{force} {told}"
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(spheres.is_empty() && compared > 50 && deleted > 0, "{compared} compared, {deleted} deleted");
+}
+
+#[test]
+fn links_in_a_bag_are_where_joints_put_them_with_z_up() {
+    let (folder, flags) = arm_run();
+    let bag = folder.path().join("bag");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    done(&with(&flags, &["--sink", &sink]));
+    let Some(read) = read(&["bag", text_of(&bag)]) else { return };
+    let read = read.unwrap();
+    let (_, _, first) = read["messages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|message| (&message[0], &message[1], &message[2]))
+        .find(|(topic, ..)| *topic == "/tf")
+        .unwrap();
+    // Every joint is at 0 then: the URDF's own numbers.
+    let expected = [("base", [0.0, 0.0, 0.0]), ("upper_arm", [0.0, 0.0, 0.12]), ("fore_arm", [0.3, 0.0, 0.12])];
+    for (link, place) in expected {
+        let transforms = first["transforms"].as_array().unwrap();
+        let found = transforms.iter().find(|transform| transform["child_frame_id"] == link).unwrap();
+        assert_eq!(found["header"]["frame_id"], "world");
+        for (axis, expected) in ["x", "y", "z"].into_iter().zip(place) {
+            assert!((number(&found["transform"]["translation"][axis]) - expected).abs() < 1e-6, "{found}");
+        }
+        assert!((number(&found["transform"]["rotation"]["w"]).abs() - 1.0).abs() < 1e-6, "{found}");
+    }
+}
+
+#[test]
+fn a_bag_replaces_nothing_and_damage_is_seen() {
+    let (folder, flags) = arm_run();
+    let bag = folder.path().join("bag");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    done(&with(&flags, &["--sink", &sink, "--ros-time", "wall"]));
+    let why = fails(2, &with(&flags, &["--sink", &sink]));
+    assert!(why.contains("bag_0.mcap") && why.lines().count() == 1, "{why}");
+    let why = fails(2, &with(&flags, &["--ros-time", "wall"]));
+    assert!(why.contains("add --sink ros2-mcap:FOLDER"), "{why}");
+    let Some(whole) = read(&["bag", text_of(&bag)]) else { return };
+    let now_ns = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_nanos() as u64;
+    let start_ns = whole.unwrap()["start_ns"].as_u64().unwrap();
+    assert!((now_ns - 600_000_000_000..now_ns).contains(&start_ns), "{start_ns}");
+    // A digit of a hash in the metadata.
+    let metadata: PathBuf = bag.join("metadata.yaml");
+    let text = std::fs::read_to_string(&metadata).unwrap();
+    let damaged = text.replacen("RIHS01_e369d0f0", "RIHS01_e369d0f1", 1);
+    assert_ne!(damaged, text);
+    std::fs::write(&metadata, damaged).unwrap();
+    let told = read(&["bag", text_of(&bag)]).unwrap();
+    assert!(told.as_ref().is_ok_and(|told| told["topics"]["/tf"]["hash"] == false) || told.is_err(), "{told:?}");
+    std::fs::write(&metadata, text).unwrap();
+    // Cut in the middle, it is no whole bag.
+    let recording = Path::new(&bag).join("bag_0.mcap");
+    let bytes = std::fs::read(&recording).unwrap();
+    std::fs::write(&recording, &bytes[..bytes.len() / 2]).unwrap();
+    let cut = read(&["bag", text_of(&bag)]).unwrap();
+    assert!(cut.is_err(), "a bag that is cut is read");
+}
