@@ -349,7 +349,7 @@ mod tests {
         let knots = knots_of(&[[0.0, 100.0], [16.0, 90.0], [20.0, 10.0], [255.0, 0.0]]);
         let plain =
             TaxelCalibration { baseline: 3.0, gain: 0.5, dead_band: 2.0, noise: Some(1.5), ..Default::default() };
-        let masked = TaxelCalibration { mask: true, ..plain.clone() };
+        let masked = TaxelCalibration { mask: true, ..plain };
         let curve = TaxelCalibration { dead_band: 2.0, noise: Some(1.0), ..Default::default() };
         let raws = [-2.0, 0.0, 1e-30, 3.0, 7.0, 7.1, 16.0, 19.5, 208.0, 1e17, 1e30, f64::NAN, f64::INFINITY];
         let mut compared = 0;
