@@ -291,7 +291,7 @@ fn a_bag_replaces_nothing_and_damage_is_seen() {
     let bag = folder.path().join("bag");
     let sink = format!("ros2-mcap:{}", text_of(&bag));
     done(&with(&flags, &["--sink", &sink, "--ros-time", "wall"]));
-    let why = fails(2, &with(&flags, &["--sink", &sink]));
+    let why = fails(1, &with(&flags, &["--sink", &sink]));
     assert!(why.contains("bag_0.mcap") && why.lines().count() == 1, "{why}");
     let why = fails(2, &with(&flags, &["--ros-time", "wall"]));
     assert!(why.contains("add --sink ros2-mcap:FOLDER"), "{why}");

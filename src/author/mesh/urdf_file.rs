@@ -137,6 +137,13 @@ impl Robot {
     }
 }
 
+/// `text` without its comments, in which what xacro has read may still stand.
+fn without_comments(text: &str) -> String {
+    let mut parts = text.split("<!--");
+    let before = parts.next().unwrap_or_default().to_owned();
+    parts.fold(before, |kept, part| kept + part.split_once("-->").map_or("", |(_, after)| after))
+}
+
 struct Reader<'a> {
     folder: &'a Path,
     options: &'a MeshOptions,
@@ -146,8 +153,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn robot(&self, path: &Path) -> Result<Robot> {
         let is_xacro = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xacro"))
-            || self.text.contains("<xacro:")
-            || self.text.contains("\"${");
+            || ["<xacro:", "\"${"].iter().any(|sign| without_comments(self.text).contains(sign));
         if is_xacro {
             let what = "it is a xacro, a program that writes a URDF; run it first: xacro robot.urdf.xacro > robot.urdf";
             return Err(Error::failed(what));
