@@ -69,7 +69,7 @@ impl Read {
             if index % FRAMES_BETWEEN == 0 && !goes_on(raised) {
                 return Err(Error::failed("interrupted"));
             }
-            Ok(Frame { t_s, values: self.values[index * width..][..width].to_vec(), pose: Vec::new() })
+            Ok(Frame { t_s, values: self.values[index * width..][..width].to_vec(), ..Frame::default() })
         })
     }
 }

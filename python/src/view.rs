@@ -65,6 +65,7 @@ impl Page {
             t_s,
             values: block.values[block.values.len() - width..].to_vec(),
             pose: block.poses.iter().filter_map(last).collect(),
+            ..Frame::default()
         };
         publisher.read(&PageInput {
             frame: &frame,
