@@ -76,7 +76,7 @@ impl Read {
 
 /// Whether to go on: what Python raises for a signal is kept.
 fn goes_on(raised: &mut Option<PyErr>) -> bool {
-    *raised = Python::attach(Python::check_signals).err();
+    *raised = Python::attach(|py| py.check_signals().err());
     raised.is_none()
 }
 
