@@ -5,7 +5,7 @@ mod calibrated;
 mod check;
 mod deserialize;
 mod flags;
-mod joints;
+mod jointed;
 
 use std::path::{Path, PathBuf};
 
@@ -239,7 +239,7 @@ pub(super) struct RunOptions {
     pub(super) joint_states: Option<PathBuf>,
 
     /// The axis that points up in the URDF: z in nearly all. The body's is y, as in glTF.
-    #[arg(long, help_heading = ROBOT, value_parser = one_of::<Up>(Up::WORDS))]
+    #[arg(long, help_heading = ROBOT, value_name = "AXIS", value_parser = one_of::<Up>(Up::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Up::WORDS))]
     pub(super) up: Option<Up>,

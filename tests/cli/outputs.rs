@@ -458,6 +458,8 @@ fn standard_streams_led_into_an_input_are_that_input() {
 /// Flags and places of arguments that name what is read.
 const READ: &[&str] = &[
     "--body",
+    "--joints",
+    "--joint-states",
     "--source",
     "--calibration",
     "--wiring",
