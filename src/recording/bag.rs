@@ -10,7 +10,8 @@ use mcap::McapError;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 
-use crate::error::{Error, Result, failed};
+use super::recorder::cannot_write;
+use crate::error::{Result, failed};
 use crate::output::{GrowingFile, OutputFolder, OutputPath};
 
 /// The file in a bag's folder that says what is in it.
@@ -76,7 +77,7 @@ impl BagWriter {
             .chunk_size(Some(CHUNK))
             .disable_seeking(true);
         let writer =
-            options.create(NoSeek::new(BufWriter::with_capacity(1 << 16, to))).map_err(|e| explained(&name, e))?;
+            options.create(NoSeek::new(BufWriter::with_capacity(1 << 16, to))).map_err(|e| cannot_write(&name, e))?;
         Ok(Self {
             name,
             file_name: file_name.to_owned(),
@@ -148,7 +149,7 @@ impl BagWriter {
     pub(crate) fn finish(mut self) -> Result<()> {
         self.with(|writer| writer.finish().map(drop))?;
         if let Some(writer) = self.writer.take() {
-            writer.into_inner().flush().map_err(|e| explained(&self.name, e.into()))?;
+            writer.into_inner().flush().map_err(|e| cannot_write(&self.name, e.into()))?;
         }
         let text = self.metadata_text();
         self.metadata.take().map_or(Ok(()), |metadata| metadata.write(text.as_bytes()))
@@ -190,7 +191,7 @@ impl BagWriter {
 
     fn with<T>(&mut self, something: impl FnOnce(&mut Writer) -> Result<T, McapError>) -> Result<T> {
         let writer = self.writer.as_mut().expect("it is there until the bag is finished");
-        something(writer).map_err(|e| explained(&self.name, e))
+        something(writer).map_err(|e| cannot_write(&self.name, e))
     }
 }
 
@@ -202,12 +203,4 @@ impl Drop for BagWriter {
             self.file.remove();
         }
     }
-}
-
-fn explained(name: &str, error: McapError) -> Error {
-    let what = match error {
-        McapError::Io(e) => e.to_string(),
-        other => other.to_string(),
-    };
-    failed!("cannot write: {what}").at(name)
 }

@@ -64,7 +64,7 @@ impl Recorder {
             // Every chunk has its own.
             .calculate_data_section_crc(false);
         let to = NoSeek::new(BufWriter::with_capacity(1 << 16, to));
-        let writer = options.create(to).map_err(|e| explained(&name, e))?;
+        let writer = options.create(to).map_err(|e| cannot_write(&name, e))?;
         let mut recorder = Self {
             name,
             file,
@@ -181,13 +181,13 @@ impl Recorder {
         self.worth_keeping = true;
         self.with(|writer| writer.finish().map(drop))?;
         let Some(writer) = self.writer.take() else { return Ok(()) };
-        writer.into_inner().flush().map_err(|e| explained(&self.name, e.into()))
+        writer.into_inner().flush().map_err(|e| cannot_write(&self.name, e.into()))
     }
 
     /// Does something with the writer.
     fn with<T>(&mut self, something: impl FnOnce(&mut Writer) -> Result<T, McapError>) -> Result<T> {
         let writer = self.writer.as_mut().expect("it is there until the recording is finished");
-        something(writer).map_err(|e| explained(&self.name, e))
+        something(writer).map_err(|e| cannot_write(&self.name, e))
     }
 }
 
@@ -201,7 +201,8 @@ impl Drop for Recorder {
     }
 }
 
-fn explained(name: &str, error: McapError) -> Error {
+/// What to say of an MCAP called `name` that cannot be written.
+pub(super) fn cannot_write(name: &str, error: McapError) -> Error {
     let what = match error {
         McapError::Io(e) => e.to_string(),
         other => other.to_string(),

@@ -1,7 +1,7 @@
 //! How a contact moves: where it is fitted now against where it was some time ago.
 //!
-//! A fit does not jump from sensor to sensor as a centroid does, so that its difference over a time is the steadiest measure of motion
-//! there is here (`docs/paper.md`); it lags behind by half of that time. Of a line only motion across it can be felt.
+//! A fit does not jump from sensor to sensor as a centroid does, so its difference over a time is the most accurate motion of all
+//! that were tried (`docs/paper.md`). It lags behind by half of that time. Of a line only motion across it can be felt.
 //!
 //! The earlier place is the newest that is at least that old, of the same touch; frames whose touch has no fit are left out.
 //! While there is none, or only one more than twice as old, motion is absent, `held`; in a touch's first frame it is absent,
