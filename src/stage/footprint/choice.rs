@@ -118,9 +118,9 @@ impl<R: Copy> Fits<R> {
 }
 
 #[cfg(test)]
-impl Fits<f64> {
+impl<R: Copy> Fits<R> {
     /// By kind the cost, and what a step would still take away of it.
-    pub(crate) fn reached(&self) -> Vec<(f64, f64)> {
+    pub(crate) fn reached(&self) -> Vec<(R, R)> {
         let mut all = vec![(self.point.cost, self.point.ahead), (self.line.cost, self.line.ahead)];
         all.extend(self.long.iter().flatten().map(|fitted| (fitted.cost, fitted.ahead)));
         all
