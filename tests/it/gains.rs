@@ -134,9 +134,9 @@ fn gains_are_found_from_a_finger_that_wanders() {
             1e3 * estimate.sigma_m,
             estimate.left,
         );
-        assert!(before > 0.15 && after < 0.05, "{layer:?}, {noise}: {before} {after}");
-        // Gains of 3 % make places a few hundredths of a millimetre worse, which counts where noise is low.
-        let most = if noise == 1 { none.0 / 3.0 } else { 1.15 * known.0 };
+        assert!(before > 0.15 && after < 0.06, "{layer:?}, {noise}: {before} {after}");
+        // Gains of 3 to 5 % make places a few hundredths of a millimetre worse: much where noise is low.
+        let most = if noise == 1 { none.0 / 3.0 } else { 1.3 * known.0 };
         assert!(own.0 < most && known.0 < own.0, "{layer:?}, {noise}: {none:?} {own:?} {known:?}");
         assert!(own.1 * 100 > known.1 * 95, "{layer:?}, {noise}: {own:?} {known:?}");
     }
