@@ -143,13 +143,14 @@ impl Engine {
             // As the backend left them: post-processing may put the last frame's percepts in their place.
             let left = check.is_some().then(|| FieldState::after(&self.plan, &self.percepts, raw.first + offset));
             post.frame(offset, frame, &raw, &mut self.percepts, &mut self.post);
+            post.fit_now(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
             if let (Some(check), Some(left)) = (&mut check, left) {
-                check.frame(&post, (offset, frame), &raw, &left, &self.post);
+                check.frame(&post, (offset, frame), &raw, &left, &self.post)?;
             }
         }
-        post.finish(&raw, &mut self.percepts, &mut self.post);
+        post.finish(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
         if let Some(check) = &mut check {
-            check.finish(&post, &raw, first_bound);
+            check.finish(&post, &raw, first_bound)?;
         }
         if let Some(upkeep) = &mut self.upkeep {
             let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();

@@ -63,23 +63,26 @@ impl Check {
         raw: &RawBatch<'_>,
         left: &[FieldState],
         after: &PostState,
-    ) {
+    ) -> Result<()> {
         let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
         let bounds = self.reference.run(raw, offset, &mut self.right, advances);
         post.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
         post.frame(offset, frame, raw, &mut self.right, &mut self.post);
+        post.fit_now(raw, &mut self.right, &mut self.post, None)?;
         for (field, bound) in bounds.iter().enumerate() {
             self.restore_doubtful(field, bound, left[field], &after.fields[field]);
         }
         self.bounds.extend(bounds);
+        Ok(())
     }
 
     /// Ends a call, whose bounds begin at `first`.
-    pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) {
-        post.finish(raw, &mut self.right, &mut self.post);
+    pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) -> Result<()> {
+        post.finish(raw, &mut self.right, &mut self.post, None)?;
         if let Some(cadence) = post.cadence {
             cadence.bounds(&mut self.bounds[first..], raw.steps, &mut self.last_bounds);
         }
+        Ok(())
     }
 
     /// Goes on from the backend's state where it may differ from the reference's.

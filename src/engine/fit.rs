@@ -1,15 +1,19 @@
 //! Contacts fitted to touches: [`crate::stage::footprint`] over a batch.
 //!
 //! It starts from the raw values in double precision, whatever the backend: which taxels are one touch is the backend's to say,
-//! what they feel is the same on all.
+//! and where a descent ends on a device of its own; what taxels feel, and what is made of an end, is the same on all.
 
-use crate::backend::RawBatch;
-use crate::backend::cpu::footprint::fit_each;
+use crate::backend::cpu::footprint::{fit_each, judge_each};
+use crate::backend::{Backend, RawBatch};
+use crate::error::Result;
 use crate::parallel;
 use crate::percept::{Column, Flags, Footprint, Host, Outputs, Percepts, Store};
 use crate::scene::{Plan, PlanField};
 use crate::stage::footprint::{OVER_S, Taxel, Touch, Trail};
 use crate::stage::touches::Found;
+
+/// What makes the descents; without it the CPU, as for the reference.
+pub(super) type On<'a> = Option<&'a mut (dyn Backend + 'static)>;
 
 /// Cells whose touches one thread makes ready at a time: some microseconds of work.
 const CELLS: usize = 32;
@@ -95,9 +99,18 @@ impl Waiting {
 
 /// Fits the touches that wait, all of them where separate touches are asked for; puts what comes of the one with the most pressure
 /// into its cell, and of each into the table of touches.
-pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, state: &mut FitState, percepts: &mut Percepts) {
+///
+/// # Errors
+/// The device does not answer.
+pub(super) fn all(
+    plan: &Plan,
+    raw: &RawBatch<'_>,
+    state: &mut FitState,
+    percepts: &mut Percepts,
+    on: On<'_>,
+) -> Result<()> {
     if state.waiting.is_empty() {
-        return;
+        return Ok(());
     }
     let waiting = std::mem::take(&mut state.waiting);
     let every = plan.outputs.contains(Outputs::TOUCHES);
@@ -109,7 +122,7 @@ pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, state: &mut FitState, percept
         }
     });
     let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();
-    let mut fitted = fit_each(&touches, Touch::conclude).into_iter();
+    let mut fitted = fitted(&touches, on)?.into_iter();
     for (waiting, ready) in waiting.iter().zip(&ready) {
         let mut strongest: Option<(f64, usize, Option<Footprint>, Flags)> = None;
         for (Ready { index, total, .. }, (footprint, flags)) in ready.iter().zip(&mut fitted) {
@@ -130,6 +143,19 @@ pub(super) fn all(plan: &Plan, raw: &RawBatch<'_>, state: &mut FitState, percept
             }
         }
     }
+    Ok(())
+}
+
+/// What each touch is fitted with, and why not: descents are those of the backend's own device, if it has one.
+fn fitted(touches: &[&Touch], on: On<'_>) -> Result<Vec<(Option<Footprint>, Flags)>> {
+    let ends = match on {
+        Some(backend) => backend.descend(touches)?,
+        None => None,
+    };
+    Ok(match ends {
+        Some(ends) => judge_each(touches, &ends, Touch::conclude),
+        None => fit_each(touches, Touch::conclude),
+    })
 }
 
 /// Puts the motion of a cell's touch since it was fitted before.

@@ -3,9 +3,10 @@
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
-use super::fit;
+use super::fit::{self, On};
 use super::place::{self, Links};
 use crate::backend::{RawBatch, Step, sigma};
+use crate::error::Result;
 use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, Receptor};
@@ -141,19 +142,33 @@ impl Post<'_> {
                 self.sigmas(field, raw, offset, cell, percepts);
             }
         }
-        if self.cadence.is_some() {
-            // The next frame may keep this one's.
-            fit::all(self.plan, raw, &mut state.fits, percepts);
-        }
+    }
+
+    /// Fits the touches of the frames completed so far, where frames may keep percepts of the one before.
+    pub(super) fn fit_now(
+        &self,
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        state: &mut PostState,
+        on: On<'_>,
+    ) -> Result<()> {
+        if self.cadence.is_some() { fit::all(self.plan, raw, &mut state.fits, percepts, on) } else { Ok(()) }
     }
 
     /// Completes the frames of `raw`, and keeps the last percepts of a call, where the next call may need them.
-    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &mut Percepts, state: &mut PostState) {
-        fit::all(self.plan, raw, &mut state.fits, percepts);
+    pub(super) fn finish(
+        &self,
+        raw: &RawBatch<'_>,
+        percepts: &mut Percepts,
+        state: &mut PostState,
+        on: On<'_>,
+    ) -> Result<()> {
+        fit::all(self.plan, raw, &mut state.fits, percepts, on)?;
         if self.cadence.is_some() && raw.frames > 0 {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);
         }
+        Ok(())
     }
 
     /// Keeps the percept of a field in frame `index` as it was in the frame before, which is in `last` where it was of

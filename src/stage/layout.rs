@@ -177,3 +177,51 @@ pub(crate) struct Member {
     pub(crate) u: f32,
     pub(crate) v: f32,
 }
+
+/// A taxel of a touch that is fitted, as [`crate::stage::footprint::Sensor`].
+#[cfg(feature = "gpu")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FitSensor {
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) margin: f32,
+    pub(crate) pressure: f32,
+    pub(crate) variance: f32,
+    /// 1 or 0.
+    pub(crate) pressed: f32,
+}
+
+/// Where a touch's descents start, as [`crate::stage::footprint::Start`].
+#[cfg(feature = "gpu")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FitStart {
+    pub(crate) along_u: f32,
+    pub(crate) along_v: f32,
+    pub(crate) point_width: f32,
+    pub(crate) line_width: f32,
+    pub(crate) blob_width: f32,
+    pub(crate) blob_length: f32,
+    pub(crate) half_length: f32,
+    pub(crate) gain_variance: f32,
+    /// Its sensors; 0 where there is no touch.
+    pub(crate) count: u32,
+    pub(crate) steps: u32,
+    /// 1 or 0.
+    pub(crate) is_long: u32,
+}
+
+/// Where a descent ended, as [`crate::stage::footprint::Shape`].
+#[cfg(feature = "gpu")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FitShape {
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) along_u: f32,
+    pub(crate) along_v: f32,
+    pub(crate) force: f32,
+    pub(crate) width: f32,
+    pub(crate) length: f32,
+}

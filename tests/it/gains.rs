@@ -17,9 +17,12 @@ fn grid() -> Body {
 }
 
 const LAYERS: [&str; 2] = ["", "kernel = \"boussinesq\"\n"];
+/// Standard deviations of raw values, where a newton is 500.
+const NOISES: [u32; 2] = [1, 8];
 
-/// A finger that wanders over the grid for two minutes with 2 to 6 N, under a layer with a σ of 2.3 mm; gains differ by ±20 %.
-fn wandering(layer: &str, seconds: u32, seed: u32) -> String {
+/// A finger that wanders over the grid for two minutes with 2 to 6 N, under a layer with a σ of 2.3 mm; gains differ by ±20 %, and raw
+/// values have `noise`.
+fn wandering(layer: &str, noise: u32, seconds: u32, seed: u32) -> String {
     let mut state = seed;
     let mut random = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -33,7 +36,7 @@ fn wandering(layer: &str, seconds: u32, seed: u32) -> String {
     }
     format!(
         "rate_hz = 25\nduration_s = {seconds}\nseed = {seed}\n[skin]\nthickness_m = {}\n{layer}[sensor]\nkind = \"linear\"\nbits = 10\n\
-         gain = 500\nnoise_sigma = 1\ngain_spread = 0.2\ngain_seed = 4\n[[touch]]\non = \"grid\"\nindenter = \"fingertip\"\n\
+         gain = 500\nnoise_sigma = {noise}\ngain_spread = 0.2\ngain_seed = 4\n[[touch]]\non = \"grid\"\nindenter = \"fingertip\"\n\
          path = [{path}]\ntimes_s = [{times}]\nforce_newton = [{forces}]\n",
         2.3e-3 * 3.0_f64.sqrt()
     )
@@ -108,13 +111,13 @@ fn places(
 #[test]
 fn gains_are_found_from_a_finger_that_wanders() {
     let body = grid();
-    for layer in LAYERS {
-        let mut source = SimulatedSource::on_body("finger", &wandering(layer, 120, 1), body.clone()).unwrap();
+    for (layer, noise) in LAYERS.into_iter().flat_map(|layer| NOISES.map(|noise| (layer, noise))) {
+        let mut source = SimulatedSource::on_body("finger", &wandering(layer, noise, 120, 1), body.clone()).unwrap();
         let estimate = estimated(&body, &mut source, "hard");
         let gains = source.gains().to_vec();
         let [before, after] = off(&estimate, &gains);
         let told = estimate.gains.iter().flatten().count();
-        let mut other = SimulatedSource::on_body("finger", &wandering(layer, 40, 2), body.clone()).unwrap();
+        let mut other = SimulatedSource::on_body("finger", &wandering(layer, noise, 40, 2), body.clone()).unwrap();
         let layer_m = 2.3e-3;
         let none = places(&body, &mut other, &|_| 1.0, layer_m, 0.2);
         other.seek(0);
@@ -122,7 +125,7 @@ fn gains_are_found_from_a_finger_that_wanders() {
         other.seek(0);
         let known = places(&body, &mut other, &|index| gains[index], layer_m, 0.05);
         println!(
-            "{layer:?}: {} touches, {told} taxels; gains off by {:.1} % before and {:.1} % after; width {:.2} mm, σ {:.2} mm, left {:.3}; \
+            "{layer:?}, noise {noise}: {} touches, {told} taxels; gains off by {:.1} % before and {:.1} % after; width {:.2} mm, σ {:.2} mm, left {:.3}; \
              places without gains {none:?}, with those found {own:?}, with the true ones {known:?}",
             estimate.touches,
             100.0 * before,
@@ -131,16 +134,18 @@ fn gains_are_found_from_a_finger_that_wanders() {
             1e3 * estimate.sigma_m,
             estimate.left,
         );
-        assert!(before > 0.15 && after < 0.05, "{layer:?}: {before} {after}");
-        // Gains of 3 % make places a few hundredths of a millimetre worse, where noise is that low.
-        assert!(own.0 < none.0 / 3.0 && own.1 == known.1 && known.0 < own.0, "{layer:?}: {none:?} {own:?} {known:?}");
+        assert!(before > 0.15 && after < 0.06, "{layer:?}, {noise}: {before} {after}");
+        // Gains of 3 to 5 % make places a few hundredths of a millimetre worse: much where noise is low.
+        let most = if noise == 1 { none.0 / 3.0 } else { 1.3 * known.0 };
+        assert!(own.0 < most && known.0 < own.0, "{layer:?}, {noise}: {none:?} {own:?} {known:?}");
+        assert!(own.1 * 100 > known.1 * 95, "{layer:?}, {noise}: {own:?} {known:?}");
     }
 }
 
 #[test]
 fn what_a_soft_onset_takes_off_is_no_gain() {
     let body = grid();
-    let mut source = SimulatedSource::on_body("finger", &wandering("", 120, 1), body.clone()).unwrap();
+    let mut source = SimulatedSource::on_body("finger", &wandering("", 1, 120, 1), body.clone()).unwrap();
     let hard = estimated(&body, &mut source, "hard");
     source.seek(0);
     let soft = estimated(&body, &mut source, "soft");

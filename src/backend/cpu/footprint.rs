@@ -5,7 +5,7 @@ use fearless_simd::{f64x8, mask64x8};
 
 use super::{Level, with_widest};
 use crate::parallel;
-use crate::stage::footprint::{Fits, Real, Sensor, Start, Touch, fit};
+use crate::stage::footprint::{Ends, Fits, Real, Sensor, Start, Touch, fit};
 
 /// Touches side by side.
 const ABREAST: usize = 8;
@@ -15,17 +15,57 @@ const FASTER_ABREAST: usize = 3;
 /// Fits all kinds to each of `touches`, on all cores, and gives what `of` makes of each touch and its fits: none where it has too few
 /// taxels for any.
 pub(crate) fn fit_each<T: Send>(touches: &[&Touch], of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync) -> Vec<T> {
-    fit_each_with(Level::new(), touches, of)
+    each(Level::new(), touches, |index| touches[index].start(), of)
 }
 
-fn fit_each_with<T: Send>(
+/// The same where descents were made elsewhere, and `ends` says of each touch where they ended.
+pub(crate) fn judge_each<T: Send>(
+    touches: &[&Touch],
+    ends: &[Option<Ends<f64>>],
+    of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
+) -> Vec<T> {
+    each(Level::new(), touches, |index| ends[index], of)
+}
+
+/// What a touch's fits are made of.
+trait Origin: Copy + Send {
+    /// The fits of up to eight touches, the last of which stands in for those that are not there.
+    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>>;
+    /// Those of one.
+    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64>;
+}
+
+impl Origin for Start<f64> {
+    #[inline(always)]
+    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>> {
+        fit(sensors, &Start::abreast(of, |numbers| f64x8::simd_from(simd, numbers)))
+    }
+
+    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64> {
+        fit(sensors, self)
+    }
+}
+
+impl Origin for Ends<f64> {
+    #[inline(always)]
+    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>> {
+        Ends::abreast(of, |numbers| f64x8::simd_from(simd, numbers)).judged(sensors)
+    }
+
+    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64> {
+        self.judged(sensors)
+    }
+}
+
+fn each<O: Origin, T: Send>(
     level: Level,
     touches: &[&Touch],
+    origin: impl Fn(usize) -> Option<O> + Sync,
     of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
 ) -> Vec<T> {
     if touches.len() < FASTER_ABREAST {
-        let fitted = |touch: &&Touch| touch.start().map(|start| fit(touch.sensors(), &start));
-        return touches.iter().map(|touch| of(touch, fitted(touch).as_ref())).collect();
+        let fits = |index: usize| origin(index).map(|origin| origin.fits(touches[index].sensors()));
+        return touches.iter().enumerate().map(|(index, touch)| of(touch, fits(index).as_ref())).collect();
     }
     // Those with as many taxels side by side: the others wait for the one with most.
     let mut order: Vec<usize> = (0..touches.len()).collect();
@@ -33,14 +73,11 @@ fn fit_each_with<T: Send>(
     let mut made: Vec<Option<T>> = order.iter().map(|_| None).collect();
     let groups = order.chunks(ABREAST).zip(made.chunks_mut(ABREAST));
     parallel::for_each(parallel::threads().min(groups.len()), groups, |(group, made)| {
-        let started: Vec<(usize, &Touch, Start<f64>)> = group
-            .iter()
-            .enumerate()
-            .filter_map(|(at, &index)| Some((at, touches[index], touches[index].start()?)))
-            .collect();
-        if !started.is_empty() {
-            let lanes = with_widest!(level, simd => abreast(simd, &started));
-            for (&(at, touch, _), fits) in started.iter().zip(&lanes) {
+        let fitted: Vec<(usize, &Touch, O)> =
+            group.iter().enumerate().filter_map(|(at, &index)| Some((at, touches[index], origin(index)?))).collect();
+        if !fitted.is_empty() {
+            let lanes = with_widest!(level, simd => abreast(simd, &fitted));
+            for (&(at, touch, _), fits) in fitted.iter().zip(&lanes) {
                 made[at] = Some(of(touch, Some(fits)));
             }
         }
@@ -55,7 +92,7 @@ fn fit_each_with<T: Send>(
 
 /// The fits of up to eight touches.
 #[inline(always)]
-fn abreast<S: Simd>(simd: S, group: &[(usize, &Touch, Start<f64>)]) -> [Fits<f64>; ABREAST] {
+fn abreast<S: Simd, O: Origin>(simd: S, group: &[(usize, &Touch, O)]) -> [Fits<f64>; ABREAST] {
     let lanes = |numbers: [f64; ABREAST]| f64x8::simd_from(simd, numbers);
     let of_lane = |lane: usize| &group[lane.min(group.len() - 1)];
     let most = group.iter().map(|(_, touch, _)| touch.sensors().len()).max().unwrap_or(0);
@@ -64,8 +101,7 @@ fn abreast<S: Simd>(simd: S, group: &[(usize, &Touch, Start<f64>)]) -> [Fits<f64
         let of = std::array::from_fn(|lane| of_lane(lane).1.sensors().get(index).unwrap_or(&Sensor::NONE));
         sensors.push(Sensor::abreast(of, lanes));
     }
-    let start = Start::abreast(std::array::from_fn(|lane| &of_lane(lane).2), lanes);
-    let fits = fit(&sensors, &start);
+    let fits = O::fits_abreast(simd, &sensors, std::array::from_fn(|lane| &of_lane(lane).2));
     std::array::from_fn(|lane| fits.map(|numbers| numbers[lane]))
 }
 
@@ -110,53 +146,35 @@ impl<S: Simd> Real for f64x8<S> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec2;
-
     use super::super::lanes::levels;
     use super::*;
     use crate::percept::Footprint;
-    use crate::stage::footprint::{Layer, Taxel};
-
-    const LAYER: Layer = Layer { sigma_m: 2e-3, gain_spread: 0.05, reach_m: 4e-3, steps: 6 };
-
-    /// Touches of all sizes, round and long, on a grid of 5 mm.
-    fn touches(layer: Layer) -> Vec<Touch> {
-        let touch = |number: i32| {
-            let wide = 3e-3 + 1e-4 * f64::from(number % 40);
-            let long = wide * (1.0 + 0.1 * f64::from(number % 17));
-            let (sin, cos) = (0.3 * f64::from(number)).sin_cos();
-            let taxel = |i: i32, j: i32| {
-                let place_m = DVec2::new(f64::from(i), f64::from(j)) * 5e-3;
-                let from = place_m - DVec2::new(1e-3, -0.5e-3);
-                let (x, y) = (from.x * cos + from.y * sin, from.y * cos - from.x * sin);
-                let pressure = (-0.5 * (x * x / (long * long) + y * y / (wide * wide))).exp();
-                let pressure = if pressure > 0.02 { pressure } else { 0.0 };
-                Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: Some(2e-3) }
-            };
-            let taxels: Vec<Taxel> = (-5..=5).flat_map(|i| (-5..=5).map(move |j| taxel(i, j))).collect();
-            Touch::new(&taxels, &layer)
-        };
-        (0..61).map(touch).collect()
-    }
+    use crate::stage::footprint::Layer;
+    use crate::stage::footprint::made_up::{LAYER, touches};
 
     fn concluded(level: Level, touches: &[Touch]) -> Vec<Option<Footprint>> {
-        fit_each_with(level, &touches.iter().collect::<Vec<_>>(), |touch, fits| touch.conclude(fits).0)
+        each(
+            level,
+            &touches.iter().collect::<Vec<_>>(),
+            |index| touches[index].start(),
+            |touch, fits| touch.conclude(fits).0,
+        )
     }
 
     #[test]
     fn lanes_have_the_bits_of_one_touch_alone_on_every_level() {
-        let touches = touches(LAYER);
+        let made_up = touches(LAYER);
         let alone = |touch: &Touch| {
             let fits = touch.start().map(|start| fit(touch.sensors(), &start));
             touch.conclude(fits.as_ref()).0
         };
-        let right: Vec<_> = touches.iter().map(alone).collect();
+        let right: Vec<_> = made_up.iter().map(alone).collect();
         assert!(right.iter().flatten().count() > 40, "{}", right.iter().flatten().count());
         for level in levels() {
-            assert_eq!(concluded(level, &touches), right, "{level:?}");
+            assert_eq!(concluded(level, &made_up), right, "{level:?}");
         }
         // Negative control: another layer has other bits.
-        let others = self::touches(Layer { sigma_m: 2.000_001e-3, ..LAYER });
+        let others = touches(Layer { sigma_m: 2.000_001e-3, ..LAYER });
         assert_ne!(concluded(Level::new(), &others), right);
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod adapter;
 mod bus;
 mod capacity;
 mod columns;
+mod footprint;
 mod members;
 mod over_fields;
 mod pack;
@@ -37,6 +38,7 @@ pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 use self::adapter::Device;
 use self::capacity::FRAMES_A_BLOCK;
 use self::columns::{Columns, NOTHING};
+use self::footprint::Descents;
 use self::over_fields::{Bound, OverFields};
 use self::pack::{Form, HEADER, Packer, STEP};
 use self::ring::{SETS, Set};
@@ -48,6 +50,7 @@ use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
+use crate::stage::footprint::{Ends, Touch};
 use crate::stage::{layout, motion};
 
 /// The backend, with everything it needs on the device.
@@ -77,6 +80,8 @@ pub(crate) struct Gpu {
     units_m: Vec<f32>,
     /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
     memory: [wgpu::Buffer; 2],
+    /// Where contacts are fitted.
+    descents: Option<Descents>,
 }
 
 impl Gpu {
@@ -197,6 +202,7 @@ impl Gpu {
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
+        let descents = wanted.footprint.then(|| Descents::new(&device));
         device.check()?;
         Ok(Self {
             plan: plan.clone(),
@@ -217,6 +223,7 @@ impl Gpu {
             pressures: wanted.pressures.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             memory: [touched, last],
+            descents,
         })
     }
 
@@ -333,6 +340,11 @@ impl Backend for Gpu {
         self.device.check()?;
         // What is on its way when something goes wrong is never collected: the device is not to be used again.
         self.stream(raw, percepts).inspect_err(|e| self.device.note(&e.to_string()))
+    }
+
+    fn descend(&mut self, touches: &[&Touch]) -> Result<Option<Vec<Option<Ends<f64>>>>> {
+        let Some(descents) = &mut self.descents else { return Ok(None) };
+        descents.run(&self.device, touches).inspect_err(|e| self.device.note(&e.to_string())).map(Some)
     }
 }
 

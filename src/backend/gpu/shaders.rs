@@ -53,6 +53,13 @@ pub(crate) const CHANGE: Shader = shader!("change"; "four_frames", "marks");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion"; "angle");
 
+/// Descents of contacts: over touches, not over frames, and so without what the others share.
+pub(crate) const FOOTPRINT: Shader = Shader {
+    name: "footprint",
+    stages: &["footprint"],
+    source: Cow::Borrowed(include_str!("../../../shaders/footprint.wgsl")),
+};
+
 /// Frames that an invocation of the program over fields takes at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Abreast {
@@ -127,6 +134,6 @@ pub(crate) fn all() -> Vec<Shader> {
             }
         }
     }
-    all.extend([HYSTERESIS, MOTION]);
+    all.extend([HYSTERESIS, MOTION, FOOTPRINT]);
     all
 }

@@ -7,7 +7,7 @@ use naga::{Module, TypeInner};
 
 use super::columns::NOTHING;
 use super::pack::Form;
-use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, narrow_fields, wide_fields};
+use super::shaders::{Abreast, CALIBRATE, CHANGE, FOOTPRINT, Members, Shader, Values, all, narrow_fields, wide_fields};
 use super::skips::skip;
 use super::stage::{GROUP, folded, pipeline};
 
@@ -54,6 +54,25 @@ fn structs_lie_as_naga_lays_them() {
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
     same_layout!(&module, Still { least, rounding, per_taxel });
+    let module = parse(&FOOTPRINT);
+    same_layout!(&module, FitSensor { u, v, margin, pressure, variance, pressed });
+    same_layout!(
+        &module,
+        FitStart {
+            along_u,
+            along_v,
+            point_width,
+            line_width,
+            blob_width,
+            blob_length,
+            half_length,
+            gain_variance,
+            count,
+            steps,
+            is_long
+        }
+    );
+    same_layout!(&module, FitShape { u, v, along_u, along_v, force, width, length });
 }
 
 /// The value of the integer constant `name`.
@@ -92,6 +111,7 @@ fn bits_have_one_meaning() {
     assert_eq!(Flags::all().bits() - shared, (of_host | of_sigma | of_footprint).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
+    assert_eq!(constant(&parse(&FOOTPRINT), "GROUP"), Some(GROUP));
     let one = parse(&narrow_fields(Abreast::One, Values::Raw, Members::Few));
     assert_eq!(constant(&one, "FIELDS_GROUP"), Some(super::stage::FIELDS_GROUP));
     assert_eq!(constant(&module, "CHARTED"), Some(layout::CHARTED));
@@ -144,7 +164,9 @@ fn every_shader_is_the_file_of_its_stage() {
     stages.dedup();
     assert_eq!(files, stages);
     for stage in stages {
-        assert!(folder.join(format!("src/stage/{stage}.rs")).is_file(), "{stage}");
+        let is_there =
+            ["rs", ""].iter().any(|ending| folder.join("src/stage").join(&stage).with_extension(ending).exists());
+        assert!(is_there, "{stage}");
         // Its sums go over members together with those of contact.
         let in_lanes = if stage == "centroid" { "contact" } else { &stage };
         assert!(folder.join(format!("src/backend/cpu/{in_lanes}.rs")).is_file(), "{stage}");

@@ -26,6 +26,47 @@ pub(crate) struct Fits<R> {
     long: Option<[Fitted<R, 6>; 2]>,
 }
 
+/// Where the descents of a touch, or of several in lanes, ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ends<R> {
+    pub(crate) point: Shape<R>,
+    pub(crate) line: Shape<R>,
+    /// Of a segment and a blob, for touches with enough taxels.
+    pub(crate) long: Option<[Shape<R>; 2]>,
+    pub(crate) gain_variance: R,
+}
+
+impl<R: Real> Ends<R> {
+    /// Several side by side, of numbers that `lanes` puts side by side. Those of which only some have all kinds have the shapes of the
+    /// others in place of those.
+    #[inline(always)]
+    pub(crate) fn abreast<const N: usize>(ends: [&Ends<f64>; N], lanes: impl Fn([f64; N]) -> R + Copy) -> Self {
+        let long = |kind: usize| {
+            Shape::abreast(ends.map(|ends| ends.long.as_ref().map_or(&ends.point, |long| &long[kind])), lanes)
+        };
+        Self {
+            point: Shape::abreast(ends.map(|ends| &ends.point), lanes),
+            line: Shape::abreast(ends.map(|ends| &ends.line), lanes),
+            long: ends.iter().any(|ends| ends.long.is_some()).then(|| [long(0), long(1)]),
+            gain_variance: lanes(ends.map(|ends| ends.gain_variance)),
+        }
+    }
+
+    /// The fits there, of `sensors`.
+    #[inline(always)]
+    pub(crate) fn judged(&self, sensors: &[Sensor<R>]) -> Fits<R> {
+        let gains = self.gain_variance;
+        let long = self.long.map(|[segment, blob]| {
+            [descend::<R, Segment, 6>(sensors, gains, segment, 0), descend::<R, Blob, 6>(sensors, gains, blob, 0)]
+        });
+        Fits {
+            point: descend::<R, Point, 4>(sensors, gains, self.point, 0),
+            line: descend::<R, Line, 4>(sensors, gains, self.line, 0),
+            long,
+        }
+    }
+}
+
 /// Fits all kinds to `sensors`, from `start`.
 #[inline(always)]
 pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
@@ -60,6 +101,12 @@ fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape:
 }
 
 impl<R: Copy> Fits<R> {
+    /// Where the descents ended, under gains that vary with `gain_variance`.
+    pub(crate) fn ends(&self, gain_variance: R) -> Ends<R> {
+        let long = self.long.as_ref().map(|long| long.each_ref().map(|fitted| fitted.shape));
+        Ends { point: self.point.shape, line: self.line.shape, long, gain_variance }
+    }
+
     /// Each number by `of`, as a lane's.
     pub(crate) fn map<T>(&self, of: impl Fn(R) -> T + Copy) -> Fits<T> {
         Fits {
@@ -67,6 +114,16 @@ impl<R: Copy> Fits<R> {
             line: mapped(&self.line, of),
             long: self.long.as_ref().map(|long| long.each_ref().map(|long| mapped(long, of))),
         }
+    }
+}
+
+#[cfg(test)]
+impl<R: Copy> Fits<R> {
+    /// By kind the cost, and what a step would still take away of it.
+    pub(crate) fn reached(&self) -> Vec<(R, R)> {
+        let mut all = vec![(self.point.cost, self.point.ahead), (self.line.cost, self.line.ahead)];
+        all.extend(self.long.iter().flatten().map(|fitted| (fitted.cost, fitted.ahead)));
+        all
     }
 }
 

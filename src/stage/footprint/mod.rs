@@ -23,22 +23,32 @@
 //! is too far from flat (`curved`), or without the layer's σ (`no_skin`). A contact whose ends lie beyond the sensors, as a
 //! line's do, has a place and an angle, but no force and no length: `off_field` too.
 //!
-//! This stage is the host's, in f64, and starts from raw values: it has the same bits on every backend. [`Real`] lets it fit
-//! several touches side by side.
+//! This stage starts from raw values, in f64. [`Real`] lets it fit several touches side by side, with the bits of one alone. On
+//! backend `gpu` the descents are the device's, in f32 (`shaders/footprint.wgsl`); what they reach is judged here, in f64
+//! ([`Ends::judged`]), so that kind, covariance and reasons for absence are decided alike everywhere.
 
 mod choice;
 mod descent;
 mod kinds;
+#[cfg(test)]
+pub(crate) mod made_up;
 mod mass;
 mod objective;
 mod real;
+#[cfg(test)]
+pub(crate) mod running;
 mod shape;
 mod touch;
 mod trail;
 
-pub(crate) use choice::{Fits, fit};
+pub(crate) use choice::{Ends, Fits, fit};
 pub(crate) use descent::STEPS;
+#[cfg(test)]
+pub(crate) use descent::descend;
+#[cfg(test)]
+pub(crate) use kinds::{Blob, Kind, Line, Point, Segment};
 pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;
+pub(crate) use shape::Shape;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};
 pub(crate) use trail::{OVER_S, Trail};
