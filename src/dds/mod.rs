@@ -22,6 +22,8 @@ const DOMAIN: &str = "ROS_DOMAIN_ID";
 const MAX_DOMAIN: u16 = 232;
 /// The header of CDR, which the writer adds itself.
 const CDR_HEADER_BYTES: usize = 4;
+/// Topics that every node has.
+const OF_EVERY_NODE: [&str; 2] = ["/parameter_events", "/rosout"];
 /// How often discovery is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
@@ -138,11 +140,12 @@ impl Node {
         }
     }
 
-    /// All topics of others that are known so far, with their types.
+    /// All topics of others that are known so far, with their types; without those that each node has.
     pub(crate) fn topics(&self) -> Vec<(String, String)> {
         let own = self.context.discovered_topics();
         let named = own.iter().filter_map(|topic| Some((ros_topic(&topic.name)?, ros_type(&topic.type_name)?)));
-        named.collect::<BTreeSet<_>>().into_iter().collect()
+        let named: BTreeSet<_> = named.filter(|(name, _)| !OF_EVERY_NODE.contains(&name.as_str())).collect();
+        named.into_iter().collect()
     }
 }
 
