@@ -67,6 +67,8 @@ pub mod body;
 pub mod bundled;
 #[cfg(any(feature = "page", feature = "cli"))]
 mod colours;
+#[cfg(feature = "ros2")]
+mod dds;
 mod engine;
 pub mod error;
 pub mod field;

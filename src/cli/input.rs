@@ -43,6 +43,7 @@ impl Input {
         let name = match &spec {
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
+            SourceSpec::Ros2 { topic, .. } => format!("ros2:{topic}"),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
         };
@@ -86,11 +87,12 @@ impl Input {
 
     /// Whether its frames may hold any taxel of the body, as no header names them.
     pub(super) fn holds_any(&self) -> bool {
-        self.spec == Some(SourceSpec::Stdin)
+        matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Ros2 { .. }))
     }
 
     pub(super) fn is_recording(&self) -> bool {
-        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::CsvStdin | SourceSpec::Serial { .. }))
+        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin};
+        !matches!(self.spec, Some(Stdin | CsvStdin | Serial { .. } | Ros2 { .. }))
     }
 
     pub(super) fn is_stdin(&self) -> bool {
@@ -116,6 +118,10 @@ impl Input {
 
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
+        #[cfg(feature = "ros2")]
+        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+            return Ok(Box::new(somatic::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(asked)?)?));
+        }
         let cut = Cut {
             from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),
             to_s: asked.to.unwrap_or(Cut::WHOLE.to_s),

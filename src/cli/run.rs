@@ -125,7 +125,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
     let has_page = sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_)));
-    let is_watched = (input.is_bundled() && at_terminal) || (input.is_recording() && has_page);
+    let is_watched =
+        (input.is_bundled() && at_terminal) || (input.is_recording() && sinks.iter().any(SinkSpec::is_watched));
     let speed = asked.speed.or(is_watched.then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);

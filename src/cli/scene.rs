@@ -25,6 +25,7 @@ pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
+use self::jointed::topic_of;
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
 
@@ -40,13 +41,13 @@ pub(super) struct RunOptions {
     pub(super) body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, page[:HOST:PORT] for browsers, or -
+    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, ros2[:/NAMESPACE] for its topics, page[:HOST:PORT] for browsers, or -
     /// for NDJSON on standard output; may be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
@@ -234,7 +235,8 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
     pub(super) joints: Option<PathBuf>,
 
-    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON [default: those in the frames].
+    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON, or ros2:/TOPIC, live [default: those
+    /// in the frames].
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(super) joint_states: Option<PathBuf>,
 
@@ -329,7 +331,8 @@ impl RunOptions {
         asked.wiring = asked.wiring.map(|file| folder.join(file));
         asked.layout = asked.layout.map(|file| folder.join(file));
         asked.joints = asked.joints.map(|file| folder.join(file));
-        asked.joint_states = asked.joint_states.map(|file| folder.join(file));
+        asked.joint_states =
+            asked.joint_states.map(|file| if topic_of(&file).is_some() { file } else { folder.join(file) });
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,

@@ -2,6 +2,8 @@
 //!
 //! A sink gets the fields' names once; only recordings use bodies and frames.
 
+#[cfg(any(test, feature = "ros2"))]
+mod handover;
 mod header;
 mod line;
 mod ndjson;
@@ -21,6 +23,8 @@ pub use ndjson::NdjsonSink;
 pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
+#[cfg(feature = "ros2")]
+pub use ros2::Ros2Sink;
 #[cfg(feature = "mcap")]
 pub use ros2::{Ros2BagSink, RosTime};
 pub use spec::{SinkSpec, SinkTarget, TableWish};

@@ -8,7 +8,7 @@ use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
 use crate::output::{OutputPath, OutputPaths};
 
-const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, page[:HOST:PORT], or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub enum SinkSpec {
     Mcap(PathBuf),
     /// `ros2-mcap:FOLDER`: a bag of ROS 2.
     Ros2Mcap(PathBuf),
+    /// `ros2` or `ros2:/NAMESPACE`: topics of ROS 2, live; the namespace is empty or begins with `/`.
+    Ros2(String),
     /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
     Page(Option<String>),
     /// `-`: NDJSON on standard output.
@@ -37,6 +39,7 @@ impl FromStr for SinkSpec {
         match text {
             "-" => return Ok(Self::Stdout),
             "page" => return Ok(Self::Page(None)),
+            "ros2" => return Ok(Self::Ros2(String::new())),
             _ => {}
         }
         let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
@@ -51,13 +54,15 @@ impl FromStr for SinkSpec {
             "parquet" => Ok(Self::Parquet(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
             "ros2-mcap" => Ok(Self::Ros2Mcap(rest.into())),
+            "ros2" if is_namespace(rest) => Ok(Self::Ros2(rest.to_owned())),
+            "ros2" => bad(format!("`{rest}` is no namespace; write ros2, or ros2:/left_arm (letters, digits and _)")),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
             _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
             _ if ending("csv") => Ok(Self::Csv(text.into())),
             _ if ending("parquet") => Ok(Self::Parquet(text.into())),
             _ if ending("mcap") => Ok(Self::Mcap(text.into())),
-            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "page"]) {
+            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "ros2", "page"]) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -79,6 +84,12 @@ impl SinkSpec {
     #[must_use]
     pub fn is_table(&self) -> bool {
         matches!(self, Self::Csv(_) | Self::Parquet(_))
+    }
+
+    /// Whether somebody watches it: a recording is then played as fast as it was.
+    #[must_use]
+    pub fn is_watched(&self) -> bool {
+        matches!(self, Self::Page(_) | Self::Ros2(_))
     }
 
     /// Reserves its files or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
@@ -115,6 +126,14 @@ impl SinkSpec {
             #[cfg(not(feature = "mcap"))]
             Self::Ros2Mcap(path) => {
                 return Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(path.display()));
+            }
+            #[cfg(feature = "ros2")]
+            Self::Ros2(namespace) => SinkTarget::Ros2(namespace.clone()),
+            #[cfg(not(feature = "ros2"))]
+            Self::Ros2(_) => {
+                let what =
+                    "built without the feature `ros2`: cargo install somatic --features ros2; or use ros2-mcap:FOLDER";
+                return Err(Error::failed(what).at("sink `ros2`"));
             }
             Self::Stdout => {
                 outputs.add_standard_output()?;
@@ -156,6 +175,9 @@ pub enum SinkTarget {
         /// What its MCAP is called.
         file_name: String,
     },
+    /// Topics of ROS 2 in a namespace.
+    #[cfg(feature = "ros2")]
+    Ros2(String),
     /// A page for browsers.
     #[cfg(feature = "page")]
     Page(crate::page::Listen),
@@ -200,6 +222,8 @@ impl SinkTarget {
             Self::Ros2Mcap { folder, file_name } => {
                 Ok(Box::new(super::Ros2BagSink::create(folder, &file_name, session)?))
             }
+            #[cfg(feature = "ros2")]
+            Self::Ros2(namespace) => Ok(Box::new(super::Ros2Sink::start(&namespace, session)?)),
             #[cfg(feature = "mcap")]
             Self::Mcap(output) => Ok(Box::new(super::RecordingSink::create(output, session)?)),
             #[cfg(not(feature = "mcap"))]
@@ -208,6 +232,16 @@ impl SinkTarget {
             }
         }
     }
+}
+
+/// Whether `text` is a namespace of ROS 2 that begins with `/`.
+fn is_namespace(text: &str) -> bool {
+    let is_part = |part: &str| {
+        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && !part.contains("__")
+    };
+    text.strip_prefix('/').is_some_and(|rest| rest.split('/').all(is_part))
 }
 
 /// What the MCAP of the bag at `path` is called: as the folder, with the number that ROS 2 counts files by.
@@ -232,6 +266,8 @@ mod tests {
         assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
         assert_eq!(parsed("ros2-mcap:bag"), SinkSpec::Ros2Mcap("bag".into()));
         assert_eq!(bag_file_name(Path::new("some/bag")), "bag_0.mcap");
+        assert_eq!(parsed("ros2"), SinkSpec::Ros2(String::new()));
+        assert_eq!(parsed("ros2:/left/arm_2"), SinkSpec::Ros2("/left/arm_2".into()));
         let why = |text: &str| {
             let error = text.parse::<SinkSpec>().unwrap_err();
             assert!(error.is_usage());
@@ -240,6 +276,9 @@ mod tests {
         assert!(why("json:a").contains("did you mean `ndjson:`"));
         assert!(why("page:").contains("HOST:PORT") && why("pgae:x").contains("did you mean `page:`"));
         assert!(why("ndjson:").contains("nothing follows"));
+        for text in ["ros2:", "ros2:arm", "ros2:/", "ros2:/a/", "ros2:/2a", "ros2:/a b", "ros2:/a__b"] {
+            assert!(why(text).contains("is no namespace"), "{text}");
+        }
         assert!(why("a.txt").contains("ndjson:FILE"));
         assert_eq!(parsed("csv:a"), SinkSpec::Csv("a".into()));
         assert_eq!(parsed("a.csv"), SinkSpec::Csv("a.csv".into()));

@@ -29,6 +29,8 @@ mod recording;
 mod render;
 mod robots;
 mod ros2;
+#[cfg(feature = "ros2")]
+mod ros2_live;
 mod run;
 #[cfg(unix)]
 mod serial;

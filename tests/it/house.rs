@@ -33,10 +33,11 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
             "source",
             vec!["error", "keys", "length", "signal", "body", "field", "bundled", "output", "recording", "wire"],
         ),
-        ("robot", vec!["error", "signal", "body", "author", "source"]),
+        ("dds", vec!["error"]),
+        ("robot", vec!["error", "signal", "body", "author", "source", "dds"]),
         ("colours", vec![]),
         ("page", vec!["error", "percept", "signal", "body", "stage", "scene", "colours"]),
-        ("sink", vec!["error", "output", "percept", "signal", "body", "scene", "recording", "page", "robot"]),
+        ("sink", vec!["error", "output", "percept", "signal", "body", "scene", "recording", "page", "robot", "dds"]),
         ("ink", vec!["error"]),
         ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
@@ -187,6 +188,7 @@ fn each_heavy_dependency_has_one_door() {
         ("prost", "recording"),
         ("ruzstd", "recording"),
         ("serialport", "source"),
+        ("ros2_client", "dds"),
     ];
     for (dependency, door) in doors {
         let mut seen = false;

@@ -15,8 +15,10 @@ impl RunOptions {
             ));
         }
         self.check_joints()?;
-        if self.ros_time.is_some() && !self.sinks.iter().any(|sink| sink.starts_with("ros2-mcap:")) {
-            return Err(Error::usage("--ros-time is for a bag of ROS 2; add --sink ros2-mcap:FOLDER"));
+        if self.ros_time.is_some() && !self.sinks.iter().any(|sink| sink.starts_with("ros2")) {
+            return Err(Error::usage(
+                "--ros-time is for messages of ROS 2; add --sink ros2-mcap:FOLDER or --sink ros2",
+            ));
         }
         if !self.allow_hosts.is_empty() && !self.sinks.iter().any(|sink| sink == "page" || sink.starts_with("page:")) {
             return Err(Error::usage("--allow-host is for a page; add --sink page:HOST:PORT"));
