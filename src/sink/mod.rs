@@ -2,6 +2,8 @@
 //!
 //! A sink gets the fields' names once; only recordings use bodies and frames.
 
+#[cfg(test)]
+mod handover;
 mod header;
 mod line;
 mod ndjson;
