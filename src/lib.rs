@@ -79,6 +79,7 @@ pub mod gains;
 mod ink;
 mod keys;
 mod length;
+mod limb;
 pub mod output;
 #[cfg(feature = "page")]
 pub mod page;

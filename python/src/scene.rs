@@ -17,7 +17,7 @@ use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Recepto
 use crate::error::{OrRaise, usage};
 
 /// Keys of scene files that say where frames come from and go to, and how a run is shown: the command's.
-const OF_THE_COMMAND: [&str; 30] = [
+const OF_THE_COMMAND: [&str; 31] = [
     "accuracy",
     "all_fields",
     "allow_host",
@@ -48,6 +48,7 @@ const OF_THE_COMMAND: [&str; 30] = [
     "verify",
     "wiring",
     "within",
+    "zenoh_config",
 ];
 
 /// The keys of a scene that say what is computed.

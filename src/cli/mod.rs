@@ -49,6 +49,7 @@ mod table;
 mod tradeoff;
 mod tune;
 mod unfit;
+mod verify;
 #[cfg(feature = "page")]
 mod view;
 mod words;

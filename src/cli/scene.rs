@@ -41,13 +41,13 @@ pub(super) struct RunOptions {
     pub(super) body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, ros2[:/NAMESPACE] for its topics, page[:HOST:PORT] for browsers, or -
+    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, ros2[:/NAMESPACE] for its topics, page[:HOST:PORT] for browsers, zenoh:KEY or zenoh-percepts:KEY to send frames or percepts of a limb to another computer, or -
     /// for NDJSON on standard output; may be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
@@ -231,6 +231,10 @@ pub(super) struct RunOptions {
     #[serde(rename = "board_rate_hz")]
     pub(super) board_rate: Option<f64>,
 
+    /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
+    #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
+    pub(super) zenoh_config: Option<PathBuf>,
+
     /// The robot's URDF: joint states, which frames carry or --joint-states has, say where links are. Needs --up.
     #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
     pub(super) joints: Option<PathBuf>,
@@ -330,6 +334,7 @@ impl RunOptions {
         asked.calibration = asked.calibration.map(|file| folder.join(file));
         asked.wiring = asked.wiring.map(|file| folder.join(file));
         asked.layout = asked.layout.map(|file| folder.join(file));
+        asked.zenoh_config = asked.zenoh_config.map(|file| folder.join(file));
         asked.joints = asked.joints.map(|file| folder.join(file));
         asked.joint_states =
             asked.joint_states.map(|file| if topic_of(&file).is_some() { file } else { folder.join(file) });
@@ -375,7 +380,7 @@ impl RunOptions {
             };
         }
         let asked = merged! {
-            values: ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
+            values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
                 coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
@@ -410,7 +415,7 @@ impl RunOptions {
         let outputs = self.outputs_with(calibration.as_ref())?;
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
-        let live = self.sources.iter().any(|source| source.starts_with("serial:"));
+        let live = self.sources.iter().any(|source| ["serial:", "zenoh:"].iter().any(|kind| source.starts_with(kind)));
         // Boards' values have their age where frames are put together.
         let max_age_s = self.max_age.filter(|_| !live).unwrap_or(usual.max_age_s);
         let scene = Scene::default()

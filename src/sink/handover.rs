@@ -200,7 +200,7 @@ fn carry_all<T>(shared: &Shared<T>, mut carrier: impl Carrier<T>) -> Result<()> 
 }
 
 /// Tells people something. A closed standard error is no reason to stop.
-pub(super) fn tell(line: &str) {
+pub(crate) fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "somatic: {line}");
 }
 

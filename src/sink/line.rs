@@ -50,8 +50,14 @@ impl LineWriter {
 
     /// Appends the frame `frame` of the batch to `line`.
     pub(super) fn write(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
+        line.push(b'{');
+        self.write_keys(percepts, frame, line);
+    }
+
+    /// The same without the `{`, for a line that begins with other keys.
+    pub(super) fn write_keys(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
         let Self { heads, all_fields, .. } = self;
-        line.extend_from_slice(b"{\"t\":");
+        line.extend_from_slice(b"\"t\":");
         print(line, &percepts.t_s(frame));
         line.extend_from_slice(b",\"frame\":");
         print(line, &percepts.frame_number(frame));

@@ -6,9 +6,10 @@ use std::str::FromStr;
 use super::table::touches_path;
 use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
+use crate::limb::{LimbSends, checked_key};
 use crate::output::{OutputPath, OutputPaths};
 
-const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], zenoh:KEY, zenoh-percepts:KEY, or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,6 +29,13 @@ pub enum SinkSpec {
     Ros2(String),
     /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
     Page(Option<String>),
+    /// `zenoh:KEY` or `zenoh-percepts:KEY`: a limb's frames or percepts, to another computer.
+    Zenoh {
+        /// Under which key of Zenoh's.
+        key: String,
+        /// What.
+        sends: LimbSends,
+    },
     /// `-`: NDJSON on standard output.
     Stdout,
 }
@@ -46,7 +54,7 @@ impl FromStr for SinkSpec {
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
-            "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" if rest.is_empty() => {
+            "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" | "zenoh" | "zenoh-percepts" if rest.is_empty() => {
                 bad(format!("nothing follows `{kind}:`; {FORMS}"))
             }
             "ndjson" => Ok(Self::Ndjson(rest.into())),
@@ -58,11 +66,19 @@ impl FromStr for SinkSpec {
             "ros2" => bad(format!("`{rest}` is no namespace; write ros2, or ros2:/left_arm (letters, digits and _)")),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
+            "zenoh" | "zenoh-percepts" => {
+                let key = checked_key(rest).map_err(|e| e.at(format!("sink `{text}`")))?;
+                let sends = if kind == "zenoh" { LimbSends::Frames } else { LimbSends::Percepts };
+                Ok(Self::Zenoh { key, sends })
+            }
             _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
             _ if ending("csv") => Ok(Self::Csv(text.into())),
             _ if ending("parquet") => Ok(Self::Parquet(text.into())),
             _ if ending("mcap") => Ok(Self::Mcap(text.into())),
-            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "ros2", "page"]) {
+            kind => match nearest(
+                kind,
+                ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "ros2", "page", "zenoh", "zenoh-percepts"],
+            ) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -135,6 +151,11 @@ impl SinkSpec {
                     "built without the feature `ros2`: cargo install somatic --features ros2; or use ros2-mcap:FOLDER";
                 return Err(Error::failed(what).at("sink `ros2`"));
             }
+            Self::Zenoh { key, .. } if cfg!(not(feature = "zenoh")) => {
+                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                return Err(Error::failed(what).at(format!("sink `zenoh:{key}`")));
+            }
+            Self::Zenoh { key, sends } => SinkTarget::Zenoh { key: key.clone(), sends: *sends },
             Self::Stdout => {
                 outputs.add_standard_output()?;
                 SinkTarget::Stdout
@@ -181,6 +202,13 @@ pub enum SinkTarget {
     /// A page for browsers.
     #[cfg(feature = "page")]
     Page(crate::page::Listen),
+    /// A limb's frames or percepts, to another computer.
+    Zenoh {
+        /// Under which key of Zenoh's.
+        key: String,
+        /// What.
+        sends: LimbSends,
+    },
     /// NDJSON on standard output.
     Stdout,
 }
@@ -216,6 +244,10 @@ impl SinkTarget {
             Self::Parquet { percepts, .. } => {
                 Err(Error::failed("built without the feature `parquet`").at(percepts.name().display()))
             }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh { key, sends } => Ok(Box::new(super::ZenohSink::open(&key, sends, session)?)),
+            #[cfg(not(feature = "zenoh"))]
+            Self::Zenoh { key, .. } => Err(Error::failed("built without the feature `zenoh`").at(key)),
             #[cfg(feature = "page")]
             Self::Page(listen) => Ok(Box::new(super::PageSink::start(&listen, session)?)),
             #[cfg(feature = "mcap")]
@@ -281,6 +313,10 @@ mod tests {
         }
         assert!(why("a.txt").contains("ndjson:FILE"));
         assert_eq!(parsed("csv:a"), SinkSpec::Csv("a".into()));
+        let zenoh = |sends| SinkSpec::Zenoh { key: "robot/arm".into(), sends };
+        assert_eq!(parsed("zenoh:robot/arm"), zenoh(LimbSends::Frames));
+        assert_eq!(parsed("zenoh-percepts:robot/arm"), zenoh(LimbSends::Percepts));
+        assert!(why("zenoh:robot/*").contains("`*`") && why("zenoh:").contains("nothing follows"));
         assert_eq!(parsed("a.csv"), SinkSpec::Csv("a.csv".into()));
         assert_eq!(parsed("a/b.parquet"), SinkSpec::Parquet("a/b.parquet".into()));
         assert!(why("parqet:a").contains("did you mean `parquet:`") && why("csv:").contains("nothing follows"));

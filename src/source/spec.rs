@@ -11,6 +11,7 @@ const FORMS: [(&str, &str); 8] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
+    ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
     ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
@@ -41,6 +42,8 @@ pub enum SourceSpec {
         /// The type of its messages, where one is given, such as `sensor_msgs/msg/PointCloud2`.
         kind: Option<String>,
     },
+    /// `zenoh:KEY`: a limb on another computer.
+    Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
     /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
@@ -70,7 +73,7 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `mcap`, `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `zenoh`, `mcap`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -113,6 +116,7 @@ impl SourceSpec {
             "mcap" => Self::Mcap(rest.into()),
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
+            "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
             "ros2" => {
@@ -160,7 +164,7 @@ impl SourceSpec {
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
-            Self::Serial { .. } | Self::Ros2 { .. } | Self::Stdin | Self::CsvStdin => None,
+            Self::Serial { .. } | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => None,
         }
     }
 
@@ -198,6 +202,16 @@ impl SourceSpec {
             Self::Serial { port, baud } => {
                 let ports = [(port.clone(), *baud)];
                 Ok(Box::new(super::SerialSource::open(&ports, taxels, &super::SerialOptions::default())?))
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(key) => {
+                let keys = std::slice::from_ref(key);
+                Ok(Box::new(super::LimbSource::open(keys, taxels, &super::LimbOptions::default())?))
+            }
+            #[cfg(not(feature = "zenoh"))]
+            Self::Zenoh(key) => {
+                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                Err(Error::failed(what).at(format!("source `zenoh:{key}`")))
             }
             #[cfg(not(feature = "serial"))]
             Self::Serial { port, .. } => {
@@ -241,7 +255,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

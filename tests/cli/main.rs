@@ -12,6 +12,15 @@ mod doubts;
 mod exports;
 mod fields;
 mod inspect;
+mod limbs;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_faults;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_merged;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_network;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_others;
 mod live;
 mod mjcf;
 mod outputs;
@@ -25,6 +34,8 @@ mod python;
 #[path = "../../src/author/random.rs"]
 mod random;
 mod recording;
+#[cfg(all(unix, feature = "zenoh"))]
+mod relay;
 #[cfg(feature = "gpu")]
 mod render;
 mod robots;

@@ -15,6 +15,10 @@ impl RunOptions {
             ));
         }
         self.check_joints()?;
+        let is_zenoh = |name: &String| name.starts_with("zenoh:") || name.starts_with("zenoh-percepts:");
+        if self.zenoh_config.is_some() && !self.sources.iter().chain(&self.sinks).any(is_zenoh) {
+            return Err(Error::usage("--zenoh-config is for limbs; add --source zenoh:KEY or --sink zenoh:KEY"));
+        }
         if self.ros_time.is_some() && !self.sinks.iter().any(|sink| sink.starts_with("ros2")) {
             return Err(Error::usage(
                 "--ros-time is for messages of ROS 2; add --sink ros2-mcap:FOLDER or --sink ros2",
