@@ -7,7 +7,7 @@ use super::{CsvSource, NdjsonSource, SimulatedSource, Source, VendorOptions, Ven
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 8] = [
+const FORMS: [(&str, &str); 9] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),

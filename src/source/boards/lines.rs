@@ -208,7 +208,6 @@ pub(in crate::source) struct State {
     pub(in crate::source) taps: Vec<Vec<ChannelTap>>,
     percepts: VecDeque<LimbPercepts>,
     /// Whom to tell of percepts.
-    #[cfg_attr(not(feature = "zenoh"), expect(dead_code, reason = "only limbs send percepts"))]
     wake: Option<Arc<dyn Fn() + Send + Sync>>,
     start: Instant,
     notices: VecDeque<Notice>,
