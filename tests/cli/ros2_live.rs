@@ -181,7 +181,8 @@ fn time_ns(frame: &Value) -> u64 {
     (frame["t"].as_f64().unwrap() * 1e9).round() as u64
 }
 
-const ARM_TOPICS: [(&str, &str, &str); 5] = [
+const ARM_TOPICS: [(&str, &str, &str); 6] = [
+    ("/left/somatic/wrench/fore_arm/patch_01", "geometry_msgs/msg/WrenchStamped", "reliable"),
     ("/left/somatic/taxels/fore_arm", CLOUD, "best_effort"),
     ("/left/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable"),
     ("/left/tf", "tf2_msgs/msg/TFMessage", "reliable"),
@@ -233,7 +234,12 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
             }
         }
     }
-    let mut compared = 0;
+    // The skin is flat and points to z: the force on it is the percept's, along −z.
+    let wrenches = of("/left/somatic/wrench/fore_arm/patch_01");
+    let forces: BTreeMap<u64, f64> =
+        wrenches.iter().map(|wrench| (stamp_ns(wrench), wrench["wrench"]["force"]["z"].as_f64().unwrap())).collect();
+    assert!(wrenches.len() == times.len() && forces.len() == percepts[0].len(), "{} wrenches", wrenches.len());
+    let (mut compared, mut forces_compared) = (0, 0);
     for frame in &percepts[0] {
         for field in frame["fields"].as_array().unwrap() {
             let marker = &spheres[&(time_ns(frame), field["field"].as_str().unwrap().to_owned())];
@@ -243,9 +249,15 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
             for (axis, ours) in [("x", x), ("y", -z), ("z", y)] {
                 assert!((number(&place[axis]) - ours).abs() < 1e-12, "{place}");
             }
+            if field["field"] == "fore_arm/patch_01" {
+                let told = number(&field["force"]);
+                assert!((forces[&time_ns(frame)] + told).abs() <= 1e-12 * told.abs(), "{field}");
+                forces_compared += 1;
+            }
             compared += 1;
         }
     }
+    assert!(forces_compared > 10, "{forces_compared} forces");
     assert!(compared > 50 && compared == spheres.len() && deleted > 0, "{compared} of {}, {deleted}", spheres.len());
 }
 
@@ -256,7 +268,7 @@ fn nobody_hears_another_domain_or_namespace() {
     let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
     let (own, other) = (domain(), domain());
     let here = Peer::receive(&python, &own, &[("/right/tf", "tf2_msgs/msg/TFMessage", "reliable")]);
-    let there = Peer::receive(&python, &other, &ARM_TOPICS[2..3]);
+    let there = Peer::receive(&python, &other, &ARM_TOPICS[3..4]);
     let mut child = run(&own, &[&arm_flags(&body, &urdf, &calibration)[..], &["--sink", "ros2:/left"]].concat());
     std::thread::sleep(Duration::from_secs(2));
     feed(&mut child, &lines[..20], Duration::from_millis(10));
