@@ -42,8 +42,9 @@
 //! # Features
 //!
 //! All of these are there by default: `cli` is the command and what only it needs, `gpu` the WGSL backend, `page` the page
-//! that shows a run in a browser. `serial` (boards on serial lines) and `mcap` (recordings) come with `cli`. A robot that embeds
-//! the library on its CPU goes without all of them, and builds in a fraction of the time.
+//! that shows a run in a browser. `serial` (boards on serial lines) and `mcap` (recordings) come with `cli`; `ros2` (live topics
+//! of ROS 2) has to be asked for. A robot that embeds the library on its CPU goes without all of them, and builds in a fraction
+//! of the time.
 
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]

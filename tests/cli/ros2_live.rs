@@ -1,10 +1,11 @@
 //! Live topics of ROS 2, as cyclonedds in another process sees and sends them.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -99,16 +100,28 @@ impl Drop for Peer {
     }
 }
 
-/// The command in `domain`, with pipes.
-fn run(domain: &str, arguments: &[&str]) -> Child {
+/// The command in `domain`. What it prints is read as it comes: a full pipe would hold it up.
+struct Running {
+    child: Child,
+    told: JoinHandle<String>,
+}
+
+fn run(domain: &str, arguments: &[&str]) -> Running {
     let mut command = somatic(arguments);
     command.env("ROS_DOMAIN_ID", domain).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    command.spawn().unwrap()
+    let mut child = command.spawn().unwrap();
+    let mut output = child.stdout.take().unwrap();
+    let told = std::thread::spawn(move || {
+        let mut text = String::new();
+        output.read_to_string(&mut text).unwrap();
+        text
+    });
+    Running { child, told }
 }
 
 /// Sends `lines` to the command's standard input, one every `period`.
-fn feed(child: &mut Child, lines: &[String], period: Duration) {
-    let input = child.stdin.as_mut().unwrap();
+fn feed(running: &mut Running, lines: &[String], period: Duration) {
+    let input = running.child.stdin.as_mut().unwrap();
     let begin = Instant::now();
     for (number, line) in lines.iter().enumerate() {
         std::thread::sleep((period * number as u32).saturating_sub(begin.elapsed()));
@@ -117,11 +130,12 @@ fn feed(child: &mut Child, lines: &[String], period: Duration) {
 }
 
 /// What the command prints until its end, with its standard input closed; on standard error too.
-fn ended(mut child: Child) -> (String, String) {
+fn ended(running: Running) -> (String, String) {
+    let Running { mut child, told } = running;
     drop(child.stdin.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    (String::from_utf8(output.stdout.clone()).unwrap(), stderr(&output))
+    (told.join().unwrap(), stderr(&output))
 }
 
 /// The arm's body, and its frames with joint states as lines for standard input.
@@ -167,7 +181,8 @@ fn time_ns(frame: &Value) -> u64 {
     (frame["t"].as_f64().unwrap() * 1e9).round() as u64
 }
 
-const ARM_TOPICS: [(&str, &str, &str); 5] = [
+const ARM_TOPICS: [(&str, &str, &str); 6] = [
+    ("/left/somatic/wrench/fore_arm/patch_01", "geometry_msgs/msg/WrenchStamped", "reliable"),
     ("/left/somatic/taxels/fore_arm", CLOUD, "best_effort"),
     ("/left/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable"),
     ("/left/tf", "tf2_msgs/msg/TFMessage", "reliable"),
@@ -219,7 +234,12 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
             }
         }
     }
-    let mut compared = 0;
+    // The skin is flat and points to z: the force on it is the percept's, along −z.
+    let wrenches = of("/left/somatic/wrench/fore_arm/patch_01");
+    let forces: BTreeMap<u64, f64> =
+        wrenches.iter().map(|wrench| (stamp_ns(wrench), wrench["wrench"]["force"]["z"].as_f64().unwrap())).collect();
+    assert!(wrenches.len() == times.len() && forces.len() == percepts[0].len(), "{} wrenches", wrenches.len());
+    let (mut compared, mut forces_compared) = (0, 0);
     for frame in &percepts[0] {
         for field in frame["fields"].as_array().unwrap() {
             let marker = &spheres[&(time_ns(frame), field["field"].as_str().unwrap().to_owned())];
@@ -229,9 +249,15 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
             for (axis, ours) in [("x", x), ("y", -z), ("z", y)] {
                 assert!((number(&place[axis]) - ours).abs() < 1e-12, "{place}");
             }
+            if field["field"] == "fore_arm/patch_01" {
+                let told = number(&field["force"]);
+                assert!((forces[&time_ns(frame)] + told).abs() <= 1e-12 * told.abs(), "{field}");
+                forces_compared += 1;
+            }
             compared += 1;
         }
     }
+    assert!(forces_compared > 10, "{forces_compared} forces");
     assert!(compared > 50 && compared == spheres.len() && deleted > 0, "{compared} of {}, {deleted}", spheres.len());
 }
 
@@ -242,7 +268,7 @@ fn nobody_hears_another_domain_or_namespace() {
     let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
     let (own, other) = (domain(), domain());
     let here = Peer::receive(&python, &own, &[("/right/tf", "tf2_msgs/msg/TFMessage", "reliable")]);
-    let there = Peer::receive(&python, &other, &ARM_TOPICS[2..3]);
+    let there = Peer::receive(&python, &other, &ARM_TOPICS[3..4]);
     let mut child = run(&own, &[&arm_flags(&body, &urdf, &calibration)[..], &["--sink", "ros2:/left"]].concat());
     std::thread::sleep(Duration::from_secs(2));
     feed(&mut child, &lines[..20], Duration::from_millis(10));
@@ -256,7 +282,7 @@ fn cloud(t_s: f64, values: &[(u32, f32)]) -> Value {
         values.iter().flat_map(|(id, value)| [id.to_le_bytes(), value.to_le_bytes()].concat()).collect();
     let field = |name: &str, offset: u32, datatype: u8| json!({"name": name, "offset": offset, "datatype": datatype, "count": 1});
     json!({
-        "header": {"stamp": {"sec": t_s.floor(), "nanosec": (t_s.fract() * 1e9).round()}, "frame_id": "hand"},
+        "header": {"stamp": {"sec": t_s as u32, "nanosec": (t_s.fract() * 1e9).round() as u32}, "frame_id": "hand"},
         "height": 1, "width": values.len(), "fields": [field("taxel", 0, 6), field("value", 4, 7)],
         "is_bigendian": false, "point_step": 8, "row_step": data.len(), "data": data, "is_dense": true,
     })
@@ -311,7 +337,7 @@ fn a_topic_that_does_not_fit_or_is_not_there_is_told_with_counts() {
             }
             peer
         });
-        let output = child.wait_with_output().unwrap();
+        let output = child.child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
         stderr(&output)
     };
@@ -413,7 +439,7 @@ fn a_thousand_taxels_at_250_hz_arrive() {
     // A second of lines is sent again with other times.
     let tail: Vec<String> =
         (1..=250).map(|number| frame(number).split_once(",\"values\"").unwrap().1.to_owned()).collect();
-    let input = child.stdin.as_mut().unwrap();
+    let input = child.child.stdin.as_mut().unwrap();
     let begin = Instant::now();
     let count = seconds * 250;
     for number in 1..=count {

@@ -22,8 +22,9 @@ const ROOM: usize = 64;
 const END_WITHIN: Duration = Duration::from_secs(2);
 /// How long the node stays after its last message, for receipts of reliable readers and what they ask for again.
 const LINGER: Duration = Duration::from_millis(300);
-/// Clouds that are kept, as in ROS 2's profile for sensor data; and messages of other topics.
-const CLOUD_DEPTH: usize = 5;
+/// Clouds that are kept: with the 5 of ROS 2's profile for sensor data, frames that come together after a pause were lost. And
+/// messages of other topics.
+const CLOUD_DEPTH: usize = ROOM;
 const DEPTH: usize = 100;
 
 /// Sends percepts, and the frames that they are made of, to nodes of ROS 2.
