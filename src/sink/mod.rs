@@ -28,7 +28,7 @@ pub use spec::{SinkSpec, SinkTarget, TableWish};
 pub use table::ParquetSink;
 #[cfg(feature = "arrow")]
 pub use table::{ArrowTable, TableKind};
-pub use table::{CsvSink, TableColumn, TableType, percept_columns, touch_columns};
+pub use table::{CsvSink, TableColumn, TableType, contact_columns, percept_columns, touch_columns};
 
 use std::str::FromStr;
 use std::time::{Duration, Instant};
