@@ -109,7 +109,8 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, ContactKind, Flags, Footprint, FootprintSigma, Outputs, Percept, Percepts, Precision, Touch,
+    COLUMNS, Column, Contact, ContactKind, ContactSide, Flags, Footprint, FootprintSigma, Outputs, Percept, Percepts,
+    Precision, Touch,
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};

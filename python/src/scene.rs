@@ -70,6 +70,7 @@ pub(crate) struct Keys {
     #[serde(deserialize_with = "word")]
     coordinates: Option<Coordinates>,
     max_gap_s: Option<f64>,
+    contact_tolerance_m: Option<f64>,
     max_age_s: Option<f64>,
     filter_window: Option<String>,
     #[serde(deserialize_with = "word")]
@@ -277,6 +278,7 @@ impl PyScene {
             .letters(Letter::all_of(letters, signal))
             .filter(self.keys.filter()?)
             .knobs(knobs)
+            .contact_tolerance_m(self.keys.contact_tolerance_m)
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)
@@ -308,6 +310,9 @@ impl Keys {
         }
         if let Some(gap) = self.max_gap_s.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("max_gap_s: {gap} is not a time span; give seconds over 0")));
+        }
+        if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
+            return Err(Error::usage(format!("contact_tolerance_m: {tolerance} is no distance; give metres over 0")));
         }
         if self.batch == Some(0) {
             return Err(Error::usage("batch: 0 is no number of frames; give one from 1 on"));

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use somatic::signal::Quantity;
 use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Outputs, Percepts, Precision, Result};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Precision, Result};
 
 use super::attachments::attachments;
 use super::describe::describe;
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
-    let table = TableWish { wide: arguments.wide, touches: asked.outputs().contains(Outputs::TOUCHES) };
+    let table = TableWish::new(asked.outputs(), arguments.wide);
     if arguments.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !arguments.describe {
         return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
     }

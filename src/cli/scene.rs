@@ -60,7 +60,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, filtered_* and footprint_*; force only where P has a
+    /// Compute only these quantities [default: all but touches, contacts, filtered_* and footprint_*; force only where P has a
     /// unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
@@ -118,6 +118,12 @@ pub(super) struct RunOptions {
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
     pub(super) coordinates: Option<Coordinates>,
+
+    /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing;
+    /// docs/robots.md].
+    #[arg(long, help_heading = COMPUTED, value_name = "M")]
+    #[serde(rename = "contact_tolerance_m")]
+    pub(super) contact_tolerance: Option<f64>,
 
     /// The longest time between two frames over which motion is measured, in seconds [default: 10].
     #[arg(long, help_heading = COMPUTED, value_name = "S")]
@@ -380,7 +386,7 @@ impl RunOptions {
             };
         }
         let asked = merged! {
-            values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
+            values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap contact_tolerance
                 coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
@@ -390,7 +396,7 @@ impl RunOptions {
     }
 
     pub(super) fn outputs(&self) -> Outputs {
-        outputs_or_usual(&self.outputs)
+        outputs_or_usual(&self.outputs).with_needed()
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.
@@ -426,6 +432,7 @@ impl RunOptions {
             .letters(Letter::all_of(letters, &self.signal))
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
+            .contact_tolerance_m(self.contact_tolerance)
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

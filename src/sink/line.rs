@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
+use crate::percept::{COLUMNS, Contact, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -16,6 +16,9 @@ pub(super) struct LineWriter {
 struct Head {
     in_anchor: String,
     in_world: String,
+    /// As JSON.
+    field: String,
+    link: String,
 }
 
 impl Head {
@@ -30,7 +33,13 @@ impl Head {
             }
             head + ",\"contact\":"
         };
-        Self { in_anchor: begin(&names.link), in_world: begin("world") }
+        let text = |text: &str| serde_json::Value::from(text).to_string();
+        Self {
+            in_anchor: begin(&names.link),
+            in_world: begin("world"),
+            field: text(&names.field),
+            link: text(&names.link),
+        }
     }
 }
 
@@ -79,7 +88,42 @@ impl LineWriter {
             self.write_flags(percept.flags, line);
             line.push(b'}');
         }
-        line.extend_from_slice(b"]}");
+        line.push(b']');
+        if let Some(contacts) = percepts.contacts(frame) {
+            self.write_contacts(contacts, line);
+        }
+        line.push(b'}');
+    }
+
+    fn write_contacts(&self, contacts: &[Contact], line: &mut Vec<u8>) {
+        key(line, "contacts");
+        line.push(b'[');
+        for (index, contact) in contacts.iter().enumerate() {
+            line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+            print(line, &contact.id);
+            for (name, of) in [("fields", true), ("links", false)] {
+                let [a, b] = contact.sides.map(|side| {
+                    let head = &self.heads[side.field];
+                    if of { &head.field } else { &head.link }
+                });
+                key(line, name);
+                line.extend_from_slice(format!("[{a},{b}]").as_bytes());
+            }
+            key(line, "touches");
+            print(line, &contact.sides.map(|side| side.touch));
+            key(line, "totals");
+            print(line, &contact.sides.map(|side| side.total));
+            key(line, "position");
+            print(line, &contact.position);
+            key(line, "distance");
+            print(line, &contact.distance);
+            if let Some(angle) = contact.angle {
+                key(line, "angle");
+                print(line, &angle);
+            }
+            line.push(b'}');
+        }
+        line.push(b']');
     }
 
     fn write_flags(&self, own: Flags, line: &mut Vec<u8>) {

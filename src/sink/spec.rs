@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::table::touches_path;
+use super::table::path_beside;
 use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
 use crate::limb::{LimbSends, checked_key};
 use crate::output::{OutputPath, OutputPaths};
+use crate::percept::Outputs;
 
 const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], zenoh:KEY, zenoh-percepts:KEY, or - for NDJSON on standard output";
 
@@ -93,6 +94,17 @@ pub struct TableWish {
     pub wide: bool,
     /// Whether separate touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
     pub touches: bool,
+    /// Whether contacts are: they go into a third file, `percepts.contacts.csv`.
+    pub contacts: bool,
+}
+
+impl TableWish {
+    /// What tables of `outputs` are to have.
+    #[must_use]
+    pub fn new(outputs: Outputs, wide: bool) -> Self {
+        let outputs = outputs.with_needed();
+        Self { wide, touches: outputs.contains(Outputs::TOUCHES), contacts: outputs.contains(Outputs::CONTACTS) }
+    }
 }
 
 impl SinkSpec {
@@ -114,8 +126,10 @@ impl SinkSpec {
     /// As [`OutputPaths::add`]; a page cannot be at this address, or for these hosts.
     #[cfg_attr(not(feature = "page"), expect(unused_variables, reason = "only a page is for hosts"))]
     pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String], table: TableWish) -> Result<SinkTarget> {
-        let touches_of =
-            |path: &Path, outputs: &mut OutputPaths| table.touches.then(|| outputs.add(touches_path(path))).transpose();
+        let beside = |path: &Path, outputs: &mut OutputPaths| {
+            let mut add = |is_asked: bool, what| is_asked.then(|| outputs.add(path_beside(path, what))).transpose();
+            Ok::<_, Error>((add(table.touches, "touches")?, add(table.contacts, "contacts")?))
+        };
         Ok(match self {
             #[cfg(feature = "page")]
             Self::Page(address) => SinkTarget::Page(crate::page::Listen::new(address.as_deref(), allow_hosts)?),
@@ -123,14 +137,18 @@ impl SinkSpec {
             Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
             Self::Csv(path) => {
-                SinkTarget::Csv { percepts: outputs.add(path)?, touches: touches_of(path, outputs)?, wide: table.wide }
+                let percepts = outputs.add(path)?;
+                let (touches, contacts) = beside(path, outputs)?;
+                SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
             }
             Self::Parquet(path) => {
                 if cfg!(not(feature = "parquet")) {
                     let what = "built without the feature `parquet`: cargo install somatic --features parquet; or use csv:FILE";
                     return Err(Error::failed(what).at(path.display()));
                 }
-                SinkTarget::Parquet { percepts: outputs.add(path)?, touches: touches_of(path, outputs)? }
+                let percepts = outputs.add(path)?;
+                let (touches, contacts) = beside(path, outputs)?;
+                SinkTarget::Parquet { percepts, touches, contacts }
             }
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
             #[cfg(feature = "mcap")]
@@ -176,6 +194,8 @@ pub enum SinkTarget {
         percepts: OutputPath,
         /// That of separate touches.
         touches: Option<OutputPath>,
+        /// That of contacts.
+        contacts: Option<OutputPath>,
         /// Whether it has one row per frame.
         wide: bool,
     },
@@ -185,6 +205,8 @@ pub enum SinkTarget {
         percepts: OutputPath,
         /// That of separate touches.
         touches: Option<OutputPath>,
+        /// That of contacts.
+        contacts: Option<OutputPath>,
     },
     /// A recording in MCAP.
     Mcap(OutputPath),
@@ -235,10 +257,12 @@ impl SinkTarget {
                 let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields);
                 Ok(Box::new(sink.with_header(header.as_deref())?))
             }
-            Self::Csv { percepts, touches, wide } => Ok(Box::new(CsvSink::create(percepts, touches, wide, session)?)),
+            Self::Csv { percepts, touches, contacts, wide } => {
+                Ok(Box::new(CsvSink::create(percepts, touches, contacts, wide, session)?))
+            }
             #[cfg(feature = "parquet")]
-            Self::Parquet { percepts, touches } => {
-                Ok(Box::new(super::ParquetSink::create(percepts, touches, session)?))
+            Self::Parquet { percepts, touches, contacts } => {
+                Ok(Box::new(super::ParquetSink::create(percepts, touches, contacts, session)?))
             }
             #[cfg(not(feature = "parquet"))]
             Self::Parquet { percepts, .. } => {

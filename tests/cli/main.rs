@@ -7,6 +7,7 @@ mod board;
 #[cfg(feature = "page")]
 mod browser;
 mod calibrate;
+mod contacts;
 mod devices;
 mod doubts;
 mod exports;

@@ -38,6 +38,16 @@ impl RunOptions {
         if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
         }
+        if let Some(tolerance) = self.contact_tolerance {
+            if !self.outputs().contains(Outputs::CONTACTS) {
+                return Err(Error::usage("--contact-tolerance is for contacts; add them to --outputs"));
+            }
+            if !(tolerance.is_finite() && tolerance > 0.0) {
+                return Err(Error::usage(format!(
+                    "--contact-tolerance {tolerance} is no distance; give metres over 0"
+                )));
+            }
+        }
         Ok(())
     }
 
