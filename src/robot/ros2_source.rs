@@ -158,7 +158,8 @@ impl Places {
             return match unknown.first() {
                 None => Ok(()),
                 Some(first) => Err(failed!(
-                    "the body has no taxel {first}, nor those of {} of {points} points; give the body that has them",
+                    "{} of {points} points are of taxels that the body does not have, the first of {first}; give the body that \
+                     has them",
                     unknown.len()
                 )),
             };

@@ -350,7 +350,7 @@ fn a_topic_that_does_not_fit_or_is_not_there_is_told_with_counts() {
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", "sensor_msgs/msg/JointState", Value::Null)));
     assert!(why.contains("its messages are sensor_msgs/msg/JointState"), "{why}");
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", CLOUD, cloud(1.0, &[(0, 1.0), (77, 1.0)]))));
-    assert!(why.contains("no taxel 77, nor those of 1 of 2 points"), "{why}");
+    assert!(why.contains("1 of 2 points are of taxels that the body does not have, the first of 77"), "{why}");
     let array = json!({"layout": {"dim": [], "data_offset": 0}, "data": [1.0, 2.0, 3.0]});
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", "std_msgs/msg/Float32MultiArray", array)));
     assert!(why.contains("an array has 3 numbers, and the body 40 taxels"), "{why}");
