@@ -252,10 +252,10 @@ impl Head {
             "--zenoh-config",
             config,
             "--summary",
+            &summary,
             // A busy machine is no silent limb.
             "--max-age",
             "0.5",
-            &summary,
             "--force",
         ];
         arguments.extend(sources.iter().map(String::as_str));
