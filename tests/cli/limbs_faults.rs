@@ -86,8 +86,8 @@ struct Story<'a> {
 }
 
 impl Story<'_> {
-    /// Plays for some time, goes through `event`, plays on; then all is accounted for. `concerned` is the index of the limb whose link is
-    /// that; its percepts must have been stale.
+    /// Plays for some time, goes through `event`, plays on; then all is accounted for. The limb at index `concerned` must have
+    /// been stale, and alone have lost frames.
     fn tell(mut self, concerned: usize, before: u64, during: u64, after: u64, mut event: impl FnMut(bool)) {
         let Self { head, limbs, .. } = &mut self;
         let row = play(limbs, 0, |_| limbs_are_read(head));
