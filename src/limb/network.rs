@@ -33,7 +33,8 @@ impl Network {
     pub(crate) fn open(config: Option<&Path>, side: Side) -> Result<Self> {
         let place = config.map_or_else(|| "zenoh".to_owned(), |path| path.display().to_string());
         let configured = match config {
-            Some(path) => Config::from_file(path).map_err(|e| failed!("no configuration of Zenoh: {e}").at(&place))?,
+            Some(path) => Config::from_file(path)
+                .map_err(|e| failed!("no configuration of Zenoh: {}", without_places(&e)).at(&place))?,
             None => loopback(side).map_err(|e| failed!("{e}").at(&place))?,
         };
         let session = zenoh::open(configured).wait().map_err(|e| {
@@ -43,7 +44,7 @@ impl Network {
                 ),
                 _ => String::new(),
             };
-            failed!("the session cannot be opened: {e}{hint}").at(&place)
+            failed!("the session cannot be opened: {}{hint}", without_places(&e)).at(&place)
         })?;
         Ok(Self(session))
     }
@@ -102,6 +103,12 @@ impl Publication {
     pub(crate) fn is_read(&self) -> bool {
         self.publisher.matching_status().wait().is_ok_and(|status| status.matching())
     }
+}
+
+/// An error's text without where in Zenoh's sources it came from.
+fn without_places(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    text.split(" at /").next().unwrap_or(&text).replace('[', "")
 }
 
 /// Peers on this computer alone, which look for nobody.

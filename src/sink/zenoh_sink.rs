@@ -16,7 +16,7 @@ use crate::scene::Plan;
 use crate::signal::RawValue;
 
 /// Packets that wait for the network; then the oldest give way.
-const ROOM: usize = 16;
+const ROOM: usize = 64;
 /// How often a limb says which taxels its frames have, for heads that come later.
 const LAYOUT_PERIOD: Duration = Duration::from_secs(1);
 /// How long the end waits for the network.

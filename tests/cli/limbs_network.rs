@@ -129,7 +129,8 @@ pub struct Limb {
     /// The ids of the limb's taxels.
     pub taxels: Vec<u32>,
     begin: Instant,
-    pub sent: u64,
+    /// When each frame was written.
+    pub written: Vec<Instant>,
 }
 
 impl Limb {
@@ -158,7 +159,7 @@ impl Limb {
         ];
         let mut running = Running::start(space, &arguments);
         let input = running.child.stdin.take();
-        Self { running, input, taxels: taxels_of(field), begin: Instant::now(), sent: 0 }
+        Self { running, input, taxels: taxels_of(field), begin: Instant::now(), written: Vec::new() }
     }
 
     /// Sends the frame `row`, at `t_s` on the limb's clock.
@@ -166,8 +167,8 @@ impl Limb {
         let values: BTreeMap<String, f64> =
             self.taxels.iter().enumerate().map(|(index, id)| (id.to_string(), value(row, index))).collect();
         let line = json!({"t": t_s, "values": values});
+        self.written.push(Instant::now());
         writeln!(self.input.as_mut().unwrap(), "{line}").unwrap();
-        self.sent += 1;
     }
 
     pub fn send(&mut self, row: u64) {
@@ -252,10 +253,10 @@ impl Head {
             "--zenoh-config",
             config,
             "--summary",
+            &summary,
             // A busy machine is no silent limb.
             "--max-age",
             "0.5",
-            &summary,
             "--force",
         ];
         arguments.extend(sources.iter().map(String::as_str));

@@ -65,7 +65,7 @@ pub struct BoardAccount {
     pub lost: u64,
     /// Delivered frames that were dropped because the consumer was too slow.
     pub dropped: u64,
-    /// Delivered frames that were replaced by a later one of the same board before they were merged.
+    /// Delivered frames that were replaced by a later one of the same board, or too old, before they were merged.
     pub replaced: u64,
     /// Corrupt packets on its line.
     pub corrupt: u64,

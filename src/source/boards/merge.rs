@@ -238,9 +238,11 @@ impl Merge {
         frame.t_s = at_s;
         self.last_s = at_s;
         for board in &mut self.boards {
-            board.waiting = false;
             let max_age_s = board.max_age_s(self.max_age_s);
-            let absent = if board.is_sending(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
+            let is_sending = board.is_sending(at_s, self.max_age_s);
+            let absent = if is_sending { RawValue::MISSING } else { RawValue::STALE };
+            // A frame that is too old by now has come for nothing.
+            board.replaced += u64::from(std::mem::take(&mut board.waiting) && !is_sending);
             for (place, known) in board.places.iter().zip(&board.known) {
                 let Some(place) = *place else { continue };
                 let young = known.filter(|known| at_s - known.confirmed_s <= max_age_s);

@@ -68,9 +68,11 @@ impl Merged {
                 }
             };
             if let Some(at_s) = due {
-                drop(state);
                 frame.values.resize(self.width, RawValue::MISSING);
                 self.merge.fill(at_s, frame);
+                for (board, account) in state.accounts.iter_mut().enumerate() {
+                    account.replaced = self.merge.board_statistics(board).0;
+                }
                 return Ok(true);
             }
             if !state.queue.is_empty() {
