@@ -318,7 +318,7 @@ fn output_names(schema: &mut schemars::Schema) {
 pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {} [default: all but touches, filtered_* and footprint_*; force only where P \
+        "Compute only these quantities: {} [default: all but touches, contacts, filtered_* and footprint_*; force only where P \
          has a unit]",
         names.join(", ")
     )

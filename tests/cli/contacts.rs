@@ -123,7 +123,8 @@ impl Plates {
         let (_folder, input) = file("frames.ndjson", lines);
         let run = Command::new(env!("CARGO_BIN_EXE_somatic"))
             .args(["run", "--body", text_of(&self.body), "--source", "-", "--backend", "cpu"])
-            .args(["--outputs", "total,contacts"])
+            // Each skin whole: of its patches, every one that is pressed would have a contact.
+            .args(["--outputs", "total,contacts", "--fields", "lower", "--fields", "upper"])
             .args(flags)
             .stdin(Stdio::from(std::fs::File::open(input).unwrap()))
             .output()
