@@ -31,7 +31,7 @@ impl ContactTolerance {
         for taxel in &body.taxels {
             places[taxel.link].push(taxel.position_in_link.to_array());
         }
-        let reach_m = places.into_iter().map(|places| median_spacing_m(places) * std::f64::consts::FRAC_1_SQRT_2);
+        let reach_m = places.into_iter().map(|places| median_spacing_m(&places) * std::f64::consts::FRAC_1_SQRT_2);
         Self { given_m, reach_m: reach_m.collect() }
     }
 
@@ -43,8 +43,8 @@ impl ContactTolerance {
 }
 
 /// The median distance between nearest taxels, m; 0 where there are none.
-fn median_spacing_m(places: Vec<[f64; 3]>) -> f64 {
-    let tree = RTree::bulk_load(places.clone());
+fn median_spacing_m(places: &[[f64; 3]]) -> f64 {
+    let tree = RTree::bulk_load(places.to_vec());
     let nearest =
         |place: &[f64; 3]| tree.nearest_neighbor_iter_with_distance_2(*place).map(|(_, d2)| d2).find(|&d2| d2 > 0.0);
     let mut distances: Vec<f64> = places.iter().filter_map(nearest).map(f64::sqrt).collect();
