@@ -44,6 +44,7 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
+mod states_topic;
 mod stdio;
 mod table;
 mod tradeoff;

@@ -25,9 +25,9 @@ pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
-use self::jointed::topic_of;
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
+use super::states_topic::topic_of;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.

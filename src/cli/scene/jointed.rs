@@ -1,12 +1,11 @@
 //! Joints that move the body's links.
 
-use std::path::Path;
-
 use somatic::robot::{JointOptions, JointedSource, Kinematics};
 use somatic::source::{JointStates, Source};
 use somatic::{Body, Error, Result};
 
 use super::RunOptions;
+use crate::cli::states_topic::topic_of;
 use crate::cli::stdio::say;
 
 impl RunOptions {
@@ -77,11 +76,6 @@ impl RunOptions {
         }
         Ok(Box::new(jointed))
     }
-}
-
-/// The topic of ROS 2 that joint states come from, if `states` is one.
-pub(super) fn topic_of(states: &Path) -> Option<&str> {
-    states.to_str()?.strip_prefix("ros2:")
 }
 
 /// The frames of `source`, with the joint states of `topic` as they come.
