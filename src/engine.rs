@@ -4,6 +4,7 @@ mod advance;
 mod block;
 mod cadence;
 mod check;
+mod contacts;
 mod fit;
 mod ids;
 mod input;
@@ -14,6 +15,7 @@ mod upkeep_state;
 
 use self::cadence::OnChange;
 use self::check::Check;
+use self::contacts::Contacts;
 use self::ids::ranges;
 use self::input::Input;
 use self::place::Links;
@@ -102,6 +104,8 @@ pub struct Engine {
     heads: Vec<Frame>,
     ids: Vec<u32>,
     links: Links,
+    /// Where contacts are asked for.
+    contacts: Option<Contacts>,
     /// Fields that could not have the kind of chart that is asked for.
     kept_charts: Vec<(String, NoChart)>,
 }
@@ -170,6 +174,7 @@ impl Engine {
                 parent: body.links.iter().map(|link| link.parent).collect(),
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
             },
+            contacts: Contacts::new(body, &plan, &scene)?,
             kept_charts: recharted.kept,
             plan,
         };

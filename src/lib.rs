@@ -42,8 +42,9 @@
 //! # Features
 //!
 //! All of these are there by default: `cli` is the command and what only it needs, `gpu` the WGSL backend, `page` the page
-//! that shows a run in a browser. `serial` (boards on serial lines) and `mcap` (recordings) come with `cli`. A robot that embeds
-//! the library on its CPU goes without all of them, and builds in a fraction of the time.
+//! that shows a run in a browser. `serial` (boards on serial lines) and `mcap` (recordings) come with `cli`; `ros2` (live topics
+//! of ROS 2) has to be asked for. A robot that embeds the library on its CPU goes without all of them, and builds in a fraction
+//! of the time.
 
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
@@ -67,6 +68,8 @@ pub mod body;
 pub mod bundled;
 #[cfg(any(feature = "page", feature = "cli"))]
 mod colours;
+#[cfg(feature = "ros2")]
+mod dds;
 mod engine;
 pub mod error;
 pub mod field;
@@ -77,6 +80,7 @@ pub mod gains;
 mod ink;
 mod keys;
 mod length;
+mod limb;
 pub mod output;
 #[cfg(feature = "page")]
 pub mod page;
@@ -105,7 +109,8 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, ContactKind, Flags, Footprint, FootprintSigma, Outputs, Percept, Percepts, Precision, Touch,
+    COLUMNS, Column, Contact, ContactKind, ContactSide, Flags, Footprint, FootprintSigma, Outputs, Percept, Percepts,
+    Precision, Touch,
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};

@@ -224,6 +224,28 @@ fn every_command_about_files_made_elsewhere_runs() {
 }
 
 #[test]
+fn every_command_about_live_topics_of_ros_2_runs() {
+    if cfg!(not(feature = "ros2")) {
+        skip("ROS2_FEATURE", "this build has no feature `ros2`, which the commands of docs/ros2.md need");
+        return;
+    }
+    let folder = workplace();
+    let mut run = 0;
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        for command in commands_of(&text, "```sh ros2") {
+            // A domain in which nobody else is.
+            let command = format!("ROS_DOMAIN_ID={} {command}", std::process::id() % 101 + 1);
+            let output = shell(&command, folder.path());
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{}: `{command}` ended with {}\n{said}", page.display(), output.status);
+            run += 1;
+        }
+    }
+    assert!(run >= 3, "only {run} commands were found");
+}
+
+#[test]
 fn commands_are_found_where_they_stand() {
     let page = "text\n```sh\nsomatic run   # why\n\n# no\nls\n```\nsomatic no\n```json\n{}\n```\n";
     assert_eq!(commands(page), ["somatic run", "ls"]);

@@ -16,6 +16,7 @@ from ._flags import Flags
 from ._native import (
     Body,
     Calibration,
+    Contacts,
     Engine,
     EngineState,
     Field,
@@ -39,6 +40,7 @@ from ._native import (
 __all__ = [
     "Body",
     "Calibration",
+    "Contacts",
     "Engine",
     "EngineState",
     "Field",

@@ -5,6 +5,7 @@ mod arrays;
 mod author;
 mod body;
 mod calibration;
+mod contacts;
 #[cfg(feature = "gpu")]
 mod drawing;
 mod engine;
@@ -36,6 +37,8 @@ mod native {
     use body::{PyBody, PyField};
     #[pymodule_export]
     use calibration::PyCalibration;
+    #[pymodule_export]
+    use contacts::PyContacts;
     #[pymodule_export]
     use engine::PyEngine;
     #[pymodule_export]

@@ -11,6 +11,7 @@ use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 
 use crate::arrays::array;
+use crate::contacts::PyContacts;
 use crate::error::usage;
 use crate::session::Run;
 use crate::stream::stream;
@@ -52,7 +53,7 @@ impl PyPercepts {
         Err(usage(
             py,
             match name {
-                "touches" => "touches are no column; see `.touches`".to_owned(),
+                "touches" | "contacts" => format!("{name} are no column; see `.{name}`"),
                 _ if COLUMNS.iter().any(|column| column.name == name) => {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }
@@ -207,6 +208,15 @@ impl PyPercepts {
             return Err(usage(py, "`touches` were not asked for; add them to the scene's outputs"));
         }
         Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
+    }
+
+    /// The contacts between links, with output `contacts`: where the robot touches itself.
+    #[getter]
+    fn contacts(&self, py: Python<'_>) -> PyResult<PyContacts> {
+        if !self.inner.outputs().contains(Outputs::CONTACTS) {
+            return Err(usage(py, "`contacts` were not asked for; add them to the scene's outputs"));
+        }
+        Ok(PyContacts { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
     }
 
     /// Arrow's C stream of the table that docs/tables.md describes: a row per frame and field in contact.

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use somatic::output::OutputPaths;
 use somatic::sink::{Flow, SinkSpec, TableWish};
 use somatic::source::{Cut, SourceSpec, VendorOptions};
-use somatic::{BackendKind, Engine, Error, Frame, Outputs};
+use somatic::{BackendKind, Engine, Error, Frame};
 
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
@@ -77,8 +77,7 @@ pub(crate) fn run<'py>(
         let about = Run::new(&engine, &body.inner, &body.bytes, &scene.text, text);
         let label = label.unwrap_or_else(|| file.display().to_string());
         let session = about.session(&label, all_fields, true);
-        let touches = about.outputs.contains(Outputs::TOUCHES);
-        let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], TableWish { wide: false, touches })?;
+        let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], TableWish::new(about.outputs, false))?;
         let mut sink = target.open(&session)?;
         let mut frames = vec![Frame::missing(0.0, source.taxels().len()); BATCH];
         let mut count = 0;

@@ -17,7 +17,7 @@ use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Recepto
 use crate::error::{OrRaise, usage};
 
 /// Keys of scene files that say where frames come from and go to, and how a run is shown: the command's.
-const OF_THE_COMMAND: [&str; 30] = [
+const OF_THE_COMMAND: [&str; 31] = [
     "accuracy",
     "all_fields",
     "allow_host",
@@ -48,6 +48,7 @@ const OF_THE_COMMAND: [&str; 30] = [
     "verify",
     "wiring",
     "within",
+    "zenoh_config",
 ];
 
 /// The keys of a scene that say what is computed.
@@ -69,6 +70,7 @@ pub(crate) struct Keys {
     #[serde(deserialize_with = "word")]
     coordinates: Option<Coordinates>,
     max_gap_s: Option<f64>,
+    contact_tolerance_m: Option<f64>,
     max_age_s: Option<f64>,
     filter_window: Option<String>,
     #[serde(deserialize_with = "word")]
@@ -276,6 +278,7 @@ impl PyScene {
             .letters(Letter::all_of(letters, signal))
             .filter(self.keys.filter()?)
             .knobs(knobs)
+            .contact_tolerance_m(self.keys.contact_tolerance_m)
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)
@@ -307,6 +310,9 @@ impl Keys {
         }
         if let Some(gap) = self.max_gap_s.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("max_gap_s: {gap} is not a time span; give seconds over 0")));
+        }
+        if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
+            return Err(Error::usage(format!("contact_tolerance_m: {tolerance} is no distance; give metres over 0")));
         }
         if self.batch == Some(0) {
             return Err(Error::usage("batch: 0 is no number of frames; give one from 1 on"));

@@ -230,7 +230,7 @@ fn gather(
             }
             Some(Arrival::End(losses)) => return Ok(losses),
             Some(Arrival::Failed(error)) => return Err(error),
-            None => {}
+            None | Some(Arrival::Woken) => {}
         }
     }
     Ok(lost)

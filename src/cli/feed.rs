@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, s
 use std::thread;
 use std::time::{Duration, Instant};
 
-use somatic::source::Source;
+use somatic::source::{Lines, Source};
 use somatic::{Error, Frame};
 
 /// What a source delivers.
@@ -14,6 +14,8 @@ pub(super) enum Arrival {
     /// The end; a line per kind of loss.
     End(Vec<String>),
     Failed(Error),
+    /// Something came that is no frame: percepts of a limb.
+    Woken,
 }
 
 /// Information on frames.
@@ -41,6 +43,8 @@ pub(super) struct ReadMode {
     pub(super) speed: Option<f64>,
 }
 
+type Queue = (SyncSender<Arrival>, Receiver<Arrival>);
+
 /// A source being read.
 pub(super) struct Feed {
     arrivals: Receiver<Arrival>,
@@ -51,17 +55,26 @@ pub(super) struct Feed {
 
 impl Feed {
     pub(super) fn start(source: Box<dyn Source + Send>, mode: ReadMode) -> Self {
-        Self::with_queue(source, mode, if mode.gather { 4 } else { 1024 }, true)
+        Self::read_by(source, mode, sync_channel(if mode.gather { 4 } else { 1024 }), true)
     }
 
     /// Starts to read `source`, which itself drops and reports late frames, at most `most` frames at once.
     pub(super) fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
-        Self::with_queue(source, ReadMode { most, gather: false, speed: None }, 1, false)
+        Self::read_by(source, ReadMode { most, gather: false, speed: None }, sync_channel(1), false)
     }
 
-    /// Starts to read `source`; up to `queue_length` arrivals wait, with the losses so far if requested.
-    fn with_queue(mut source: Box<dyn Source + Send>, mode: ReadMode, queue_length: usize, with_losses: bool) -> Self {
-        let (sender, arrivals) = sync_channel(queue_length);
+    /// The same, and percepts of limbs on its `lines` wake who waits.
+    pub(super) fn start_woken(source: Box<dyn Source + Send>, most: usize, lines: &Lines) -> Self {
+        let (sender, arrivals) = sync_channel(1);
+        let waker = sender.clone();
+        // Where a frame waits already, there is no need.
+        lines.on_percepts(move || drop(waker.try_send(Arrival::Woken)));
+        Self::read_by(source, ReadMode { most, gather: false, speed: None }, (sender, arrivals), false)
+    }
+
+    /// Starts to read `source` into a queue of arrivals, with the losses so far if requested.
+    fn read_by(mut source: Box<dyn Source + Send>, mode: ReadMode, queue: Queue, with_losses: bool) -> Self {
+        let (sender, arrivals) = queue;
         let (spare, used) = channel();
         thread::spawn(move || {
             let end = read(&mut *source, mode, with_losses, &sender, &used);

@@ -18,6 +18,7 @@ impl FilesRead {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
         let named = named.chain(asked.joints.as_deref()).chain(asked.joint_states.as_deref());
+        let named = named.chain(asked.zenoh_config.as_deref());
         Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
     }
 

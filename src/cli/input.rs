@@ -1,6 +1,9 @@
 //! The input of a run.
 
-use somatic::source::{CsvSource, Cut, NdjsonSource, Replay, SerialSource, SimulatedSource, Source, SourceSpec};
+use somatic::signal::Wiring;
+use somatic::source::{
+    CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, VendorOptions,
+};
 use somatic::{Body, Error, Result, bundled};
 
 use super::attached;
@@ -17,7 +20,17 @@ pub(super) struct Input {
     /// `None` is the bundled touch.
     pub(super) spec: Option<SourceSpec>,
     /// The serial lines with their baud rates, if given; empty for other sources.
-    pub(super) lines: Vec<(String, Option<u32>)>,
+    lines: Vec<(String, Option<u32>)>,
+    /// The keys of limbs on other computers; empty for other sources.
+    limbs: Vec<String>,
+}
+
+/// Boards on serial lines, or limbs on other computers.
+pub(super) struct OpenedLines {
+    pub(super) source: Box<dyn Source + Send>,
+    pub(super) lines: Lines,
+    /// Of boards.
+    pub(super) wiring: Option<Wiring>,
 }
 
 impl Input {
@@ -30,7 +43,9 @@ impl Input {
     pub(super) fn named(asked: &RunOptions) -> Result<Self> {
         let Some(text) = asked.sources.first() else {
             return match asked.body.as_deref() {
-                None | Some("hand") => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new() }),
+                None | Some("hand") => {
+                    Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() })
+                }
                 Some(body) => {
                     check_body_name(body)?;
                     Err(Error::usage(format!(
@@ -43,11 +58,16 @@ impl Input {
         let name = match &spec {
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
+            SourceSpec::Ros2 { topic, .. } => format!("ros2:{topic}"),
+            SourceSpec::Zenoh(_) if asked.sources.len() > 1 => format!("{} limbs", asked.sources.len()),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
             _ => text.clone(),
         };
         let lines = asked.line_flags().lines(&asked.sources)?;
-        let input = Self { name, spec: Some(spec), lines };
+        let keys = asked.sources.iter().map(|source| source.parse());
+        let keys = keys.map(|spec| spec.map(|spec| if let SourceSpec::Zenoh(key) = spec { Some(key) } else { None }));
+        let limbs = keys.collect::<Result<Vec<Option<String>>>>()?.into_iter().flatten().collect();
+        let input = Self { name, spec: Some(spec), lines, limbs };
         if input.spec == Some(SourceSpec::CsvStdin) {
             return match asked.repeat {
                 Some(_) => Err(Error::usage("--loop is for recordings in files; standard input cannot be read twice")),
@@ -86,11 +106,17 @@ impl Input {
 
     /// Whether its frames may hold any taxel of the body, as no header names them.
     pub(super) fn holds_any(&self) -> bool {
-        self.spec == Some(SourceSpec::Stdin)
+        matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Ros2 { .. } | SourceSpec::Zenoh(_)))
     }
 
     pub(super) fn is_recording(&self) -> bool {
-        !matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::CsvStdin | SourceSpec::Serial { .. }))
+        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Zenoh};
+        !matches!(self.spec, Some(Stdin | CsvStdin | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+    }
+
+    /// Whether several boards or limbs are merged.
+    pub(super) fn is_merged(&self) -> bool {
+        !(self.lines.is_empty() && self.limbs.is_empty())
     }
 
     pub(super) fn is_stdin(&self) -> bool {
@@ -110,12 +136,32 @@ impl Input {
         ))
     }
 
-    pub(super) fn open_lines(&self, ids: &[u32], asked: &RunOptions) -> Result<SerialSource> {
-        asked.line_flags().open(&self.lines, ids, asked.max_age)
+    /// Opens the boards or limbs that are merged.
+    pub(super) fn open_lines(&self, ids: &[u32], asked: &RunOptions) -> Result<OpenedLines> {
+        #[cfg(feature = "zenoh")]
+        if !self.limbs.is_empty() {
+            let options = somatic::source::LimbOptions {
+                zenoh_config: asked.zenoh_config.clone(),
+                live_rate_hz: asked.live_rate,
+                max_age_s: asked.max_age,
+            };
+            let source = somatic::source::LimbSource::open(&self.limbs, ids, &options)?;
+            return Ok(OpenedLines { lines: source.lines(), wiring: None, source: Box::new(source) });
+        }
+        if let Some(key) = self.limbs.first() {
+            SourceSpec::Zenoh(key.clone()).open(ids, &VendorOptions::default())?;
+        }
+        let source = asked.line_flags().open(&self.lines, ids, asked.max_age)?;
+        let (lines, wiring) = (source.lines(), Some(source.wiring().clone()));
+        Ok(OpenedLines { source: Box::new(source), lines, wiring })
     }
 
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
+        #[cfg(feature = "ros2")]
+        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+            return Ok(Box::new(somatic::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(asked)?)?));
+        }
         let cut = Cut {
             from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),
             to_s: asked.to.unwrap_or(Cut::WHOLE.to_s),

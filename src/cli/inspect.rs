@@ -6,8 +6,8 @@ mod report;
 
 use clap::Args;
 use somatic::author::{coverage, lint};
-use somatic::error::Result;
-use somatic::field::FieldSet;
+use somatic::error::{Error, Result};
+use somatic::field::{ContactTolerance, FieldSet, rest_overlaps};
 
 use self::inspection::Inspection;
 use super::bodies::load_body;
@@ -33,9 +33,17 @@ pub(super) struct Arguments {
     /// Exit with 1 where anything is odd.
     #[arg(long)]
     strict: bool,
+
+    /// How near taxels of two links must be to be told as near at rest, in metres [default: by the taxels' spacing, as for
+    /// contacts; docs/robots.md].
+    #[arg(long, value_name = "M")]
+    contact_tolerance: Option<f64>,
 }
 
 pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
+    if let Some(tolerance) = arguments.contact_tolerance.filter(|it| !(it.is_finite() && *it > 0.0)) {
+        return Err(Error::usage(format!("--contact-tolerance {tolerance} is no distance; give metres over 0")));
+    }
     let body = load_body(&arguments.body)?;
     let mut findings = body.findings.clone();
     let fields = match FieldSet::new(&body) {
@@ -48,7 +56,8 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     let odd = lint(&body, &fields);
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);
-    let seen = Inspection { body, fields, coverage, findings, odd };
+    let overlaps = rest_overlaps(&body, &ContactTolerance::new(&body, arguments.contact_tolerance));
+    let seen = Inspection { body, fields, coverage, overlaps, findings, odd };
     print(&match arguments.json {
         true => json::text(&seen),
         false => report::text(&seen),

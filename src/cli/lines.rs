@@ -64,6 +64,18 @@ impl LineReport {
         }
     }
 
+    pub(super) fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    /// Percepts that limbs have computed since the last call, a line of NDJSON each.
+    /// When each was read is beside them.
+    pub(super) fn percepts(&self) -> Option<(Vec<String>, Vec<Instant>)> {
+        let percepts = self.lines.percepts().into_iter().map(|percepts| (percepts.line, percepts.read_at));
+        let percepts: (Vec<String>, Vec<Instant>) = percepts.unzip();
+        (!percepts.0.is_empty()).then_some(percepts)
+    }
+
     /// What sinks are to be told now, if anything.
     pub(super) fn news(&mut self) -> Option<News> {
         let now = Instant::now();
@@ -82,7 +94,7 @@ impl LineReport {
             (*frames, *at) = (account.delivered, now);
         }
         BoardHealth {
-            name: format!("board {}", account.board),
+            name: account.name(),
             state: account.state.word().to_owned(),
             rate_hz: account.rate_hz,
             frames: account.delivered,
@@ -122,7 +134,7 @@ impl LineReport {
         let mut rows = Vec::new();
         if accounts.len() <= MAX_BOARD_ROWS {
             rows.extend(accounts.iter().map(|account| {
-                let text = format!("  board {}: {}, {}", account.board, account.state.word(), told(account));
+                let text = format!("  {}: {}, {}", account.name(), account.state.word(), told(account));
                 if account.state == BoardState::Speaking { text } else { style(text).yellow().to_string() }
             }));
         } else {
@@ -147,12 +159,13 @@ impl LineReport {
         if !self.quiet {
             for account in accounts.iter().filter(|account| account.state != BoardState::Awaited) {
                 let port = account.port.as_deref().unwrap_or("?");
-                say(&format!("board {} at {port}: {}", account.board, told(account)));
+                let place = if account.limb.is_some() { String::new() } else { format!(" at {port}") };
+                say(&format!("{}{place}: {}", account.name(), told(account)));
             }
             let awaited = accounts.iter().filter(|account| account.state == BoardState::Awaited);
-            let awaited: Vec<String> = awaited.map(|account| account.board.to_string()).collect();
+            let awaited: Vec<String> = awaited.map(BoardAccount::name).collect();
             if !awaited.is_empty() && answered {
-                say(&format!("no packets from: board {}", awaited.join(", ")));
+                say(&format!("no packets from: {}", awaited.join(", ")));
             }
             if !self.latency.is_empty() {
                 say(&format!("from the last byte read to the percept written: {}", self.latency.words()));
@@ -164,8 +177,12 @@ impl LineReport {
             summary.write(text.as_bytes())?;
         }
         if !answered {
-            let what =
-                "no board has answered; are they powered, and the ports right? `somatic devices` shows the ports";
+            let what = match accounts.iter().any(|account| account.limb.is_some()) {
+                true => "no limb was heard; do they run, under these keys, and does the network reach this computer?",
+                false => {
+                    "no board has answered; are they powered, and the ports right? `somatic devices` shows the ports"
+                }
+            };
             return Err(Error::failed(what));
         }
         Ok(self.lines.losses())
@@ -208,7 +225,7 @@ fn together(accounts: &[BoardAccount]) -> String {
     let sum = |of: fn(&BoardAccount) -> u64| accounts.iter().map(of).sum::<u64>();
     let mut text = format!(
         "  {}: {} frames sent, {} delivered, {} lost",
-        count(accounts.len() as u64, "board"),
+        count(accounts.len() as u64, if accounts[0].limb.is_some() { "limb" } else { "board" }),
         sum(|account| account.delivered + account.lost),
         sum(|account| account.delivered),
         sum(|account| account.lost)
@@ -224,8 +241,9 @@ fn together(accounts: &[BoardAccount]) -> String {
 }
 
 fn as_json(account: &BoardAccount) -> Value {
+    let name = account.limb.as_ref().map_or_else(|| ("board", json!(account.board)), |key| ("limb", json!(key)));
     json!({
-        "board": account.board,
+        (name.0): name.1,
         "port": account.port,
         "state": account.state.word(),
         "sent": account.delivered + account.lost,

@@ -44,11 +44,13 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
+mod states_topic;
 mod stdio;
 mod table;
 mod tradeoff;
 mod tune;
 mod unfit;
+mod verify;
 #[cfg(feature = "page")]
 mod view;
 mod words;

@@ -1,6 +1,8 @@
 //! `somatic plan`: what a scene costs, and what it leaves out.
 
 mod bill;
+#[cfg(feature = "zenoh")]
+mod network;
 mod shown;
 mod timed;
 

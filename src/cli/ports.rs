@@ -30,19 +30,22 @@ impl LineFlags {
     /// The lines that `sources` name, each with its speed in baud where one is given; none where they are no serial lines.
     pub(super) fn lines(&self, sources: &[String]) -> Result<Vec<(String, Option<u32>)>> {
         let mut lines = Vec::new();
+        let mut limbs = 0;
         for source in sources {
-            if let SourceSpec::Serial { port, baud } = source.parse()? {
-                lines.push((port, baud));
+            match source.parse()? {
+                SourceSpec::Serial { port, baud } => lines.push((port, baud)),
+                SourceSpec::Zenoh(_) => limbs += 1,
+                _ => {}
             }
         }
-        if sources.len() > 1 && lines.len() < sources.len() {
+        if sources.len() > 1 && lines.len() < sources.len() && limbs < sources.len() {
             return Err(Error::usage(
-                "only serial lines are read several at a time; merge the others, or run once for each",
+                "only serial lines, or only limbs, are read several at a time; merge the others, or run once for each",
             ));
         }
         let of_lines = [
             ("--wiring", self.wiring.is_some()),
-            ("--live-rate", self.live_rate.is_some()),
+            ("--live-rate", self.live_rate.is_some() && limbs == 0),
             ("--board-rate", self.board_rate.is_some()),
         ];
         match of_lines.iter().find(|(_, given)| *given && lines.is_empty()) {

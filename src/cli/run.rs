@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use somatic::signal::Quantity;
 use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
-use somatic::source::Source;
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Outputs, Percepts, Precision, Result};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Precision, Result};
 
 use super::attachments::attachments;
 use super::describe::describe;
@@ -28,6 +27,7 @@ use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, FAILED, print, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
+use super::verify::has_another_to_compare;
 use super::words;
 
 const FIRST_EXAMPLES: &str = "\
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
-    let table = TableWish { wide: arguments.wide, touches: asked.outputs().contains(Outputs::TOUCHES) };
+    let table = TableWish::new(asked.outputs(), arguments.wide);
     if arguments.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !arguments.describe {
         return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
     }
@@ -116,7 +116,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         say(&format!("{}: {finding}", body.name));
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let recorded = if input.lines.is_empty() { Some(input.open(&ids, &asked)?) } else { None };
+    let recorded = if input.is_merged() { None } else { Some(input.open(&ids, &asked)?) };
     let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
     if summary.is_some() && recorded.is_some() {
         return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
@@ -125,7 +125,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
     let at_terminal = view.is_table();
     let has_page = sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_)));
-    let is_watched = (input.is_bundled() && at_terminal) || (input.is_recording() && has_page);
+    let is_watched =
+        (input.is_bundled() && at_terminal) || (input.is_recording() && sinks.iter().any(SinkSpec::is_watched));
     let speed = asked.speed.or(is_watched.then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
@@ -144,12 +145,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             (source, None)
         }
         None => {
-            let source = input.open_lines(&ids, &asked)?;
+            let opened = input.open_lines(&ids, &asked)?;
             engine.track_stale();
-            engine.wire(source.wiring());
-            wiring = Some(source.wiring().clone());
-            let live = LineReport::new(source.lines(), summary, asked.quiet);
-            (Box::new(source) as Box<dyn Source + Send>, Some(live))
+            opened.wiring.iter().for_each(|wiring| engine.wire(wiring));
+            wiring = opened.wiring;
+            (opened.source, Some(LineReport::new(opened.lines, summary, asked.quiet)))
         }
     };
     let source = asked.jointed(source, &body)?;
@@ -187,6 +187,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         source: &input.name,
         backend: [backend, &device, settled.why.as_deref().unwrap_or(why)],
         wiring: wiring.as_ref(),
+        zenoh_config: asked.zenoh_config.as_deref(),
         ros_time: asked.ros_time.unwrap_or_default(),
     };
     if arguments.describe {
@@ -201,9 +202,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if at_terminal && !input.is_stdin() { Keys::listen() } else { None };
-    let feed = match live {
+    let feed = match &live {
         None => Feed::start(source, ReadMode { most: batch, gather, speed }),
-        Some(_) => Feed::start_live(source, batch),
+        Some(live) => Feed::start_woken(source, batch, live.lines()),
     };
     #[cfg(feature = "page")]
     let explainer = match has_page {
@@ -241,22 +242,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             Err(error)
         }
     }
-}
-
-/// Whether there is another backend than the reference to compare with it: an error where the reference was asked for, and
-/// said where a measurement chose it.
-fn has_another_to_compare(engine: &Engine, chosen: Option<&str>) -> Result<bool> {
-    if engine.backend().0 != "reference" {
-        return Ok(true);
-    }
-    if chosen.is_none() {
-        return Err(Error::usage(
-            "--verify would compare the reference with itself; take backend cpu or gpu in single precision, or leave \
-             --verify out",
-        ));
-    }
-    say("nothing to verify: the reference itself was chosen");
-    Ok(false)
 }
 
 /// Takes frames from a feed through the engine to whoever is to have the percepts.
@@ -330,9 +315,13 @@ impl Pump {
                 Some(Arrival::Failed(error)) => return Err(error),
                 // Nothing comes, but something may be held back.
                 None if self.flush => self.each_sink(|sink| sink.flush())?,
-                None => {}
+                None | Some(Arrival::Woken) => {}
             }
             if let Some(live) = &mut self.live {
+                if let Some((lines, read_at)) = live.percepts() {
+                    serve(&mut self.sinks, true, &mut self.failed, |sink| give_lines(sink, &lines))?;
+                    live.see(&read_at);
+                }
                 live.tell(self.view.is_table());
                 self.view.set_footer(|| live.rows());
                 if let Some(news) = live.news() {
@@ -440,6 +429,14 @@ fn give(sink: &mut dyn Sink, input: &InputFrames<'_>, percepts: &Percepts, flush
         }
     }
     if flush { sink.flush() } else { Ok(Flow::Open) }
+}
+
+/// Gives a sink percepts that limbs have computed.
+fn give_lines(sink: &mut dyn Sink, lines: &[String]) -> Result<Flow> {
+    match sink.write_percepts_of_limbs(lines)? {
+        Flow::Open => sink.flush(),
+        Flow::Closed => Ok(Flow::Closed),
+    }
 }
 
 /// Says, the first time, what is doubtful in the frames so far.

@@ -27,6 +27,7 @@ use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
+use super::states_topic::topic_of;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -40,13 +41,13 @@ pub(super) struct RunOptions {
     pub(super) body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
     pub(super) sources: Vec<String>,
 
-    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, page[:HOST:PORT] for browsers, or -
+    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, ros2[:/NAMESPACE] for its topics, page[:HOST:PORT] for browsers, zenoh:KEY or zenoh-percepts:KEY to send frames or percepts of a limb to another computer, or -
     /// for NDJSON on standard output; may be repeated [default: a table at a terminal, else -].
     #[arg(long = "sink", value_name = "SINK")]
     #[serde(rename = "sink", deserialize_with = "names_of::<SinkSpec, _>")]
@@ -59,7 +60,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, filtered_* and footprint_*; force only where P has a
+    /// Compute only these quantities [default: all but touches, contacts, filtered_* and footprint_*; force only where P has a
     /// unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
@@ -117,6 +118,12 @@ pub(super) struct RunOptions {
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
     pub(super) coordinates: Option<Coordinates>,
+
+    /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing;
+    /// docs/robots.md].
+    #[arg(long, help_heading = COMPUTED, value_name = "M")]
+    #[serde(rename = "contact_tolerance_m")]
+    pub(super) contact_tolerance: Option<f64>,
 
     /// The longest time between two frames over which motion is measured, in seconds [default: 10].
     #[arg(long, help_heading = COMPUTED, value_name = "S")]
@@ -230,11 +237,16 @@ pub(super) struct RunOptions {
     #[serde(rename = "board_rate_hz")]
     pub(super) board_rate: Option<f64>,
 
+    /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
+    #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
+    pub(super) zenoh_config: Option<PathBuf>,
+
     /// The robot's URDF: joint states, which frames carry or --joint-states has, say where links are. Needs --up.
     #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
     pub(super) joints: Option<PathBuf>,
 
-    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON [default: those in the frames].
+    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON, or ros2:/TOPIC, live [default: those
+    /// in the frames].
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(super) joint_states: Option<PathBuf>,
 
@@ -306,7 +318,7 @@ fn output_names(schema: &mut schemars::Schema) {
 pub(super) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {} [default: all but touches, filtered_* and footprint_*; force only where P \
+        "Compute only these quantities: {} [default: all but touches, contacts, filtered_* and footprint_*; force only where P \
          has a unit]",
         names.join(", ")
     )
@@ -328,8 +340,10 @@ impl RunOptions {
         asked.calibration = asked.calibration.map(|file| folder.join(file));
         asked.wiring = asked.wiring.map(|file| folder.join(file));
         asked.layout = asked.layout.map(|file| folder.join(file));
+        asked.zenoh_config = asked.zenoh_config.map(|file| folder.join(file));
         asked.joints = asked.joints.map(|file| folder.join(file));
-        asked.joint_states = asked.joint_states.map(|file| folder.join(file));
+        asked.joint_states =
+            asked.joint_states.map(|file| if topic_of(&file).is_some() { file } else { folder.join(file) });
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
@@ -372,7 +386,7 @@ impl RunOptions {
             };
         }
         let asked = merged! {
-            values: ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap
+            values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap contact_tolerance
                 coordinates filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
@@ -382,7 +396,7 @@ impl RunOptions {
     }
 
     pub(super) fn outputs(&self) -> Outputs {
-        outputs_or_usual(&self.outputs)
+        outputs_or_usual(&self.outputs).with_needed()
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.
@@ -407,7 +421,7 @@ impl RunOptions {
         let outputs = self.outputs_with(calibration.as_ref())?;
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
-        let live = self.sources.iter().any(|source| source.starts_with("serial:"));
+        let live = self.sources.iter().any(|source| ["serial:", "zenoh:"].iter().any(|kind| source.starts_with(kind)));
         // Boards' values have their age where frames are put together.
         let max_age_s = self.max_age.filter(|_| !live).unwrap_or(usual.max_age_s);
         let scene = Scene::default()
@@ -418,6 +432,7 @@ impl RunOptions {
             .letters(Letter::all_of(letters, &self.signal))
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
+            .contact_tolerance_m(self.contact_tolerance)
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

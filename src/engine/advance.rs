@@ -136,7 +136,12 @@ impl Engine {
             cadence.look(&raw, frames);
         }
         self.backend.run(&raw, &mut self.percepts)?;
-        let post = Post { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref() };
+        let post = Post {
+            plan: &self.plan,
+            links: &self.links,
+            contacts: self.contacts.as_ref(),
+            cadence: self.cadence.as_ref(),
+        };
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());
         post.place(frames, raw.first, &mut self.percepts);
         for (offset, frame) in frames.iter().enumerate() {

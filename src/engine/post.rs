@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
+use super::contacts::Contacts;
 use super::fit::{self, On};
 use super::place::{self, Links};
 use crate::backend::{RawBatch, Step, sigma};
@@ -11,7 +12,7 @@ use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{difference, filter, force, motion, touches};
+use crate::stage::{contacts, difference, filter, force, motion, touches};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -20,6 +21,7 @@ pub(super) struct PostState {
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
     pub(super) fits: fit::FitState,
+    pub(super) contacts: contacts::Memory,
 }
 
 /// The same of one field.
@@ -37,7 +39,12 @@ pub(super) struct PostFieldState {
 impl PostState {
     /// The state before the first frame.
     pub(super) fn initial(fields: usize) -> Self {
-        Self { fields: vec![PostFieldState::default(); fields], last: None, fits: fit::FitState::initial(fields) }
+        Self {
+            fields: vec![PostFieldState::default(); fields],
+            last: None,
+            fits: fit::FitState::initial(fields),
+            contacts: contacts::Memory::default(),
+        }
     }
 }
 
@@ -45,6 +52,7 @@ impl PostState {
 pub(super) struct Post<'a> {
     pub(super) plan: &'a Plan,
     pub(super) links: &'a Links,
+    pub(super) contacts: Option<&'a Contacts>,
     /// Which fields changed, where the others keep their percepts.
     pub(super) cadence: Option<&'a OnChange>,
 }
@@ -141,6 +149,9 @@ impl Post<'_> {
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
             }
+        }
+        if let Some(contacts) = self.contacts {
+            contacts.find(self.plan, self.links, frame, index, percepts, &mut state.contacts);
         }
     }
 

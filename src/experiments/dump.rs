@@ -60,8 +60,10 @@ pub fn write(
 
 /// Whether `outputs` can be written.
 pub fn check(outputs: Outputs) -> Result<()> {
-    if outputs.contains(Outputs::TOUCHES) {
-        return Err(Error::usage("--dump writes arrays, and touches are none; leave `touches` out of --outputs"));
+    if outputs.intersects(Outputs::TOUCHES | Outputs::CONTACTS) {
+        return Err(Error::usage(
+            "--dump writes arrays, and touches and contacts are none; leave them out of --outputs",
+        ));
     }
     Ok(())
 }
@@ -136,8 +138,8 @@ mod tests {
     use somatic::backend::BackendKind;
 
     #[test]
-    fn every_output_but_touches_is_an_array() {
-        let outputs = Outputs::all().difference(Outputs::TOUCHES);
+    fn every_output_but_touches_and_contacts_is_an_array() {
+        let outputs = Outputs::all() - Outputs::TOUCHES - Outputs::CONTACTS;
         assert!(check(outputs).is_ok() && check(Outputs::all()).is_err());
         let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, local: false, frames: 4, seed: 1 };
         let mut engine = shape.engine(&shape.body(), BackendKind::Reference, outputs).unwrap();

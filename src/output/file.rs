@@ -103,19 +103,25 @@ impl OutputFile {
         })
     }
 
-    /// Moves this file and `other` into place: both, or neither.
+    /// Moves this file and `others` into place: all, or none.
     ///
     /// # Errors
     /// As [`OutputFile::finish`].
-    pub fn finish_with(self, other: Self) -> Result<()> {
-        let target = match &self.to {
-            Target::Temporary { target, .. } => Some(target.clone()),
-            Target::Device(_) => None,
-        };
-        self.finish()?;
-        other.finish().inspect_err(|_| {
-            let _ = target.map(fs::remove_file);
-        })
+    pub fn finish_with(self, others: Vec<Self>) -> Result<()> {
+        let mut made = Vec::new();
+        for file in std::iter::once(self).chain(others) {
+            let target = match &file.to {
+                Target::Temporary { target, .. } => Some(target.clone()),
+                Target::Device(_) => None,
+            };
+            file.finish().inspect_err(|_| {
+                made.iter().for_each(|target| {
+                    let _ = fs::remove_file(target);
+                });
+            })?;
+            made.extend(target);
+        }
+        Ok(())
     }
 }
 

@@ -148,9 +148,9 @@ fn both_files_or_neither() {
     let begun = |name: &str| OutputPath::new(folder.path().join(name), false, &[]).unwrap().begin().unwrap();
     let (first, second) = (begun("first"), begun("second"));
     fs::write(folder.path().join("second"), "mine").unwrap();
-    assert!(first.finish_with(second).is_err());
+    assert!(first.finish_with(vec![second]).is_err());
     assert_eq!(names_in(folder.path()), ["in.csv", "second"]);
-    begun("third").finish_with(begun("fourth")).unwrap();
+    begun("third").finish_with(vec![begun("fourth")]).unwrap();
     assert_eq!(names_in(folder.path()), ["fourth", "in.csv", "second", "third"]);
 }
 

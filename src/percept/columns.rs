@@ -115,6 +115,9 @@ macro_rules! columns {
                 $(#[doc = $help] const $output = 1 << $bit;)*
                 /// The separate touches of the field, each with an identity; only on request.
                 const TOUCHES = 1 << 16;
+                /// Touches of two links at one place in the world, each with an identity; only on request, and with
+                /// [`Outputs::TOUCHES`].
+                const CONTACTS = 1 << 37;
             }
         }
 
@@ -222,7 +225,7 @@ macro_rules! columns {
             };)*
         }
 
-        /// Every output but [`Outputs::TOUCHES`], which are a table of their own.
+        /// Every output but [`Outputs::TOUCHES`] and [`Outputs::CONTACTS`], which are tables of their own.
         pub const COLUMNS: &[Column] = &[$(Column::$output),*];
     };
 }
@@ -311,10 +314,10 @@ columns! {
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::FILTERED`] and
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::CONTACTS`], [`Outputs::FILTERED`],
     /// [`Outputs::SIGMAS`], [`Outputs::FOOTPRINT`] and [`Outputs::FORCE`], which depends on the calibration.
     pub const USUAL: Self = Self::all()
-        .difference(Self::TOUCHES)
+        .difference(Self::TOUCHES.union(Self::CONTACTS))
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
         .difference(Self::FOOTPRINT)
@@ -356,6 +359,12 @@ impl Outputs {
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
+    }
+
+    /// These, and those that they refer to: contacts name touches.
+    #[must_use]
+    pub const fn with_needed(self) -> Self {
+        if self.contains(Self::CONTACTS) { self.union(Self::TOUCHES) } else { self }
     }
 
     /// Those that each separate touch has for itself.

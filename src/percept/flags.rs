@@ -69,6 +69,8 @@ bitflags! {
         const UNSURE = 1 << 26;
         /// The states of the joints that move the field are missing or too old: its position and normal are in the link.
         const STALE_POSE = 1 << 27;
+        /// Frames do not say where the field is in the world: it is in no contact.
+        const NO_POSE = 1 << 28;
     }
 }
 

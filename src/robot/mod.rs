@@ -19,13 +19,21 @@
 mod jointed_source;
 #[cfg(feature = "meshes")]
 mod kinematics;
+#[cfg(feature = "ros2")]
+mod live_joints;
 #[cfg(feature = "meshes")]
 mod matching;
 pub mod messages;
+#[cfg(feature = "ros2")]
+mod ros2_source;
 
 #[cfg(feature = "meshes")]
 pub use jointed_source::{JointOptions, JointedSource};
 #[cfg(feature = "meshes")]
 pub use kinematics::Kinematics;
+#[cfg(feature = "ros2")]
+pub use live_joints::LiveJoints;
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
+#[cfg(feature = "ros2")]
+pub use ros2_source::Ros2Source;

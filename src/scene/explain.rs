@@ -110,13 +110,18 @@ impl Plan {
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
             ("touches", stages.touches, of(&all), ""),
+            ("contacts", stages.contacts, found, ""),
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
             ("footprint", stages.footprint, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
-            let gives = if name == "touches" { Outputs::TOUCHES } else { Outputs::of_stage(name) };
+            let gives = match name {
+                "touches" => Outputs::TOUCHES,
+                "contacts" => Outputs::CONTACTS,
+                _ => Outputs::of_stage(name),
+            };
             let asked: Vec<String> = (self.outputs() & gives).names().collect();
             let why = match (runs, asked.is_empty(), idle.is_empty()) {
                 (true, false, _) => format!("asked for: {}", asked.join(", ")),
@@ -127,7 +132,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "force", "filter", "sigma", "footprint"].contains(&name),
+                on_host: ["position", "touches", "contacts", "force", "filter", "sigma", "footprint"].contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },

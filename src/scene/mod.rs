@@ -44,6 +44,9 @@ pub struct Scene {
     pub knobs: Knobs,
     /// In which frame positions and normals are given.
     pub coordinates: Coordinates,
+    /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::CONTACTS`]. `None` is that of
+    /// [`crate::field::ContactTolerance`].
+    pub contact_tolerance_m: Option<f64>,
 }
 
 impl Default for Scene {
@@ -57,6 +60,7 @@ impl Default for Scene {
             coordinates: Coordinates::default(),
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
+            contact_tolerance_m: None,
         }
     }
 }
@@ -69,6 +73,7 @@ setters!(Scene {
     filter: MotionFilter,
     knobs: Knobs,
     coordinates: Coordinates,
+    contact_tolerance_m: Option<f64>,
 });
 
 impl Scene {

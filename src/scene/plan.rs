@@ -157,7 +157,7 @@ impl Plan {
             chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
-        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
+        let outputs = scene.knobs.orientation_by.applied(scene.outputs).with_needed();
         let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
         let mut plan = Self {
             outputs,

@@ -12,6 +12,7 @@ pub(crate) struct Stages {
     pub(crate) motion: bool,
     pub(crate) position: bool,
     pub(crate) touches: bool,
+    pub(crate) contacts: bool,
     pub(crate) force: bool,
     /// Whether percepts keep the taxels' pressures, for stages on the host.
     pub(crate) pressures: bool,
@@ -39,6 +40,7 @@ impl Stages {
             motion,
             position,
             touches,
+            contacts: outputs.contains(Outputs::CONTACTS),
             force,
             pressures,
             filter,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
+use crate::percept::{COLUMNS, Contact, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -16,6 +16,9 @@ pub(super) struct LineWriter {
 struct Head {
     in_anchor: String,
     in_world: String,
+    /// As JSON.
+    field: String,
+    link: String,
 }
 
 impl Head {
@@ -30,7 +33,13 @@ impl Head {
             }
             head + ",\"contact\":"
         };
-        Self { in_anchor: begin(&names.link), in_world: begin("world") }
+        let text = |text: &str| serde_json::Value::from(text).to_string();
+        Self {
+            in_anchor: begin(&names.link),
+            in_world: begin("world"),
+            field: text(&names.field),
+            link: text(&names.link),
+        }
     }
 }
 
@@ -50,8 +59,14 @@ impl LineWriter {
 
     /// Appends the frame `frame` of the batch to `line`.
     pub(super) fn write(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
+        line.push(b'{');
+        self.write_keys(percepts, frame, line);
+    }
+
+    /// The same without the `{`, for a line that begins with other keys.
+    pub(super) fn write_keys(&self, percepts: &Percepts, frame: usize, line: &mut Vec<u8>) {
         let Self { heads, all_fields, .. } = self;
-        line.extend_from_slice(b"{\"t\":");
+        line.extend_from_slice(b"\"t\":");
         print(line, &percepts.t_s(frame));
         line.extend_from_slice(b",\"frame\":");
         print(line, &percepts.frame_number(frame));
@@ -73,7 +88,42 @@ impl LineWriter {
             self.write_flags(percept.flags, line);
             line.push(b'}');
         }
-        line.extend_from_slice(b"]}");
+        line.push(b']');
+        if let Some(contacts) = percepts.contacts(frame) {
+            self.write_contacts(contacts, line);
+        }
+        line.push(b'}');
+    }
+
+    fn write_contacts(&self, contacts: &[Contact], line: &mut Vec<u8>) {
+        key(line, "contacts");
+        line.push(b'[');
+        for (index, contact) in contacts.iter().enumerate() {
+            line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+            print(line, &contact.id);
+            for (name, of) in [("fields", true), ("links", false)] {
+                let [a, b] = contact.sides.map(|side| {
+                    let head = &self.heads[side.field];
+                    if of { &head.field } else { &head.link }
+                });
+                key(line, name);
+                line.extend_from_slice(format!("[{a},{b}]").as_bytes());
+            }
+            key(line, "touches");
+            print(line, &contact.sides.map(|side| side.touch));
+            key(line, "totals");
+            print(line, &contact.sides.map(|side| side.total));
+            key(line, "position");
+            print(line, &contact.position);
+            key(line, "distance");
+            print(line, &contact.distance);
+            if let Some(angle) = contact.angle {
+                key(line, "angle");
+                print(line, &angle);
+            }
+            line.push(b'}');
+        }
+        line.push(b']');
     }
 
     fn write_flags(&self, own: Flags, line: &mut Vec<u8>) {

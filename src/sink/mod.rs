@@ -2,6 +2,8 @@
 //!
 //! A sink gets the fields' names once; only recordings use bodies and frames.
 
+#[cfg(any(test, feature = "ros2", feature = "zenoh"))]
+mod handover;
 mod header;
 mod line;
 mod ndjson;
@@ -15,12 +17,17 @@ mod spec;
 mod table;
 #[cfg(feature = "mcap")]
 mod view;
+#[cfg(feature = "zenoh")]
+mod zenoh_sink;
 
+pub use crate::limb::LimbSends;
 pub use ndjson::NdjsonSink;
 #[cfg(feature = "page")]
 pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
+#[cfg(feature = "ros2")]
+pub use ros2::Ros2Sink;
 #[cfg(feature = "mcap")]
 pub use ros2::{Ros2BagSink, RosTime};
 pub use spec::{SinkSpec, SinkTarget, TableWish};
@@ -28,7 +35,9 @@ pub use spec::{SinkSpec, SinkTarget, TableWish};
 pub use table::ParquetSink;
 #[cfg(feature = "arrow")]
 pub use table::{ArrowTable, TableKind};
-pub use table::{CsvSink, TableColumn, TableType, percept_columns, touch_columns};
+pub use table::{CsvSink, TableColumn, TableType, contact_columns, percept_columns, touch_columns};
+#[cfg(feature = "zenoh")]
+pub use zenoh_sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};
 
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -60,6 +69,15 @@ pub trait Sink {
     /// # Errors
     /// As [`Sink::write`].
     fn write_news(&mut self, _news: &News) -> Result<Flow> {
+        Ok(Flow::Open)
+    }
+
+    /// Takes percepts that limbs on other computers have computed, each a line of NDJSON without its end. Only NDJSON holds
+    /// them; other sinks ignore them.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    fn write_percepts_of_limbs(&mut self, _lines: &[String]) -> Result<Flow> {
         Ok(Flow::Open)
     }
 
@@ -173,6 +191,8 @@ pub struct Session<'a> {
     pub backend: [&'a str; 3],
     /// Which taxel is on which channel of which board.
     pub wiring: Option<&'a Wiring>,
+    /// Zenoh's own configuration, a file; without one limbs send to this computer alone.
+    pub zenoh_config: Option<&'a std::path::Path>,
     /// Which times messages of ROS have.
     #[cfg(feature = "mcap")]
     pub ros_time: RosTime,

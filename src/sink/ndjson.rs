@@ -116,6 +116,19 @@ impl Sink for NdjsonSink {
         Ok(Flow::Open)
     }
 
+    fn write_percepts_of_limbs(&mut self, lines: &[String]) -> Result<Flow> {
+        for line in lines {
+            if self.closed {
+                return Ok(Flow::Closed);
+            }
+            let written = writeln!(self.writer, "{line}");
+            if self.flow(written)? == Flow::Closed {
+                return Ok(Flow::Closed);
+            }
+        }
+        Ok(Flow::Open)
+    }
+
     fn flush(&mut self) -> Result<Flow> {
         if self.closed {
             return Ok(Flow::Closed);

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::table::touches_path;
+use super::table::path_beside;
 use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
+use crate::limb::{LimbSends, checked_key};
 use crate::output::{OutputPath, OutputPaths};
+use crate::percept::Outputs;
 
-const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, page[:HOST:PORT], or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], zenoh:KEY, zenoh-percepts:KEY, or - for NDJSON on standard output";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,8 +26,17 @@ pub enum SinkSpec {
     Mcap(PathBuf),
     /// `ros2-mcap:FOLDER`: a bag of ROS 2.
     Ros2Mcap(PathBuf),
+    /// `ros2` or `ros2:/NAMESPACE`: topics of ROS 2, live; the namespace is empty or begins with `/`.
+    Ros2(String),
     /// `page` or `page:HOST:PORT`: a page for browsers, at an address of this machine.
     Page(Option<String>),
+    /// `zenoh:KEY` or `zenoh-percepts:KEY`: a limb's frames or percepts, to another computer.
+    Zenoh {
+        /// Under which key of Zenoh's.
+        key: String,
+        /// What.
+        sends: LimbSends,
+    },
     /// `-`: NDJSON on standard output.
     Stdout,
 }
@@ -37,13 +48,14 @@ impl FromStr for SinkSpec {
         match text {
             "-" => return Ok(Self::Stdout),
             "page" => return Ok(Self::Page(None)),
+            "ros2" => return Ok(Self::Ros2(String::new())),
             _ => {}
         }
         let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
         let bad = |what: String| Err(Error::usage(what).at(format!("sink `{text}`")));
         let (kind, rest) = text.split_once(':').unwrap_or(("", text));
         match kind {
-            "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" if rest.is_empty() => {
+            "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" | "zenoh" | "zenoh-percepts" if rest.is_empty() => {
                 bad(format!("nothing follows `{kind}:`; {FORMS}"))
             }
             "ndjson" => Ok(Self::Ndjson(rest.into())),
@@ -51,13 +63,23 @@ impl FromStr for SinkSpec {
             "parquet" => Ok(Self::Parquet(rest.into())),
             "mcap" => Ok(Self::Mcap(rest.into())),
             "ros2-mcap" => Ok(Self::Ros2Mcap(rest.into())),
+            "ros2" if is_namespace(rest) => Ok(Self::Ros2(rest.to_owned())),
+            "ros2" => bad(format!("`{rest}` is no namespace; write ros2, or ros2:/left_arm (letters, digits and _)")),
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
+            "zenoh" | "zenoh-percepts" => {
+                let key = checked_key(rest).map_err(|e| e.at(format!("sink `{text}`")))?;
+                let sends = if kind == "zenoh" { LimbSends::Frames } else { LimbSends::Percepts };
+                Ok(Self::Zenoh { key, sends })
+            }
             _ if ending("ndjson") => Ok(Self::Ndjson(text.into())),
             _ if ending("csv") => Ok(Self::Csv(text.into())),
             _ if ending("parquet") => Ok(Self::Parquet(text.into())),
             _ if ending("mcap") => Ok(Self::Mcap(text.into())),
-            kind => match nearest(kind, ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "page"]) {
+            kind => match nearest(
+                kind,
+                ["ndjson", "csv", "parquet", "mcap", "ros2-mcap", "ros2", "page", "zenoh", "zenoh-percepts"],
+            ) {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
@@ -72,6 +94,17 @@ pub struct TableWish {
     pub wide: bool,
     /// Whether separate touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
     pub touches: bool,
+    /// Whether contacts are: they go into a third file, `percepts.contacts.csv`.
+    pub contacts: bool,
+}
+
+impl TableWish {
+    /// What tables of `outputs` are to have.
+    #[must_use]
+    pub fn new(outputs: Outputs, wide: bool) -> Self {
+        let outputs = outputs.with_needed();
+        Self { wide, touches: outputs.contains(Outputs::TOUCHES), contacts: outputs.contains(Outputs::CONTACTS) }
+    }
 }
 
 impl SinkSpec {
@@ -81,14 +114,22 @@ impl SinkSpec {
         matches!(self, Self::Csv(_) | Self::Parquet(_))
     }
 
+    /// Whether somebody watches it: a recording is then played as fast as it was.
+    #[must_use]
+    pub fn is_watched(&self) -> bool {
+        matches!(self, Self::Page(_) | Self::Ros2(_))
+    }
+
     /// Reserves its files or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
     ///
     /// # Errors
     /// As [`OutputPaths::add`]; a page cannot be at this address, or for these hosts.
     #[cfg_attr(not(feature = "page"), expect(unused_variables, reason = "only a page is for hosts"))]
     pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String], table: TableWish) -> Result<SinkTarget> {
-        let touches_of =
-            |path: &Path, outputs: &mut OutputPaths| table.touches.then(|| outputs.add(touches_path(path))).transpose();
+        let beside = |path: &Path, outputs: &mut OutputPaths| {
+            let mut add = |is_asked: bool, what| is_asked.then(|| outputs.add(path_beside(path, what))).transpose();
+            Ok::<_, Error>((add(table.touches, "touches")?, add(table.contacts, "contacts")?))
+        };
         Ok(match self {
             #[cfg(feature = "page")]
             Self::Page(address) => SinkTarget::Page(crate::page::Listen::new(address.as_deref(), allow_hosts)?),
@@ -96,14 +137,18 @@ impl SinkSpec {
             Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
             Self::Csv(path) => {
-                SinkTarget::Csv { percepts: outputs.add(path)?, touches: touches_of(path, outputs)?, wide: table.wide }
+                let percepts = outputs.add(path)?;
+                let (touches, contacts) = beside(path, outputs)?;
+                SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
             }
             Self::Parquet(path) => {
                 if cfg!(not(feature = "parquet")) {
                     let what = "built without the feature `parquet`: cargo install somatic --features parquet; or use csv:FILE";
                     return Err(Error::failed(what).at(path.display()));
                 }
-                SinkTarget::Parquet { percepts: outputs.add(path)?, touches: touches_of(path, outputs)? }
+                let percepts = outputs.add(path)?;
+                let (touches, contacts) = beside(path, outputs)?;
+                SinkTarget::Parquet { percepts, touches, contacts }
             }
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
             #[cfg(feature = "mcap")]
@@ -116,6 +161,19 @@ impl SinkSpec {
             Self::Ros2Mcap(path) => {
                 return Err(Error::failed("built without the feature `mcap`; use ndjson:FILE").at(path.display()));
             }
+            #[cfg(feature = "ros2")]
+            Self::Ros2(namespace) => SinkTarget::Ros2(namespace.clone()),
+            #[cfg(not(feature = "ros2"))]
+            Self::Ros2(_) => {
+                let what =
+                    "built without the feature `ros2`: cargo install somatic --features ros2; or use ros2-mcap:FOLDER";
+                return Err(Error::failed(what).at("sink `ros2`"));
+            }
+            Self::Zenoh { key, .. } if cfg!(not(feature = "zenoh")) => {
+                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                return Err(Error::failed(what).at(format!("sink `zenoh:{key}`")));
+            }
+            Self::Zenoh { key, sends } => SinkTarget::Zenoh { key: key.clone(), sends: *sends },
             Self::Stdout => {
                 outputs.add_standard_output()?;
                 SinkTarget::Stdout
@@ -136,6 +194,8 @@ pub enum SinkTarget {
         percepts: OutputPath,
         /// That of separate touches.
         touches: Option<OutputPath>,
+        /// That of contacts.
+        contacts: Option<OutputPath>,
         /// Whether it has one row per frame.
         wide: bool,
     },
@@ -145,6 +205,8 @@ pub enum SinkTarget {
         percepts: OutputPath,
         /// That of separate touches.
         touches: Option<OutputPath>,
+        /// That of contacts.
+        contacts: Option<OutputPath>,
     },
     /// A recording in MCAP.
     Mcap(OutputPath),
@@ -156,9 +218,19 @@ pub enum SinkTarget {
         /// What its MCAP is called.
         file_name: String,
     },
+    /// Topics of ROS 2 in a namespace.
+    #[cfg(feature = "ros2")]
+    Ros2(String),
     /// A page for browsers.
     #[cfg(feature = "page")]
     Page(crate::page::Listen),
+    /// A limb's frames or percepts, to another computer.
+    Zenoh {
+        /// Under which key of Zenoh's.
+        key: String,
+        /// What.
+        sends: LimbSends,
+    },
     /// NDJSON on standard output.
     Stdout,
 }
@@ -185,21 +257,29 @@ impl SinkTarget {
                 let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields);
                 Ok(Box::new(sink.with_header(header.as_deref())?))
             }
-            Self::Csv { percepts, touches, wide } => Ok(Box::new(CsvSink::create(percepts, touches, wide, session)?)),
+            Self::Csv { percepts, touches, contacts, wide } => {
+                Ok(Box::new(CsvSink::create(percepts, touches, contacts, wide, session)?))
+            }
             #[cfg(feature = "parquet")]
-            Self::Parquet { percepts, touches } => {
-                Ok(Box::new(super::ParquetSink::create(percepts, touches, session)?))
+            Self::Parquet { percepts, touches, contacts } => {
+                Ok(Box::new(super::ParquetSink::create(percepts, touches, contacts, session)?))
             }
             #[cfg(not(feature = "parquet"))]
             Self::Parquet { percepts, .. } => {
                 Err(Error::failed("built without the feature `parquet`").at(percepts.name().display()))
             }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh { key, sends } => Ok(Box::new(super::ZenohSink::open(&key, sends, session)?)),
+            #[cfg(not(feature = "zenoh"))]
+            Self::Zenoh { key, .. } => Err(Error::failed("built without the feature `zenoh`").at(key)),
             #[cfg(feature = "page")]
             Self::Page(listen) => Ok(Box::new(super::PageSink::start(&listen, session)?)),
             #[cfg(feature = "mcap")]
             Self::Ros2Mcap { folder, file_name } => {
                 Ok(Box::new(super::Ros2BagSink::create(folder, &file_name, session)?))
             }
+            #[cfg(feature = "ros2")]
+            Self::Ros2(namespace) => Ok(Box::new(super::Ros2Sink::start(&namespace, session)?)),
             #[cfg(feature = "mcap")]
             Self::Mcap(output) => Ok(Box::new(super::RecordingSink::create(output, session)?)),
             #[cfg(not(feature = "mcap"))]
@@ -208,6 +288,16 @@ impl SinkTarget {
             }
         }
     }
+}
+
+/// Whether `text` is a namespace of ROS 2 that begins with `/`.
+fn is_namespace(text: &str) -> bool {
+    let is_part = |part: &str| {
+        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && !part.contains("__")
+    };
+    text.strip_prefix('/').is_some_and(|rest| rest.split('/').all(is_part))
 }
 
 /// What the MCAP of the bag at `path` is called: as the folder, with the number that ROS 2 counts files by.
@@ -232,6 +322,8 @@ mod tests {
         assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
         assert_eq!(parsed("ros2-mcap:bag"), SinkSpec::Ros2Mcap("bag".into()));
         assert_eq!(bag_file_name(Path::new("some/bag")), "bag_0.mcap");
+        assert_eq!(parsed("ros2"), SinkSpec::Ros2(String::new()));
+        assert_eq!(parsed("ros2:/left/arm_2"), SinkSpec::Ros2("/left/arm_2".into()));
         let why = |text: &str| {
             let error = text.parse::<SinkSpec>().unwrap_err();
             assert!(error.is_usage());
@@ -240,8 +332,15 @@ mod tests {
         assert!(why("json:a").contains("did you mean `ndjson:`"));
         assert!(why("page:").contains("HOST:PORT") && why("pgae:x").contains("did you mean `page:`"));
         assert!(why("ndjson:").contains("nothing follows"));
+        for text in ["ros2:", "ros2:arm", "ros2:/", "ros2:/a/", "ros2:/2a", "ros2:/a b", "ros2:/a__b"] {
+            assert!(why(text).contains("is no namespace"), "{text}");
+        }
         assert!(why("a.txt").contains("ndjson:FILE"));
         assert_eq!(parsed("csv:a"), SinkSpec::Csv("a".into()));
+        let zenoh = |sends| SinkSpec::Zenoh { key: "robot/arm".into(), sends };
+        assert_eq!(parsed("zenoh:robot/arm"), zenoh(LimbSends::Frames));
+        assert_eq!(parsed("zenoh-percepts:robot/arm"), zenoh(LimbSends::Percepts));
+        assert!(why("zenoh:robot/*").contains("`*`") && why("zenoh:").contains("nothing follows"));
         assert_eq!(parsed("a.csv"), SinkSpec::Csv("a.csv".into()));
         assert_eq!(parsed("a/b.parquet"), SinkSpec::Parquet("a/b.parquet".into()));
         assert!(why("parqet:a").contains("did you mean `parquet:`") && why("csv:").contains("nothing follows"));

@@ -2,9 +2,13 @@
 //!
 //! A source knows the ids of the taxels it delivers; only the simulated one knows a body.
 
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+mod boards;
 mod csv;
 mod csv_file;
 mod joint_states;
+#[cfg(feature = "zenoh")]
+mod limbs;
 mod ndjson;
 #[cfg(feature = "serial")]
 mod ports;
@@ -19,14 +23,18 @@ mod unknown_taxels;
 mod vendor;
 
 pub use self::csv::CsvSource;
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+pub use boards::{BoardAccount, BoardState, ChannelTap, LimbPercepts, Lines, Notice, TapTrouble};
 pub use csv_file::CsvFile;
 pub use joint_states::{JointPosition, JointStates};
+#[cfg(feature = "zenoh")]
+pub use limbs::{LimbOptions, LimbSource};
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "serial")]
 pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
 #[cfg(feature = "serial")]
-pub use serial::{BoardAccount, BoardState, ChannelTap, Lines, Notice, SerialOptions, SerialSource, TapTrouble};
+pub use serial::{SerialOptions, SerialSource};
 pub use simulated::{SimulatedSource, Truth, write_recording};
 pub use spec::SourceSpec;
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};

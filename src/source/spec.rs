@@ -7,9 +7,11 @@ use super::{CsvSource, NdjsonSource, SimulatedSource, Source, VendorOptions, Ven
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 7] = [
+const FORMS: [(&str, &str); 9] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
+    ("ros2", "ros2:/TOPIC[@TYPE]"),
+    ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
     ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
@@ -33,6 +35,15 @@ pub enum SourceSpec {
         /// Its speed, where one is given.
         baud: Option<u32>,
     },
+    /// `ros2:/TOPIC[@TYPE]`: a topic of ROS 2.
+    Ros2 {
+        /// Its name, from `/` on.
+        topic: String,
+        /// The type of its messages, where one is given, such as `sensor_msgs/msg/PointCloud2`.
+        kind: Option<String>,
+    },
+    /// `zenoh:KEY`: a limb on another computer.
+    Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
     /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
@@ -62,7 +73,7 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `mcap`, `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `zenoh`, `mcap`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -105,8 +116,21 @@ impl SourceSpec {
             "mcap" => Self::Mcap(rest.into()),
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
+            "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
+            "ros2" => {
+                let (topic, kind) = rest.split_once('@').map_or((rest, None), |(topic, kind)| (topic, Some(kind)));
+                if !topic.starts_with('/') || kind.is_some_and(str::is_empty) {
+                    return bad(format!(
+                        "`{rest}` is no topic; write ros2:/TOPIC, or ros2:/TOPIC@sensor_msgs/msg/PointCloud2"
+                    ));
+                }
+                // As ROS 1 and people write types.
+                let whole =
+                    |kind: &str| if kind.contains("/msg/") { kind.to_owned() } else { kind.replacen('/', "/msg/", 1) };
+                Self::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) }
+            }
             _ => match rest.rsplit_once('@') {
                 None => Self::Serial { port: rest.to_owned(), baud: None },
                 Some((port, baud)) => match baud.parse() {
@@ -140,7 +164,7 @@ impl SourceSpec {
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
-            Self::Serial { .. } | Self::Stdin | Self::CsvStdin => None,
+            Self::Serial { .. } | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => None,
         }
     }
 
@@ -169,10 +193,25 @@ impl SourceSpec {
             }
             Self::Vendor(path) => Ok(Box::new(VendorSource::open(path, options)?)),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
+            Self::Ros2 { topic, .. } => {
+                let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \
+                            somatic --features ros2";
+                Err(Error::failed(what).at(format!("source `ros2:{topic}`")))
+            }
             #[cfg(feature = "serial")]
             Self::Serial { port, baud } => {
                 let ports = [(port.clone(), *baud)];
                 Ok(Box::new(super::SerialSource::open(&ports, taxels, &super::SerialOptions::default())?))
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(key) => {
+                let keys = std::slice::from_ref(key);
+                Ok(Box::new(super::LimbSource::open(keys, taxels, &super::LimbOptions::default())?))
+            }
+            #[cfg(not(feature = "zenoh"))]
+            Self::Zenoh(key) => {
+                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                Err(Error::failed(what).at(format!("source `zenoh:{key}`")))
             }
             #[cfg(not(feature = "serial"))]
             Self::Serial { port, .. } => {
@@ -196,6 +235,11 @@ mod tests {
         assert_eq!(parsed("csv:-"), SourceSpec::CsvStdin);
         assert_eq!(parsed("sim:touch.toml"), SourceSpec::Sim("touch.toml".into()));
         assert_eq!(parsed("serial:COM3"), SourceSpec::Serial { port: "COM3".into(), baud: None });
+        let ros2 = |kind: Option<&str>| SourceSpec::Ros2 { topic: "/arm/skin".into(), kind: kind.map(str::to_owned) };
+        assert_eq!(parsed("ros2:/arm/skin"), ros2(None));
+        let cloud = Some("sensor_msgs/msg/PointCloud2");
+        assert_eq!(parsed("ros2:/arm/skin@sensor_msgs/msg/PointCloud2"), ros2(cloud));
+        assert_eq!(parsed("ros2:/arm/skin@sensor_msgs/PointCloud2"), ros2(cloud));
         let port = "/dev/ttyUSB0".to_owned();
         assert_eq!(parsed("serial:/dev/ttyUSB0@921600"), SourceSpec::Serial { port, baud: Some(921_600) });
     }
@@ -209,8 +253,9 @@ mod tests {
         };
         assert!(why("csv:").contains("nothing follows"));
         assert!(why("seril:a").contains("did you mean `serial:`"));
+        assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

@@ -15,6 +15,7 @@ pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod change;
 pub(crate) mod contact;
+pub(crate) mod contacts;
 pub(crate) mod difference;
 pub(crate) mod filter;
 pub(crate) mod footprint;

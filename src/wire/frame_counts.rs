@@ -50,7 +50,7 @@ impl FrameCounts {
     }
 
     /// Counts a packet, which is a frame or not, and returns its order.
-    pub(super) fn count(&mut self, head: &Head, is_frame: bool) -> PacketOrder {
+    pub(crate) fn count(&mut self, head: &Head, is_frame: bool) -> PacketOrder {
         let after = head.sequence.wrapping_add(u32::from(is_frame));
         let counts = self.boards.entry(head.board).or_insert_with(|| BoardCounts {
             boot: head.boot,

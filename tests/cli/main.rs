@@ -7,11 +7,21 @@ mod board;
 #[cfg(feature = "page")]
 mod browser;
 mod calibrate;
+mod contacts;
 mod devices;
 mod doubts;
 mod exports;
 mod fields;
 mod inspect;
+mod limbs;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_faults;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_merged;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_network;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_others;
 mod live;
 mod mjcf;
 mod outputs;
@@ -25,10 +35,14 @@ mod python;
 #[path = "../../src/author/random.rs"]
 mod random;
 mod recording;
+#[cfg(all(unix, feature = "zenoh"))]
+mod relay;
 #[cfg(feature = "gpu")]
 mod render;
 mod robots;
 mod ros2;
+#[cfg(feature = "ros2")]
+mod ros2_live;
 mod run;
 #[cfg(unix)]
 mod serial;

@@ -463,6 +463,7 @@ const READ: &[&str] = &[
     "--source",
     "--calibration",
     "--wiring",
+    "--zenoh-config",
     "--recipe",
     "[SCENE]",
     "<BODY>",

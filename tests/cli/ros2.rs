@@ -294,7 +294,7 @@ fn a_bag_replaces_nothing_and_damage_is_seen() {
     let why = fails(1, &with(&flags, &["--sink", &sink]));
     assert!(why.contains("bag_0.mcap") && why.lines().count() == 1, "{why}");
     let why = fails(2, &with(&flags, &["--ros-time", "wall"]));
-    assert!(why.contains("add --sink ros2-mcap:FOLDER"), "{why}");
+    assert!(why.contains("add --sink ros2-mcap:FOLDER or --sink ros2"), "{why}");
     let Some(whole) = read(&["bag", text_of(&bag)]) else { return };
     let now_ns = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_nanos() as u64;
     let start_ns = whole.unwrap()["start_ns"].as_u64().unwrap();

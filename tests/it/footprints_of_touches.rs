@@ -91,7 +91,20 @@ fn touches_have_the_same_footprints_on_every_backend() {
     let right = of(BackendKind::Reference);
     assert!(right.iter().flatten().count() > 180);
     for backend in crate::common::backends() {
-        assert_eq!(of(backend), right, "{backend:?}");
+        let found = of(backend);
+        if backend != BackendKind::Gpu {
+            assert_eq!(found, right, "{backend:?}");
+            continue;
+        }
+        // Descents on the device are in single precision: at rest both are within a tenth of a sigma of where all go.
+        for (found, right) in found.iter().zip(&right) {
+            assert_eq!(found.map(|fit| fit.kind), right.map(|fit| fit.kind));
+            let (Some(found), Some(right)) = (found, right) else { continue };
+            let sigma = right.sigma.unwrap().place;
+            let apart = [0, 1].map(|axis| (found.place[axis] - right.place[axis]).abs() / sigma[axis]);
+            assert!(apart.iter().all(|apart| *apart < 0.2), "{apart:?} σ apart: {found:?} {right:?}");
+        }
+        assert_ne!(found, right, "the device has digits of its own");
     }
 }
 

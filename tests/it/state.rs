@@ -26,7 +26,7 @@ impl Case {
         let calibration = Some(Calibration::parse(&text, &ids).unwrap());
         // Cadence `on-change` excludes letters of change and filters.
         let (receptors, outputs): (&[_], _) = match self.cadence {
-            Cadence::OnChange => (&[Receptor::Sustained], Outputs::all() - Outputs::FILTERED),
+            Cadence::OnChange => (&[Receptor::Sustained], Outputs::all() - Outputs::FILTERED - Outputs::CONTACTS),
             Cadence::EveryFrame => (&[Receptor::Sustained, Receptor::Change], Outputs::all()),
         };
         let knobs = Knobs::default().cadence(self.cadence);

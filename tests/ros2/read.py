@@ -116,10 +116,11 @@ def bag(folder):
     return told
 
 
-match sys.argv[1:]:
-    case ["messages", path]:
-        json.dump(messages(path), sys.stdout)
-    case ["bag", folder]:
-        json.dump(bag(folder), sys.stdout)
-    case _:
-        raise SystemExit(__doc__)
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["messages", path]:
+            json.dump(messages(path), sys.stdout)
+        case ["bag", folder]:
+            json.dump(bag(folder), sys.stdout)
+        case _:
+            raise SystemExit(__doc__)

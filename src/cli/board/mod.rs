@@ -172,7 +172,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
                 Some(Arrival::End(_)) if play.again => feed = None,
                 Some(Arrival::End(_)) => ending = Some(now),
                 Some(Arrival::Failed(error)) => return Err(error),
-                None => {}
+                None | Some(Arrival::Woken) => {}
             }
         }
         for station in &mut stations {

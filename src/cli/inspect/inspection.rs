@@ -2,13 +2,15 @@
 
 use somatic::author::{Coverage, Finding};
 use somatic::body::Body;
-use somatic::field::Field;
+use somatic::field::{Field, RestOverlap};
 
 /// What is reported about a body.
 pub(super) struct Inspection {
     pub(super) body: Body,
     pub(super) fields: Vec<Field>,
     pub(super) coverage: Coverage,
+    /// Links with taxels that are within the tolerance of contacts at rest.
+    pub(super) overlaps: Vec<RestOverlap>,
     /// A line each; those of reading first.
     pub(super) findings: Vec<String>,
     /// Findings of the lint.

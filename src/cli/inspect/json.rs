@@ -28,6 +28,13 @@ pub(super) fn text(seen: &Inspection) -> String {
         "fields": fields.iter().map(|f| field(body, fields, f)).collect::<Vec<_>>(),
         "findings": seen.findings,
         "lint": seen.odd.iter().map(finding).collect::<Vec<_>>(),
+        "near_at_rest": seen.overlaps.iter().map(|overlap| json!({
+            "links": overlap.links.map(link),
+            "tolerance": overlap.tolerance_m,
+            "nearest": overlap.nearest_m,
+            "taxels": overlap.taxels.each_ref().map(|side| side.iter().map(|&index| body.taxels[index].id).collect::<Vec<_>>()),
+            "facing": overlap.facing,
+        })).collect::<Vec<_>>(),
         "coverage": {
             "links": seen.coverage.links.iter().map(|of| json!({
                 "link": link(of.link), "area": of.area, "seen": of.seen,

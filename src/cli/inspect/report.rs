@@ -5,7 +5,7 @@ use console::style;
 use rstar::RTree;
 use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
-use somatic::field::{Field, WORLD};
+use somatic::field::{Field, RestOverlap, WORLD};
 
 use super::inspection::Inspection;
 use crate::cli::table::{plain, shown};
@@ -26,6 +26,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     }
     let charts = fields.iter().filter(|field| field.chart.is_ok()).count();
     line("fields", format!("{}, {charts} with a chart", fields.len()));
+    if !seen.overlaps.is_empty() {
+        text += &format!("\n{}", shown(&overlaps(body, &seen.overlaps)));
+    }
     if !body.links.is_empty() {
         text += &format!("\n{}", shown(&links(body, &seen.coverage)));
     }
@@ -98,6 +101,23 @@ fn links(body: &Body, coverage: &Coverage) -> Table {
         let seen = surface.filter(|of| of.seen > 0.0);
         let seen = seen.map_or(String::new(), |of| format!("{:.0} %", 100.0 * of.seen / of.area));
         table.add_row([format!("{branch}{}", body.links[link].name), some(taxels), area, seen]);
+    }
+    table
+}
+
+/// Links whose taxels are so near at rest that touches there could be one contact.
+fn overlaps(body: &Body, overlaps: &[RestOverlap]) -> Table {
+    let mut table = plain(["near at rest", "taxels", "nearest mm", "within mm", "pairs that face"], 2..5);
+    for overlap in overlaps {
+        let [a, b] = overlap.links.map(|link| body.links[link].name.as_str());
+        let [of_a, of_b] = overlap.taxels.each_ref().map(Vec::len);
+        table.add_row([
+            format!("{a}, {b}"),
+            format!("{of_a}, {of_b}"),
+            millimetres(overlap.nearest_m),
+            millimetres(overlap.tolerance_m),
+            some(overlap.facing),
+        ]);
     }
     table
 }

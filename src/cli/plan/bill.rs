@@ -29,6 +29,9 @@ pub(super) struct Bill {
     pub(super) batch: usize,
     pub(super) stages: Vec<Stage>,
     pub(super) measured: Measured,
+    /// Where a limb sends to another computer.
+    #[cfg(feature = "zenoh")]
+    pub(super) network: Option<super::network::Network>,
 }
 
 /// A stage, and its time in a frame, µs, where it is timed by itself.
@@ -80,6 +83,11 @@ impl Bill {
         for ((rung, us), below) in rungs.iter().zip(&us).zip(below) {
             stages[rung.stages.end - 1].measured_us = Some((us - below).max(0.0));
         }
+        #[cfg(feature = "zenoh")]
+        let network = match engines.last_mut() {
+            Some(engine) => super::network::Network::of(asked, engine, &played.calls, recorded.is_some())?,
+            None => None,
+        };
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
         Ok(Self {
             body: body.name.clone(),
@@ -94,6 +102,8 @@ impl Bill {
             batch,
             stages,
             measured: Measured { on, whole_us: us[us.len() - 1], agreement },
+            #[cfg(feature = "zenoh")]
+            network,
         })
     }
 }

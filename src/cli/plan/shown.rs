@@ -19,6 +19,8 @@ impl Bill {
         line("memberships", self.memberships.to_string());
         let moved = format!("{} B up, {} B down", self.bytes[0], self.bytes[1]);
         line("a frame", format!("{moved}, {:.2} µs {}", self.measured.whole_us, self.measured.on));
+        #[cfg(feature = "zenoh")]
+        self.network.iter().for_each(|network| line("network", network.words()));
         let (name, what, why) = &self.backend;
         line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
         let Words { arithmetic, charts, orientation_by, coverage, cadence, .. } = self.knobs.words();
@@ -86,6 +88,10 @@ impl Bill {
             "us": rounded(self.measured.whole_us),
             "stages": self.stages.iter().map(stage).collect::<Vec<_>>(),
         });
+        #[cfg(feature = "zenoh")]
+        if let Some(network) = &self.network {
+            bill["network"] = network.json();
+        }
         if let Some(agreement) = &self.measured.agreement {
             // What is counted or chosen has no error to speak of.
             let measured = agreement

@@ -15,8 +15,14 @@ impl RunOptions {
             ));
         }
         self.check_joints()?;
-        if self.ros_time.is_some() && !self.sinks.iter().any(|sink| sink.starts_with("ros2-mcap:")) {
-            return Err(Error::usage("--ros-time is for a bag of ROS 2; add --sink ros2-mcap:FOLDER"));
+        let is_zenoh = |name: &String| name.starts_with("zenoh:") || name.starts_with("zenoh-percepts:");
+        if self.zenoh_config.is_some() && !self.sources.iter().chain(&self.sinks).any(is_zenoh) {
+            return Err(Error::usage("--zenoh-config is for limbs; add --source zenoh:KEY or --sink zenoh:KEY"));
+        }
+        if self.ros_time.is_some() && !self.sinks.iter().any(|sink| sink.starts_with("ros2")) {
+            return Err(Error::usage(
+                "--ros-time is for messages of ROS 2; add --sink ros2-mcap:FOLDER or --sink ros2",
+            ));
         }
         if !self.allow_hosts.is_empty() && !self.sinks.iter().any(|sink| sink == "page" || sink.starts_with("page:")) {
             return Err(Error::usage("--allow-host is for a page; add --sink page:HOST:PORT"));
@@ -31,6 +37,16 @@ impl RunOptions {
         }
         if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
+        }
+        if let Some(tolerance) = self.contact_tolerance {
+            if !self.outputs().contains(Outputs::CONTACTS) {
+                return Err(Error::usage("--contact-tolerance is for contacts; add them to --outputs"));
+            }
+            if !(tolerance.is_finite() && tolerance > 0.0) {
+                return Err(Error::usage(format!(
+                    "--contact-tolerance {tolerance} is no distance; give metres over 0"
+                )));
+            }
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use somatic::source::{JointStates, Source};
 use somatic::{Body, Error, Result};
 
 use super::RunOptions;
+use crate::cli::states_topic::topic_of;
 use crate::cli::stdio::say;
 
 impl RunOptions {
@@ -36,8 +37,11 @@ impl RunOptions {
         if self.joint_states.is_some() && self.repeat.is_some() {
             return refuse("--loop lets the time of frames go on, and --joint-states ends; leave one of them out");
         }
-        if self.joints_delay.is_some() && self.joint_states.is_none() {
-            return refuse("--joints-delay is for --joint-states; states in frames have the frame's own time");
+        let is_live = self.joint_states.as_deref().and_then(topic_of).is_some();
+        if self.joints_delay.is_some() && (self.joint_states.is_none() || is_live) {
+            return refuse(
+                "--joints-delay is for a recording of joint states; states in frames and of topics have the frame's own time",
+            );
         }
         if let Some(delay) = self.joints_delay.filter(|delay| !delay.is_finite()) {
             return Err(Error::usage(format!("--joints-delay {delay} is not a time span; give seconds")));
@@ -57,7 +61,13 @@ impl RunOptions {
         let (Some(urdf), Some(up)) = (&self.joints, self.up) else { return Ok(source) };
         let robot = Kinematics::load(urdf)?;
         let mut options = JointOptions::new(up);
-        options.states = self.joint_states.as_ref().map(JointStates::open).transpose()?;
+        let topic = self.joint_states.as_deref().and_then(topic_of);
+        let source = match topic {
+            Some(topic) => live(source, topic)?,
+            None => source,
+        };
+        let recorded = self.joint_states.as_ref().filter(|_| topic.is_none());
+        options.states = recorded.map(JointStates::open).transpose()?;
         options.delay_s = self.joints_delay.unwrap_or(options.delay_s);
         options.max_age_s = self.joints_max_age.unwrap_or(options.max_age_s);
         let jointed = JointedSource::new(source, robot, body, options).map_err(|e| e.at(urdf.display()))?;
@@ -66,6 +76,18 @@ impl RunOptions {
         }
         Ok(Box::new(jointed))
     }
+}
+
+/// The frames of `source`, with the joint states of `topic` as they come.
+#[cfg(feature = "ros2")]
+fn live(source: Box<dyn Source + Send>, topic: &str) -> Result<Box<dyn Source + Send>> {
+    Ok(Box::new(somatic::robot::LiveJoints::open(source, topic)?))
+}
+
+#[cfg(not(feature = "ros2"))]
+fn live(_: Box<dyn Source + Send>, topic: &str) -> Result<Box<dyn Source + Send>> {
+    let what = "built without the feature `ros2`: cargo install somatic --features ros2";
+    Err(Error::failed(what).at(format!("joint states `ros2:{topic}`")))
 }
 
 fn is_mcap(source: &str) -> bool {

@@ -181,7 +181,7 @@ impl TuningSession {
             }
             Some(Arrival::Failed(error)) => Err(error),
             Some(Arrival::End(_)) => Err(Error::failed("the lines are closed")),
-            None => Ok(()),
+            None | Some(Arrival::Woken) => Ok(()),
         }
     }
 

@@ -15,9 +15,9 @@ mod types;
 
 pub use cdr::{Byte, Cdr, CdrReader, CdrWriter};
 pub use types::{
-    Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Duration, Header, JointState, KeyValue, Marker,
-    MarkerArray, MeshFile, Point, PointCloud2, PointField, Pose, Quaternion, TfMessage, Time, Transform,
-    TransformStamped, UvCoordinate, Vector3, Wrench, WrenchStamped,
+    Color, CompressedImage, DiagnosticArray, DiagnosticStatus, Duration, Float32MultiArray, Header, JointState,
+    KeyValue, Marker, MarkerArray, MeshFile, MultiArrayDimension, MultiArrayLayout, Point, PointCloud2, PointField,
+    Pose, Quaternion, TfMessage, Time, Transform, TransformStamped, UvCoordinate, Vector3, Wrench, WrenchStamped,
 };
 
 /// A message that can be a topic's.

@@ -7,6 +7,7 @@ macro_rules! messages {
     ($($(#[$about:meta])* $name:ident = $ros:literal { $($field:ident: $type:ty),+ $(,)? })+) => {
         $($(#[$about])*
         #[derive(Clone, Debug, Default, PartialEq)]
+        #[cfg_attr(feature = "ros2", derive(serde::Deserialize))]
         pub struct $name {
             $(#[doc = concat!("`", stringify!($field), "`, as `", $ros, "` defines it.")] pub $field: $type,)+
         }
@@ -68,6 +69,12 @@ messages! {
         header: Header, height: u32, width: u32, fields: Vec<PointField>, is_bigendian: bool, point_step: u32, row_step: u32,
         data: Vec<u8>, is_dense: bool,
     }
+    /// What a dimension of an array is.
+    MultiArrayDimension = "std_msgs/MultiArrayDimension" { label: String, size: u32, stride: u32 }
+    /// How an array is laid out.
+    MultiArrayLayout = "std_msgs/MultiArrayLayout" { dim: Vec<MultiArrayDimension>, data_offset: u32 }
+    /// Numbers.
+    Float32MultiArray = "std_msgs/Float32MultiArray" { layout: MultiArrayLayout, data: Vec<f32> }
     /// Positions of joints, rad or m.
     JointState = "sensor_msgs/JointState" {
         header: Header, name: Vec<String>, position: Vec<f64>, velocity: Vec<f64>, effort: Vec<f64>,
@@ -112,6 +119,7 @@ topics! {
     WrenchStamped = "geometry_msgs/msg/WrenchStamped" "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"
     DiagnosticArray = "diagnostic_msgs/msg/DiagnosticArray" "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"
     TfMessage = "tf2_msgs/msg/TFMessage" "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"
+    Float32MultiArray = "std_msgs/msg/Float32MultiArray" "0599f6f85b4bfca379873a0b4375a0aca022156bd2d7021275d116ed1fa8bfe0"
     JointState = "sensor_msgs/msg/JointState" "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
 }
 

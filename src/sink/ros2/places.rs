@@ -9,7 +9,7 @@ use crate::body::Body;
 use crate::robot::messages::{
     Header, PointCloud2, PointField, Quaternion, TfMessage, Time, Transform, TransformStamped, Vector3,
 };
-use crate::signal::{Frame, Pose};
+use crate::signal::Pose;
 
 /// The frame of coordinates that links are in: z up, as REP 103 has it.
 pub(super) const WORLD: &str = "world";
@@ -101,9 +101,9 @@ impl Clouds {
     }
 }
 
-/// Where the links are that `frame` poses, or all at rest where it poses none.
-pub(super) fn transforms(time_ns: u64, body: &[(String, Pose)], frame: &Frame) -> TfMessage {
-    let poses = if frame.pose.is_empty() { body } else { &frame.pose };
+/// Where the links of `posed` are, or all of `at_rest` where it has none.
+pub(super) fn transforms(time_ns: u64, at_rest: &[(String, Pose)], posed: &[(String, Pose)]) -> TfMessage {
+    let poses = if posed.is_empty() { at_rest } else { posed };
     let turn = z_up_from_y_up();
     let transform = |(link, pose): &(String, Pose)| TransformStamped {
         header: header(time_ns, WORLD),

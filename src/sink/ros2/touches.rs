@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::places::{WORLD, header, quaternion, vector, z_up_from_y_up};
-use crate::percept::{Percept, Percepts};
+use crate::percept::Percept;
 use crate::robot::messages::{Color, Marker, MarkerArray, Point, Pose};
 
 /// Types and actions of `visualization_msgs/Marker`.
@@ -24,23 +24,26 @@ pub(super) struct Touches {
     fields: Vec<(String, String)>,
     /// By field, whether its sphere and its arrow are shown.
     shown: Vec<[bool; 2]>,
+    /// The same before the last message.
+    before: Vec<[bool; 2]>,
 }
 
 impl Touches {
     pub(super) fn new(fields: Vec<(String, String)>) -> Self {
-        Self { shown: vec![[false; 2]; fields.len()], fields }
+        let none = vec![[false; 2]; fields.len()];
+        Self { shown: none.clone(), before: none, fields }
     }
 
-    /// The markers of a frame: those of touched fields, and the ends of those that are no longer touched. `None` where there
+    /// The markers of a frame: those of `touched` fields, and the ends of those that are no longer touched. `None` where there
     /// are neither.
-    pub(super) fn message(&mut self, time_ns: u64, percepts: &Percepts, frame: usize) -> Option<MarkerArray> {
+    pub(super) fn message(&mut self, time_ns: u64, touched: &[Percept]) -> Option<MarkerArray> {
         let mut shows = vec![[false; 2]; self.fields.len()];
         let mut markers = Vec::new();
-        for percept in percepts.touched(frame) {
+        for percept in touched {
             let Some(position) = percept.position.map(DVec3::from) else { continue };
             shows[percept.field] = [true, percept.normal.is_some()];
-            markers.push(self.sphere(time_ns, &percept, position));
-            markers.extend(percept.normal.map(|normal| self.arrow(time_ns, &percept, position, normal.into())));
+            markers.push(self.sphere(time_ns, percept, position));
+            markers.extend(percept.normal.map(|normal| self.arrow(time_ns, percept, position, normal.into())));
         }
         for (field, (shows, shown)) in shows.iter().zip(&self.shown).enumerate() {
             for part in (0..2).filter(|&part| shown[part] && !shows[part]) {
@@ -49,8 +52,15 @@ impl Touches {
                 markers.push(Marker { header: header(time_ns, link), ns, id, action: DELETE, ..Marker::default() });
             }
         }
-        self.shown = shows;
+        self.before = std::mem::replace(&mut self.shown, shows);
         (!markers.is_empty()).then_some(MarkerArray { markers })
+    }
+
+    /// Says that the last message was not sent: what it ended is still shown.
+    pub(super) fn was_refused(&mut self) {
+        for (shown, before) in self.shown.iter_mut().zip(&self.before) {
+            (0..2).for_each(|part| shown[part] |= before[part]);
+        }
     }
 
     fn marker(&self, time_ns: u64, percept: &Percept, part: usize, position: DVec3, turn: DQuat) -> Marker {
@@ -95,4 +105,35 @@ impl Touches {
 /// The id of a field's sphere (0) or arrow (1): the same from onset to release, and in every run of the same scene.
 fn id(field: usize, part: usize) -> i32 {
     i32::try_from(2 * field + part).unwrap_or(i32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::percept::{Outputs, Percepts, Precision};
+
+    #[test]
+    fn a_marker_whose_end_was_not_sent_is_ended_with_the_next_message() {
+        let mut percepts = Percepts::new(Outputs::POSITION, 2, Precision::F64);
+        percepts.reset(1);
+        let touch = |field| {
+            let mut touch = percepts.get(0, field);
+            touch.position = Some([0.1, 0.0, 0.0]);
+            touch
+        };
+        let mut touches = Touches::new(vec![("a".to_owned(), "hand".to_owned()), ("b".to_owned(), "hand".to_owned())]);
+        let mut told = |touched: &[Percept], is_sent: bool| {
+            let markers = touches.message(0, touched).map_or_else(Vec::new, |message| message.markers);
+            if !is_sent {
+                touches.was_refused();
+            }
+            markers.iter().map(|marker| (marker.ns.clone(), marker.action)).collect::<Vec<_>>()
+        };
+        let [a, b] = ["a", "b"].map(str::to_owned);
+        assert_eq!(told(&[touch(0)], true), [(a.clone(), ADD)]);
+        assert_eq!(told(&[touch(1)], false), [(b.clone(), ADD), (a.clone(), DELETE)]);
+        assert_eq!(told(&[touch(1)], true), [(b.clone(), ADD), (a, DELETE)]);
+        assert_eq!(told(&[], true), [(b, DELETE)]);
+        assert_eq!(told(&[], true), []);
+    }
 }

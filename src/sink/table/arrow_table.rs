@@ -12,7 +12,10 @@ use arrow_array::{ArrayRef, DictionaryArray, RecordBatch, StringArray};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use sha2::{Digest as _, Sha256};
 
-use super::{Row, TableColumn, TableType, ValueOf, percept_columns, rows, touch_columns, touch_rows};
+use super::{
+    Row, TableColumn, TableType, ValueOf, contact_columns, contact_rows, percept_columns, rows, touch_columns,
+    touch_rows,
+};
 use crate::percept::{ContactKind, Flags, Percepts};
 use crate::sink::{FieldNames, Session};
 
@@ -34,6 +37,8 @@ pub enum TableKind {
     AllFields,
     /// Each separate touch of each frame.
     Touches,
+    /// Each contact of each frame.
+    Contacts,
 }
 
 /// The words of the columns of words, and of flags.
@@ -57,7 +62,11 @@ impl ArrowTable {
     /// A table of the percepts of `session`, whose schema has the units of columns, and in its metadata what was run.
     #[must_use]
     pub fn new(kind: TableKind, session: &Session<'_>) -> Self {
-        let columns = if kind == TableKind::Touches { touch_columns(session) } else { percept_columns(session) };
+        let columns = match kind {
+            TableKind::Touches => touch_columns(session),
+            TableKind::Contacts => contact_columns(session),
+            TableKind::Touched | TableKind::AllFields => percept_columns(session),
+        };
         let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
         let field = |column: &TableColumn| {
             let about =
@@ -103,6 +112,7 @@ impl ArrowTable {
         assert_eq!(percepts.fields(), self.words.names.len(), "a table is told the name of every field");
         match self.kind {
             TableKind::Touches => touch_rows(percepts, frame).for_each(|row| self.push_row(&row)),
+            TableKind::Contacts => contact_rows(percepts, frame).for_each(|row| self.push_row(&row)),
             kind => rows(percepts, frame, kind == TableKind::AllFields).for_each(|row| self.push_row(&row)),
         }
     }
@@ -172,8 +182,8 @@ impl Builder {
             TableType::Words => Self::Words(ListBuilder::new(StringBuilder::new())),
             TableType::Word => {
                 let word = |name: &FieldNames| match column.value {
-                    ValueOf::Field => Some(name.field.clone()),
-                    ValueOf::Link => Some(name.link.clone()),
+                    ValueOf::Field | ValueOf::SideField(_) => Some(name.field.clone()),
+                    ValueOf::Link | ValueOf::SideLink(_) => Some(name.link.clone()),
                     ValueOf::Letter => name.letter.clone(),
                     ValueOf::Signal => name.signal.clone(),
                     _ => None,

@@ -7,7 +7,10 @@ use std::io::{self, ErrorKind};
 use csv::{QuoteStyle, Writer, WriterBuilder};
 use serde::Serialize;
 
-use super::{Row, TableColumn, TableType, ValueOf, output_columns, percept_columns, rows, touch_columns, touch_rows};
+use super::{
+    Row, TableColumn, TableType, ValueOf, contact_columns, contact_rows, output_columns, percept_columns, rows,
+    touch_columns, touch_rows,
+};
 use crate::error::{Error, Result, failed};
 use crate::output::{OutputFile, OutputPath};
 use crate::percept::{Flags, Percepts};
@@ -20,6 +23,7 @@ const BETWEEN_WORDS: &str = ";";
 pub struct CsvSink {
     percepts: CsvFile,
     touches: Option<CsvFile>,
+    contacts: Option<CsvFile>,
     rows: Rows,
     names: Vec<FieldNames>,
     flags: Vec<(Flags, String)>,
@@ -42,17 +46,24 @@ struct CsvFile {
 }
 
 impl CsvSink {
-    /// Writes to `output`, where the file appears when the sink is finished, and separate touches to `touches`. With `wide`
-    /// there is one row per frame, and every field has columns of its own.
+    /// Writes to `output`, where the file appears when the sink is finished, separate touches to `touches`, and contacts to
+    /// `contacts`. With `wide` there is one row per frame, and every field has columns of its own.
     ///
     /// # Errors
     /// A file cannot be made.
-    pub fn create(output: OutputPath, touches: Option<OutputPath>, wide: bool, session: &Session<'_>) -> Result<Self> {
+    pub fn create(
+        output: OutputPath,
+        touches: Option<OutputPath>,
+        contacts: Option<OutputPath>,
+        wide: bool,
+        session: &Session<'_>,
+    ) -> Result<Self> {
         let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
         let names = session.names.clone();
         let mut sink = Self {
             percepts: CsvFile::begin(output, percept_columns(session))?,
             touches: touches.map(|output| CsvFile::begin(output, touch_columns(session))).transpose()?,
+            contacts: contacts.map(|output| CsvFile::begin(output, contact_columns(session))).transpose()?,
             rows: Rows::PerField { all_fields: session.all_fields },
             names,
             flags,
@@ -74,9 +85,9 @@ impl CsvSink {
             let titles: Vec<String> = sink.percepts.columns.iter().map(TableColumn::title).collect();
             sink.percepts.record(titles)?;
         }
-        if let Some(touches) = &mut sink.touches {
-            let titles: Vec<String> = touches.columns.iter().map(TableColumn::title).collect();
-            touches.record(titles)?;
+        for file in [&mut sink.touches, &mut sink.contacts].into_iter().flatten() {
+            let titles: Vec<String> = file.columns.iter().map(TableColumn::title).collect();
+            file.record(titles)?;
         }
         Ok(sink)
     }
@@ -86,7 +97,7 @@ impl CsvSink {
     }
 
     fn write_all(&mut self, percepts: &Percepts) -> Result<(), csv::Error> {
-        let Self { percepts: file, touches, rows: how, names, flags, .. } = self;
+        let Self { percepts: file, touches, contacts, rows: how, names, flags, .. } = self;
         for frame in 0..percepts.frames() {
             match how {
                 Rows::PerField { all_fields } => {
@@ -98,7 +109,7 @@ impl CsvSink {
                     }
                 }
                 Rows::PerFrame(columns) => {
-                    let first = Row { percepts, frame, field: 0, touch: None };
+                    let first = Row { percepts, frame, field: 0, touch: None, contact: None };
                     for column in 0..file.columns.len() {
                         file.field(&first, file.columns[column].kind, file.columns[column].value, names, flags)?;
                     }
@@ -112,11 +123,12 @@ impl CsvSink {
             }
             if let Some(touches) = touches {
                 for row in touch_rows(percepts, frame) {
-                    for column in 0..touches.columns.len() {
-                        let TableColumn { kind, value, .. } = touches.columns[column];
-                        touches.field(&row, kind, value, names, flags)?;
-                    }
-                    touches.writer.write_record(None::<&[u8]>)?;
+                    touches.row(&row, names, flags)?;
+                }
+            }
+            if let Some(contacts) = contacts {
+                for row in contact_rows(percepts, frame) {
+                    contacts.row(&row, names, flags)?;
                 }
             }
         }
@@ -151,6 +163,15 @@ impl CsvFile {
 
     fn record(&mut self, cells: Vec<String>) -> Result<()> {
         self.writer.write_record(cells).map_err(|e| cannot_write(&io_error(e), &self.name))
+    }
+
+    /// Writes a row in all of its columns.
+    fn row(&mut self, row: &Row<'_>, names: &[FieldNames], flags: &[(Flags, String)]) -> Result<(), csv::Error> {
+        for column in 0..self.columns.len() {
+            let TableColumn { kind, value, .. } = self.columns[column];
+            self.field(row, kind, value, names, flags)?;
+        }
+        self.writer.write_record(None::<&[u8]>)
     }
 
     /// Writes the value of a row in a column.
@@ -227,7 +248,8 @@ impl Sink for CsvSink {
             return Ok(Flow::Closed);
         }
         let flushed = self.percepts.writer.flush();
-        let flushed = flushed.and_then(|()| self.touches.as_mut().map_or(Ok(()), |touches| touches.writer.flush()));
+        let mut beside = [&mut self.touches, &mut self.contacts].into_iter().flatten();
+        let flushed = flushed.and_then(|()| beside.try_for_each(|file| file.writer.flush()));
         let flow = flow_of(flushed, &self.percepts.name)?;
         self.closed |= flow == Flow::Closed;
         Ok(flow)
@@ -239,9 +261,7 @@ impl Sink for CsvSink {
             return Ok(());
         }
         let percepts = self.percepts.finish()?;
-        match self.touches {
-            Some(touches) => percepts.finish_with(touches.finish()?),
-            None => percepts.finish(),
-        }
+        let beside = [self.touches, self.contacts].into_iter().flatten();
+        percepts.finish_with(beside.map(CsvFile::finish).collect::<Result<_>>()?)
     }
 }

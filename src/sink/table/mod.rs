@@ -1,23 +1,23 @@
 //! Percepts as a table: one row per frame and field in contact, a column for each component of an output.
 //!
-//! [`percept_columns`] and [`touch_columns`] list the columns; sinks write by these lists.
+//! [`percept_columns`], [`touch_columns`] and [`contact_columns`] list the columns; sinks write by these lists.
 
 #[cfg(feature = "arrow")]
 mod arrow_table;
 mod csv_sink;
 #[cfg(feature = "parquet")]
 mod parquet_sink;
-mod touches_path;
+mod path_beside;
 
 #[cfg(feature = "arrow")]
 pub use arrow_table::{ArrowTable, TableKind};
 pub use csv_sink::CsvSink;
 #[cfg(feature = "parquet")]
 pub use parquet_sink::ParquetSink;
-pub(super) use touches_path::touches_path;
+pub(super) use path_beside::path_beside;
 
 use super::{FieldNames, Session};
-use crate::percept::{Column, ContactKind, Flags, Outputs, Percepts, Touch, Unit};
+use crate::percept::{Column, Contact, ContactKind, Flags, Outputs, Percepts, Touch, Unit};
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +89,14 @@ enum ValueOf {
     TouchCentroid(usize),
     TouchPosition(usize),
     TouchFootprint(&'static Column, usize),
+    ContactId,
+    ContactPosition(usize),
+    ContactDistance,
+    ContactAngle,
+    SideField(usize),
+    SideLink(usize),
+    SideTouch(usize),
+    SideTotal(usize),
 }
 
 impl TableColumn {
@@ -224,6 +232,35 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
     columns
 }
 
+/// The columns of a session's contacts, one row each.
+#[must_use]
+pub fn contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
+    let p = unit_of(Unit::P, session);
+    let mut columns = vec![
+        TableColumn::new("t", "s", TableType::F64, "Time of the frame.", ValueOf::Time),
+        TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
+        TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId),
+    ];
+    for (side, letter) in ["a", "b"].into_iter().enumerate() {
+        let mut column = |name: &str, unit: &str, kind, help: &str, value| {
+            columns.push(TableColumn::new(&format!("{name}_{letter}"), unit, kind, help, value));
+        };
+        column("field", "", TableType::Word, "Name of the field on this side.", ValueOf::SideField(side));
+        column("link", "", TableType::Word, "The link that it is on.", ValueOf::SideLink(side));
+        column("touch", "", TableType::U64, "The `id` of its touch.", ValueOf::SideTouch(side));
+        column("total", &p, TableType::F64, "Σ wᵢPᵢ over the touch's taxels.", ValueOf::SideTotal(side));
+    }
+    for (component, suffix) in X_Y_AND_Z.into_iter().enumerate() {
+        let (name, help) = (format!("position_{suffix}"), "Halfway between the places of both touches, in the world.");
+        columns.push(TableColumn::new(&name, "m", TableType::F64, help, ValueOf::ContactPosition(component)));
+    }
+    let help = "How far these places are apart.";
+    columns.push(TableColumn::new("distance", "m", TableType::F64, help, ValueOf::ContactDistance));
+    let help = "Between the outward normals there, π where they oppose; absent where a field has no chart.";
+    columns.push(TableColumn::new("angle", "rad", TableType::F64, help, ValueOf::ContactAngle).or_absent());
+    columns
+}
+
 fn unit_of(unit: Unit, session: &Session<'_>) -> String {
     match unit {
         Unit::Force if session.p_unit == "Pa" => "N".to_owned(),
@@ -232,7 +269,7 @@ fn unit_of(unit: Unit, session: &Session<'_>) -> String {
     }
 }
 
-/// A row of either table.
+/// A row of any of the tables.
 #[derive(Clone, Copy)]
 struct Row<'a> {
     percepts: &'a Percepts,
@@ -240,6 +277,8 @@ struct Row<'a> {
     field: usize,
     /// In the table of touches.
     touch: Option<&'a Touch>,
+    /// In the table of contacts.
+    contact: Option<&'a Contact>,
 }
 
 /// A number of a row, in double precision or as a whole number.
@@ -261,6 +300,10 @@ impl Row<'_> {
             ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
             ValueOf::TouchPosition(component) => self.touch.map(|touch| touch.position[component]),
             ValueOf::TouchFootprint(column, component) => Some(self.touch?.value(column)?[component]),
+            ValueOf::ContactPosition(component) => self.contact.map(|contact| contact.position[component]),
+            ValueOf::ContactDistance => self.contact.map(|contact| contact.distance),
+            ValueOf::ContactAngle => self.contact?.angle,
+            ValueOf::SideTotal(side) => self.contact.map(|contact| contact.sides[side].total),
             _ => None,
         }
     }
@@ -269,6 +312,8 @@ impl Row<'_> {
         match value {
             ValueOf::Frame => Some(self.percepts.frame_number(self.frame)),
             ValueOf::TouchId => self.touch.map(|touch| touch.id),
+            ValueOf::ContactId => self.contact.map(|contact| contact.id),
+            ValueOf::SideTouch(side) => self.contact.map(|contact| contact.sides[side].touch),
             ValueOf::TouchActive => self.touch.map(|touch| touch.active.into()),
             ValueOf::Output(..) => self.float(value).map(|number| number as u64),
             _ => None,
@@ -283,6 +328,8 @@ impl Row<'_> {
             ValueOf::Link => Some(self.link(names)),
             ValueOf::Letter => name.letter.as_deref(),
             ValueOf::Signal => name.signal.as_deref(),
+            ValueOf::SideField(side) => Some(&names[self.contact?.sides[side].field].field),
+            ValueOf::SideLink(side) => Some(&names[self.contact?.sides[side].field].link),
             _ => self.float(value).and_then(|kind| ContactKind::ALL.get(kind as usize)).map(|kind| kind.name()),
         }
     }
@@ -300,12 +347,24 @@ impl Row<'_> {
 /// The rows of a frame: its fields in contact, or all.
 fn rows(percepts: &Percepts, frame: usize, all_fields: bool) -> impl Iterator<Item = Row<'_>> {
     let listed = move |&field: &usize| all_fields || percepts.in_contact(frame, field);
-    (0..percepts.fields()).filter(listed).map(move |field| Row { percepts, frame, field, touch: None })
+    (0..percepts.fields()).filter(listed).map(move |field| Row { percepts, frame, field, touch: None, contact: None })
 }
 
 /// The rows of a frame's separate touches.
 fn touch_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
     rows(percepts, frame, false).flat_map(move |row| {
         percepts.touches(frame, row.field).iter().map(move |touch| Row { touch: Some(touch), ..row })
+    })
+}
+
+/// The rows of a frame's contacts.
+fn contact_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
+    let contacts = percepts.contacts(frame).unwrap_or_default().iter();
+    contacts.map(move |contact| Row {
+        percepts,
+        frame,
+        field: contact.sides[0].field,
+        touch: None,
+        contact: Some(contact),
     })
 }

@@ -23,6 +23,7 @@ const GROUP_ROWS: usize = 1 << 17;
 pub struct ParquetSink {
     percepts: ParquetFile,
     touches: Option<ParquetFile>,
+    contacts: Option<ParquetFile>,
 }
 
 struct ParquetFile {
@@ -32,16 +33,25 @@ struct ParquetFile {
 }
 
 impl ParquetSink {
-    /// Writes to `output`, where the file appears when the sink is finished, and separate touches to `touches`.
+    /// Writes to `output`, where the file appears when the sink is finished, separate touches to `touches`, and
+    /// contacts to `contacts`.
     ///
     /// # Errors
     /// A file cannot be made.
-    pub fn create(output: OutputPath, touches: Option<OutputPath>, session: &Session<'_>) -> Result<Self> {
+    pub fn create(
+        output: OutputPath,
+        touches: Option<OutputPath>,
+        contacts: Option<OutputPath>,
+        session: &Session<'_>,
+    ) -> Result<Self> {
         let kind = if session.all_fields { TableKind::AllFields } else { TableKind::Touched };
-        let touches = touches.map(|output| ParquetFile::begin(output, ArrowTable::new(TableKind::Touches, session)));
+        let beside = |output: Option<OutputPath>, kind| {
+            output.map(|output| ParquetFile::begin(output, ArrowTable::new(kind, session))).transpose()
+        };
         Ok(Self {
             percepts: ParquetFile::begin(output, ArrowTable::new(kind, session))?,
-            touches: touches.transpose()?,
+            touches: beside(touches, TableKind::Touches)?,
+            contacts: beside(contacts, TableKind::Contacts)?,
         })
     }
 }
@@ -99,8 +109,8 @@ impl Sink for ParquetSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
         for frame in 0..percepts.frames() {
             self.percepts.push(percepts, frame)?;
-            if let Some(touches) = &mut self.touches {
-                touches.push(percepts, frame)?;
+            for file in [&mut self.touches, &mut self.contacts].into_iter().flatten() {
+                file.push(percepts, frame)?;
             }
         }
         Ok(Flow::Open)
@@ -113,9 +123,7 @@ impl Sink for ParquetSink {
 
     fn finish(self: Box<Self>) -> Result<()> {
         let percepts = self.percepts.finish()?;
-        match self.touches {
-            Some(touches) => percepts.finish_with(touches.finish()?),
-            None => percepts.finish(),
-        }
+        let beside = [self.touches, self.contacts].into_iter().flatten();
+        percepts.finish_with(beside.map(ParquetFile::finish).collect::<Result<_>>()?)
     }
 }

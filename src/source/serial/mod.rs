@@ -4,33 +4,23 @@
 //! oldest frames are dropped and counted. Frames of boards are merged into frames of the skin. `docs/live.md`
 //! explains the messages.
 
-mod clock;
-mod lines;
-mod merge;
 mod port;
 mod session;
-mod taps;
 
 use std::collections::HashSet;
 use std::path::Path;
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-pub use lines::{BoardAccount, BoardState, Lines, Notice};
-pub use taps::{ChannelTap, TapTrouble};
-
-use self::lines::Shared;
-use self::merge::{Merge, Pace};
 use self::session::{LineConfig, Session};
 use super::Source;
+use super::boards::{Lines, Merge, Merged, Pace, Shared};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, Wiring};
 
 /// The default speed of a line, baud.
 const DEFAULT_BAUD: u32 = 57_600;
-/// How often to check whether the lines are closed.
-const CLOSE_POLL: Duration = Duration::from_millis(50);
 
 /// How boards on serial lines are read.
 #[derive(Clone, Debug, Default)]
@@ -50,12 +40,9 @@ pub struct SerialOptions {
 ///
 /// Times count from its opening, s. Values of a silent board are [`crate::RawValue::STALE`].
 pub struct SerialSource {
-    lines: Lines,
-    merge: Merge,
+    merged: Merged,
     taxels: Vec<u32>,
     wiring: Arc<Wiring>,
-    start: Instant,
-    read_at: Option<Instant>,
 }
 
 impl SerialSource {
@@ -72,7 +59,7 @@ impl SerialSource {
             None => Wiring::in_order(ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
         };
         check(ports, ids, &wiring)?;
-        let pace = pace(options.live_rate_hz)?;
+        let pace = Pace::of(options.live_rate_hz)?;
         let rate_mhz = options.board_rate_hz.map(rate_mhz).transpose()?;
         let taxels: Vec<u32> =
             wiring.boards().iter().flat_map(|board| board.taxels.iter().flatten().copied()).collect();
@@ -82,7 +69,7 @@ impl SerialSource {
 
         let wiring = Arc::new(wiring);
         let start = Instant::now();
-        let shared = Arc::new(Shared::new(&wiring, ports.len(), start));
+        let shared = Arc::new(Shared::of_boards(&wiring, ports.len(), start));
         for (line, (port, baud)) in ports.iter().enumerate() {
             let usual = || wired_baud(&wiring, port).unwrap_or(DEFAULT_BAUD);
             let session = Session::new(LineConfig {
@@ -100,7 +87,8 @@ impl SerialSource {
                 .map_err(|e| failed!("cannot start a thread: {e}").at(port))?;
         }
         let merge = Merge::new(places, pace, options.max_age_s);
-        Ok(Self { lines: Lines(shared), merge, taxels, wiring, start, read_at: None })
+        let merged = Merged::new(shared, merge, taxels.len(), start);
+        Ok(Self { merged, taxels, wiring })
     }
 
     /// The taxel on each channel of each board.
@@ -112,7 +100,7 @@ impl SerialSource {
     /// State and messages of the lines, for display.
     #[must_use]
     pub fn lines(&self) -> Lines {
-        self.lines.clone()
+        self.merged.lines.clone()
     }
 }
 
@@ -142,15 +130,6 @@ fn check(ports: &[(String, Option<u32>)], ids: &[u32], wiring: &Wiring) -> Resul
     Ok(())
 }
 
-fn pace(live_rate_hz: Option<f64>) -> Result<Pace> {
-    match live_rate_hz {
-        None => Ok(Pace::Fastest),
-        Some(0.0) => Ok(Pace::Arrival),
-        Some(hz) if (0.001..=1e5).contains(&hz) => Ok(Pace::Every(hz.recip())),
-        Some(hz) => Err(Error::usage(format!("--live-rate {hz} is not a rate; give 0.001 to 100000 Hz, or 0"))),
-    }
-}
-
 fn rate_mhz(hz: f64) -> Result<u32> {
     if hz == 0.0 || (0.001..=1e6).contains(&hz) {
         return Ok((hz * 1e3).round() as u32);
@@ -166,58 +145,14 @@ impl Source for SerialSource {
     }
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        let shared = Arc::clone(&self.lines.0);
-        let mut state = shared.lock();
-        loop {
-            if state.closed {
-                return Ok(false);
-            }
-            let due = match state.take() {
-                Some((came, read_at)) => {
-                    let due = self.merge.take(&came);
-                    let (replaced, drift, rate_hz) = self.merge.board_statistics(came.board);
-                    let account = &mut state.accounts[came.board];
-                    (account.replaced, account.drift, account.rate_hz) = (replaced, drift, rate_hz);
-                    self.read_at = Some(read_at);
-                    due
-                }
-                None => {
-                    // A frame of silent boards has no time of reading.
-                    let has_read_time = self.merge.is_timed() || self.merge.is_waiting();
-                    let due = self.merge.tick(self.start.elapsed().as_secs_f64());
-                    self.read_at = self.read_at.filter(|_| due.is_none() || has_read_time);
-                    due
-                }
-            };
-            if let Some(at_s) = due {
-                drop(state);
-                frame.values.resize(self.taxels.len(), crate::signal::RawValue::MISSING);
-                self.merge.fill(at_s, frame);
-                return Ok(true);
-            }
-            if !state.queue.is_empty() {
-                continue;
-            }
-            if let Some(error) = state.fatal_error() {
-                return Err(error);
-            }
-            let until_due = |due_s: f64| Duration::try_from_secs_f64(due_s - self.start.elapsed().as_secs_f64());
-            let wait = self.merge.due_s().map_or(CLOSE_POLL, |due| until_due(due).unwrap_or_default().min(CLOSE_POLL));
-            state = shared.arrived.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.merged.next_frame(frame)
     }
 
     fn read_at(&mut self) -> Option<Instant> {
-        self.read_at.take()
+        self.merged.read_at()
     }
 
     fn losses(&self) -> Vec<String> {
-        self.lines.losses()
-    }
-}
-
-impl Drop for SerialSource {
-    fn drop(&mut self) {
-        self.lines.close();
+        self.merged.lines.losses()
     }
 }

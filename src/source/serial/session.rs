@@ -7,10 +7,9 @@ mod taps;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::lines::{BoardState, Shared, Verdict};
-use super::merge::BoardFrame;
+use super::super::boards::{BoardFrame, BoardState, Shared, Verdict};
 use crate::error::Error;
-use crate::signal::Wiring;
+use crate::signal::{RawValue, Wiring};
 use crate::wire::{ANY_BOARD, Command, Corruption, Decoder, Dialogue, Event, Outcome, RetryPolicy, Status};
 
 /// The baud rates to try, most likely first.
@@ -335,7 +334,11 @@ impl LineState {
                         lost: 0,
                         restarted: false,
                         partial: values.is_partial(),
-                        values: values.iter().collect(),
+                        places: None,
+                        values: values
+                            .iter()
+                            .map(|(channel, value)| (channel.into(), RawValue::new(value.into())))
+                            .collect(),
                     };
                     self.frame(head, frame, now, read_at);
                 }

@@ -27,7 +27,7 @@ pub fn write_recording(simulation: &mut SimulatedSource, frames: OutputPath, tru
     simulation.seek(0);
     write(simulation, &mut frames, &mut truth)?;
 
-    frames.finish_with(truth)?;
+    frames.finish_with(vec![truth])?;
     Ok(simulation.frames())
 }
 

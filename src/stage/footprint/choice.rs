@@ -102,6 +102,7 @@ fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape:
 
 impl<R: Copy> Fits<R> {
     /// Where the descents ended, under gains that vary with `gain_variance`.
+    #[cfg(feature = "gpu")]
     pub(crate) fn ends(&self, gain_variance: R) -> Ends<R> {
         let long = self.long.as_ref().map(|long| long.each_ref().map(|fitted| fitted.shape));
         Ends { point: self.point.shape, line: self.line.shape, long, gain_variance }

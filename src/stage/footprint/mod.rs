@@ -49,6 +49,7 @@ pub(crate) use descent::descend;
 pub(crate) use kinds::{Blob, Kind, Line, Point, Segment};
 pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;
+#[cfg(feature = "gpu")]
 pub(crate) use shape::Shape;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};
 pub(crate) use trail::{OVER_S, Trail};

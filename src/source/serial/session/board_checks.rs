@@ -5,9 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::{LineConfig, LineState};
 use crate::signal::WiredBoard;
-use crate::source::serial::lines::{BoardState, Verdict};
-use crate::source::serial::merge::BoardFrame;
-use crate::source::serial::taps::ChannelTap;
+use crate::source::boards::{BoardFrame, BoardState, ChannelTap, Verdict};
 use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, PacketOrder, layout_hash};
 
 impl LineState {
@@ -144,7 +142,7 @@ impl LineState {
         let mut frame = frame;
         {
             let taps = &self.config.shared.lock().taps[board];
-            frame.values.retain(|(channel, _)| !taps.get(usize::from(*channel)).is_some_and(|tap| tap.is_unknown()));
+            frame.values.retain(|(channel, _)| !taps.get(*channel as usize).is_some_and(|tap| tap.is_unknown()));
         }
         let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_restarted));
         self.config.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);

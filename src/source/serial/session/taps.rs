@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::LineState;
-use crate::source::serial::taps::TapTrouble;
+use crate::source::boards::TapTrouble;
 use crate::wire::{Command, Ended, Outcome, Status};
 
 impl LineState {

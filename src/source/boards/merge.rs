@@ -1,7 +1,10 @@
 //! Merges the boards' frames into frames of the whole skin. No I/O, no clock: the caller passes host times, s.
+//! A board is whatever numbers its frames and stamps them with a clock of its own: on a serial line, or a limb on a network.
 //!
 //! A channel's value is confirmed by a frame with it, or by a partial frame that omits it as unchanged, if no frame
 //! was lost in between. Values that are too old are missing, values of a silent board are stale; neither is zero.
+
+use std::sync::Arc;
 
 use crate::signal::{Frame, RawValue};
 
@@ -24,7 +27,7 @@ const MAX_WAIT_S: f64 = 0.005;
 const MAX_WAIT_PERIODS: f64 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Pace {
+pub(in crate::source) enum Pace {
     /// At each frame of the fastest board.
     Fastest,
     /// At each frame of any board.
@@ -34,26 +37,29 @@ pub(super) enum Pace {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct BoardFrame {
+pub(in crate::source) struct BoardFrame {
     /// Index of the board in the wiring.
-    pub(super) board: usize,
+    pub(in crate::source) board: usize,
     /// The board's clock, unwrapped, µs.
-    pub(super) board_us: u64,
+    pub(in crate::source) board_us: u64,
     /// When its last byte was read, s.
-    pub(super) arrived_s: f64,
+    pub(in crate::source) arrived_s: f64,
     /// Frames before it that were lost.
-    pub(super) lost: u32,
+    pub(in crate::source) lost: u32,
     /// Whether the board's clock has restarted.
-    pub(super) restarted: bool,
+    pub(in crate::source) restarted: bool,
     /// Whether omitted channels are unchanged.
-    pub(super) partial: bool,
-    pub(super) values: Vec<(u16, u16)>,
+    pub(in crate::source) partial: bool,
+    /// Per channel the index in a frame's values, where the board itself tells what it has.
+    pub(in crate::source) places: Option<Arc<[Option<usize>]>>,
+    /// Channels with their values.
+    pub(in crate::source) values: Vec<(u32, RawValue)>,
 }
 
 /// The last value of a channel.
 #[derive(Clone, Copy)]
 struct Known {
-    value: u16,
+    value: RawValue,
     /// Time of the last frame that confirmed it, s.
     confirmed_s: f64,
     /// Whether no frame was lost since.
@@ -63,7 +69,7 @@ struct Known {
 #[derive(Default)]
 struct Board {
     /// Per channel, the index of its taxel in a frame's values.
-    places: Vec<Option<usize>>,
+    places: Arc<[Option<usize>]>,
     /// Per channel.
     known: Vec<Option<Known>>,
     clock: Clock,
@@ -89,8 +95,13 @@ impl Board {
     /// Takes over `frame`'s values. Returns when it was read, host time, s.
     fn take(&mut self, frame: &BoardFrame) -> f64 {
         if frame.restarted {
-            (self.clock, self.last) = (Clock::default(), None);
+            self.clock.restart();
+            self.last = None;
             self.known.fill(None);
+        }
+        if let Some(places) = frame.places.as_ref().filter(|places| !Arc::ptr_eq(places, &self.places)) {
+            // A value of another channel says nothing of this one.
+            (self.known, self.places) = (vec![None; places.len()], Arc::clone(places));
         }
         let at = self.clock.host_time_s(frame.board_us, frame.arrived_s);
         if let Some((before_us, _)) = self.last {
@@ -110,7 +121,7 @@ impl Board {
             }
         }
         for &(channel, value) in &frame.values {
-            if let Some(known) = self.known.get_mut(usize::from(channel)) {
+            if let Some(known) = self.known.get_mut(channel as usize) {
                 *known = Some(Known { value, confirmed_s: at, sure: true });
             }
         }
@@ -119,7 +130,7 @@ impl Board {
     }
 }
 
-pub(super) struct Merge {
+pub(in crate::source) struct Merge {
     boards: Vec<Board>,
     pace: Pace,
     max_age_s: Option<f64>,
@@ -133,17 +144,24 @@ pub(super) struct Merge {
 
 impl Merge {
     /// `boards` has per board and channel the index in a frame's values.
-    pub(super) fn new(boards: Vec<Vec<Option<usize>>>, pace: Pace, max_age_s: Option<f64>) -> Self {
+    pub(in crate::source) fn new(boards: Vec<Vec<Option<usize>>>, pace: Pace, max_age_s: Option<f64>) -> Self {
         let board = |places: Vec<Option<usize>>| {
             let known = vec![None; places.len()];
-            Board { known, places, period_s: DEFAULT_PERIOD_S, ..Board::default() }
+            Board { known, places: places.into(), period_s: DEFAULT_PERIOD_S, ..Board::default() }
         };
         let boards = boards.into_iter().map(board).collect();
         Self { boards, pace, max_age_s, leader: None, last_s: f64::NEG_INFINITY, due_s: None, held_s: None }
     }
 
+    /// The same for limbs, whose frames a network may hold up.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::source) fn of_limbs(mut self) -> Self {
+        self.boards.iter_mut().for_each(|board| board.clock = Clock::of_limb());
+        self
+    }
+
     /// Takes a board's frame. Returns the time of the merged frame that is now due, if any.
-    pub(super) fn take(&mut self, frame: &BoardFrame) -> Option<f64> {
+    pub(in crate::source) fn take(&mut self, frame: &BoardFrame) -> Option<f64> {
         let at = self.boards.get_mut(frame.board)?.take(frame);
         if let Pace::Every(period_s) = self.pace {
             self.due_s.get_or_insert(frame.arrived_s + period_s);
@@ -174,7 +192,7 @@ impl Merge {
         })
     }
 
-    pub(super) fn is_waiting(&self) -> bool {
+    pub(in crate::source) fn is_waiting(&self) -> bool {
         self.held_s.is_some()
     }
 
@@ -191,18 +209,18 @@ impl Merge {
         leads
     }
 
-    pub(super) fn is_timed(&self) -> bool {
+    pub(in crate::source) fn is_timed(&self) -> bool {
         matches!(self.pace, Pace::Every(_))
     }
 
     /// When [`Merge::tick`] next has something to do, s.
-    pub(super) fn due_s(&self) -> Option<f64> {
+    pub(in crate::source) fn due_s(&self) -> Option<f64> {
         let held = self.held_s.map(|(_, until)| until);
         held.into_iter().chain(self.due_s).reduce(f64::min)
     }
 
     /// The time of the merged frame that is due at `now_s`, if any.
-    pub(super) fn tick(&mut self, now_s: f64) -> Option<f64> {
+    pub(in crate::source) fn tick(&mut self, now_s: f64) -> Option<f64> {
         if let Some((at, _)) = self.held_s.take_if(|(_, until)| now_s >= *until) {
             return (at > self.last_s).then_some(at);
         }
@@ -215,24 +233,26 @@ impl Merge {
     }
 
     /// Fills `frame` with the values valid at `at_s`.
-    pub(super) fn fill(&mut self, at_s: f64, frame: &mut Frame) {
+    pub(in crate::source) fn fill(&mut self, at_s: f64, frame: &mut Frame) {
         frame.clear();
         frame.t_s = at_s;
         self.last_s = at_s;
         for board in &mut self.boards {
-            board.waiting = false;
             let max_age_s = board.max_age_s(self.max_age_s);
-            let absent = if board.is_sending(at_s, self.max_age_s) { RawValue::MISSING } else { RawValue::STALE };
+            let is_sending = board.is_sending(at_s, self.max_age_s);
+            let absent = if is_sending { RawValue::MISSING } else { RawValue::STALE };
+            // A frame that is too old by now has come for nothing.
+            board.replaced += u64::from(std::mem::take(&mut board.waiting) && !is_sending);
             for (place, known) in board.places.iter().zip(&board.known) {
                 let Some(place) = *place else { continue };
                 let young = known.filter(|known| at_s - known.confirmed_s <= max_age_s);
-                frame.values[place] = young.map_or(absent, |known| RawValue::new(known.value.into()));
+                frame.values[place] = young.map_or(absent, |known| known.value);
             }
         }
     }
 
     /// The board's frames replaced before they were merged, its clock's drift and its rate, Hz.
-    pub(super) fn board_statistics(&self, board: usize) -> (u64, Option<f64>, Option<f64>) {
+    pub(in crate::source) fn board_statistics(&self, board: usize) -> (u64, Option<f64>, Option<f64>) {
         let board = &self.boards[board];
         (board.replaced, board.clock.drift(), board.last.map(|_| board.period_s.recip()))
     }
@@ -242,10 +262,10 @@ impl Merge {
 mod tests {
     use super::*;
 
-    fn frame(board: usize, at_s: f64, values: &[(u16, u16)]) -> BoardFrame {
+    fn frame(board: usize, at_s: f64, values: &[(u32, u16)]) -> BoardFrame {
         let board_us = (at_s * 1e6).round() as u64;
-        let values = values.to_vec();
-        BoardFrame { board, board_us, arrived_s: at_s, lost: 0, restarted: false, partial: false, values }
+        let values = values.iter().map(|&(channel, value)| (channel, RawValue::new(value.into()))).collect();
+        BoardFrame { board, board_us, arrived_s: at_s, lost: 0, restarted: false, partial: false, places: None, values }
     }
 
     fn two_boards(pace: Pace, max_age_s: Option<f64>) -> Merge {
@@ -352,7 +372,7 @@ mod tests {
     fn a_partial_frame_confirms_what_it_leaves_out_unless_something_was_lost() {
         let mut merge = two_boards(Pace::Arrival, Some(0.1));
         merge.take(&frame(0, 1.0, &[(0, 5), (1, 6)]));
-        let partial = |at, lost, values: &[(u16, u16)]| BoardFrame { partial: true, lost, ..frame(0, at, values) };
+        let partial = |at, lost, values: &[(u32, u16)]| BoardFrame { partial: true, lost, ..frame(0, at, values) };
         merge.take(&partial(1.09, 0, &[(0, 8)]));
         assert_eq!(numbers(&mut merge, 1.15), [Some(8.0), Some(6.0), None]);
         merge.take(&partial(1.18, 1, &[(0, 9)]));

@@ -37,23 +37,23 @@ impl TapTrouble {
 
 impl ChannelTap {
     /// The tap to request, unless it is set or the board has refused it.
-    pub(super) fn due(self) -> Option<u8> {
+    pub(in crate::source) fn due(self) -> Option<u8> {
         self.wanted.filter(|_| self.wanted != self.set && self.trouble.is_none())
     }
 
     /// Whether the channel's readings are still invalid: a tap is requested, and the present one is unknown.
-    pub(super) fn is_unknown(self) -> bool {
+    pub(in crate::source) fn is_unknown(self) -> bool {
         self.due().is_some() && self.set.is_none()
     }
 
     /// Forgets the tap after its board has restarted.
-    pub(super) fn forget(&mut self) {
+    pub(in crate::source) fn forget(&mut self) {
         (self.set, self.trouble) = (None, None);
     }
 }
 
 /// The taps requested by `wiring`, board by board.
-pub(super) fn wanted(wiring: &Wiring) -> Vec<Vec<ChannelTap>> {
+pub(in crate::source) fn wanted(wiring: &Wiring) -> Vec<Vec<ChannelTap>> {
     let tap = |wanted: &Option<u8>| ChannelTap { wanted: *wanted, ..ChannelTap::default() };
     wiring.boards().iter().map(|board| board.taps.iter().map(tap).collect()).collect()
 }

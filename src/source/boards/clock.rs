@@ -16,9 +16,12 @@ const FIT_DRIFT_S: f64 = 1.0;
 const REPORT_DRIFT_S: f64 = 30.0;
 /// A larger offset means that the board's clock was set; it is then estimated anew, s.
 const JUMP_S: f64 = 2.0;
+/// A network may hold frames up for longer, s.
+#[cfg(feature = "zenoh")]
+const NETWORK_LATE_S: f64 = 60.0;
 
-#[derive(Clone, Debug, Default)]
-pub(super) struct Clock {
+#[derive(Clone, Debug)]
+pub(in crate::source) struct Clock {
     first_us: Option<u64>,
     /// Earliest arrivals: board time x since the first frame, s, and y − x, s.
     buckets: VecDeque<(f64, f64)>,
@@ -27,17 +30,38 @@ pub(super) struct Clock {
     slope: f64,
     /// The last frame's board time and host time, s.
     last: Option<(f64, f64)>,
+    /// A frame that arrives later than this is of a clock that was set back, s.
+    latest_s: f64,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        let buckets = VecDeque::new();
+        Self { first_us: None, buckets, offset_s: 0.0, slope: 0.0, last: None, latest_s: JUMP_S }
+    }
 }
 
 impl Clock {
+    /// Of a limb, whose network may hold frames up.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::source) fn of_limb() -> Self {
+        Self { latest_s: NETWORK_LATE_S, ..Self::default() }
+    }
+
+    /// Begins anew.
+    pub(in crate::source) fn restart(&mut self) {
+        *self = Self { latest_s: self.latest_s, ..Self::default() };
+    }
+
     /// The host time, s, of a frame read at board time `board_us` that arrived at `arrived_s`. Never before earlier frames,
     /// nor after its arrival.
-    pub(super) fn host_time_s(&mut self, board_us: u64, arrived_s: f64) -> f64 {
+    pub(in crate::source) fn host_time_s(&mut self, board_us: u64, arrived_s: f64) -> f64 {
         let x = self.since_first_s(board_us);
         let y = arrived_s - x;
         let known = self.offset_s + self.slope * x;
-        if self.last.is_some_and(|(last_x, _)| x < last_x || (y - known).abs() > JUMP_S) {
-            *self = Self::default();
+        let jumps = known - y > JUMP_S || y - known > self.latest_s;
+        if self.last.is_some_and(|(last_x, _)| x < last_x || jumps) {
+            self.restart();
             return self.host_time_s(board_us, arrived_s);
         }
         let lower = match self.buckets.back_mut() {
@@ -69,7 +93,7 @@ impl Clock {
     }
 
     /// Relative error of the board's clock, positive if fast, once known.
-    pub(super) fn drift(&self) -> Option<f64> {
+    pub(in crate::source) fn drift(&self) -> Option<f64> {
         let (first, last) = (self.buckets.front()?.0, self.buckets.back()?.0);
         (last - first >= REPORT_DRIFT_S).then(|| (1.0 + self.slope).recip() - 1.0)
     }

@@ -1,11 +1,12 @@
-//! Where the table of touches is beside that of percepts.
+//! Where the tables of touches and contacts are beside that of percepts.
 
 use std::path::{Path, PathBuf};
 
-/// `percepts.csv` has its touches in `percepts.touches.csv`.
-pub(in crate::sink) fn touches_path(path: &Path) -> PathBuf {
+/// `percepts.csv` has its `touches` in `percepts.touches.csv`.
+pub(in crate::sink) fn path_beside(path: &Path, what: &str) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
-    name.push(".touches");
+    name.push(".");
+    name.push(what);
     if let Some(ending) = path.extension() {
         name.push(".");
         name.push(ending);
@@ -22,7 +23,7 @@ mod tests {
         for (path, wanted) in
             [("a/b.csv", "a/b.touches.csv"), ("b", "b.touches"), ("x.y.parquet", "x.y.touches.parquet")]
         {
-            assert_eq!(touches_path(Path::new(path)), Path::new(wanted));
+            assert_eq!(path_beside(Path::new(path), "touches"), Path::new(wanted));
         }
     }
 }

@@ -12,6 +12,9 @@ use crate::signal::Wiring;
 
 const MAX_QUEUED_FRAMES: usize = 64;
 const MAX_NOTICES: usize = 256;
+/// Frames' percepts of limbs that wait.
+#[cfg(feature = "zenoh")]
+const MAX_QUEUED_PERCEPTS: usize = 1024;
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(300);
 
 /// The state of a board.
@@ -46,9 +49,11 @@ impl BoardState {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BoardAccount {
-    /// Its id.
+    /// Its id; of a limb its number from 1.
     pub board: u16,
-    /// The port it was last found on.
+    /// The key of a limb on a network, which is no board.
+    pub limb: Option<String>,
+    /// The port it was last found on; of a limb its key, once it was heard.
     pub port: Option<String>,
     /// Bits of its values, once it has been identified.
     pub bits: Option<u8>,
@@ -60,7 +65,7 @@ pub struct BoardAccount {
     pub lost: u64,
     /// Delivered frames that were dropped because the consumer was too slow.
     pub dropped: u64,
-    /// Delivered frames that were replaced by a later one of the same board before they were merged.
+    /// Delivered frames that were replaced by a later one of the same board, or too old, before they were merged.
     pub replaced: u64,
     /// Corrupt packets on its line.
     pub corrupt: u64,
@@ -72,6 +77,27 @@ pub struct BoardAccount {
     pub drift: Option<f64>,
     /// Frames a second, Hz.
     pub rate_hz: Option<f64>,
+}
+
+impl BoardAccount {
+    /// What messages call it, such as `board 3`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.limb.as_ref().map_or_else(|| format!("board {}", self.board), |key| format!("limb {key}"))
+    }
+}
+
+/// Percepts that a limb has computed.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LimbPercepts {
+    /// A line of NDJSON as percepts have it, with the limb's key as `limb` and its time as that of the lines, s.
+    pub line: String,
+    /// When it was read.
+    pub read_at: Instant,
+    /// The index of its account.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::source) limb: usize,
 }
 
 /// A message about a line.
@@ -92,7 +118,7 @@ impl fmt::Display for Notice {
 
 /// Access to the state of serial lines from any thread while they are read.
 #[derive(Clone)]
-pub struct Lines(pub(super) Arc<Shared>);
+pub struct Lines(pub(in crate::source) Arc<Shared>);
 
 impl Lines {
     /// The potentiometers, one per channel, board by board in the order of the wiring.
@@ -116,6 +142,17 @@ impl Lines {
         self.0.lock().notices.drain(..).collect()
     }
 
+    /// The percepts of limbs since the last call: in order for each limb; those of several in the order of their arrival.
+    #[must_use]
+    pub fn percepts(&self) -> Vec<LimbPercepts> {
+        self.0.lock().percepts.drain(..).collect()
+    }
+
+    /// Has `wake` called whenever percepts of a limb come, on a thread that it must not hold up.
+    pub fn on_percepts(&self, wake: impl Fn() + Send + Sync + 'static) {
+        self.0.lock().wake = Some(Arc::new(wake));
+    }
+
     /// One account per board, in the order of the wiring.
     #[must_use]
     pub fn accounts(&self) -> Vec<BoardAccount> {
@@ -134,7 +171,7 @@ impl Lines {
             if account.dropped > 0 {
                 parts.push(format!("{} of {sent} frames came faster than they were taken", account.dropped));
             }
-            (!parts.is_empty()).then(|| format!("board {}: {}", account.board, parts.join(", ")))
+            (!parts.is_empty()).then(|| format!("{}: {}", account.name(), parts.join(", ")))
         };
         self.0.lock().accounts.iter().filter_map(losses).collect()
     }
@@ -144,6 +181,7 @@ impl Lines {
         let mut state = self.0.lock();
         state.closed = true;
         self.0.arrived.notify_all();
+        self.0.closing.notify_all();
         let until = Instant::now() + CLOSE_TIMEOUT;
         while state.readers > 0
             && let Some(left) = until.checked_duration_since(Instant::now())
@@ -155,7 +193,7 @@ impl Lines {
 
 /// The result of looking for a board on a line.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(in crate::source) enum Verdict {
     Pending,
     /// A board of the wiring was found.
     Good,
@@ -163,11 +201,14 @@ pub(super) enum Verdict {
     Bad(Error),
 }
 
-pub(super) struct State {
-    pub(super) queue: VecDeque<(BoardFrame, Instant)>,
-    pub(super) accounts: Vec<BoardAccount>,
+pub(in crate::source) struct State {
+    pub(in crate::source) queue: VecDeque<(BoardFrame, Instant)>,
+    pub(in crate::source) accounts: Vec<BoardAccount>,
     /// One per channel, board by board.
-    pub(super) taps: Vec<Vec<ChannelTap>>,
+    pub(in crate::source) taps: Vec<Vec<ChannelTap>>,
+    percepts: VecDeque<LimbPercepts>,
+    /// Whom to tell of percepts.
+    wake: Option<Arc<dyn Fn() + Send + Sync>>,
     start: Instant,
     notices: VecDeque<Notice>,
     verdicts: Vec<Verdict>,
@@ -175,42 +216,83 @@ pub(super) struct State {
     owners: Vec<Option<usize>>,
     /// Per board, frames dropped since the last that was kept.
     gaps: Vec<u32>,
-    pub(super) closed: bool,
-    pub(super) readers: usize,
+    pub(in crate::source) closed: bool,
+    pub(in crate::source) readers: usize,
 }
 
-pub(super) struct Shared {
+pub(in crate::source) struct Shared {
     state: Mutex<State>,
-    pub(super) arrived: Condvar,
+    pub(in crate::source) arrived: Condvar,
+    /// The lines are closed.
+    pub(in crate::source) closing: Condvar,
     lines: usize,
 }
 
 impl Shared {
-    pub(super) fn new(wiring: &Wiring, lines: usize, start: Instant) -> Self {
+    pub(in crate::source) fn of_boards(wiring: &Wiring, lines: usize, start: Instant) -> Self {
         let account = |board: u16| BoardAccount { board, ..BoardAccount::default() };
-        let accounts: Vec<_> = wiring.boards().iter().map(|board| account(board.id)).collect();
+        let accounts = wiring.boards().iter().map(|board| account(board.id)).collect();
+        Self::new(accounts, taps::wanted(wiring), lines, start)
+    }
+
+    /// The state of whatever `accounts` stand for, with potentiometers or none, that `lines` readers read.
+    pub(in crate::source) fn new(
+        accounts: Vec<BoardAccount>,
+        taps: Vec<Vec<ChannelTap>>,
+        lines: usize,
+        start: Instant,
+    ) -> Self {
         let state = State {
             queue: VecDeque::new(),
+            percepts: VecDeque::new(),
+            wake: None,
             start,
             notices: VecDeque::new(),
             verdicts: vec![Verdict::Pending; lines],
             owners: vec![None; accounts.len()],
             gaps: vec![0; accounts.len()],
-            taps: taps::wanted(wiring),
+            taps,
             accounts,
             closed: false,
             readers: lines,
         };
-        Self { state: Mutex::new(state), arrived: Condvar::new(), lines }
+        Self { state: Mutex::new(state), arrived: Condvar::new(), closing: Condvar::new(), lines }
     }
 
-    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
+    /// The same with another number of threads that read.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::source) fn with_readers(self, readers: usize) -> Self {
+        self.lock().readers = readers;
+        self
+    }
+
+    /// Queues percepts that a limb has computed; drops the oldest if nobody takes them.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::source) fn deliver_percepts(&self, percepts: LimbPercepts) {
+        let mut state = self.lock();
+        let account = &mut state.accounts[percepts.limb];
+        account.delivered += 1;
+        account.state = BoardState::Speaking;
+        state.percepts.push_back(percepts);
+        if state.percepts.len() > MAX_QUEUED_PERCEPTS
+            && let Some(oldest) = state.percepts.pop_front()
+        {
+            state.accounts[oldest.limb].dropped += 1;
+        }
+        let wake = state.wake.clone();
+        drop(state);
+        if let Some(wake) = wake {
+            wake();
+        }
+    }
+
+    pub(in crate::source) fn lock(&self) -> MutexGuard<'_, State> {
         // A thread that panicked has left the state valid.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Queues `frame`; drops the oldest one if the queue is full.
-    pub(super) fn deliver(&self, frame: BoardFrame, read_at: Instant) {
+    pub(in crate::source) fn deliver(&self, frame: BoardFrame, read_at: Instant) {
         let mut state = self.lock();
         let account = &mut state.accounts[frame.board];
         account.delivered += 1;
@@ -237,40 +319,40 @@ impl Shared {
 
 impl State {
     /// The next channel of `board` to set, and its tap.
-    pub(super) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
+    pub(in crate::source) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
         (0..).zip(&self.taps[board]).find_map(|(channel, tap)| Some((channel, tap.due()?)))
     }
 
     /// Stops requesting taps of `board`. Returns the number of channels without the requested tap.
-    pub(super) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
+    pub(in crate::source) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
         let due = self.taps[board].iter_mut().filter(|tap| tap.due().is_some());
         due.map(|tap| tap.trouble = Some(why)).count()
     }
 
-    pub(super) fn take(&mut self) -> Option<(BoardFrame, Instant)> {
+    pub(in crate::source) fn take(&mut self) -> Option<(BoardFrame, Instant)> {
         let (mut frame, read_at) = self.queue.pop_front()?;
         frame.lost += std::mem::take(&mut self.gaps[frame.board]);
         Some((frame, read_at))
     }
 
-    pub(super) fn notify(&mut self, text: String) {
+    pub(in crate::source) fn notify(&mut self, text: String) {
         if self.notices.len() < MAX_NOTICES {
             self.notices.push_back(Notice { at_s: self.start.elapsed().as_secs_f64(), text });
         }
     }
 
     /// Assigns `board` to the line `line`. Returns the line that has it already, if another does.
-    pub(super) fn claim(&mut self, board: usize, line: usize) -> Option<usize> {
+    pub(in crate::source) fn claim(&mut self, board: usize, line: usize) -> Option<usize> {
         let owner = self.owners[board].get_or_insert(line);
         (*owner != line).then_some(*owner)
     }
 
-    pub(super) fn release(&mut self, line: usize) {
+    pub(in crate::source) fn release(&mut self, line: usize) {
         self.owners.iter_mut().filter(|owner| **owner == Some(line)).for_each(|owner| *owner = None);
     }
 
     /// Sets the result of a line. An error gives a notice, unless it ends the source.
-    pub(super) fn set_verdict(&mut self, line: usize, verdict: Verdict) {
+    pub(in crate::source) fn set_verdict(&mut self, line: usize, verdict: Verdict) {
         if self.verdicts[line] != Verdict::Good {
             self.verdicts[line] = verdict.clone();
         }
@@ -283,11 +365,11 @@ impl State {
     }
 
     /// The error that ends the source, if no line can be used.
-    pub(super) fn fatal_error(&self) -> Option<Error> {
+    pub(in crate::source) fn fatal_error(&self) -> Option<Error> {
         let bad = self.verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Bad(_))).count();
         match &self.verdicts[..] {
             [Verdict::Bad(error)] => Some(error.clone()),
-            all if bad == all.len() => Some(failed!("none of {bad} serial lines can be used")),
+            all if bad == all.len() => Some(failed!("none of {bad} lines can be used")),
             _ => None,
         }
     }

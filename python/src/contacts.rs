@@ -1,0 +1,126 @@
+//! `Contacts`: where the robot touches itself, in a batch.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyCapsule;
+use somatic::sink::TableKind;
+use somatic::{Contact, Percepts};
+
+use crate::arrays::array;
+use crate::session::Run;
+use crate::stream::stream;
+
+/// The contacts between links of some frames, a row each, in the order of frames: touches of two links at one place in the
+/// world. Frames without poses have none.
+///
+/// Needs output `contacts`.
+///
+/// >>> import numpy as np
+/// >>> import somatic_touch as st
+/// >>> engine = st.Engine(st.Body.grid(1, 5, 0.01), {"outputs": ["contacts"]}, backend="cpu")
+/// >>> contacts = engine.process([0.0], np.array([[3, 1, 0, 0, 5]], np.float32)).contacts
+/// >>> len(contacts), contacts.touch.shape
+/// (0, (0, 2))
+#[pyclass(module = "somatic_touch", name = "Contacts", frozen)]
+pub(crate) struct PyContacts {
+    pub(crate) percepts: Arc<Percepts>,
+    pub(crate) run: Arc<Run>,
+}
+
+impl PyContacts {
+    /// Frame and contact of each row.
+    fn rows(&self) -> impl Iterator<Item = (usize, &Contact)> {
+        let of = |frame| self.percepts.contacts(frame).unwrap_or_default().iter();
+        (0..self.percepts.frames()).flat_map(move |frame| of(frame).map(move |contact| (frame, contact)))
+    }
+
+    fn column<T: numpy::Element>(
+        &self,
+        py: Python<'_>,
+        width: usize,
+        of: impl Fn((usize, &Contact), &mut Vec<T>),
+    ) -> PyResult<Py<PyAny>> {
+        let mut values = Vec::new();
+        self.rows().for_each(|row| of(row, &mut values));
+        let shape = [values.len() / width, width];
+        array(py, values, if width == 1 { &shape[..1] } else { &shape })
+    }
+}
+
+#[pymethods]
+impl PyContacts {
+    /// The frame of each, int64 [contacts]: an index into the batch.
+    #[getter]
+    fn frame(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 1, |(frame, _), to| to.push(frame as i64))
+    }
+
+    /// The time of its frame, float64 [contacts], in seconds.
+    #[getter]
+    fn t(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 1, |(frame, _), to| to.push(self.percepts.t_s(frame)))
+    }
+
+    /// Its identity, uint64 [contacts]: lasts as long as both touches.
+    #[getter]
+    fn id(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 1, |(_, contact), to| to.push(contact.id))
+    }
+
+    /// The field on either side, int64 [contacts, 2]: indices into `Percepts.fields`.
+    #[getter]
+    fn field(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| side.field as i64)))
+    }
+
+    /// The touch on either side, uint64 [contacts, 2]: its `id` among those of its field.
+    #[getter]
+    fn touch(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| side.touch)))
+    }
+
+    /// The total of either touch, float64 [contacts, 2], in the unit of pressures.
+    #[getter]
+    fn total(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| side.total)))
+    }
+
+    /// Halfway between the places of both touches, float64 [contacts, 3], in metres, in the world.
+    #[getter]
+    fn position(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 3, |(_, contact), to| to.extend(contact.position))
+    }
+
+    /// How far these places are apart, float64 [contacts], in metres.
+    #[getter]
+    fn distance(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 1, |(_, contact), to| to.push(contact.distance))
+    }
+
+    /// The angle between the normals there, float64 [contacts], in radians; NaN where a field has no chart.
+    #[getter]
+    fn angle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 1, |(_, contact), to| to.push(contact.angle.unwrap_or(f64::NAN)))
+    }
+
+    /// Arrow's C stream of the table that docs/tables.md describes.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // The interface lets a producer keep to its own schema.
+        let _ = requested_schema;
+        stream(py, &self.percepts, &self.run, TableKind::Contacts)
+    }
+
+    fn __len__(&self) -> usize {
+        self.rows().count()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Contacts: {} rows>", self.__len__())
+    }
+}

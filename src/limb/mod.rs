@@ -1,0 +1,19 @@
+//! Limbs: parts of a robot on computers of their own, whose frames or percepts go over Zenoh.
+//!
+//! `docs/many-machines.md` specifies what goes over the network, byte by byte.
+
+mod key;
+#[cfg(feature = "zenoh")]
+mod network;
+#[cfg(feature = "zenoh")]
+mod packet;
+mod sends;
+
+pub(crate) use key::checked_key;
+#[cfg(feature = "zenoh")]
+pub(crate) use network::{Network, Publication, Side};
+#[cfg(feature = "zenoh")]
+pub(crate) use packet::{
+    FRAME_BYTES, Packet, PerceptHead, end_packet, frame_packet, hash, layout_packet, open, percepts_begin, raw_value,
+};
+pub use sends::LimbSends;

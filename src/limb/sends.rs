@@ -1,0 +1,21 @@
+//! What limbs send.
+
+/// What a limb sends to the computer that brings limbs together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimbSends {
+    /// Raw frames, of which that computer makes percepts.
+    Frames,
+    /// Percepts, as in NDJSON.
+    Percepts,
+}
+
+impl LimbSends {
+    /// What they are called.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Frames => "frames",
+            Self::Percepts => "percepts",
+        }
+    }
+}

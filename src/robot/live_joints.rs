@@ -1,0 +1,130 @@
+//! Joint states from a topic of ROS 2, carried by the frames of another source.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::messages::{JointState, Message as _};
+use crate::dds::{Delivery, Node, Reader};
+use crate::error::{Error, Result, failed};
+use crate::signal::Frame;
+use crate::source::Source;
+
+/// States that are kept until the next frame reads them.
+const DEPTH: usize = 64;
+/// The node's name.
+const NODE: &str = "somatic_joints";
+
+/// Frames of another source, each with the joint states that have come since the one before.
+pub struct LiveJoints {
+    source: Box<dyn Source + Send>,
+    name: String,
+    /// It stays as long as what reads from it.
+    _node: Node,
+    states: Reader<JointState>,
+    /// Joints that have come since the last frame.
+    come: BTreeMap<String, f64>,
+}
+
+impl LiveJoints {
+    /// Reads `topic`, whose messages are `sensor_msgs/msg/JointState`, for the frames of `source`.
+    ///
+    /// # Errors
+    /// There is no network, or the name is none of a topic.
+    pub fn open(source: Box<dyn Source + Send>, topic: &str) -> Result<Self> {
+        let name = format!("joint states `ros2:{topic}`");
+        let at = |e: Error| e.at(&name);
+        let mut node = Node::new("", NODE).map_err(at)?;
+        let states = node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH }).map_err(at)?;
+        Ok(Self { source, name, _node: node, states, come: BTreeMap::new() })
+    }
+
+    fn read_states(&mut self) -> Result<()> {
+        while let Some(state) = self.states.take()? {
+            take_state(&state, &mut self.come)?;
+        }
+        Ok(())
+    }
+}
+
+/// Adds the positions of `state` to `come`. A state without positions tells of none.
+fn take_state(state: &JointState, come: &mut BTreeMap<String, f64>) -> Result<()> {
+    if state.position.is_empty() {
+        return Ok(());
+    }
+    if state.position.len() != state.name.len() {
+        return Err(failed!("a state has {} names and {} positions", state.name.len(), state.position.len()));
+    }
+    for (joint, position) in state.name.iter().zip(&state.position) {
+        if !position.is_finite() {
+            return Err(failed!("joint `{joint}` is at {position}; send finite numbers"));
+        }
+        come.insert(joint.clone(), *position);
+    }
+    Ok(())
+}
+
+impl Source for LiveJoints {
+    fn taxels(&self) -> &[u32] {
+        self.source.taxels()
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        if !self.source.next_frame(frame)? {
+            return Ok(false);
+        }
+        self.read_states().map_err(|e| e.at(&self.name))?;
+        frame.joints.clear();
+        frame.joints.extend(std::mem::take(&mut self.come));
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.source.progress()
+    }
+
+    fn skip_to(&mut self, t_s: f64) {
+        self.source.skip_to(t_s);
+    }
+
+    fn report_stale(&mut self) {
+        self.source.report_stale();
+    }
+
+    fn has_stale(&self) -> bool {
+        self.source.has_stale()
+    }
+
+    fn read_at(&mut self) -> Option<Instant> {
+        self.source.read_at()
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        self.source.notices()
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.source.losses()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_position_of_each_joint_stays() {
+        let mut come = BTreeMap::new();
+        let state = |names: &[&str], position: &[f64]| JointState {
+            name: names.iter().map(|name| (*name).to_owned()).collect(),
+            position: position.to_vec(),
+            ..JointState::default()
+        };
+        take_state(&state(&["a", "b"], &[1.0, 2.0]), &mut come).unwrap();
+        take_state(&state(&["b"], &[3.0]), &mut come).unwrap();
+        take_state(&state(&["a"], &[]), &mut come).unwrap();
+        assert_eq!(come.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>(), [("a", 1.0), ("b", 3.0)]);
+        let why = |state| take_state(&state, &mut BTreeMap::new()).unwrap_err().to_string();
+        assert_eq!(why(state(&["a", "b"], &[1.0])), "a state has 2 names and 1 positions");
+        assert!(why(state(&["a"], &[f64::NAN])).contains("joint `a` is at NaN"));
+    }
+}

@@ -1,0 +1,467 @@
+//! Live topics of ROS 2, as cyclonedds in another process sees and sends them.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::python::python_with;
+use super::skips::skip;
+use super::{done, frames, somatic, stderr, text_of};
+
+const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
+const CLOUD: &str = "sensor_msgs/msg/PointCloud2";
+
+/// Another process with cyclonedds, in a domain of its own.
+struct Peer {
+    child: Child,
+    input: Option<ChildStdin>,
+    output: BufReader<ChildStdout>,
+}
+
+/// A domain that no other test has: ports of domains up to 101 are below those that Linux gives away.
+fn domain() -> String {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    ((std::process::id() * 11 + NEXT.fetch_add(1, Ordering::Relaxed)) % 101 + 1).to_string()
+}
+
+/// Python with cyclonedds, unless the test is skipped.
+fn python() -> Option<PathBuf> {
+    match python_with("ros2", "import cyclonedds.idl, mcap_ros2.reader, rosbags.rosbag2") {
+        Ok(python) => Some(python),
+        Err(why) => {
+            skip("ROS2", why);
+            None
+        }
+    }
+}
+
+impl Peer {
+    fn start(python: &Path, domain: &str, arguments: &[&str]) -> Self {
+        let mut child = Command::new(python)
+            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ros2/live.py"))
+            .args(arguments)
+            .env("ROS_DOMAIN_ID", domain)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let output = BufReader::new(child.stdout.take().unwrap());
+        Self { input: child.stdin.take(), output, child }
+    }
+
+    fn receive(python: &Path, domain: &str, topics: &[(&str, &str, &str)]) -> Self {
+        let named: Vec<String> = topics.iter().map(|(topic, kind, how)| format!("{topic}={kind}:{how}")).collect();
+        let mut arguments = vec!["receive"];
+        arguments.extend(named.iter().map(String::as_str));
+        let mut peer = Self::start(python, domain, &arguments);
+        peer.wait_for("listening");
+        peer
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        assert!(self.output.read_line(&mut line).unwrap() > 0, "the peer has ended");
+        line
+    }
+
+    fn wait_for(&mut self, word: &str) {
+        while self.line().trim() != word {}
+    }
+
+    fn say(&mut self, line: &str) {
+        writeln!(self.input.as_mut().unwrap(), "{line}").unwrap();
+    }
+
+    /// Everything that has come: topic, time (ns), message.
+    fn received(mut self) -> Vec<(String, u64, Value)> {
+        self.say("end");
+        loop {
+            let line = self.line();
+            if line.starts_with('[') {
+                assert!(self.child.wait().unwrap().success());
+                let all: Vec<(String, u64, Value)> = serde_json::from_str(&line).unwrap();
+                return all;
+            }
+        }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The command in `domain`. What it prints is read as it comes: a full pipe would hold it up.
+struct Running {
+    child: Child,
+    told: JoinHandle<String>,
+}
+
+fn run(domain: &str, arguments: &[&str]) -> Running {
+    let mut command = somatic(arguments);
+    command.env("ROS_DOMAIN_ID", domain).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut output = child.stdout.take().unwrap();
+    let told = std::thread::spawn(move || {
+        let mut text = String::new();
+        output.read_to_string(&mut text).unwrap();
+        text
+    });
+    Running { child, told }
+}
+
+/// Sends `lines` to the command's standard input, one every `period`.
+fn feed(running: &mut Running, lines: &[String], period: Duration) {
+    let input = running.child.stdin.as_mut().unwrap();
+    let begin = Instant::now();
+    for (number, line) in lines.iter().enumerate() {
+        std::thread::sleep((period * number as u32).saturating_sub(begin.elapsed()));
+        writeln!(input, "{line}").unwrap();
+    }
+}
+
+/// What the command prints until its end, with its standard input closed; on standard error too.
+fn ended(running: Running) -> (String, String) {
+    let Running { mut child, told } = running;
+    drop(child.stdin.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    (told.join().unwrap(), stderr(&output))
+}
+
+/// The arm's body, and its frames with joint states as lines for standard input.
+fn arm() -> (TempDir, PathBuf, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("arm.glb");
+    done(&["author", "--urdf-skin", &format!("{ROBOT}/arm.urdf"), "-o", text_of(&body)]);
+    let table = |name: &str| -> Vec<BTreeMap<String, f64>> {
+        let text = std::fs::read_to_string(format!("{ROBOT}/{name}")).unwrap();
+        let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+        let names = lines.next().unwrap();
+        let row = |cells: Vec<String>| {
+            let cells = names.iter().cloned().zip(cells);
+            cells.filter_map(|(name, cell)| Some((name, cell.parse().ok()?))).collect()
+        };
+        lines.map(row).collect()
+    };
+    let states = table("arm-joints.csv");
+    let frames = table("arm-touch.csv").into_iter().map(|mut frame| {
+        let t_s = frame.remove("t").unwrap();
+        let mut joints = states.iter().rev().find(|state| state["t"] <= t_s).unwrap_or(&states[0]).clone();
+        joints.remove("t");
+        json!({"t": t_s, "values": frame, "joints": joints}).to_string()
+    });
+    let frames = frames.collect();
+    (folder, body, frames)
+}
+
+fn arm_flags<'a>(body: &'a Path, urdf: &'a str, calibration: &'a str) -> Vec<&'a str> {
+    let start = ["run", "--body", text_of(body), "--source", "-", "--joints", urdf, "--up", "z", "--calibration"];
+    [&start[..], &[calibration, "--backend", "reference", "--sink", "-"]].concat()
+}
+
+fn stamp_ns(message: &Value) -> u64 {
+    let header = message.get("header").unwrap_or_else(|| {
+        message.get("markers").map_or_else(|| &message["transforms"][0]["header"], |markers| &markers[0]["header"])
+    });
+    let of = |key: &str| header["stamp"][key].as_u64().unwrap();
+    of("sec") * 1_000_000_000 + of("nanosec")
+}
+
+fn time_ns(frame: &Value) -> u64 {
+    (frame["t"].as_f64().unwrap() * 1e9).round() as u64
+}
+
+const ARM_TOPICS: [(&str, &str, &str); 6] = [
+    ("/left/somatic/wrench/fore_arm/patch_01", "geometry_msgs/msg/WrenchStamped", "reliable"),
+    ("/left/somatic/taxels/fore_arm", CLOUD, "best_effort"),
+    ("/left/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable"),
+    ("/left/tf", "tf2_msgs/msg/TFMessage", "reliable"),
+    ("/left/somatic/joint_states", "sensor_msgs/msg/JointState", "reliable"),
+    ("/left/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "reliable"),
+];
+
+#[test]
+fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
+    let Some(python) = python() else { return };
+    let (_folder, body, lines) = arm();
+    let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
+    let flags = [&arm_flags(&body, &urdf, &calibration)[..], &["--sink", "ros2:/left"]].concat();
+    let domain = domain();
+    let mut peer = Peer::receive(&python, &domain, &ARM_TOPICS);
+    let mut percepts = Vec::new();
+    for _ in 0..2 {
+        let mut child = run(&domain, &flags);
+        peer.wait_for("matched");
+        // The writers have yet to find their readers.
+        std::thread::sleep(Duration::from_millis(500));
+        feed(&mut child, &lines, Duration::from_millis(10));
+        let (told, said) = ended(child);
+        assert!(!said.contains("left out") && !said.contains("not sent"), "{said}");
+        percepts.push(frames(&told));
+        peer.wait_for("unmatched");
+    }
+    assert_eq!(percepts[0], percepts[1]);
+    let received = peer.received();
+    let of = |topic: &str| -> Vec<&Value> {
+        received.iter().filter(|(own, ..)| own == topic).map(|(_, _, message)| message).collect()
+    };
+    // Every frame, twice: reliable topics in order and without a gap.
+    let times: Vec<u64> = percepts.iter().flatten().map(time_ns).collect();
+    for topic in ["/left/tf", "/left/somatic/joint_states"] {
+        assert_eq!(of(topic).into_iter().map(stamp_ns).collect::<Vec<_>>(), times, "{topic}");
+    }
+    let clouds = of("/left/somatic/taxels/fore_arm");
+    assert!(clouds.len() * 1000 >= times.len() * 999, "{} of {} clouds", clouds.len(), times.len());
+    assert!(clouds.iter().all(|cloud| cloud["header"]["frame_id"] == "fore_arm" && cloud["point_step"] == 16));
+    // The spheres are the percepts, z up.
+    let mut spheres = BTreeMap::new();
+    let mut deleted = 0;
+    for message in of("/left/somatic/touches") {
+        for marker in message["markers"].as_array().unwrap() {
+            deleted += usize::from(marker["action"] == 2);
+            if marker["type"] == 2 && marker["action"] == 0 {
+                spheres.insert((stamp_ns(message), marker["ns"].as_str().unwrap().to_owned()), marker.clone());
+            }
+        }
+    }
+    // The skin is flat and points to z: the force on it is the percept's, along −z.
+    let wrenches = of("/left/somatic/wrench/fore_arm/patch_01");
+    let forces: BTreeMap<u64, f64> =
+        wrenches.iter().map(|wrench| (stamp_ns(wrench), wrench["wrench"]["force"]["z"].as_f64().unwrap())).collect();
+    assert!(wrenches.len() == times.len() && forces.len() == percepts[0].len(), "{} wrenches", wrenches.len());
+    let (mut compared, mut forces_compared) = (0, 0);
+    for frame in &percepts[0] {
+        for field in frame["fields"].as_array().unwrap() {
+            let marker = &spheres[&(time_ns(frame), field["field"].as_str().unwrap().to_owned())];
+            let number = |value: &Value| value.as_f64().unwrap();
+            let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
+            let place = &marker["pose"]["position"];
+            for (axis, ours) in [("x", x), ("y", -z), ("z", y)] {
+                assert!((number(&place[axis]) - ours).abs() < 1e-12, "{place}");
+            }
+            if field["field"] == "fore_arm/patch_01" {
+                let told = number(&field["force"]);
+                assert!((forces[&time_ns(frame)] + told).abs() <= 1e-12 * told.abs(), "{field}");
+                forces_compared += 1;
+            }
+            compared += 1;
+        }
+    }
+    assert!(forces_compared > 10, "{forces_compared} forces");
+    assert!(compared > 50 && compared == spheres.len() && deleted > 0, "{compared} of {}, {deleted}", spheres.len());
+}
+
+#[test]
+fn nobody_hears_another_domain_or_namespace() {
+    let Some(python) = python() else { return };
+    let (_folder, body, lines) = arm();
+    let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
+    let (own, other) = (domain(), domain());
+    let here = Peer::receive(&python, &own, &[("/right/tf", "tf2_msgs/msg/TFMessage", "reliable")]);
+    let there = Peer::receive(&python, &other, &ARM_TOPICS[3..4]);
+    let mut child = run(&own, &[&arm_flags(&body, &urdf, &calibration)[..], &["--sink", "ros2:/left"]].concat());
+    std::thread::sleep(Duration::from_secs(2));
+    feed(&mut child, &lines[..20], Duration::from_millis(10));
+    ended(child);
+    assert!(here.received().is_empty() && there.received().is_empty());
+}
+
+/// Points of the given taxels as a message, big enough to come in fragments where there are many.
+fn cloud(t_s: f64, values: &[(u32, f32)]) -> Value {
+    let data: Vec<u8> =
+        values.iter().flat_map(|(id, value)| [id.to_le_bytes(), value.to_le_bytes()].concat()).collect();
+    let field = |name: &str, offset: u32, datatype: u8| json!({"name": name, "offset": offset, "datatype": datatype, "count": 1});
+    json!({
+        "header": {"stamp": {"sec": t_s as u32, "nanosec": (t_s.fract() * 1e9).round() as u32}, "frame_id": "hand"},
+        "height": 1, "width": values.len(), "fields": [field("taxel", 0, 6), field("value", 4, 7)],
+        "is_bigendian": false, "point_step": 8, "row_step": data.len(), "data": data, "is_dense": true,
+    })
+}
+
+#[test]
+fn frames_from_a_topic_are_those_from_standard_input() {
+    let Some(python) = python() else { return };
+    let ids: Vec<u32> = (0..9).collect();
+    let value = |frame: usize, id: u32| ((frame * 7 + id as usize * 13) % 50) as f32;
+    let frames_sent: Vec<Vec<(u32, f32)>> =
+        (0..40).map(|frame| ids.iter().map(|&id| (id, value(frame, id))).collect()).collect();
+    let domain = domain();
+    let mut peer = Peer::start(&python, &domain, &["send", "/skin", CLOUD, "reliable"]);
+    let child =
+        run(&domain, &["run", "--source", "ros2:/skin", "--backend", "reference", "--sink", "-", "--for", "8s"]);
+    peer.wait_for("matched");
+    for (frame, values) in frames_sent.iter().enumerate() {
+        peer.say(&cloud(1.0 + frame as f64 * 0.25, values).to_string());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let (told, _) = ended(child);
+    let mut standard = run(&domain, &["run", "--source", "-", "--backend", "reference", "--sink", "-"]);
+    let lines: Vec<String> = frames_sent
+        .iter()
+        .enumerate()
+        .map(|(frame, values)| {
+            let values: BTreeMap<String, f32> = values.iter().map(|(id, value)| (id.to_string(), *value)).collect();
+            json!({"t": 1.0 + frame as f64 * 0.25, "values": values}).to_string()
+        })
+        .collect();
+    feed(&mut standard, &lines, Duration::ZERO);
+    let (expected, _) = ended(standard);
+    assert_eq!(frames(&told), frames(&expected));
+    assert!(frames(&told).len() == 40 && told.contains("hand/"), "{told}");
+}
+
+#[test]
+fn a_topic_that_does_not_fit_or_is_not_there_is_told_with_counts() {
+    let Some(python) = python() else { return };
+    let refused = |domain: &str, source: &str, send: Option<(&str, &str, Value)>| {
+        let peer = send
+            .map(|(topic, kind, message)| (Peer::start(&python, domain, &["send", topic, kind, "reliable"]), message));
+        let child = run(domain, &["run", "--source", source, "--sink", "-", "--for", "20s"]);
+        let _peer = peer.map(|(mut peer, message)| {
+            if !message.is_null() {
+                peer.wait_for("matched");
+                (0..20).for_each(|_| {
+                    peer.say(&message.to_string());
+                    std::thread::sleep(Duration::from_millis(20));
+                });
+            }
+            peer
+        });
+        let output = child.child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let own = domain();
+    let why = refused(&own, "ros2:/skin", Some(("/other", CLOUD, Value::Null)));
+    assert!(
+        why.contains(&format!("within 10 s in domain {own}")) && why.contains("/other (sensor_msgs/msg/PointCloud2)"),
+        "{why}"
+    );
+    let why = refused(&domain(), "ros2:/skin", Some(("/skin", "sensor_msgs/msg/JointState", Value::Null)));
+    assert!(why.contains("its messages are sensor_msgs/msg/JointState"), "{why}");
+    let why = refused(&domain(), "ros2:/skin", Some(("/skin", CLOUD, cloud(1.0, &[(0, 1.0), (77, 1.0)]))));
+    assert!(why.contains("1 of 2 points are of taxels that the body does not have, the first of 77"), "{why}");
+    let array = json!({"layout": {"dim": [], "data_offset": 0}, "data": [1.0, 2.0, 3.0]});
+    let why = refused(&domain(), "ros2:/skin", Some(("/skin", "std_msgs/msg/Float32MultiArray", array)));
+    assert!(why.contains("an array has 3 numbers, and the body 40 taxels"), "{why}");
+}
+
+#[test]
+fn joint_states_of_a_topic_put_percepts_into_the_world() {
+    let Some(python) = python() else { return };
+    let (_folder, body, lines) = arm();
+    let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
+    let without: Vec<String> = lines
+        .iter()
+        .map(|line| {
+            let mut frame: Value = serde_json::from_str(line).unwrap();
+            frame.as_object_mut().unwrap().remove("joints");
+            frame.to_string()
+        })
+        .collect();
+    let pose = json!({"shoulder": 0.3, "elbow": -0.4, "grip": 0.01});
+    let with: Vec<String> = without
+        .iter()
+        .map(|line| {
+            let mut frame: Value = serde_json::from_str(line).unwrap();
+            frame["joints"] = pose.clone();
+            frame.to_string()
+        })
+        .collect();
+    let domain = domain();
+    let flags = arm_flags(&body, &urdf, &calibration);
+    let mut given = run(&domain, &flags);
+    feed(&mut given, &with, Duration::ZERO);
+    let expected = frames(&ended(given).0);
+    let kind = "sensor_msgs/msg/JointState";
+    let mut peer = Peer::start(&python, &domain, &["send", "/joint_states", kind, "reliable"]);
+    let live = [&flags[..], &["--joint-states", "ros2:/joint_states", "--joints-max-age", "1"]].concat();
+    let mut child = run(&domain, &live);
+    peer.wait_for("matched");
+    std::thread::sleep(Duration::from_millis(300));
+    let state = json!({
+        "header": {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": ""}, "name": ["shoulder", "elbow", "grip"],
+        "position": [0.3, -0.4, 0.01], "velocity": [], "effort": [],
+    });
+    for line in &without {
+        peer.say(&state.to_string());
+        std::thread::sleep(Duration::from_millis(10));
+        feed(&mut child, std::slice::from_ref(line), Duration::ZERO);
+    }
+    let (told, said) = ended(child);
+    let told = frames(&told);
+    assert_eq!(told.len(), expected.len());
+    // The first states may come after the first frames.
+    let late = told.iter().zip(&expected).filter(|(own, other)| own != other).count();
+    assert!(late <= 5, "{late} frames differ: {said}");
+    assert!(told.iter().any(|frame| frame["fields"][0]["link"] == "world"));
+    // Nobody sends: positions stay in links.
+    let mut silent = run(&domain, &[&flags[..], &["--joint-states", "ros2:/nobody"]].concat());
+    feed(&mut silent, &without, Duration::ZERO);
+    let (told, said) = ended(silent);
+    assert!(said.contains("no state so far") && !told.contains("\"link\":\"world\""), "{said}");
+}
+
+#[test]
+fn a_thousand_taxels_at_250_hz_arrive() {
+    let Some(python) = python() else { return };
+    let seconds: usize = std::env::var("SOMATIC_ROS2_SECONDS").map_or(4, |text| text.parse().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("sheet.glb");
+    done(&["author", "--grid", "25x40", "--pitch", "5mm", "-o", text_of(&body)]);
+    let domain = domain();
+    let topics = [
+        ("/somatic/taxels/sheet", CLOUD, "best_effort:stamps"),
+        ("/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable:stamps"),
+    ];
+    let mut peer = Peer::receive(&python, &domain, &topics);
+    let mut child = run(
+        &domain,
+        &["run", "--body", text_of(&body), "--source", "-", "--outputs", "position,normal", "--sink", "ros2"],
+    );
+    peer.wait_for("matched");
+    std::thread::sleep(Duration::from_millis(500));
+    let frame = |number: usize| {
+        let values: BTreeMap<String, usize> =
+            (0..1000).map(|id: usize| (id.to_string(), 1 + (id * number) % 90)).collect();
+        json!({"t": number as f64 * 0.004, "values": values}).to_string()
+    };
+    // A second of lines is sent again with other times.
+    let tail: Vec<String> =
+        (1..=250).map(|number| frame(number).split_once(",\"values\"").unwrap().1.to_owned()).collect();
+    let input = child.child.stdin.as_mut().unwrap();
+    let begin = Instant::now();
+    let count = seconds * 250;
+    for number in 1..=count {
+        std::thread::sleep(Duration::from_micros(4000 * number as u64).saturating_sub(begin.elapsed()));
+        writeln!(input, "{{\"t\":{},\"values\"{}", number as f64 * 0.004, tail[number % 250]).unwrap();
+    }
+    let took = begin.elapsed();
+    let (_, said) = ended(child);
+    assert!(!said.contains("left out") && !said.contains("not sent"), "{said}");
+    let received = peer.received();
+    let sent: Vec<u64> = (1..=count).map(|number| (number as f64 * 0.004 * 1e9).round() as u64).collect();
+    let stamps = |topic: &str| -> Vec<u64> {
+        let own = received.iter().filter(|(name, ..)| name == topic);
+        own.map(|(_, _, stamp)| stamp.as_u64().unwrap()).collect()
+    };
+    assert_eq!(stamps("/somatic/touches"), sent, "reliable");
+    let clouds = stamps("/somatic/taxels/sheet");
+    let missing: Vec<&u64> = sent.iter().filter(|stamp| clouds.binary_search(stamp).is_err()).collect();
+    println!("{count} frames in {took:?}: {} clouds missing, at {missing:?} ns", missing.len());
+    assert!(
+        clouds.is_sorted() && missing.len() * 1000 <= count,
+        "{} of {count} are missing: {missing:?}",
+        missing.len()
+    );
+}
