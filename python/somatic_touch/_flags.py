@@ -41,6 +41,7 @@ class Flags(enum.IntFlag):
     NOISE_UNKNOWN = 1 << 25
     UNSURE = 1 << 26
     STALE_POSE = 1 << 27
+    NO_POSE = 1 << 28
 
     @classmethod
     def _missing_(cls, value: object) -> object:
