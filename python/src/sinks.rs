@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use somatic::Error;
 use somatic::output::OutputPaths;
 use somatic::sink::{Flow, Sink, SinkSpec, TableWish};
-use somatic::Error;
 
 use crate::error::{OrRaise, usage};
 use crate::percepts::PyPercepts;
