@@ -92,7 +92,7 @@ const EXP: [f64; 14] = [
     1.0,
 ];
 /// 1/√2π and √2π.
-const PEAK: f64 = 0.398_942_280_401_432_7;
+pub(super) const PEAK: f64 = 0.398_942_280_401_432_7;
 const SQRT_TAU: f64 = 2.506_628_274_631_000_7;
 /// Mills' ratio Φ(−z)/φ(z) as a quotient of polynomials, by Hart, as West has it.
 const MILLS: [[f64; 7]; 2] = [
