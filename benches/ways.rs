@@ -55,9 +55,7 @@ fn write_ndjson(bencher: Bencher<'_, '_>, fields: usize) {
     let shape = Shape { sensors: 1000, fields, members: 16, wide: 0, local: false, frames: FRAMES, seed: 1 };
     let body = shape.body();
     let mut engine = shape.engine(&body, BackendKind::Cpu, Outputs::USUAL).unwrap();
-    let name =
-        |(field, link): (&str, &str)| FieldNames { field: field.into(), link: link.into(), ..Default::default() };
-    let names: Vec<FieldNames> = engine.plan().fields().map(name).collect();
+    let names = FieldNames::all_of(engine.plan());
     let percepts = engine.process(&shape.frames()).unwrap();
     let write = |to: Box<dyn std::io::Write + Send>| {
         let mut sink: Box<dyn Sink + Send> = Box::new(NdjsonSink::to_writer("nobody", to, &names, false));

@@ -169,12 +169,16 @@ impl Engine {
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
             links: Links {
                 posed: scene.coordinates == Coordinates::World,
+                in_link: scene
+                    .in_link
+                    .as_deref()
+                    .and_then(|name| body.links.iter().position(|link| link.name == *name)),
                 index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
                 names: body.links.iter().map(|link| link.name.clone()).collect(),
                 parent: body.links.iter().map(|link| link.parent).collect(),
                 world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
             },
-            contacts: Contacts::new(body, &plan, &scene)?,
+            contacts: Contacts::new(body, &plan, &scene),
             kept_charts: recharted.kept,
             plan,
         };

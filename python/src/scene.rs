@@ -69,6 +69,8 @@ pub(crate) struct Keys {
     tare: bool,
     #[serde(deserialize_with = "word")]
     coordinates: Option<Coordinates>,
+    #[serde(rename = "in")]
+    in_link: Option<String>,
     max_gap_s: Option<f64>,
     contact_tolerance_m: Option<f64>,
     max_age_s: Option<f64>,
@@ -279,6 +281,7 @@ impl PyScene {
             .filter(self.keys.filter()?)
             .knobs(knobs)
             .contact_tolerance_m(self.keys.contact_tolerance_m)
+            .in_link(self.keys.in_link.clone())
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

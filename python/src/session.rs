@@ -33,18 +33,8 @@ impl Run {
         let plan = engine.plan().clone();
         let (name, what, why) = engine.backend();
         let labels = (0..plan.fields().len()).map(|field| plan.label(field)).collect();
-        let names = plan.fields().enumerate().map(|(index, (field, link))| {
-            let mark = plan.mark(index);
-            FieldNames {
-                field: field.to_owned(),
-                link: link.to_owned(),
-                letter: mark.receptor.map(|receptor| receptor.to_string()),
-                signal: mark.signal.map(|signal| signal.to_string()),
-            }
-        });
-        let names = names.collect();
         Self {
-            names,
+            names: FieldNames::all_of(&plan),
             labels,
             outputs: engine.percepts().outputs(),
             precision: engine.percepts().precision(),

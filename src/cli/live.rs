@@ -209,6 +209,8 @@ struct Table {
     rows: Vec<FieldRow>,
     largest_total: f64,
     unit: PrintedUnit,
+    /// What positions in the world are in.
+    world: String,
     in_world: bool,
     /// Rows shown at most so far: the table grows and does not shrink, or what is below would jump.
     tallest: usize,
@@ -234,6 +236,7 @@ impl Table {
             rows: (0..plan.fields().len()).map(row).collect(),
             largest_total: 0.0,
             unit: plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of),
+            world: plan.world().to_owned(),
             in_world: false,
             tallest: 0,
         }
@@ -283,7 +286,8 @@ impl Table {
         let shown = |row: &&FieldRow| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE_TIME);
         let visible: Vec<&FieldRow> = self.rows.iter().filter(shown).collect();
         let longest = self.rows.iter().map(|row| wide(&row.name)).max().unwrap_or(0);
-        let layout = columns::Layout::new(longest, self.outputs, self.in_world, columns.saturating_sub(2), self.unit);
+        let world = self.in_world.then_some(&*self.world);
+        let layout = columns::Layout::new(longest, self.outputs, world, columns.saturating_sub(2), self.unit);
         lines.push(format!("  {}", style(layout.headings()).dim()));
 
         let room = rows.saturating_sub(lines.len());

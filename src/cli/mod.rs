@@ -31,7 +31,6 @@ mod keys;
 mod latency;
 mod lines;
 mod live;
-mod names;
 mod paper;
 mod plan;
 mod plot;

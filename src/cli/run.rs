@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use somatic::signal::Quantity;
-use somatic::sink::{Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
+use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Precision, Result};
 
 use super::attachments::attachments;
@@ -22,7 +22,6 @@ use super::interrupt::stop_on_signal;
 use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
-use super::names::field_names;
 use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, FAILED, print, say, tell_losses};
 use super::tradeoff::{say_kept, settled};
@@ -169,7 +168,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let targets = if sinks.is_empty() && !at_terminal { vec![SinkTarget::Stdout] } else { targets };
-    let names = field_names(engine.plan());
+    let names = FieldNames::all_of(engine.plan());
     let records = targets.iter().any(SinkTarget::holds_attached);
     let (backend, device, why) = engine.backend();
     let session = Session {

@@ -6,6 +6,7 @@ mod check;
 mod deserialize;
 mod flags;
 mod jointed;
+mod outputs;
 
 use std::path::{Path, PathBuf};
 
@@ -25,6 +26,8 @@ pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
+use self::outputs::output_names;
+pub(super) use self::outputs::{outputs_help, outputs_or_usual};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
 use super::states_topic::topic_of;
@@ -60,8 +63,8 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, contacts, filtered_* and footprint_*; force only where P has a
-    /// unit].
+    /// Compute only these quantities [default: all but touches, contacts, speed_in_world, filtered_*, footprint_* and *_sigma;
+    /// force only where P has a unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
     #[schemars(with = "Vec<String>", transform = output_names)]
@@ -118,6 +121,11 @@ pub(super) struct RunOptions {
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
     pub(super) coordinates: Option<Coordinates>,
+
+    /// Put positions, normals and contacts into the frame of this link instead of the world, where frames carry poses.
+    #[arg(long = "in", help_heading = COMPUTED, value_name = "LINK")]
+    #[serde(rename = "in")]
+    pub(super) in_link: Option<String>,
 
     /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing;
     /// docs/robots.md].
@@ -309,26 +317,6 @@ pub(super) struct RunOptions {
     pub(super) first: FirstSource,
 }
 
-/// Says in a schema which outputs there are.
-fn output_names(schema: &mut schemars::Schema) {
-    let names: Vec<String> = Outputs::all().names().collect();
-    schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
-}
-
-pub(super) fn outputs_help() -> String {
-    let names: Vec<String> = Outputs::all().names().collect();
-    format!(
-        "Compute only these quantities: {} [default: all but touches, contacts, filtered_* and footprint_*; force only where P \
-         has a unit]",
-        names.join(", ")
-    )
-}
-
-/// All of `named`, or the default outputs where none are.
-pub(super) fn outputs_or_usual(named: &[Outputs]) -> Outputs {
-    named.iter().copied().reduce(|a, b| a | b).unwrap_or(Outputs::USUAL)
-}
-
 impl RunOptions {
     /// What the scene file at `path` asks for, its paths made relative to where we are.
     fn load(path: &Path) -> Result<Self> {
@@ -387,7 +375,7 @@ impl RunOptions {
         }
         let asked = merged! {
             values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap contact_tolerance
-                coordinates filter_window filter_by filter_time filter_over,
+                coordinates in_link filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
         };
@@ -433,6 +421,7 @@ impl RunOptions {
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
             .contact_tolerance_m(self.contact_tolerance)
+            .in_link(self.in_link.clone())
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

@@ -8,9 +8,11 @@ use super::post::{Post, PostFieldState, PostState};
 use crate::backend::bounds::{BoundedReference, CellBound};
 use crate::backend::{BackendState, FieldState, RawBatch};
 use crate::error::Result;
-use crate::percept::{Percepts, Precision};
+use crate::percept::{Outputs, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::Frame;
+use crate::stage::limit::Limit;
+use crate::stage::world_motion;
 
 /// The reference's side of a comparison.
 pub(super) struct Check {
@@ -20,6 +22,8 @@ pub(super) struct Check {
     pub(super) bounds: Vec<CellBound>,
     /// Those of the last frame, where percepts may be kept.
     last_bounds: Vec<CellBound>,
+    /// By field, how far its position in the last frame may be off, m, where motion in the world is asked for.
+    position_off: Vec<f64>,
 }
 
 impl Check {
@@ -39,6 +43,7 @@ impl Check {
             right,
             bounds: Vec::new(),
             last_bounds: vec![CellBound::default(); plan.fields.len()],
+            position_off: vec![0.0; plan.fields.len()],
         };
         check.reference.restore(backend)?;
         for (field, state) in post.fields.iter().enumerate() {
@@ -65,10 +70,14 @@ impl Check {
         after: &PostState,
     ) -> Result<()> {
         let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
-        let bounds = self.reference.run(raw, offset, &mut self.right, advances);
+        let mut bounds = self.reference.run(raw, offset, &mut self.right, advances);
+        let before: Vec<world_motion::Memory> = self.post.fields.iter().map(|field| field.world_motion).collect();
         post.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
         post.frame(offset, frame, raw, &mut self.right, &mut self.post);
         post.fit_now(raw, &mut self.right, &mut self.post, None)?;
+        if post.plan.stages().world_motion {
+            self.bound_world_motion(raw.steps[offset].dt_s, &before, &mut bounds);
+        }
         for (field, bound) in bounds.iter().enumerate() {
             self.restore_doubtful(field, bound, left[field], &after.fields[field]);
         }
@@ -85,12 +94,29 @@ impl Check {
         Ok(())
     }
 
+    /// Adds the bounds of motion in the world, which hang on those of positions, to `bounds`. `before` is what was kept of each
+    /// field's position before this frame.
+    fn bound_world_motion(&mut self, dt_s: f64, before: &[world_motion::Memory], bounds: &mut [CellBound]) {
+        for (field, bound) in bounds.iter_mut().enumerate() {
+            let off = &mut self.position_off[field];
+            if let Limit::Within(now) = bound.limit(Outputs::POSITION) {
+                let limit = before[field].bound(dt_s, self.post.fields[field].world_motion, [*off, now]);
+                bound.set([(Outputs::SPEED_IN_WORLD, limit)]);
+                *off = now;
+            } else {
+                // From here on both have the backend's.
+                *off = 0.0;
+            }
+        }
+    }
+
     /// Goes on from the backend's state where it may differ from the reference's.
     fn restore_doubtful(&mut self, field: usize, bound: &CellBound, left: FieldState, after: &PostFieldState) {
         let (may_remember, own) = (bound.may_remember, &mut self.post.fields[field]);
         if may_remember.contact {
             self.reference.restore_field(field, left);
             own.contact = after.contact;
+            own.world_motion = after.world_motion;
         }
         if may_remember.touches {
             own.touches = after.touches.clone();
@@ -106,6 +132,8 @@ impl Check {
 
 #[cfg(test)]
 mod tests {
+    use glam::{DQuat, DVec3};
+
     use super::*;
     use crate::backend::BackendKind;
     use crate::backend::agreement::{Agreement, compare};
@@ -113,7 +141,7 @@ mod tests {
     use crate::engine::{Engine, Options};
     use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Store, Touch, Values};
     use crate::scene::Scene;
-    use crate::signal::RawValue;
+    use crate::signal::{Pose, RawValue};
     use crate::stage::limit::Limit;
     use crate::stage::touches::TouchBound;
 
@@ -137,15 +165,18 @@ mod tests {
                 Err(error) if error.is_no_adapter() => return None,
                 made => made.unwrap(),
             };
+            let root = body.links[0].name.clone();
             let frame = |index: usize| {
                 let mut frame = engine.frame(0.01 * index as f64);
                 let value = |i: usize| 100.0 + 37.0 * ((i * (index + 3)) % 11) as f64;
                 frame.values = (0..frame.values.len()).map(|i| RawValue::new(value(i))).collect();
+                let translation = DVec3::new(0.003 * index as f64, 0.0, 0.0);
+                frame.pose.push((root.clone(), Pose { translation, rotation: DQuat::IDENTITY }));
                 frame
             };
             let frames: Vec<Frame> = (0..8).map(frame).collect();
             let (_, agreement) = engine.process_and_compare(&frames).unwrap();
-            assert!(agreement.holds() && agreement.quantities.len() == 29, "{backend:?}: {agreement}");
+            assert!(agreement.holds() && agreement.quantities.len() == 30, "{backend:?}: {agreement}");
             let check = engine.check.take().unwrap();
             Some(Self { engine, check })
         }

@@ -1,21 +1,20 @@
 //! Contacts of a frame: [`crate::stage::contacts`] over the touches that post-processing has found.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
 use super::place::{self, Links};
 use crate::body::Body;
-use crate::error::{Error, Result};
 use crate::field::{ContactTolerance, rest_overlaps};
 use crate::percept::{Contact, ContactSide, Flags, Outputs, Percepts};
-use crate::scene::{Coordinates, Plan, Scene};
+use crate::scene::{Plan, PlanField, Scene};
 use crate::signal::Frame;
 use crate::stage::contacts::{Memory, Side, pairs};
 
 /// Which fields can be in contact, and when two touches are.
 pub(super) struct Contacts {
-    /// By field of the plan, its link, if all of its taxels are on one and no other field divides it.
+    /// By field of the plan, its link, if its touches can be in contact.
     links: Vec<Option<usize>>,
     tolerance: ContactTolerance,
     /// Pairs of links that are within the tolerance at rest.
@@ -24,27 +23,16 @@ pub(super) struct Contacts {
 
 impl Contacts {
     /// `None` where contacts are not asked for.
-    pub(super) fn new(body: &Body, plan: &Plan, scene: &Scene) -> Result<Option<Self>> {
+    pub(super) fn new(body: &Body, plan: &Plan, scene: &Scene) -> Option<Self> {
         if !plan.outputs.contains(Outputs::CONTACTS) {
-            return Ok(None);
-        }
-        if scene.coordinates == Coordinates::Anchor {
-            return Err(Error::usage(
-                "contacts are places in the world; leave out coordinates `anchor`, or `contacts`",
-            ));
+            return None;
         }
         let tolerance = ContactTolerance::new(body, scene.contact_tolerance_m);
-        let link = |field| {
-            let field: &crate::scene::PlanField = field;
-            let mut taxels = plan.members_of(field).iter().map(|member| plan.channel_of(member.slot as usize));
-            let is_on_anchor = |channel: usize| Some(body.taxels[plan.body_taxels[channel]].link) == field.anchor;
-            field.anchor.filter(|_| !field.divided && taxels.all(is_on_anchor))
-        };
-        Ok(Some(Self {
-            links: plan.fields.iter().map(link).collect(),
+        Some(Self {
+            links: links_in_contact(body, plan),
             overlaps: rest_overlaps(body, &tolerance).into_iter().map(|overlap| overlap.links).collect(),
             tolerance,
-        }))
+        })
     }
 
     /// Finds the contacts of `frame`, the next of `percepts`, whose touches are there.
@@ -97,4 +85,27 @@ impl Contacts {
         let contacts: Vec<Contact> = found.iter().map(contact).collect();
         percepts.push_contacts(contacts, placed || !touched);
     }
+}
+
+/// By field of `plan`, its link, if its touches can be in contact. Of nested fields on one link that is the coarsest that has
+/// a chart, so that a press over several patches is one touch; where none has one, it is those that no other divides.
+fn links_in_contact(body: &Body, plan: &Plan) -> Vec<Option<usize>> {
+    let parent_of: BTreeMap<&str, &str> =
+        body.fields.iter().filter_map(|spec| Some((spec.name.as_str(), spec.parent.as_deref()?))).collect();
+    let link_of = |field: &PlanField| {
+        let mut taxels = plan.members_of(field).iter().map(|member| plan.channel_of(member.slot as usize));
+        let is_on_anchor = |channel: usize| Some(body.taxels[plan.body_taxels[channel]].link) == field.anchor;
+        field.anchor.filter(|_| taxels.all(is_on_anchor))
+    };
+    let charted: BTreeSet<&str> = plan
+        .fields
+        .iter()
+        .filter(|field| field.charted && link_of(field).is_some())
+        .map(|field| field.name.as_str())
+        .collect();
+    let is_coarsest = |field: &&PlanField| {
+        let mut above = std::iter::successors(parent_of.get(field.name.as_str()), |parent| parent_of.get(**parent));
+        (field.charted || !field.divided) && !above.any(|parent| charted.contains(parent))
+    };
+    plan.fields.iter().map(|field| Some(field).filter(is_coarsest).and_then(link_of)).collect()
 }

@@ -22,6 +22,8 @@ const AT_ONCE: usize = 16;
 pub(super) struct Links {
     /// Whether poses are heeded.
     pub(super) posed: bool,
+    /// The link in whose frame everything is put instead of the world.
+    pub(super) in_link: Option<usize>,
     pub(super) index_of: HashMap<String, usize>,
     pub(super) names: Vec<String>,
     pub(super) parent: Vec<Option<usize>>,
@@ -144,10 +146,17 @@ pub(super) fn in_world(world_from_anchor: &DAffine3, position: DVec3, normal: DV
 }
 
 impl Links {
-    /// world_from_anchor of `field` in `frame`, if that says where it is.
+    /// world_from_anchor of `field` in `frame`, if that says where it is; the world is the scene's link, where it names one.
     #[inline(always)]
     pub(super) fn world_from_anchor(&self, field: &PlanField, frame: &Frame) -> Option<DAffine3> {
-        if frame.pose.is_empty() || !self.posed { None } else { self.world_from(field.anchor?, frame) }
+        if frame.pose.is_empty() || !self.posed {
+            return None;
+        }
+        let world_from_anchor = self.world_from(field.anchor?, frame)?;
+        match self.in_link {
+            None => Some(world_from_anchor),
+            Some(link) => Some(self.world_from(link, frame)?.inverse() * world_from_anchor),
+        }
     }
 
     /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from

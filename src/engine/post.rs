@@ -12,7 +12,7 @@ use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{contacts, difference, filter, force, motion, touches};
+use crate::stage::{contacts, difference, filter, force, motion, touches, world_motion};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -32,6 +32,8 @@ pub(super) struct PostFieldState {
     pub(super) filter: filter::Memory,
     /// Where the centroid was, where motion is measured over a time.
     pub(super) difference: difference::Memory,
+    /// Where it was touched in the world.
+    pub(super) world_motion: world_motion::Memory,
     /// Whether the last frame was in contact, so that there is something to release.
     pub(super) contact: bool,
 }
@@ -104,7 +106,7 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.pressures || stages.filter || stages.sigma || self.cadence.is_some()) {
+        if !(stages.pressures || stages.filter || stages.world_motion || stages.sigma || self.cadence.is_some()) {
             return;
         }
         for (number, field) in self.plan.fields.iter().enumerate() {
@@ -145,6 +147,9 @@ impl Post<'_> {
             }
             if stages.filter && field.charted {
                 self.filter(field, step, cell, percepts, before);
+            }
+            if stages.world_motion {
+                self.world_motion((field, frame), step, cell, percepts, &mut before.world_motion);
             }
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
@@ -217,6 +222,31 @@ impl Post<'_> {
         percepts.add_present(cell, found.present & self.plan.outputs);
         for (host, components) in found.outputs() {
             percepts.set_host(host, cell, &components[..host.column().components]);
+        }
+    }
+
+    /// Finds how fast a cell's position moves in the world.
+    fn world_motion(
+        &self,
+        (field, frame): (&PlanField, &Frame),
+        step: &Step,
+        cell: usize,
+        percepts: &mut Percepts,
+        memory: &mut world_motion::Memory,
+    ) {
+        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
+            memory.release();
+            return;
+        }
+        let position_in_anchor = || place::on_skin(field, centroid(percepts, cell)).0;
+        let world = self.links.world_from_anchor(field, frame);
+        let position_in_world = world.map(|world| world.transform_point3(position_in_anchor()));
+        match memory.follow(step.dt_s, step.flags, position_in_world) {
+            Ok(speed) => {
+                percepts.add_present(cell, Outputs::SPEED_IN_WORLD);
+                percepts.set_host(Host::SpeedInWorld, cell, &[speed]);
+            }
+            Err(why) => percepts.flags[cell] |= why,
         }
     }
 

@@ -15,6 +15,7 @@ use super::serve::Serving;
 use super::token::random_hex;
 use super::wake::Waits;
 use crate::error::{Error, Result};
+use crate::field::WORLD;
 
 /// Requests that wait for the player at most.
 const MAX_REQUESTS: usize = 256;
@@ -34,8 +35,15 @@ impl Server {
     /// Starts to serve `scene`; what there is to see comes from the publisher.
     ///
     /// # Errors
-    /// The address is taken, or the system has no random numbers for a token.
+    /// The address is taken, or the system has no random numbers for a token; or places are not in the world
+    /// ([`crate::Scene::in_link`]).
     pub fn start(listen: &Listen, scene: PageScene) -> Result<(Self, Publisher)> {
+        if scene.plan.world() != WORLD {
+            return Err(Error::usage(format!(
+                "a page shows the world, and `in` puts places into `{}`; leave one of them out",
+                scene.plan.world()
+            )));
+        }
         let listener = listen.bind()?;
         let ready = listener.set_nonblocking(true).and_then(|()| listener.local_addr());
         let address = ready.map_err(|e| Error::failed(format!("cannot listen: {e}")))?;

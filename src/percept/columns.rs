@@ -138,7 +138,8 @@ macro_rules! columns {
             )*
             /// Why quantities are absent, or in doubt.
             pub flags: Flags,
-            /// Whether position and normal are in the world, because the frame carried a pose, or in the field's anchor.
+            /// Whether position and normal are in the world (or in [`crate::Scene::in_link`]), because the frame carried a pose, or
+            /// in the field's anchor.
             pub in_world: bool,
         }
 
@@ -271,6 +272,8 @@ columns! {
     SPEED 14 speed: f64, MetrePerSecond, Number, motion, parts [Speed] host [];
     #[doc = "Radial distance over time, m/s (eq. 8)."]
     RADIAL_SPEED 15 radial_speed: f64, MetrePerSecond, Number, motion, parts [RadialSpeed] host [];
+    #[doc = "How fast the position moves in the world (or in --in LINK), over the skin and with its link, m/s; only on request."]
+    SPEED_IN_WORLD 38 speed_in_world: f64, MetrePerSecond, Number, world_motion, parts [] host [SpeedInWorld];
     #[doc = "(Δu, Δv) since the last centroid that counted, m, where this one counts too; only on request, as is all filtered motion."]
     FILTERED_DISPLACEMENT 17 filtered_displacement: [f64; 2], Metre, Vector, filter, parts [] host [FilteredDisplacement];
     #[doc = "The direction of such steps, averaged over time, rad in (−π, π]."]
@@ -315,12 +318,14 @@ columns! {
 
 impl Outputs {
     /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::CONTACTS`], [`Outputs::FILTERED`],
-    /// [`Outputs::SIGMAS`], [`Outputs::FOOTPRINT`] and [`Outputs::FORCE`], which depends on the calibration.
+    /// [`Outputs::SIGMAS`], [`Outputs::FOOTPRINT`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the
+    /// calibration.
     pub const USUAL: Self = Self::all()
         .difference(Self::TOUCHES.union(Self::CONTACTS))
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
         .difference(Self::FOOTPRINT)
+        .difference(Self::SPEED_IN_WORLD)
         .difference(Self::FORCE);
 
     /// How sure quantities are.
@@ -403,7 +408,7 @@ impl Column {
 impl Component {
     /// The outputs that it is made for: its own, and those that later stages make of it.
     pub(crate) fn wanted_for(self) -> Outputs {
-        const PLACE: Outputs = Outputs::of_stage("position");
+        const PLACE: Outputs = Outputs::of_stage("position").union(Outputs::SPEED_IN_WORLD);
         let own = self.column().map_or(Outputs::empty(), |column| column.output);
         match self {
             Self::CentroidU | Self::CentroidV | Self::CentroidDepth => own | PLACE,

@@ -69,7 +69,7 @@ bitflags! {
         const UNSURE = 1 << 26;
         /// The states of the joints that move the field are missing or too old: its position and normal are in the link.
         const STALE_POSE = 1 << 27;
-        /// Frames do not say where the field is in the world: it is in no contact.
+        /// Frames do not say where the field is in the world: it is in no contact with another link, and has no speed there.
         const NO_POSE = 1 << 28;
     }
 }

@@ -84,6 +84,9 @@ impl Serialize for Plan {
     }
 }
 
+/// The stages that run on the host, whatever the backend.
+const ON_HOST: [&str; 8] = ["position", "world_motion", "touches", "contacts", "force", "filter", "sigma", "footprint"];
+
 impl Plan {
     /// All stages, in the order that they run in.
     #[must_use]
@@ -109,6 +112,7 @@ impl Plan {
             ("hysteresis", stages.hysteresis, found, "the calibration has no thresholds"),
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
+            ("world_motion", stages.world_motion, found, ""),
             ("touches", stages.touches, of(&all), ""),
             ("contacts", stages.contacts, found, ""),
             ("force", stages.force, of(&all), ""),
@@ -132,7 +136,7 @@ impl Plan {
             PlannedStage {
                 name,
                 runs,
-                on_host: ["position", "touches", "contacts", "force", "filter", "sigma", "footprint"].contains(&name),
+                on_host: ON_HOST.contains(&name),
                 why,
                 gives,
                 over: if runs { over } else { 0 },
@@ -151,8 +155,7 @@ impl Plan {
             "change" => "a letter is `change`",
             "contact" => "says which fields are touched",
             "hysteresis" => "the calibration has thresholds",
-            "centroid" => "later stages need it",
-            "position" => "touches need it",
+            "centroid" | "position" => "later stages need it",
             "touches" => "a footprint is one touch's",
             _ => "others need it",
         }

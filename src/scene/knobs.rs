@@ -133,8 +133,10 @@ impl Knobs {
         if on_change && outputs.intersects(Outputs::FILTERED) {
             return refuse("cadence on-change and outputs filtered_* both decide which motion counts");
         }
-        if on_change && outputs.contains(Outputs::CONTACTS) {
-            return refuse("cadence on-change keeps places of touches while links move, and contacts are made of them");
+        if on_change && outputs.intersects(Outputs::CONTACTS | Outputs::SPEED_IN_WORLD) {
+            return refuse(
+                "cadence on-change keeps places of touches while links move, and contacts and speed_in_world are made of them",
+            );
         }
         let either = Outputs::ORIENTATION | Outputs::AXIS;
         if self.orientation_by != OrientationBy::AsAsked && !outputs.intersects(either) {

@@ -20,6 +20,9 @@ pub use plan::Plan;
 pub(crate) use plan::PlanField;
 pub(crate) use stages::Stages;
 
+use crate::body::Body;
+use crate::error::{Error, Result, suggestion};
+use crate::field::WORLD;
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
@@ -44,6 +47,8 @@ pub struct Scene {
     pub knobs: Knobs,
     /// In which frame positions and normals are given.
     pub coordinates: Coordinates,
+    /// The link in whose frame everything is given instead of the world: poses are taken from there on.
+    pub in_link: Option<String>,
     /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::CONTACTS`]. `None` is that of
     /// [`crate::field::ContactTolerance`].
     pub contact_tolerance_m: Option<f64>,
@@ -58,6 +63,7 @@ impl Default for Scene {
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
             coordinates: Coordinates::default(),
+            in_link: None,
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
             contact_tolerance_m: None,
@@ -77,6 +83,39 @@ setters!(Scene {
 });
 
 impl Scene {
+    /// What places in the world are said to be in: `world`, or the link that stands for it.
+    fn world_of(&self, body: &Body) -> Result<String> {
+        let Some(link) = &self.in_link else { return Ok(WORLD.to_owned()) };
+        if self.coordinates == Coordinates::Anchor {
+            return Err(Error::usage(format!(
+                "coordinates `anchor` leave every field in its own link, and `in` puts all into `{link}`; leave one of them out"
+            )));
+        }
+        if !body.links.iter().any(|of_body| of_body.name == *link) {
+            let near = suggestion(link, body.links.iter().map(|of_body| of_body.name.as_str()));
+            return Err(Error::usage(format!("the body has no link `{link}`; {near}")).at(&body.name));
+        }
+        Ok(link.clone())
+    }
+
+    /// Refuses outputs that are made of places in the world where none are given.
+    fn check_world(&self) -> Result<()> {
+        let of_world = self.outputs & (Outputs::CONTACTS | Outputs::SPEED_IN_WORLD);
+        match of_world.names().next().filter(|_| self.coordinates == Coordinates::Anchor) {
+            Some(name) => Err(Error::usage(format!(
+                "`{name}` is made of places in the world; leave out coordinates `anchor`, or `{name}`"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The same with this [`Scene::in_link`].
+    #[must_use]
+    pub fn in_link(mut self, link: Option<impl Into<String>>) -> Self {
+        self.in_link = link.map(Into::into);
+        self
+    }
+
     /// The same with these [`Scene::fields`].
     #[must_use]
     pub fn fields(mut self, globs: impl IntoIterator<Item = impl Into<String>>) -> Self {

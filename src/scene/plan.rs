@@ -30,6 +30,8 @@ pub struct Plan {
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
+    /// What places in the world are said to be in.
+    world: String,
     /// Up to where changes count as 0, in P per second, as the calibration has it.
     pub(crate) change_dead_band: f64,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
@@ -137,6 +139,7 @@ impl Plan {
         Letter::check(&scene.letters)?;
         let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
         scene.knobs.check(scene.outputs, has_changes)?;
+        scene.check_world()?;
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
@@ -165,6 +168,7 @@ impl Plan {
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
+            world: scene.world_of(body)?,
             change_dead_band: calibration.change.dead_band,
             calibrations,
             onsets,
@@ -248,6 +252,12 @@ impl Plan {
             plan.columns |= Outputs::ACTIVE;
         }
         Ok(plan)
+    }
+
+    /// What places in the world are said to be in: `world`, or the link of [`Scene::in_link`].
+    #[must_use]
+    pub fn world(&self) -> &str {
+        &self.world
     }
 
     /// The quantities that are computed.

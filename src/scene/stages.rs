@@ -11,6 +11,7 @@ pub(crate) struct Stages {
     pub(crate) hysteresis: bool,
     pub(crate) motion: bool,
     pub(crate) position: bool,
+    pub(crate) world_motion: bool,
     pub(crate) touches: bool,
     pub(crate) contacts: bool,
     pub(crate) force: bool,
@@ -27,7 +28,8 @@ impl Stages {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let footprint = wants("footprint");
         let touches = outputs.contains(Outputs::TOUCHES) || footprint;
-        let position = wants("position") || touches;
+        let world_motion = wants("world_motion");
+        let position = wants("position") || touches || world_motion;
         let [orientation, axis, motion, filter, force, sigma] =
             ["orientation", "axis", "motion", "filter", "force", "sigma"].map(wants);
         let centroid = wants("centroid") || position || orientation || axis || motion || filter;
@@ -39,6 +41,7 @@ impl Stages {
             hysteresis: false,
             motion,
             position,
+            world_motion,
             touches,
             contacts: outputs.contains(Outputs::CONTACTS),
             force,

@@ -36,7 +36,7 @@ impl Head {
         let text = |text: &str| serde_json::Value::from(text).to_string();
         Self {
             in_anchor: begin(&names.link),
-            in_world: begin("world"),
+            in_world: begin(&names.world),
             field: text(&names.field),
             link: text(&names.link),
         }

@@ -124,10 +124,37 @@ pub struct FieldNames {
     pub field: String,
     /// The link in whose frame its position and normal are given: its anchor.
     pub link: String,
+    /// The frame of those that are in the world: `world`, or the link that stands for it.
+    pub world: String,
     /// Its letter, if the output names it: `sustained` or `change`.
     pub letter: Option<String>,
     /// Its signal, if the output names it: `raw` or `linear`.
     pub signal: Option<String>,
+}
+
+impl FieldNames {
+    /// The names of the fields of `plan`, in their order.
+    #[must_use]
+    pub fn all_of(plan: &Plan) -> Vec<Self> {
+        let name = |(index, (field, link)): (usize, (&str, &str))| {
+            let mark = plan.mark(index);
+            Self {
+                field: field.into(),
+                link: link.into(),
+                world: plan.world().into(),
+                letter: mark.receptor.map(|receptor| receptor.to_string()),
+                signal: mark.signal.map(|signal| signal.to_string()),
+            }
+        };
+        plan.fields().enumerate().map(name).collect()
+    }
+
+    /// The same with a field's letter and signal, if there are any, as a part of its name.
+    #[cfg(feature = "mcap")]
+    fn told_apart(&self) -> Self {
+        let marks = [&self.letter, &self.signal].into_iter().flatten();
+        Self { field: marks.fold(self.field.clone(), |name, mark| format!("{name} ({mark})")), ..self.clone() }
+    }
 }
 
 /// Frames, and access to their pressures.

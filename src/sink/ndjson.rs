@@ -156,7 +156,12 @@ mod tests {
 
     fn names() -> Vec<FieldNames> {
         [("hand/palm", "hand"), ("say \"hi\"", "arm")]
-            .map(|(field, link)| FieldNames { field: field.into(), link: link.into(), ..FieldNames::default() })
+            .map(|(field, link)| FieldNames {
+                field: field.into(),
+                link: link.into(),
+                world: "world".into(),
+                ..FieldNames::default()
+            })
             .into()
     }
 

@@ -53,7 +53,8 @@ pub(super) struct ViewWriter {
     world: Vec<DAffine3>,
     /// Per taxel id, its link and position in it, m.
     taxels: HashMap<u32, (usize, DVec3)>,
-    fields: Vec<(String, String)>,
+    /// Told apart by their names alone.
+    fields: Vec<FieldNames>,
     /// Topics of the fields without parents, each with the field's index.
     top_fields: Vec<(String, usize)>,
     /// By link, the corners of its triangles in its frame, m, until they are written.
@@ -82,11 +83,6 @@ impl ViewWriter {
                 }),
             })
             .collect();
-        let field = |names: &FieldNames| {
-            let marks = [&names.letter, &names.signal].into_iter().flatten();
-            let name = marks.fold(names.field.clone(), |name, mark| format!("{name} ({mark})"));
-            (name, names.link.clone())
-        };
         let mut surface = vec![Vec::new(); links.len()];
         for (link, corners) in body.triangles_at_rest() {
             let link_from_world = body.links[link].world_from_link.inverse();
@@ -97,10 +93,10 @@ impl ViewWriter {
             let parent = body.fields.iter().find(|spec| spec.name == name).and_then(|spec| spec.parent.as_deref());
             !parent.is_some_and(is_computed)
         };
-        let fields: Vec<(String, String)> = names.iter().map(field).collect();
+        let fields: Vec<FieldNames> = names.iter().map(FieldNames::told_apart).collect();
         let top = names.iter().zip(&fields).enumerate().filter(|(_, (names, _))| is_top(&names.field));
         Self {
-            top_fields: top.map(|(index, (_, (name, _)))| (format!("{FIELDS}{name}"), index)).collect(),
+            top_fields: top.map(|(index, (_, shown))| (format!("{FIELDS}{}", shown.field), index)).collect(),
             surface: Some(surface),
             index_of: links.iter().enumerate().map(|(index, link)| (link.name.clone(), index)).collect(),
             world: links.iter().map(|link| link.world_from_link).collect(),
@@ -198,14 +194,14 @@ impl ViewWriter {
             let mut any = false;
             for percept in percepts.touched(frame) {
                 let Some(position) = percept.position else { continue };
-                let (field, link) = &self.fields[percept.field];
+                let FieldNames { field, link, world, .. } = &self.fields[percept.field];
                 let pressed = percept.total.or(percept.peak);
                 self.max_total = self.max_total.max(pressed.unwrap_or(0.0));
                 let share = pressed.map_or(1.0, |pressed| pressed / self.max_total.max(f64::MIN_POSITIVE));
                 let area = percept.area.filter(|&area| area > 0.0);
                 scene.push(&Arrow {
                     field,
-                    link: if percept.in_world { "world" } else { link },
+                    link: if percept.in_world { world } else { link },
                     position,
                     normal: percept.normal,
                     diameter_m: area.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt()),

@@ -28,6 +28,7 @@ pub(crate) mod orientation;
 pub(crate) mod position;
 pub(crate) mod sigma;
 pub(crate) mod touches;
+pub(crate) mod world_motion;
 
 use glam::DVec3;
 

@@ -30,23 +30,23 @@ const LAYERS_M: f64 = 0.001;
 
 /// What is simulated in a frame.
 #[derive(Clone, Copy)]
-struct Truth {
+pub(super) struct Truth {
     /// Where it presses, in the world of the URDF.
-    place: DVec3,
+    pub(super) place: DVec3,
     lower: bool,
     upper: bool,
-    lift: f64,
-    slide: f64,
+    pub(super) lift: f64,
+    pub(super) slide: f64,
 }
 
 impl Truth {
-    fn is_contact(&self) -> bool {
+    pub(super) fn is_contact(&self) -> bool {
         self.lower && self.upper && 0.05 + self.lift < 0.01
     }
 }
 
 /// The plates open, close, slide on each other, open while both are touched by others, and close on one that feels nothing.
-fn truth() -> Vec<Truth> {
+pub(super) fn truth() -> Vec<Truth> {
     let at = |index: usize| {
         let along = f64::from(u32::try_from(index).unwrap());
         let closed = Truth {
@@ -67,7 +67,7 @@ fn truth() -> Vec<Truth> {
     (0..26).map(at).collect()
 }
 
-struct Plates {
+pub(super) struct Plates {
     _folder: tempfile::TempDir,
     urdf: PathBuf,
     body: PathBuf,
@@ -76,7 +76,7 @@ struct Plates {
 }
 
 impl Plates {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let (urdf, body) = (folder.path().join("plates.urdf"), folder.path().join("plates.glb"));
         std::fs::write(&urdf, URDF).unwrap();
@@ -94,7 +94,7 @@ impl Plates {
     }
 
     /// A frame for each of `truth`: a bump of pressure on each pressed skin; joints are told with `slide_off` (m).
-    fn lines(&self, truth: &[Truth], slide_off: f64) -> String {
+    pub(super) fn lines(&self, truth: &[Truth], slide_off: f64) -> String {
         let line = |(index, truth): (usize, &Truth)| {
             let value = |(id, link, place): &(u64, String, DVec3)| {
                 let (origin, pressed) = match link.as_str() {
@@ -121,10 +121,10 @@ impl Plates {
 
     fn run(&self, lines: &str, flags: &[&str]) -> Vec<Value> {
         let (_folder, input) = file("frames.ndjson", lines);
+        let outputs: &[&str] = if flags.contains(&"--outputs") { &[] } else { &["--outputs", "total,contacts"] };
         let run = Command::new(env!("CARGO_BIN_EXE_somatic"))
             .args(["run", "--body", text_of(&self.body), "--source", "-", "--backend", "cpu"])
-            // Each skin whole: of its patches, every one that is pressed would have a contact.
-            .args(["--outputs", "total,contacts", "--fields", "lower", "--fields", "upper"])
+            .args(outputs)
             .args(flags)
             .stdin(Stdio::from(std::fs::File::open(input).unwrap()))
             .output()
@@ -133,7 +133,12 @@ impl Plates {
         frames(&String::from_utf8_lossy(&run.stdout))
     }
 
-    fn jointed(&self, lines: &str, flags: &[&str]) -> Vec<Value> {
+    /// The percepts of `lines` in their own links.
+    pub(super) fn anchored(&self, lines: &str) -> Vec<Value> {
+        self.run(lines, &["--outputs", "position", "--coordinates", "anchor"])
+    }
+
+    pub(super) fn jointed(&self, lines: &str, flags: &[&str]) -> Vec<Value> {
         self.run(lines, &[&["--joints", text_of(&self.urdf), "--up", "z"], flags].concat())
     }
 }

@@ -57,6 +57,7 @@ mod tradeoff;
 mod tune;
 #[cfg(all(unix, feature = "page"))]
 mod view;
+mod world;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

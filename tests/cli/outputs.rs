@@ -506,6 +506,7 @@ const NO_FILES: &[&str] = &[
     "LENGTH,ANGLE",
     "LENGTH[,LENGTH",
     "LETTER,...",
+    "LINK",
     "LOW..HIGH",
     "M",
     "MEASURE",

@@ -52,4 +52,5 @@ mod upkeep;
 mod validator;
 mod verify;
 mod wire;
+mod world;
 mod worst;

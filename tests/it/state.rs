@@ -24,9 +24,10 @@ impl Case {
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let text = if self.upkeep { [CALIBRATION, UPKEEP].concat() } else { CALIBRATION.to_owned() };
         let calibration = Some(Calibration::parse(&text, &ids).unwrap());
-        // Cadence `on-change` excludes letters of change and filters.
+        // Cadence `on-change` excludes letters of change and filters, and what is made of places in the world.
+        let on_change = Outputs::all() - Outputs::FILTERED - Outputs::CONTACTS - Outputs::SPEED_IN_WORLD;
         let (receptors, outputs): (&[_], _) = match self.cadence {
-            Cadence::OnChange => (&[Receptor::Sustained], Outputs::all() - Outputs::FILTERED - Outputs::CONTACTS),
+            Cadence::OnChange => (&[Receptor::Sustained], on_change),
             Cadence::EveryFrame => (&[Receptor::Sustained, Receptor::Change], Outputs::all()),
         };
         let knobs = Knobs::default().cadence(self.cadence);

@@ -104,13 +104,14 @@ pub(super) struct Layout {
     name: usize,
     columns: Vec<&'static Column>,
     flags: usize,
-    in_world: bool,
+    /// What positions are in, where that is not their field's anchor.
+    world: Option<String>,
     unit: PrintedUnit,
 }
 
 impl Layout {
     /// For names up to `longest` and the quantities `outputs`, those of P in `unit`, in `width` columns.
-    pub(super) fn new(longest: usize, outputs: Outputs, in_world: bool, width: usize, unit: PrintedUnit) -> Self {
+    pub(super) fn new(longest: usize, outputs: Outputs, world: Option<&str>, width: usize, unit: PrintedUnit) -> Self {
         let mut columns: Vec<&Column> = COLUMNS.iter().filter(|column| outputs.intersects(column.outputs)).collect();
         let taken = |columns: &[&Column]| columns.iter().map(|column| column.width + GAP).sum::<usize>();
         let least_name = longest.clamp(5, MIN_NAME_WIDTH);
@@ -126,17 +127,16 @@ impl Layout {
         let gap = if flags > 0 { GAP } else { 0 };
         let name = longest.max(5).min(width.saturating_sub(taken(&columns) + gap + flags));
         let flags = if flags > 0 { width.saturating_sub(name + taken(&columns) + gap) } else { 0 };
-        Self { name, columns, flags, in_world, unit }
+        Self { name, columns, flags, world: world.map(str::to_owned), unit }
     }
 
     pub(super) fn headings(&self) -> String {
         let mut text = fitted("field", self.name, false);
         for column in &self.columns {
             text += &" ".repeat(GAP);
-            let world = self.in_world && column.outputs == Outputs::POSITION;
-            let heading = match column.outputs {
-                _ if world => "x    y    z mm world".to_owned(),
-                Outputs::TOTAL | Outputs::PEAK if !column.heading.is_empty() => self.unit.heads(column.heading),
+            let heading = match (column.outputs, &self.world) {
+                (Outputs::POSITION, Some(world)) => format!("x    y    z mm {world}"),
+                (Outputs::TOTAL | Outputs::PEAK, _) if !column.heading.is_empty() => self.unit.heads(column.heading),
                 _ => column.heading.to_owned(),
             };
             text += &fitted(&heading, column.width, true);
@@ -216,7 +216,8 @@ mod tests {
     fn every_row_fits_whatever_the_width() {
         for width in 0..200 {
             for longest in [1, 8, 30] {
-                let layout = Layout::new(longest, Outputs::all(), true, width, PrintedUnit::of(Quantity::Pascal));
+                let layout =
+                    Layout::new(longest, Outputs::all(), Some("world"), width, PrintedUnit::of(Quantity::Pascal));
                 let headings = console::measure_text_width(&layout.headings());
                 assert!(headings <= width.max(5) || layout.columns.is_empty(), "{width}: {headings}");
             }
@@ -226,7 +227,7 @@ mod tests {
     #[test]
     fn what_was_not_asked_for_has_no_column_and_a_wide_terminal_has_all() {
         let headings =
-            |outputs, width| Layout::new(10, outputs, false, width, PrintedUnit::of(Quantity::Pascal)).headings();
+            |outputs, width| Layout::new(10, outputs, None, width, PrintedUnit::of(Quantity::Pascal)).headings();
         assert!(!headings(Outputs::TOTAL, 200).contains("angle"));
         assert!(
             headings(Outputs::all(), 200).contains("peak kPa") && headings(Outputs::all(), 200).contains("force N")

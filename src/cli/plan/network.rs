@@ -1,10 +1,9 @@
 //! What a limb would send: its frames, or its percepts.
 
 use serde_json::{Value, json};
-use somatic::sink::{limb_frame_bytes, limb_percept_bytes};
+use somatic::sink::{FieldNames, limb_frame_bytes, limb_percept_bytes};
 use somatic::{Engine, Frame, Result};
 
-use crate::cli::names::field_names;
 use crate::cli::scene::RunOptions;
 
 /// Bytes that a limb sends, without those of Zenoh and of the network.
@@ -26,7 +25,7 @@ impl Network {
         if !asked.sinks.iter().any(|sink| sink.starts_with("zenoh:") || sink.starts_with("zenoh-percepts:")) {
             return Ok(None);
         }
-        let names = field_names(engine.plan());
+        let names = FieldNames::all_of(engine.plan());
         let frame_bytes = limb_frame_bytes(engine.plan()) as f64;
         let (mut bytes, mut frames) = (0, 0);
         for call in calls {

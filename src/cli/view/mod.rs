@@ -82,8 +82,20 @@ fn shown(arg: clap::Arg) -> clap::Arg {
 }
 
 /// Flags of `run` that a page has no use for.
-const HIDDEN: [&str; 11] =
-    ["sink", "header", "verify", "force", "all-fields", "record", "loop", "batch", "strict", "live-rate", "board-rate"];
+const HIDDEN: [&str; 12] = [
+    "in",
+    "sink",
+    "header",
+    "verify",
+    "force",
+    "all-fields",
+    "record",
+    "loop",
+    "batch",
+    "strict",
+    "live-rate",
+    "board-rate",
+];
 
 /// How a page is served and opened.
 struct Opening<'a> {

@@ -7,9 +7,9 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::{Map, Value};
 use somatic::percept::Measure;
 use somatic::recording::Reader;
+use somatic::sink::FieldNames;
 use somatic::{COLUMNS, Column, Percept, Percepts, Plan, Result};
 
-use super::super::names::field_names;
 use super::recording::Recording;
 
 /// Quantities that differ by less than this part are the same: another backend rounds differently.
@@ -62,7 +62,7 @@ impl Recorded {
     /// # Errors
     /// It cannot be read.
     pub(super) fn open(path: &Path, plan: &Plan) -> Result<Option<Self>> {
-        let names = field_names(plan).into_iter().map(|names| [Some(names.field), names.letter, names.signal]);
+        let names = FieldNames::all_of(plan).into_iter().map(|names| [Some(names.field), names.letter, names.signal]);
         let mut recorded = Self {
             reader: Reader::open(path)?,
             line: Vec::new(),

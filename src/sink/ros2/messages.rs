@@ -13,7 +13,7 @@ use crate::robot::messages::{
     WrenchStamped,
 };
 use crate::signal::{BoardHealth, Pose};
-use crate::sink::Session;
+use crate::sink::{FieldNames, Session};
 
 /// Period of the transforms of links at rest, s: a player that jumps needs them soon.
 const LINKS_PERIOD_S: f64 = 1.0;
@@ -81,18 +81,13 @@ impl Messages {
         let of_field =
             |field: &WrenchField| topic::<WrenchStamped>(format!("/somatic/wrench/{}", topic_part(&field.name)));
         topics.extend(wrenches.iter().map(of_field));
-        let names = session.names.iter().map(|names| {
-            let marks = [&names.letter, &names.signal].into_iter().flatten();
-            let name = marks.fold(names.field.clone(), |name, mark| format!("{name} ({mark})"));
-            (name, names.link.clone())
-        });
         Ok(Self {
             topics,
             clouds,
             first_cloud,
             wrenches,
             first_wrench,
-            touches: Touches::new(names.collect()),
+            touches: Touches::new(session.names.iter().map(FieldNames::told_apart).collect()),
             at_rest: rest_poses(body),
             links_told_s: None,
             pressure_of: HashMap::new(),

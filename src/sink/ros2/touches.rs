@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3};
 use super::places::{WORLD, header, quaternion, vector, z_up_from_y_up};
 use crate::percept::Percept;
 use crate::robot::messages::{Color, Marker, MarkerArray, Point, Pose};
+use crate::sink::FieldNames;
 
 /// Types and actions of `visualization_msgs/Marker`.
 const ARROW: i32 = 0;
@@ -20,8 +21,8 @@ const COLOUR: Color = Color { r: 1.0, g: 0.55, b: 0.1, a: 0.9 };
 
 /// Makes the markers of each frame.
 pub(super) struct Touches {
-    /// By field, its name and the link of its anchor.
-    fields: Vec<(String, String)>,
+    /// Told apart by their names alone.
+    fields: Vec<FieldNames>,
     /// By field, whether its sphere and its arrow are shown.
     shown: Vec<[bool; 2]>,
     /// The same before the last message.
@@ -29,7 +30,7 @@ pub(super) struct Touches {
 }
 
 impl Touches {
-    pub(super) fn new(fields: Vec<(String, String)>) -> Self {
+    pub(super) fn new(fields: Vec<FieldNames>) -> Self {
         let none = vec![[false; 2]; fields.len()];
         Self { shown: none.clone(), before: none, fields }
     }
@@ -47,7 +48,7 @@ impl Touches {
         }
         for (field, (shows, shown)) in shows.iter().zip(&self.shown).enumerate() {
             for part in (0..2).filter(|&part| shown[part] && !shows[part]) {
-                let (name, link) = &self.fields[field];
+                let FieldNames { field: name, link, .. } = &self.fields[field];
                 let (ns, id) = (name.clone(), id(field, part));
                 markers.push(Marker { header: header(time_ns, link), ns, id, action: DELETE, ..Marker::default() });
             }
@@ -64,11 +65,13 @@ impl Touches {
     }
 
     fn marker(&self, time_ns: u64, percept: &Percept, part: usize, position: DVec3, turn: DQuat) -> Marker {
-        let (name, link) = &self.fields[percept.field];
-        let world = z_up_from_y_up();
-        let (position, turn) = if percept.in_world { (world * position, world * turn) } else { (position, turn) };
+        let FieldNames { field: name, link, world, .. } = &self.fields[percept.field];
+        let frame = if percept.in_world { world } else { link };
+        // A link stays as the body has it, the world itself is z up.
+        let up = if percept.in_world && world == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
+        let (position, turn) = (up * position, up * turn);
         Marker {
-            header: header(time_ns, if percept.in_world { WORLD } else { link }),
+            header: header(time_ns, frame),
             ns: name.clone(),
             id: id(percept.field, part),
             action: ADD,
@@ -121,7 +124,8 @@ mod tests {
             touch.position = Some([0.1, 0.0, 0.0]);
             touch
         };
-        let mut touches = Touches::new(vec![("a".to_owned(), "hand".to_owned()), ("b".to_owned(), "hand".to_owned())]);
+        let names = |field: &str| FieldNames { field: field.into(), link: "hand".into(), ..FieldNames::default() };
+        let mut touches = Touches::new(["a", "b"].map(names).into());
         let mut told = |touched: &[Percept], is_sent: bool| {
             let markers = touches.message(0, touched).map_or_else(Vec::new, |message| message.markers);
             if !is_sent {

@@ -189,7 +189,7 @@ impl Builder {
                     _ => None,
                 };
                 let others: Vec<&str> = match column.value {
-                    ValueOf::Link => vec!["world"],
+                    ValueOf::Link => names.first().map(|name| name.world.as_str()).into_iter().collect(),
                     ValueOf::Output(..) | ValueOf::TouchFootprint(..) => {
                         ContactKind::ALL.map(ContactKind::name).to_vec()
                     }

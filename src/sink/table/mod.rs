@@ -285,7 +285,7 @@ struct Row<'a> {
 impl Row<'_> {
     fn link<'n>(&self, names: &'n [FieldNames]) -> &'n str {
         match self.percepts.in_world(self.frame, self.field) {
-            true => "world",
+            true => &names[self.field].world,
             false => &names[self.field].link,
         }
     }
