@@ -15,7 +15,6 @@ use super::serve::Serving;
 use super::token::random_hex;
 use super::wake::Waits;
 use crate::error::{Error, Result};
-use crate::field::WORLD;
 
 /// Requests that wait for the player at most.
 const MAX_REQUESTS: usize = 256;
@@ -38,10 +37,9 @@ impl Server {
     /// The address is taken, or the system has no random numbers for a token; or places are not in the world
     /// ([`crate::Scene::in_link`]).
     pub fn start(listen: &Listen, scene: PageScene) -> Result<(Self, Publisher)> {
-        if scene.plan.world() != WORLD {
+        if let Some(link) = scene.plan.in_link() {
             return Err(Error::usage(format!(
-                "a page shows the world, and `in` puts places into `{}`; leave one of them out",
-                scene.plan.world()
+                "a page shows the world, and `in` puts places into `{link}`; leave one of them out"
             )));
         }
         let listener = listen.bind()?;

@@ -22,7 +22,6 @@ pub(crate) use stages::Stages;
 
 use crate::body::Body;
 use crate::error::{Error, Result, suggestion};
-use crate::field::WORLD;
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
@@ -83,9 +82,9 @@ setters!(Scene {
 });
 
 impl Scene {
-    /// What places in the world are said to be in: `world`, or the link that stands for it.
-    fn world_of(&self, body: &Body) -> Result<String> {
-        let Some(link) = &self.in_link else { return Ok(WORLD.to_owned()) };
+    /// The link that stands for the world, which `body` must have.
+    fn checked_link(&self, body: &Body) -> Result<Option<String>> {
+        let Some(link) = &self.in_link else { return Ok(None) };
         if self.coordinates == Coordinates::Anchor {
             return Err(Error::usage(format!(
                 "coordinates `anchor` leave every field in its own link, and `in` puts all into `{link}`; leave one of them out"
@@ -95,7 +94,7 @@ impl Scene {
             let near = suggestion(link, body.links.iter().map(|of_body| of_body.name.as_str()));
             return Err(Error::usage(format!("the body has no link `{link}`; {near}")).at(&body.name));
         }
-        Ok(link.clone())
+        Ok(Some(link.clone()))
     }
 
     /// Refuses outputs that are made of places in the world where none are given.

@@ -30,8 +30,8 @@ pub struct Plan {
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
-    /// What places in the world are said to be in.
-    world: String,
+    /// The link that stands for the world.
+    in_link: Option<String>,
     /// Up to where changes count as 0, in P per second, as the calibration has it.
     pub(crate) change_dead_band: f64,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
@@ -168,7 +168,7 @@ impl Plan {
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
-            world: scene.world_of(body)?,
+            in_link: scene.checked_link(body)?,
             change_dead_band: calibration.change.dead_band,
             calibrations,
             onsets,
@@ -257,7 +257,13 @@ impl Plan {
     /// What places in the world are said to be in: `world`, or the link of [`Scene::in_link`].
     #[must_use]
     pub fn world(&self) -> &str {
-        &self.world
+        self.in_link().unwrap_or(WORLD)
+    }
+
+    /// The link in whose frame places are given instead of the world.
+    #[must_use]
+    pub fn in_link(&self) -> Option<&str> {
+        self.in_link.as_deref()
     }
 
     /// The quantities that are computed.
