@@ -64,8 +64,12 @@ fn names_in(text: &str) -> Result<Vec<String>> {
     if !["mcap", ""].contains(&storage.as_str()) {
         return Err(failed!("its storage is {storage}, and MCAP is read here; {CONVERTED}"));
     }
-    if value("compression_mode").is_some_and(|mode| !mode.is_empty() && !mode.eq_ignore_ascii_case("none")) {
-        return Err(failed!("it is compressed by files or messages, and chunks of MCAP are read here; {CONVERTED}"));
+    let mode = value("compression_mode").unwrap_or_default();
+    if ["file", "message"].iter().any(|other| mode.eq_ignore_ascii_case(other)) {
+        return Err(failed!(
+            "each {} is compressed by itself, and chunks of MCAP are read here; {CONVERTED}",
+            mode.to_lowercase()
+        ));
     }
     let list = value("relative_file_paths").unwrap_or_default();
     let names: Vec<String> = match list.strip_prefix('[').and_then(|list| list.strip_suffix(']')) {
@@ -128,7 +132,7 @@ mod tests {
                 .contains("its storage is sqlite3, and MCAP is read here; convert it")
         );
         assert!(
-            why("  storage_identifier: mcap\n  compression_mode: FILE\n").contains("compressed by files or messages")
+            why("  storage_identifier: mcap\n  compression_mode: FILE\n").contains("each file is compressed by itself")
         );
         assert!(why("  storage_identifier: mcap\n  relative_file_paths: []\n").contains("ros2 bag reindex"));
         assert!(why("").contains("relative_file_paths"));

@@ -151,6 +151,10 @@ fn topics_of(files: &[PathBuf]) -> Result<Topics> {
             // Channels are told where their first messages are.
             while reader.next_message()?.is_some() {}
         }
+        if reader.channels.is_empty() && !reader.has_end() {
+            return Err(Error::failed("it is cut off before its first whole chunk; nothing of it can be read")
+                .at(file.display()));
+        }
         for channel in reader.channels.values() {
             let kind = reader.schemas.get(&channel.schema).cloned().unwrap_or_default();
             topics.entry(channel.topic.clone()).or_default().insert((whole(&kind), channel.encoding.clone()));

@@ -127,7 +127,7 @@ impl Time {
     /// The time after ROS's zero, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) * 1e-9
+        self.nanoseconds() as f64 / 1e9
     }
 
     /// The time after ROS's zero, ns.
