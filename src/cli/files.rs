@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use somatic::Body;
 use somatic::output::OutputPaths;
-use somatic::source::{SimulatedSource, SourceSpec};
+use somatic::source::{BagName, SimulatedSource, SourceSpec};
 
 use super::scene::RunOptions;
+use super::states_topic::StatesFrom;
 
 /// Files that a command reads, whether they are there or not.
 #[derive(Default)]
@@ -17,9 +18,13 @@ impl FilesRead {
     pub(super) fn of(asked: &RunOptions, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
-        let named = named.chain(asked.joints.as_deref()).chain(asked.joint_states.as_deref());
-        let named = named.chain(asked.zenoh_config.as_deref());
-        Self::default().files(named).bodies(&asked.body).sources(&asked.sources)
+        let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());
+        let files = Self::default().files(named).bodies(&asked.body).sources(&asked.sources);
+        match asked.joint_states.as_deref().map(StatesFrom::named) {
+            Some(Ok(StatesFrom::File(file))) => files.files([file]),
+            Some(Ok(StatesFrom::Bag(bag))) => files.bag(&bag),
+            _ => files,
+        }
     }
 
     pub(super) fn files(mut self, paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
@@ -31,10 +36,17 @@ impl FilesRead {
         self.files(names.into_iter().flat_map(Body::files))
     }
 
+    /// The file of a bag, or those of its folder.
+    fn bag(self, bag: &BagName) -> Self {
+        let within = std::fs::read_dir(&bag.path).into_iter().flatten().flatten().map(|entry| entry.path());
+        self.files(within).files([&bag.path])
+    }
+
     /// The files of `sources`; an invalid source is reported when it is opened.
     pub(super) fn sources(self, sources: &[String]) -> Self {
         sources.iter().filter_map(|source| source.parse().ok()).fold(self, |files, source| match source {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
+            SourceSpec::Ros2Mcap(bag) => files.bag(&bag),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
             SourceSpec::Stdin | SourceSpec::CsvStdin => files.files(["/dev/stdin"]),
             _ => files,

@@ -1,5 +1,6 @@
 //! The input of a run.
 
+use somatic::robot::BagSource;
 use somatic::signal::Wiring;
 use somatic::source::{
     CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, VendorOptions,
@@ -56,6 +57,7 @@ impl Input {
         };
         let Some(spec) = asked.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
+            SourceSpec::Ros2Mcap(bag) => bag.to_string(),
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
             SourceSpec::Ros2 { topic, .. } => format!("ros2:{topic}"),
@@ -106,7 +108,10 @@ impl Input {
 
     /// Whether its frames may hold any taxel of the body, as no header names them.
     pub(super) fn holds_any(&self) -> bool {
-        matches!(self.spec, Some(SourceSpec::Stdin | SourceSpec::Ros2 { .. } | SourceSpec::Zenoh(_)))
+        matches!(
+            self.spec,
+            Some(SourceSpec::Stdin | SourceSpec::Ros2 { .. } | SourceSpec::Ros2Mcap(_) | SourceSpec::Zenoh(_))
+        )
     }
 
     pub(super) fn is_recording(&self) -> bool {
@@ -170,11 +175,16 @@ impl Input {
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
         let options = asked.export_options()?;
         let strict = asked.strict;
+        let of_bag = matches!(spec, Some(SourceSpec::Ros2Mcap(_))).then(|| self.body(asked)).transpose()?;
         // It was opened for its sensors; what comes after its first frame is still to be read.
         let mut opened = asked.take_export()?;
         let mut open = move || -> Result<Box<dyn Source + Send>> {
             if let Some(source) = opened.take() {
                 return Ok(source);
+            }
+            if let (Some(spec @ SourceSpec::Ros2Mcap(bag)), Some(body)) = (&spec, &of_bag) {
+                spec.check_options(&options)?;
+                return Ok(Box::new(BagSource::open(bag, body)?));
             }
             match &spec {
                 Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {

@@ -6,7 +6,9 @@ mod check;
 mod deserialize;
 mod flags;
 mod jointed;
+mod joints_delay;
 mod outputs;
+mod within;
 
 use std::path::{Path, PathBuf};
 
@@ -26,11 +28,12 @@ pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
+use self::joints_delay::JointsDelay;
 use self::outputs::output_names;
 pub(super) use self::outputs::{outputs_help, outputs_or_usual};
+use self::within::{sink_within, source_within, states_within};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
-use super::states_topic::topic_of;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; paths in a file are relative to that file. Flags come before keys.
@@ -43,7 +46,7 @@ pub(super) struct RunOptions {
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where touch frames come from: csv:FILE, mcap:FILE, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
+    /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
     /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
@@ -253,8 +256,8 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
     pub(super) joints: Option<PathBuf>,
 
-    /// Joint states in a recording of their own, a CSV under t,<joint>,... or NDJSON, or ros2:/TOPIC, live [default: those
-    /// in the frames].
+    /// Joint states in a recording of their own: a CSV under t,<joint>,..., NDJSON, a bag of ROS 2 in MCAP (a .mcap, a folder, or
+    /// ros2-mcap:PATH:/TOPIC), or ros2:/TOPIC, live [default: those in the frames].
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(super) joint_states: Option<PathBuf>,
 
@@ -264,10 +267,12 @@ pub(super) struct RunOptions {
     #[schemars(with = "Option<String>", extend("enum" = Up::WORDS))]
     pub(super) up: Option<Up>,
 
-    /// How much later the clock of --joint-states stamps an instant than that of the frames, in seconds [default: 0].
+    /// How much later the clock of --joint-states stamps an instant than that of the frames, in seconds; auto estimates it
+    /// for frames and states from one bag of ROS 2 [default: 0].
     #[arg(long, help_heading = ROBOT, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "joints_delay_s")]
-    pub(super) joints_delay: Option<f64>,
+    #[schemars(with = "Option<f64>", extend("type" = ["number", "string", "null"], "pattern" = "^auto$"))]
+    pub(super) joints_delay: Option<JointsDelay>,
 
     /// The age of a joint's last state from which on positions stay in links, flagged stale_pose, in seconds [default:
     /// 0.1].
@@ -330,32 +335,14 @@ impl RunOptions {
         asked.layout = asked.layout.map(|file| folder.join(file));
         asked.zenoh_config = asked.zenoh_config.map(|file| folder.join(file));
         asked.joints = asked.joints.map(|file| folder.join(file));
-        asked.joint_states =
-            asked.joint_states.map(|file| if topic_of(&file).is_some() { file } else { folder.join(file) });
+        asked.joint_states = asked.joint_states.map(|states| states_within(folder, states)).transpose()?;
         // A bundled body, unless a file is called the same.
         asked.body = asked.body.map(|body| match there(Path::new(&body)) {
             file if Path::new(&file).exists() || bundled::body(&body).is_none() => file,
             _ => body,
         });
-        for source in &mut asked.sources {
-            match source.parse()? {
-                SourceSpec::Csv(file) => *source = format!("csv:{}", there(&file)),
-                SourceSpec::Mcap(file) => *source = format!("mcap:{}", there(&file)),
-                SourceSpec::Vendor(file) => *source = there(&file),
-                SourceSpec::Sim(file) => *source = format!("sim:{}", there(&file)),
-                _ => {}
-            }
-        }
-        for sink in &mut asked.sinks {
-            match sink.parse()? {
-                SinkSpec::Ndjson(file) => *sink = format!("ndjson:{}", there(&file)),
-                SinkSpec::Csv(file) => *sink = format!("csv:{}", there(&file)),
-                SinkSpec::Parquet(file) => *sink = format!("parquet:{}", there(&file)),
-                SinkSpec::Mcap(file) => *sink = format!("mcap:{}", there(&file)),
-                SinkSpec::Ros2Mcap(folder) => *sink = format!("ros2-mcap:{}", there(&folder)),
-                _ => {}
-            }
-        }
+        asked.sources = asked.sources.iter().map(|source| source_within(folder, source)).collect::<Result<_>>()?;
+        asked.sinks = asked.sinks.iter().map(|sink| sink_within(folder, sink)).collect::<Result<_>>()?;
         Ok(asked)
     }
 

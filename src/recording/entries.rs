@@ -1,4 +1,4 @@
-//! What single records say: taxels, attachments, channels.
+//! What single records say: taxels, attachments, channels, schemas.
 
 use super::records::{Parts, Record, op};
 use super::{FRAMES_CHANNEL, TAXEL_IDS, ids_of};
@@ -18,6 +18,8 @@ pub struct Attached {
 
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
+    /// The id of its messages' schema.
+    pub(super) schema: u16,
     pub(super) topic: String,
     pub(super) encoding: String,
 }
@@ -58,6 +60,11 @@ pub(super) fn data_of(body: &[u8]) -> Option<&[u8]> {
 }
 
 pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
-    let (id, _schema) = (parts.u16()?, parts.u16()?);
-    Some((id, Channel { topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))
+    let (id, schema) = (parts.u16()?, parts.u16()?);
+    Some((id, Channel { schema, topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))
+}
+
+/// The id of a schema, and its name.
+pub(super) fn schema(parts: &mut Parts<'_>) -> Option<(u16, String)> {
+    Some((parts.u16()?, parts.text()?.to_owned()))
 }

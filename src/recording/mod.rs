@@ -3,7 +3,10 @@
 //! `docs/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
 //! read record by record here, so that a damaged one gives what is whole in it and memory stays bounded.
 
+mod account;
 mod bag;
+mod bag_files;
+mod bag_reader;
 mod entries;
 mod frames;
 mod percepts;
@@ -17,6 +20,7 @@ mod unpack;
 mod view;
 
 pub(crate) use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
+pub(crate) use self::bag_reader::{BagReader, WantedTopic};
 pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;

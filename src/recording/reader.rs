@@ -5,7 +5,8 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use super::entries::{Attached, Channel, attached, channel, data_of, preface};
+use super::account::Account;
+use super::entries::{Attached, Channel, attached, channel, data_of, preface, schema};
 use super::frames::FrameMessage;
 use super::records::{MAX_RECORD_BYTES, Next, Parts, Record, Records, op};
 use super::{FRAMES, nanoseconds, unpack};
@@ -30,6 +31,12 @@ pub struct Reader {
     taxels: Vec<u32>,
     attached: Vec<Attached>,
     pub(super) channels: HashMap<u16, Channel>,
+    /// The names of schemas.
+    pub(super) schemas: HashMap<u16, String>,
+    /// Whether the file's summary tells its channels.
+    pub(super) has_summary: bool,
+    /// Whether chunks without a checksum are read.
+    takes_unchecked: bool,
     chunk: Vec<u8>,
     /// What of the chunk is still to be read.
     left: std::ops::Range<usize>,
@@ -40,20 +47,7 @@ pub struct Reader {
     /// What is given for values that are stale, and whether any was so far.
     stale: RawValue,
     seen_stale: bool,
-    /// How many frames were whole, and the time of the last.
-    whole: u64,
-    last_s: Option<f64>,
-    damage: Damage,
-    losses: Vec<String>,
-}
-
-#[derive(Default)]
-struct Damage {
-    places: u64,
-    bytes: u64,
-    /// The times of the frames before and after the first of it.
-    after_s: Option<f64>,
-    before_s: Option<f64>,
+    account: Account,
 }
 
 impl Reader {
@@ -65,17 +59,37 @@ impl Reader {
         let path = path.as_ref();
         let name = path.display().to_string();
         let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        let opened = Self::of(&name, file).map_err(|e| match e {
-            Opening::Io(e) => Error::io(path, &e),
-            Opening::Wrong(what) => Error::failed(what).at(&name),
-        })?;
-        Ok(opened)
+        Self::of(&name, file).map_err(|e| e.at(path))
     }
 
     fn of(name: &str, file: File) -> Result<Self, Opening> {
-        let wrong = |what: &str| Opening::Wrong(what.to_owned());
+        let (mut reader, taxels) = Self::begin(name, file, "frame")?;
+        reader.taxels = taxels.ok_or_else(|| {
+            Opening::Wrong(
+                "it holds no frames of touch, which `somatic run --sink mcap:FILE` and `somatic convert` write; a bag of ROS 2 is \
+                 named ros2-mcap:PATH"
+                    .to_owned(),
+            )
+        })?;
+        Ok(reader)
+    }
+
+    /// Opens the MCAP of other programs at `path`, whose messages [`Reader::next_message`] gives.
+    ///
+    /// Chunks without a checksum are read, too: recorders of ROS 2 leave it out for speed.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no MCAP.
+    pub(super) fn open_any(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+        let (reader, _) = Self::begin(&path.display().to_string(), file, "message").map_err(|e| e.at(path))?;
+        Ok(Self { takes_unchecked: true, ..reader })
+    }
+
+    /// Reads what comes before the first chunk; gives the taxels, too, if they are told. `thing` is what is read.
+    fn begin(name: &str, file: File, thing: &'static str) -> Result<(Self, Option<Vec<u32>>), Opening> {
         let Some(mut records) = Records::of(file)? else {
-            return Err(wrong("this is not an MCAP file: its first bytes differ"));
+            return Err(Opening::Wrong("this is not an MCAP file: its first bytes differ".to_owned()));
         };
         let has_end = records.has_end()?;
         let mut reader = Self {
@@ -84,6 +98,9 @@ impl Reader {
             taxels: Vec::new(),
             attached: Vec::new(),
             channels: HashMap::new(),
+            schemas: HashMap::new(),
+            has_summary: false,
+            takes_unchecked: false,
             chunk: Vec::new(),
             left: 0..0,
             from: 0,
@@ -91,22 +108,26 @@ impl Reader {
             ended: false,
             stale: RawValue::MISSING,
             seen_stale: false,
-            whole: 0,
-            last_s: None,
-            damage: Damage::default(),
-            losses: Vec::new(),
+            account: Account::new(name, thing),
         };
         // Each channel is told in the first chunk that has it; should that be damaged, others still make sense.
-        let told = reader.records.in_summary(op::CHANNEL)?;
-        reader.channels = told.iter().filter_map(|body| channel(&mut Parts(body))).collect();
+        for (kind, body) in reader.records.in_summary(&[op::CHANNEL, op::SCHEMA])? {
+            reader.has_summary |= kind == op::CHANNEL;
+            reader.learn(kind, &body);
+        }
         let taxels = reader.read_head()?;
-        reader.taxels = taxels.ok_or_else(|| {
-            wrong("it holds no frames of touch, which `somatic run --sink mcap:FILE` and `somatic convert` write")
-        })?;
-        Ok(reader)
+        Ok((reader, taxels))
     }
 
-    /// Reads what comes before the first chunk; gives the taxels, if they are told.
+    /// Takes a channel, or the name of a schema.
+    fn learn(&mut self, kind: u8, body: &[u8]) {
+        match kind {
+            op::CHANNEL => self.channels.extend(channel(&mut Parts(body))),
+            op::SCHEMA => self.schemas.extend(schema(&mut Parts(body))),
+            _ => {}
+        }
+    }
+
     fn read_head(&mut self) -> Result<Option<Vec<u32>>, Opening> {
         let mut taxels = None;
         let mut body = Vec::new();
@@ -120,14 +141,14 @@ impl Reader {
                 op::METADATA => {
                     self.records.body(record, u64::MAX, &mut body)?;
                     if let Some(preface) = preface(&body).filter(|_| taxels.is_none()) {
-                        let frames = Channel { topic: FRAMES.to_owned(), encoding: "protobuf".to_owned() };
+                        let frames = Channel { schema: 0, topic: FRAMES.to_owned(), encoding: "protobuf".to_owned() };
                         self.channels.extend(preface.frames.map(|id| (id, frames)));
                         taxels = Some(preface.taxels);
                     }
                 }
-                op::CHANNEL => {
+                op::CHANNEL | op::SCHEMA => {
                     self.records.body(record, MAX_RECORD_BYTES, &mut body)?;
-                    self.channels.extend(channel(&mut Parts(&body)));
+                    self.learn(record.kind, &body);
                 }
                 op::ATTACHMENT => {
                     self.records.body(record, ATTACHMENT_HEAD, &mut body)?;
@@ -202,7 +223,7 @@ impl Reader {
     /// What of the file was not read, in a line each; complete once the last frame is.
     #[must_use]
     pub fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        self.account.losses().to_vec()
     }
 
     /// Reads the next frame into `frame`. `false` at the end.
@@ -231,13 +252,9 @@ impl Reader {
         }
     }
 
-    /// Notes that there was a whole frame at `t_s`.
+    /// Notes that there was a whole frame, or message, at `t_s`.
     pub(super) fn saw(&mut self, t_s: f64) {
-        self.whole += 1;
-        self.last_s = Some(t_s);
-        if self.damage.places > 0 {
-            self.damage.before_s.get_or_insert(t_s);
-        }
+        self.account.saw(t_s);
     }
 
     /// The next message, whatever it says.
@@ -270,11 +287,8 @@ impl Reader {
             self.left.start = end;
             let mut parts = Parts(body);
             match kind {
-                op::CHANNEL => {
-                    if let Some((id, channel)) = channel(&mut parts) {
-                        self.channels.insert(id, channel);
-                    }
-                }
+                op::CHANNEL => self.channels.extend(channel(&mut parts)),
+                op::SCHEMA => self.schemas.extend(schema(&mut parts)),
                 op::MESSAGE => {
                     let head = (|| Some((parts.u16()?, parts.u32()?, parts.u64()?, parts.u64()?)))();
                     if let Some((channel, _, log_time, _)) = head {
@@ -302,7 +316,7 @@ impl Reader {
                 Next::Record(record) => record,
                 Next::Cut if !self.has_end => {
                     let bytes = self.records.length - start;
-                    self.tell_cut(bytes);
+                    self.account.tell_cut(bytes);
                     return Ok(false);
                 }
                 Next::Cut | Next::Damaged => {
@@ -321,7 +335,7 @@ impl Reader {
                         return Ok(true);
                     }
                 }
-                op::CHANNEL | op::MESSAGE => {
+                op::CHANNEL | op::SCHEMA | op::MESSAGE => {
                     // Without a chunk around them, as other programs may write.
                     self.records.go_to(start)?;
                     let whole = Record { at: start, length: record.length + (record.at - start), ..record };
@@ -380,8 +394,9 @@ impl Reader {
             None => (packed.len() as u64 == size).then_some(packed),
             Some(unpacked) => unpacked.as_deref(),
         };
-        // The format lets a checksum be 0 for none; then nothing could be told from damage.
-        if records.is_none_or(|records| crc32fast::hash(records) != crc) {
+        // The format lets a checksum be 0 for none; then nothing could be told from damage, and our own have one.
+        let is_unchecked = crc == 0 && self.takes_unchecked;
+        if records.is_none_or(|records| !is_unchecked && crc32fast::hash(records) != crc) {
             self.damaged(record.length);
             return Ok(false);
         }
@@ -392,42 +407,16 @@ impl Reader {
         Ok(true)
     }
 
-    fn damaged(&mut self, bytes: u64) {
-        if self.damage.places == 0 {
-            self.damage.after_s = self.last_s;
-        }
-        self.damage.places += 1;
-        self.damage.bytes += bytes;
-    }
-
-    fn tell_cut(&mut self, bytes: u64) {
-        let what = if bytes > 0 { format!("; {bytes} bytes of an incomplete chunk") } else { String::new() };
-        let missing = match self.last_s {
-            Some(t_s) => format!("what came after t = {t_s} s is missing"),
-            None => "it has no complete frame".to_owned(),
-        };
-        self.losses.push(format!("{}: it is cut off: {missing}{what}", self.name));
+    /// Notes that `bytes` were not read.
+    pub(super) fn damaged(&mut self, bytes: u64) {
+        self.account.damaged(bytes);
     }
 
     /// Says what is to be said when nothing more comes; once.
     fn end(&mut self) {
-        if std::mem::replace(&mut self.ended, true) || self.damage.places == 0 {
-            return;
+        if !std::mem::replace(&mut self.ended, true) {
+            self.account.end();
         }
-        let Damage { places, bytes, after_s, before_s } = self.damage;
-        let places = if places == 1 { "one place".to_owned() } else { format!("{places} places, the first") };
-        let when = match (after_s, before_s) {
-            (Some(after), Some(before)) => format!("between t = {after} s and t = {before} s"),
-            (Some(after), None) => format!("after t = {after} s"),
-            (None, Some(before)) => format!("before t = {before} s"),
-            (None, None) => "before any frame".to_owned(),
-        };
-        let frames = match self.whole {
-            0 => "no frame is whole".to_owned(),
-            1 => "1 frame is whole".to_owned(),
-            whole => format!("{whole} frames are intact"),
-        };
-        self.losses.push(format!("{}: damaged in {places} {when}: {bytes} bytes not read, {frames}", self.name));
     }
 }
 
@@ -435,6 +424,15 @@ impl Reader {
 enum Opening {
     Io(io::Error),
     Wrong(String),
+}
+
+impl Opening {
+    fn at(self, path: &Path) -> Error {
+        match self {
+            Self::Io(e) => Error::io(path, &e),
+            Self::Wrong(what) => Error::failed(what).at(path.display()),
+        }
+    }
 }
 
 impl From<io::Error> for Opening {

@@ -98,7 +98,12 @@ impl<R: Read + Seek> Records<R> {
 
     /// Goes on with the record at `at`.
     pub(super) fn go_to(&mut self, at: u64) -> io::Result<()> {
-        self.file.seek(SeekFrom::Start(at))?;
+        // What has been read ahead stays, where it can: a step back to the head of a record is a short one.
+        let now = self.file.stream_position()?;
+        match i64::try_from(i128::from(at) - i128::from(now)) {
+            Ok(step) => self.file.seek_relative(step)?,
+            Err(_) => self.file.seek(SeekFrom::Start(at)).map(drop)?,
+        }
         self.at = at;
         Ok(())
     }
@@ -120,17 +125,17 @@ impl<R: Read + Seek> Records<R> {
         Ok((bytes[0] == op::FOOTER && bytes[END as usize - 8..] == MAGIC).then_some(start))
     }
 
-    /// The bodies of the summary's records of kind `kind`.
-    pub(super) fn in_summary(&mut self, kind: u8) -> io::Result<Vec<Vec<u8>>> {
+    /// The summary's records of these kinds: the kind of each, and its body.
+    pub(super) fn in_summary(&mut self, kinds: &[u8]) -> io::Result<Vec<(u8, Vec<u8>)>> {
         let back = self.at;
         let mut bodies = Vec::new();
         if let Some(start) = self.summary_start()?.filter(|&start| start > 0 && start < self.length) {
             self.go_to(start)?;
             while let Next::Record(record) = self.next()? {
-                if record.kind == kind {
+                if kinds.contains(&record.kind) {
                     let mut body = Vec::new();
                     self.body(record, MAX_RECORD_BYTES, &mut body)?;
-                    bodies.push(body);
+                    bodies.push((record.kind, body));
                 } else {
                     self.skip(record.length)?;
                 }

@@ -204,6 +204,8 @@ impl Source for JointedSource {
     }
 
     fn losses(&self) -> Vec<String> {
-        self.source.losses()
+        let mut losses = self.source.losses();
+        losses.extend(self.options.states.iter().flat_map(|states| states.losses().iter().cloned()));
+        losses
     }
 }

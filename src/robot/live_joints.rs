@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::messages::{JointState, Message as _};
+use super::told_positions::told_positions;
 use crate::dds::{Delivery, Node, Reader};
 use crate::error::{Error, Result, failed};
 use crate::signal::Frame;
@@ -21,8 +22,8 @@ pub struct LiveJoints {
     /// It stays as long as what reads from it.
     _node: Node,
     states: Reader<JointState>,
-    /// Joints that have come since the last frame.
-    come: BTreeMap<String, f64>,
+    /// Joints that have arrived since the last frame.
+    arrived: BTreeMap<String, f64>,
 }
 
 impl LiveJoints {
@@ -35,30 +36,24 @@ impl LiveJoints {
         let at = |e: Error| e.at(&name);
         let mut node = Node::new("", NODE).map_err(at)?;
         let states = node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH }).map_err(at)?;
-        Ok(Self { source, name, _node: node, states, come: BTreeMap::new() })
+        Ok(Self { source, name, _node: node, states, arrived: BTreeMap::new() })
     }
 
     fn read_states(&mut self) -> Result<()> {
         while let Some(state) = self.states.take()? {
-            take_state(&state, &mut self.come)?;
+            take_state(&state, &mut self.arrived)?;
         }
         Ok(())
     }
 }
 
-/// Adds the positions of `state` to `come`. A state without positions tells of none.
-fn take_state(state: &JointState, come: &mut BTreeMap<String, f64>) -> Result<()> {
-    if state.position.is_empty() {
-        return Ok(());
-    }
-    if state.position.len() != state.name.len() {
-        return Err(failed!("a state has {} names and {} positions", state.name.len(), state.position.len()));
-    }
-    for (joint, position) in state.name.iter().zip(&state.position) {
+/// Adds the positions of `state` to `arrived`. A state without positions tells of none.
+fn take_state(state: &JointState, arrived: &mut BTreeMap<String, f64>) -> Result<()> {
+    for (joint, position) in told_positions(state)? {
         if !position.is_finite() {
             return Err(failed!("joint `{joint}` is at {position}; send finite numbers"));
         }
-        come.insert(joint.clone(), *position);
+        arrived.insert(joint.clone(), position);
     }
     Ok(())
 }
@@ -74,7 +69,7 @@ impl Source for LiveJoints {
         }
         self.read_states().map_err(|e| e.at(&self.name))?;
         frame.joints.clear();
-        frame.joints.extend(std::mem::take(&mut self.come));
+        frame.joints.extend(std::mem::take(&mut self.arrived));
         Ok(true)
     }
 
@@ -113,18 +108,18 @@ mod tests {
 
     #[test]
     fn the_newest_position_of_each_joint_stays() {
-        let mut come = BTreeMap::new();
+        let mut arrived = BTreeMap::new();
         let state = |names: &[&str], position: &[f64]| JointState {
             name: names.iter().map(|name| (*name).to_owned()).collect(),
             position: position.to_vec(),
             ..JointState::default()
         };
-        take_state(&state(&["a", "b"], &[1.0, 2.0]), &mut come).unwrap();
-        take_state(&state(&["b"], &[3.0]), &mut come).unwrap();
-        take_state(&state(&["a"], &[]), &mut come).unwrap();
-        assert_eq!(come.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>(), [("a", 1.0), ("b", 3.0)]);
+        take_state(&state(&["a", "b"], &[1.0, 2.0]), &mut arrived).unwrap();
+        take_state(&state(&["b"], &[3.0]), &mut arrived).unwrap();
+        take_state(&state(&["a"], &[]), &mut arrived).unwrap();
+        assert_eq!(arrived.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>(), [("a", 1.0), ("b", 3.0)]);
         let why = |state| take_state(&state, &mut BTreeMap::new()).unwrap_err().to_string();
-        assert_eq!(why(state(&["a", "b"], &[1.0])), "a state has 2 names and 1 positions");
+        assert_eq!(why(state(&["a", "b"], &[1.0])), "a state has 2 names and 1 positions; send one for each");
         assert!(why(state(&["a"], &[f64::NAN])).contains("joint `a` is at NaN"));
     }
 }

@@ -15,8 +15,14 @@
 //! # Ok::<(), somatic::Error>(())
 //! ```
 
+#[cfg(feature = "mcap")]
+mod bag_source;
+#[cfg(feature = "mcap")]
+mod bag_states;
 #[cfg(feature = "meshes")]
 mod jointed_source;
+#[cfg(feature = "mcap")]
+mod joints_delay;
 #[cfg(feature = "meshes")]
 mod kinematics;
 #[cfg(feature = "ros2")]
@@ -24,11 +30,19 @@ mod live_joints;
 #[cfg(feature = "meshes")]
 mod matching;
 pub mod messages;
+#[cfg(any(feature = "mcap", feature = "ros2"))]
+mod places;
 #[cfg(feature = "ros2")]
 mod ros2_source;
+#[cfg(any(feature = "mcap", feature = "ros2"))]
+mod told_positions;
 
+#[cfg(feature = "mcap")]
+pub use bag_source::BagSource;
 #[cfg(feature = "meshes")]
 pub use jointed_source::{JointOptions, JointedSource};
+#[cfg(feature = "mcap")]
+pub use joints_delay::{DelayEstimate, Transport};
 #[cfg(feature = "meshes")]
 pub use kinematics::Kinematics;
 #[cfg(feature = "ros2")]

@@ -1,12 +1,12 @@
 //! Live frames from a topic of ROS 2: a cloud of points, or numbers in the order of the body's taxels.
 
-use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use super::messages::{Float32MultiArray, Message, PointCloud2, PointField};
+use super::messages::{Float32MultiArray, Message, PointCloud2};
+use super::places::{Places, not_read};
 use crate::body::Body;
 use crate::dds::{Delivery, Node, Reader};
-use crate::error::{Error, Result, failed};
+use crate::error::{Result, failed};
 use crate::signal::{Frame, RawValue};
 use crate::source::Source;
 
@@ -16,9 +16,6 @@ const FOUND_WITHIN: Duration = Duration::from_secs(10);
 const WAIT: Duration = Duration::from_secs(1);
 /// Messages that are kept until they are read: a quarter of a second at 250 Hz.
 const DEPTH: usize = 64;
-/// Fields of a point that are its raw value, the first that is there; and those that are its taxel's id.
-const VALUE_FIELDS: [&str; 4] = ["value", "raw", "pressure", "intensity"];
-const ID_FIELDS: [&str; 2] = ["taxel", "id"];
 /// The node's name.
 const NODE: &str = "somatic_source";
 
@@ -85,22 +82,22 @@ fn found(node: &Node, topic: &str) -> Result<String> {
     }
 }
 
-fn not_read(kind: &str) -> Error {
-    failed!("its messages are {kind}; frames are read from {} and {}", PointCloud2::TYPE, Float32MultiArray::TYPE)
-}
-
 impl Source for Ros2Source {
     fn taxels(&self) -> &[u32] {
-        &self.places.ids
+        self.places.ids()
     }
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             frame.clear();
-            frame.values.resize(self.places.ids.len(), RawValue::MISSING);
+            frame.values.resize(self.places.ids().len(), RawValue::MISSING);
             let read = match &mut self.topic {
                 Topic::Clouds(reader) => reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, frame)),
-                Topic::Arrays(reader) => reader.next(WAIT)?.map(|array| self.places.array(&array, frame)),
+                Topic::Arrays(reader) => reader.next(WAIT)?.map(|array| {
+                    // It has no stamp: its time is when it came.
+                    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                    self.places.array(&array, now.as_secs_f64(), frame)
+                }),
             };
             if let Some(read) = read {
                 self.read_at = Some(Instant::now());
@@ -111,281 +108,5 @@ impl Source for Ros2Source {
 
     fn read_at(&mut self) -> Option<Instant> {
         self.read_at.take()
-    }
-}
-
-/// Where values go.
-struct Places {
-    ids: Vec<u32>,
-    index_of: HashMap<u32, usize>,
-    /// By link, its taxels in the body's order.
-    of_link: BTreeMap<String, Vec<usize>>,
-    all: Vec<usize>,
-}
-
-impl Places {
-    fn new(body: &Body) -> Self {
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let mut of_link: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (index, taxel) in body.taxels.iter().enumerate() {
-            of_link.entry(body.links[taxel.link].name.clone()).or_default().push(index);
-        }
-        let index_of = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
-        Self { all: (0..ids.len()).collect(), ids, index_of, of_link }
-    }
-
-    /// Puts the values of a cloud into `frame`.
-    fn cloud(&self, cloud: &PointCloud2, frame: &mut Frame) -> Result<()> {
-        frame.t_s = f64::from(cloud.header.stamp.sec) + f64::from(cloud.header.stamp.nanosec) * 1e-9;
-        let points = cloud.width as usize * cloud.height as usize;
-        let named =
-            |names: &[&str]| names.iter().find_map(|name| cloud.fields.iter().find(|field| field.name == *name));
-        let Some(value) = named(&VALUE_FIELDS) else {
-            let fields: Vec<&str> = cloud.fields.iter().map(|field| field.name.as_str()).collect();
-            return Err(failed!("its points have {}; name the raw value `value`", fields.join(", ")));
-        };
-        let value = Column::new(cloud, value)?;
-        if let Some(id) = named(&ID_FIELDS) {
-            let id = Column::new(cloud, id)?;
-            let mut unknown = Vec::new();
-            for point in 0..points {
-                let own = id.at(point);
-                match self.index_of.get(&(own as u32)).filter(|_| own == f64::from(own as u32)) {
-                    Some(&index) => frame.values[index] = RawValue::new(value.at(point)),
-                    None => unknown.push(own),
-                }
-            }
-            return match unknown.first() {
-                None => Ok(()),
-                Some(first) => Err(failed!(
-                    "{} of {points} points are of taxels that the body does not have, the first of {first}; give the body that \
-                     has them",
-                    unknown.len()
-                )),
-            };
-        }
-        let link = cloud.header.frame_id.trim_start_matches('/');
-        let own = self.of_link.get(link);
-        let taxels = [own, Some(&self.all)].into_iter().flatten().find(|taxels| taxels.len() == points);
-        let Some(taxels) = taxels else {
-            let of_link = own.map_or_else(
-                || format!("the body has no taxels on a link `{link}`"),
-                |taxels| format!("link `{link}` has {} taxels", taxels.len()),
-            );
-            return Err(failed!(
-                "a cloud has {points} points, and {of_link} and {} in all; give each point its taxel's id as a field `taxel`",
-                self.ids.len()
-            ));
-        };
-        for (point, &index) in taxels.iter().enumerate() {
-            frame.values[index] = RawValue::new(value.at(point));
-        }
-        Ok(())
-    }
-
-    /// Puts the numbers of an array into `frame`, with the time at which it came.
-    fn array(&self, array: &Float32MultiArray, frame: &mut Frame) -> Result<()> {
-        frame.t_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
-        let values = array.data.get(array.layout.data_offset as usize..).unwrap_or_default();
-        if values.len() != self.ids.len() {
-            return Err(failed!(
-                "an array has {} numbers, and the body {} taxels; send one for each, in the body's order (somatic inspect \
-                 BODY --json lists them)",
-                values.len(),
-                self.ids.len()
-            ));
-        }
-        for (to, value) in frame.values.iter_mut().zip(values) {
-            *to = RawValue::new(f64::from(*value));
-        }
-        Ok(())
-    }
-}
-
-/// A field of all points.
-struct Column<'a> {
-    data: &'a [u8],
-    offset: usize,
-    /// Points of a row, and the bytes of a row and of a point.
-    width: usize,
-    row_step: usize,
-    point_step: usize,
-    is_big: bool,
-    datatype: u8,
-}
-
-impl<'a> Column<'a> {
-    fn new(cloud: &'a PointCloud2, field: &PointField) -> Result<Self> {
-        let size = match field.datatype {
-            1 | 2 => 1,
-            3 | 4 => 2,
-            5..=7 => 4,
-            8 => 8,
-            other => return Err(failed!("field `{}` has datatype {other}; ROS has 1 to 8", field.name)),
-        };
-        let column = Self {
-            data: &cloud.data,
-            offset: field.offset as usize,
-            width: cloud.width as usize,
-            row_step: cloud.row_step as usize,
-            point_step: cloud.point_step as usize,
-            is_big: cloud.is_bigendian,
-            datatype: field.datatype,
-        };
-        let ends = |height: usize| {
-            let row = height.checked_sub(1)?.checked_mul(column.row_step)?;
-            let point = column.width.checked_sub(1)?.checked_mul(column.point_step)?;
-            row.checked_add(point)?.checked_add(column.offset)?.checked_add(size)
-        };
-        let points = column.width.checked_mul(cloud.height as usize);
-        let is_whole = points == Some(0) || ends(cloud.height as usize).is_some_and(|end| end <= cloud.data.len());
-        if is_whole && points.is_some() {
-            return Ok(column);
-        }
-        Err(failed!(
-            "a cloud of {} × {} points of {} bytes has {} bytes; field `{}` does not fit",
-            cloud.width,
-            cloud.height,
-            cloud.point_step,
-            cloud.data.len(),
-            field.name
-        ))
-    }
-
-    fn at(&self, point: usize) -> f64 {
-        let (row, column) = (point / self.width, point % self.width);
-        let bytes = &self.data[row * self.row_step + column * self.point_step + self.offset..];
-        macro_rules! number {
-            ($type:ty) => {{
-                let mut own = [0; size_of::<$type>()];
-                own.copy_from_slice(&bytes[..size_of::<$type>()]);
-                f64::from(if self.is_big { <$type>::from_be_bytes(own) } else { <$type>::from_le_bytes(own) })
-            }};
-        }
-        match self.datatype {
-            1 => number!(i8),
-            2 => number!(u8),
-            3 => number!(i16),
-            4 => number!(u16),
-            5 => number!(i32),
-            6 => number!(u32),
-            7 => number!(f32),
-            _ => number!(f64),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bundled;
-    use crate::robot::messages::{Header, Time};
-
-    fn places() -> (Places, Body) {
-        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        (Places::new(&body), body)
-    }
-
-    fn cloud(frame_id: &str, fields: &[(&str, u32, u8)], point_step: u32, data: Vec<u8>) -> PointCloud2 {
-        let field = |(name, offset, datatype): &(&str, u32, u8)| PointField {
-            name: (*name).to_owned(),
-            offset: *offset,
-            datatype: *datatype,
-            count: 1,
-        };
-        let stamp = Time { sec: 7, nanosec: 500_000_000 };
-        PointCloud2 {
-            header: Header { stamp, frame_id: frame_id.to_owned() },
-            height: 1,
-            width: data.len() as u32 / point_step,
-            fields: fields.iter().map(field).collect(),
-            point_step,
-            row_step: data.len() as u32,
-            data,
-            ..PointCloud2::default()
-        }
-    }
-
-    fn read(places: &Places, cloud: &PointCloud2) -> Result<Frame> {
-        let mut frame = Frame::missing(0.0, places.ids.len());
-        places.cloud(cloud, &mut frame).map(|()| frame)
-    }
-
-    #[test]
-    fn points_with_ids_go_to_their_taxels() {
-        let (places, _) = places();
-        let (first, last) = (places.ids[0], *places.ids.last().unwrap());
-        let mut data = Vec::new();
-        for (id, value) in [(last, 2.5_f32), (first, f32::NAN)] {
-            data.extend((id as u16).to_be_bytes());
-            data.extend(value.to_be_bytes());
-        }
-        let mut cloud = cloud("anywhere", &[("taxel", 0, 4), ("value", 2, 7)], 6, data);
-        cloud.is_bigendian = true;
-        let frame = read(&places, &cloud).unwrap();
-        assert_eq!(frame.t_s, 7.5);
-        assert_eq!(frame.values.last().unwrap().number(), Some(2.5));
-        assert_eq!(frame.values[0], RawValue::FAULTY);
-        assert!(frame.values[1..places.ids.len() - 1].iter().all(|value| value.is_missing()));
-        cloud.is_bigendian = false;
-        let why = read(&places, &cloud).unwrap_err().to_string();
-        assert!(why.contains("of 2 points"), "{why}");
-    }
-
-    #[test]
-    fn points_without_ids_are_the_links_or_all_in_order_or_refused_with_counts() {
-        let (places, body) = places();
-        let (link, taxels) = places.of_link.iter().next().unwrap();
-        let of = |count: usize| (0..count).flat_map(|at| (at as f32).to_le_bytes()).collect::<Vec<u8>>();
-        let field = [("pressure", 0, 7)];
-        let frame = read(&places, &cloud(link, &field, 4, of(taxels.len()))).unwrap();
-        for (at, &index) in taxels.iter().enumerate() {
-            assert_eq!(frame.values[index].number(), Some(at as f64));
-        }
-        let all = body.taxels.len();
-        let frame = read(&places, &cloud("map", &field, 4, of(all))).unwrap();
-        assert!(frame.values.iter().enumerate().all(|(at, value)| value.number() == Some(at as f64)));
-        let why = read(&places, &cloud(link, &field, 4, of(all + 1))).unwrap_err().to_string();
-        assert!(
-            why.contains(&format!("{} points", all + 1)) && why.contains(&format!("{} taxels", taxels.len())),
-            "{why}"
-        );
-        let why = read(&places, &cloud(link, &[("x", 0, 7), ("y", 0, 7)], 4, of(all))).unwrap_err().to_string();
-        assert!(why.contains("have x, y"), "{why}");
-    }
-
-    #[test]
-    fn sizes_that_do_not_fit_are_refused() {
-        let (places, _) = places();
-        let whole = cloud("map", &[("value", 0, 7)], 4, vec![0; 4 * places.ids.len()]);
-        assert!(read(&places, &whole).is_ok());
-        let refused = |change: &dyn Fn(&mut PointCloud2)| {
-            let mut other = whole.clone();
-            change(&mut other);
-            read(&places, &other).unwrap_err().to_string()
-        };
-        assert!(refused(&|cloud| cloud.data.truncate(9)).contains("does not fit"));
-        assert!(refused(&|cloud| cloud.fields[0].offset = u32::MAX).contains("does not fit"));
-        assert!(refused(&|cloud| cloud.point_step = u32::MAX).contains("does not fit"));
-        assert!(refused(&|cloud| (cloud.width, cloud.height) = (u32::MAX, u32::MAX)).contains("does not fit"));
-        assert!(refused(&|cloud| cloud.fields[0].datatype = 9).contains("datatype 9"));
-        assert!(refused(&|cloud| cloud.width = 0).contains("0 points"));
-    }
-
-    #[test]
-    fn arrays_are_in_the_bodys_order_and_as_long() {
-        let (places, _) = places();
-        let mut frame = Frame::missing(0.0, places.ids.len());
-        let mut array = Float32MultiArray { data: vec![1.5; places.ids.len() + 1], ..Float32MultiArray::default() };
-        let why = places.array(&array, &mut frame).unwrap_err().to_string();
-        assert!(
-            why.contains(&format!("has {} numbers, and the body {}", places.ids.len() + 1, places.ids.len())),
-            "{why}"
-        );
-        array.layout.data_offset = 1;
-        places.array(&array, &mut frame).unwrap();
-        assert!(frame.values.iter().all(|value| value.number() == Some(1.5)) && frame.t_s > 1.7e9);
-        array.layout.data_offset = u32::MAX;
-        assert!(places.array(&array, &mut frame).is_err());
     }
 }

@@ -19,6 +19,7 @@ pub struct JointStates {
     index_of: HashMap<String, usize>,
     /// By joint, times (s) and positions; times do not fall.
     tracks: Vec<Vec<(f64, f64)>>,
+    losses: Vec<String>,
 }
 
 /// A joint's position at a time.
@@ -129,6 +130,35 @@ impl JointStates {
         }
         track.push((t_s, position));
         Ok(())
+    }
+
+    /// States without joints so far, which people call `name`: for [`JointStates::add`].
+    #[cfg(feature = "mcap")]
+    pub(crate) fn named(name: String) -> Self {
+        Self { name, ..Self::default() }
+    }
+
+    /// Adds that the joint called `name` is at `position` (rad or m) at `t_s`, which may be before what is there;
+    /// [`JointStates::sort`] comes last.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn add(&mut self, name: &str, t_s: f64, position: f64) {
+        let joint = self.joint_index(name).unwrap_or_else(|| self.joint(name.to_owned()));
+        self.tracks[joint].push((t_s, position));
+    }
+
+    /// Puts the states of each joint into the order of their times, and keeps what of them was not read.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn sort(&mut self, losses: Vec<String>) {
+        for track in &mut self.tracks {
+            track.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
+        }
+        self.losses = losses;
+    }
+
+    /// What of the recording was not read, in a line each.
+    #[must_use]
+    pub fn losses(&self) -> &[String] {
+        &self.losses
     }
 
     /// What people call the recording.

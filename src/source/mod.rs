@@ -2,6 +2,7 @@
 //!
 //! A source knows the ids of the taxels it delivers; only the simulated one knows a body.
 
+mod bag_name;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 mod boards;
 mod csv;
@@ -22,6 +23,7 @@ mod spec;
 mod unknown_taxels;
 mod vendor;
 
+pub use self::bag_name::BagName;
 pub use self::csv::CsvSource;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 pub use boards::{BoardAccount, BoardState, ChannelTap, LimbPercepts, Lines, Notice, TapTrouble};

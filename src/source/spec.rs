@@ -3,16 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::bag_name::BagName;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 9] = [
+const FORMS: [(&str, &str); 10] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
+    ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC][@TYPE]"),
     ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
     ("-", "- for NDJSON on standard input"),
@@ -46,6 +48,8 @@ pub enum SourceSpec {
     Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
+    /// `ros2-mcap:PATH[:/TOPIC][@TYPE]`: a topic of a bag of ROS 2.
+    Ros2Mcap(BagName),
     /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
     /// export.
     Vendor(PathBuf),
@@ -73,7 +77,7 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `zenoh`, `mcap`, `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -114,6 +118,10 @@ impl SourceSpec {
         Ok(match kind {
             "csv" => Self::Csv(rest.into()),
             "mcap" => Self::Mcap(rest.into()),
+            "ros2-mcap" => match rest.parse() {
+                Ok(name) => Self::Ros2Mcap(name),
+                Err(e) => return bad(e.to_string()),
+            },
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
             "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
@@ -127,8 +135,7 @@ impl SourceSpec {
                     ));
                 }
                 // As ROS 1 and people write types.
-                let whole =
-                    |kind: &str| if kind.contains("/msg/") { kind.to_owned() } else { kind.replacen('/', "/msg/", 1) };
+                let whole = |kind: &str| super::bag_name::type_of(kind).unwrap_or_else(|| kind.to_owned());
                 Self::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) }
             }
             _ => match rest.rsplit_once('@') {
@@ -159,13 +166,28 @@ impl SourceSpec {
         }
     }
 
-    /// The file that is read, if it is one.
+    /// The file or folder that is read, if it is one.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
+            Self::Ros2Mcap(name) => Some(&name.path),
             Self::Serial { .. } | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => None,
         }
+    }
+
+    /// Checks that `options` say nothing that is not for this source.
+    ///
+    /// # Errors
+    /// A usage error if they do.
+    pub fn check_options(&self, options: &VendorOptions) -> Result<()> {
+        if !matches!(self, Self::Vendor(_)) {
+            options.check_unused()?;
+        }
+        if options.rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin | Self::Vendor(_)) {
+            return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
+        }
+        Ok(())
     }
 
     /// Opens the source. `taxels` are the ids that the body has; `options` say what its file does not, such as the rate of a
@@ -174,13 +196,8 @@ impl SourceSpec {
     /// # Errors
     /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
-        if !matches!(self, Self::Vendor(_)) {
-            options.check_unused()?;
-        }
+        self.check_options(options)?;
         let rate_hz = options.rate_hz;
-        if rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin | Self::Vendor(_)) {
-            return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
-        }
         match self {
             Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
             Self::CsvStdin => Ok(Box::new(CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?)),
@@ -193,6 +210,14 @@ impl SourceSpec {
             }
             Self::Vendor(path) => Ok(Box::new(VendorSource::open(path, options)?)),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
+            Self::Ros2Mcap(name) => {
+                let what = if cfg!(feature = "mcap") {
+                    "a bag of ROS 2 is read for a body: by `somatic run`, or `robot::BagSource`"
+                } else {
+                    "this build reads no MCAP; build with feature `mcap`"
+                };
+                Err(Error::failed(what).at(name.path.display()))
+            }
             Self::Ros2 { topic, .. } => {
                 let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \
                             somatic --features ros2";
@@ -231,6 +256,8 @@ mod tests {
         assert_eq!(parsed("csv:a/b.txt"), SourceSpec::Csv("a/b.txt".into()));
         assert_eq!(parsed("a/b.CSV"), SourceSpec::Csv("a/b.CSV".into()));
         assert_eq!(parsed("C:\\b.csv"), SourceSpec::Csv("C:\\b.csv".into()));
+        let bag = BagName { topic: Some("/arm/skin".into()), ..BagName::new("a/bag") };
+        assert_eq!(parsed("ros2-mcap:a/bag:/arm/skin"), SourceSpec::Ros2Mcap(bag));
         assert_eq!(parsed("-"), SourceSpec::Stdin);
         assert_eq!(parsed("csv:-"), SourceSpec::CsvStdin);
         assert_eq!(parsed("sim:touch.toml"), SourceSpec::Sim("touch.toml".into()));
@@ -252,10 +279,11 @@ mod tests {
             error.to_string()
         };
         assert!(why("csv:").contains("nothing follows"));
+        assert!(why("ros2-mcap:").contains("nothing follows"));
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
 
 mod author;
+mod bags;
 mod bench;
 #[cfg(unix)]
 mod board;

@@ -47,7 +47,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
             ],
         ),
         ("dds", vec!["error"]),
-        ("robot", vec!["error", "signal", "body", "author", "source", "dds"]),
+        ("robot", vec!["error", "signal", "body", "author", "recording", "source", "dds"]),
         ("colours", vec![]),
         ("page", vec!["error", "percept", "signal", "body", "stage", "scene", "colours"]),
         (

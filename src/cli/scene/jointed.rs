@@ -1,11 +1,11 @@
 //! Joints that move the body's links.
 
 use somatic::robot::{JointOptions, JointedSource, Kinematics};
-use somatic::source::{JointStates, Source};
+use somatic::source::{JointStates, Source, SourceSpec};
 use somatic::{Body, Error, Result};
 
 use super::RunOptions;
-use crate::cli::states_topic::topic_of;
+use crate::cli::states_topic::StatesFrom;
 use crate::cli::stdio::say;
 
 impl RunOptions {
@@ -31,25 +31,21 @@ impl RunOptions {
         if self.joint_states.is_none() && self.sources != ["-"] && !self.sources.iter().any(|s| is_mcap(s)) {
             return refuse(
                 "frames of this source carry no joint states; give a recording of them: --joint-states FILE, a CSV under \
-                 t,<joint>,... or NDJSON",
+                 t,<joint>,..., NDJSON or a bag of ROS 2",
             );
         }
         if self.joint_states.is_some() && self.repeat.is_some() {
             return refuse("--loop lets the time of frames go on, and --joint-states ends; leave one of them out");
         }
-        let is_live = self.joint_states.as_deref().and_then(topic_of).is_some();
-        if self.joints_delay.is_some() && (self.joint_states.is_none() || is_live) {
-            return refuse(
-                "--joints-delay is for a recording of joint states; states in frames and of topics have the frame's own time",
-            );
-        }
-        if let Some(delay) = self.joints_delay.filter(|delay| !delay.is_finite()) {
-            return Err(Error::usage(format!("--joints-delay {delay} is not a time span; give seconds")));
-        }
+        self.check_delay(self.states_from()?.as_ref())?;
         if let Some(age) = self.joints_max_age.filter(|age| age.is_nan() || *age < 0.0) {
             return Err(Error::usage(format!("--joints-max-age {age} is not a time span; give seconds from 0")));
         }
         Ok(())
+    }
+
+    fn states_from(&self) -> Result<Option<StatesFrom<'_>>> {
+        self.joint_states.as_deref().map(StatesFrom::named).transpose()
     }
 
     /// `source`, with poses of the links of `body` where joints are asked for.
@@ -61,14 +57,20 @@ impl RunOptions {
         let (Some(urdf), Some(up)) = (&self.joints, self.up) else { return Ok(source) };
         let robot = Kinematics::load(urdf)?;
         let mut options = JointOptions::new(up);
-        let topic = self.joint_states.as_deref().and_then(topic_of);
-        let source = match topic {
-            Some(topic) => live(source, topic)?,
+        let states = self.states_from()?;
+        options.delay_s = self.delay_s(states.as_ref())?;
+        let source = match states {
             None => source,
+            Some(StatesFrom::Topic(topic)) => live(source, topic)?,
+            Some(StatesFrom::Bag(bag)) => {
+                options.states = Some(JointStates::open_bag(&bag)?);
+                source
+            }
+            Some(StatesFrom::File(file)) => {
+                options.states = Some(JointStates::open(file)?);
+                source
+            }
         };
-        let recorded = self.joint_states.as_ref().filter(|_| topic.is_none());
-        options.states = recorded.map(JointStates::open).transpose()?;
-        options.delay_s = self.joints_delay.unwrap_or(options.delay_s);
         options.max_age_s = self.joints_max_age.unwrap_or(options.max_age_s);
         let jointed = JointedSource::new(source, robot, body, options).map_err(|e| e.at(urdf.display()))?;
         if !self.quiet {
@@ -91,5 +93,5 @@ fn live(_: Box<dyn Source + Send>, topic: &str) -> Result<Box<dyn Source + Send>
 }
 
 fn is_mcap(source: &str) -> bool {
-    source.starts_with("mcap:") || source.to_ascii_lowercase().ends_with(".mcap")
+    matches!(source.parse(), Ok(SourceSpec::Mcap(_)))
 }

@@ -32,6 +32,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
         Ok(Subject::Recording(Box::new(asked)))
     };
     match ending.as_deref() {
+        _ if what.starts_with("ros2-mcap:") => as_source(""),
         Some("mcap") => as_source("mcap"),
         Some("csv") => as_source("csv"),
         Some("asf" | "lst" | "asc" | "txt" | "tsv") => as_source(""),

@@ -38,7 +38,7 @@ pub struct CdrReader<'a> {
 
 impl<'a> CdrReader<'a> {
     /// `None` where `bytes` do not begin with the header of plain little-endian CDR.
-    pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
+    pub(in crate::robot) fn new(bytes: &'a [u8]) -> Option<Self> {
         let (header, bytes) = bytes.split_at_checked(HEADER.len())?;
         // The last two bytes are options, which writers may use for padding at the end.
         (header[..2] == HEADER[..2]).then_some(Self { bytes, at: 0 })

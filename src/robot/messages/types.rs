@@ -124,6 +124,18 @@ topics! {
 }
 
 impl Time {
+    /// The time after ROS's zero, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.nanoseconds() as f64 / 1e9
+    }
+
+    /// The time after ROS's zero, ns.
+    #[must_use]
+    pub fn nanoseconds(&self) -> i64 {
+        i64::from(self.sec) * 1_000_000_000 + i64::from(self.nanosec)
+    }
+
     /// The time `ns` after ROS's zero; the last one that it has where that is later.
     #[must_use]
     pub fn from_ns(ns: u64) -> Self {

@@ -1,0 +1,285 @@
+//! One topic of a bag of ROS 2 being read: an MCAP, or several one after the other.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::bag_files::bag_files;
+use super::reader::Reader;
+use crate::error::{Error, Result, failed};
+
+/// The encoding of messages that is read.
+const CDR: &str = "cdr";
+
+/// Which topic of a bag is read.
+pub(crate) struct WantedTopic<'a> {
+    /// Its name; without one, it is the only topic of these types.
+    pub(crate) topic: Option<&'a str>,
+    /// The types that its messages may have, such as `sensor_msgs/msg/JointState`.
+    pub(crate) kinds: &'a [&'a str],
+}
+
+/// A message as it was recorded.
+pub(crate) struct BagMessage<'a> {
+    /// When it came, by the recorder's clock, ns.
+    pub(crate) log_ns: u64,
+    /// The message, in CDR.
+    pub(crate) data: &'a [u8],
+}
+
+/// Reads the messages of a topic, in the order of the files.
+pub(crate) struct BagReader {
+    files: Vec<PathBuf>,
+    /// Their lengths, bytes.
+    lengths: Vec<u64>,
+    /// How many files have been opened.
+    opened: usize,
+    reader: Option<Reader>,
+    topic: String,
+    kind: String,
+    losses: Vec<String>,
+}
+
+/// By name, the types of a bag's topics, and the encodings of their messages.
+type Topics = BTreeMap<String, BTreeSet<(String, String)>>;
+
+impl BagReader {
+    /// Opens the bag at `path`, an MCAP file or a folder of such.
+    ///
+    /// # Errors
+    /// It cannot be read, is no bag in MCAP, or has no such topic, or several; its messages are not in CDR.
+    pub(crate) fn open(path: &Path, wanted: &WantedTopic<'_>) -> Result<Self> {
+        let files = bag_files(path)?;
+        let (topic, kind) = choose(&topics_of(&files)?, wanted, path).map_err(|e| e.at(path.display()))?;
+        let length = |file: &PathBuf| std::fs::metadata(file).map_or(0, |there| there.len());
+        let mut reader = Self {
+            lengths: files.iter().map(length).collect(),
+            files,
+            opened: 0,
+            reader: None,
+            topic,
+            kind,
+            losses: Vec::new(),
+        };
+        reader.open_next()?;
+        Ok(reader)
+    }
+
+    /// Goes on with the next file, if there is one.
+    fn open_next(&mut self) -> Result<()> {
+        if let Some(reader) = self.reader.take() {
+            self.losses.append(&mut reader.losses());
+        }
+        if let Some(file) = self.files.get(self.opened) {
+            self.opened += 1;
+            self.reader = Some(Reader::open_any(file)?);
+        }
+        Ok(())
+    }
+
+    /// The topic's name.
+    pub(crate) fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The type of its messages.
+    pub(crate) fn kind(&self) -> &str {
+        &self.kind
+    }
+
+    /// The bag's files, in their order.
+    pub(crate) fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// The next message. `None` at the end.
+    ///
+    /// # Errors
+    /// A file cannot be read.
+    pub(crate) fn next(&mut self) -> Result<Option<BagMessage<'_>>> {
+        let message = loop {
+            let Some(reader) = &mut self.reader else { return Ok(None) };
+            let Some(message) = reader.next_message()? else {
+                self.open_next()?;
+                continue;
+            };
+            match reader.channels.get(&message.channel) {
+                Some(channel) if channel.topic == self.topic => break message,
+                Some(_) => {}
+                None => {
+                    let bytes = reader.data(&message).len() as u64;
+                    reader.damaged(bytes);
+                }
+            }
+        };
+        Ok(self.reader.as_ref().map(|reader| BagMessage { log_ns: message.log_time, data: reader.data(&message) }))
+    }
+
+    /// Notes that the last message was whole, and of the time `t_s`.
+    pub(crate) fn saw(&mut self, t_s: f64) {
+        if let Some(reader) = &mut self.reader {
+            reader.saw(t_s);
+        }
+    }
+
+    /// Notes that the last message, of `bytes`, was not to be read.
+    pub(crate) fn damaged(&mut self, bytes: usize) {
+        if let Some(reader) = &mut self.reader {
+            reader.damaged(bytes as u64);
+        }
+    }
+
+    /// How much of the bag has been read, in 0..=1.
+    pub(crate) fn progress(&self) -> f64 {
+        let own = self.reader.as_ref().zip(self.opened.checked_sub(1).and_then(|own| self.lengths.get(own)));
+        let own = own.map_or(0.0, |(reader, length)| reader.progress() * *length as f64);
+        let done = self.lengths.iter().take(self.opened - usize::from(self.reader.is_some())).sum::<u64>() as f64;
+        ((done + own) / self.lengths.iter().sum::<u64>().max(1) as f64).min(1.0)
+    }
+
+    /// What of the bag was not read, in a line each; complete once the last message is.
+    pub(crate) fn losses(&self) -> &[String] {
+        &self.losses
+    }
+}
+
+/// The topics of all `files`.
+fn topics_of(files: &[PathBuf]) -> Result<Topics> {
+    let mut topics = Topics::new();
+    for file in files {
+        let mut reader = Reader::open_any(file)?;
+        if !reader.has_summary {
+            // Channels are told where their first messages are.
+            while reader.next_message()?.is_some() {}
+        }
+        if reader.channels.is_empty() && !reader.has_end() {
+            return Err(Error::failed("it is cut off before its first whole chunk; nothing of it can be read")
+                .at(file.display()));
+        }
+        for channel in reader.channels.values() {
+            let kind = reader.schemas.get(&channel.schema).cloned().unwrap_or_default();
+            topics.entry(channel.topic.clone()).or_default().insert((whole(&kind), channel.encoding.clone()));
+        }
+    }
+    Ok(topics)
+}
+
+/// A type as ROS 2 spells it; ROS 1 has no `msg` in it.
+fn whole(kind: &str) -> String {
+    match kind.split('/').count() {
+        2 => kind.replacen('/', "/msg/", 1),
+        _ => kind.to_owned(),
+    }
+}
+
+/// The topic that is `wanted` of the bag at `path`, and its type.
+fn choose(topics: &Topics, wanted: &WantedTopic<'_>, path: &Path) -> Result<(String, String)> {
+    let kinds = wanted.kinds.join(" or ");
+    let is_read = |kind: &str| wanted.kinds.contains(&kind);
+    let listed = || match topics.is_empty() {
+        true => "it has no topic at all".to_owned(),
+        false => {
+            let kind = |all: &BTreeSet<(String, String)>| all.first().map_or("", |(kind, _)| kind.as_str()).to_owned();
+            let words: Vec<String> = topics.iter().map(|(name, all)| format!("{name} ({})", kind(all))).collect();
+            format!("it has {}", words.join(", "))
+        }
+    };
+    let name = match wanted.topic {
+        Some(name) if !topics.contains_key(name) => {
+            let near = crate::error::nearest(name, topics.keys().map(String::as_str));
+            let hint = near.map_or(String::new(), |near| format!("; did you mean {near}?"));
+            return Err(failed!("there is no topic {name}: {}{hint}", listed()));
+        }
+        Some(name) => name.to_owned(),
+        None => {
+            let fit = topics.iter().filter(|(_, all)| all.iter().any(|(kind, _)| is_read(kind)));
+            let names: Vec<&String> = fit.map(|(name, _)| name).collect();
+            match &names[..] {
+                [name] => (*name).clone(),
+                [] => {
+                    let other = topics.values().flatten().find(|(_, encoding)| encoding != CDR);
+                    let why = other.map_or(String::new(), |(_, encoding)| format!("; {}", not_cdr(encoding)));
+                    return Err(failed!("there is no topic of {kinds}: {}{why}", listed()));
+                }
+                [first, ..] => {
+                    let names: Vec<&str> = names.iter().map(|name| name.as_str()).collect();
+                    return Err(failed!(
+                        "there are several topics of {kinds}: {}; name one: ros2-mcap:{}:{first}",
+                        names.join(", "),
+                        path.display()
+                    ));
+                }
+            }
+        }
+    };
+    let all: Vec<&(String, String)> = topics.get(&name).into_iter().flatten().collect();
+    let place = |e: Error| e.at(&name);
+    match &all[..] {
+        [(_, encoding)] if encoding != CDR => Err(place(Error::failed(not_cdr(encoding)))),
+        [(kind, _)] if !is_read(kind) => Err(place(failed!("its messages are {kind}; {kinds} is read"))),
+        [(kind, _)] => Ok((name, kind.clone())),
+        _ => {
+            let kinds: Vec<String> = all.iter().map(|(kind, encoding)| format!("{kind} in {encoding}")).collect();
+            Err(place(failed!(
+                "it has messages of several types, {}; record them anew, on a topic each",
+                kinds.join(", ")
+            )))
+        }
+    }
+}
+
+fn not_cdr(encoding: &str) -> String {
+    let encoding: String = encoding.chars().take(20).collect();
+    format!(
+        "messages are in `{encoding}`, and CDR is read here, as `ros2 bag record --storage mcap` writes it; convert or record \
+         them so"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn topics(all: &[(&str, &str, &str)]) -> Topics {
+        let mut topics = Topics::new();
+        for (name, kind, encoding) in all {
+            topics.entry((*name).to_owned()).or_default().insert((whole(kind), (*encoding).to_owned()));
+        }
+        topics
+    }
+
+    fn chosen(all: &[(&str, &str, &str)], topic: Option<&str>) -> Result<String, String> {
+        let wanted = WantedTopic { topic, kinds: &["sensor_msgs/msg/JointState"] };
+        choose(&topics(all), &wanted, Path::new("bag")).map(|(name, _)| name).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn the_only_topic_of_a_type_is_chosen_else_it_is_named() {
+        let (joint, other) = ("sensor_msgs/msg/JointState", "std_msgs/msg/String");
+        let one = [("/a", joint, "cdr"), ("/b", other, "cdr")];
+        assert_eq!(chosen(&one, None).as_deref(), Ok("/a"));
+        assert_eq!(chosen(&one, Some("/a")).as_deref(), Ok("/a"));
+        assert_eq!(
+            chosen(&one, Some("/b")).unwrap_err(),
+            "/b: its messages are std_msgs/msg/String; sensor_msgs/msg/JointState is read"
+        );
+        let why = chosen(&one, Some("/aa")).unwrap_err();
+        assert!(why.contains("there is no topic /aa: it has /a (sensor_msgs/msg/JointState), /b (std_msgs"), "{why}");
+        let two = [("/a", joint, "cdr"), ("/b", joint, "cdr")];
+        assert!(chosen(&two, None).unwrap_err().ends_with("/a, /b; name one: ros2-mcap:bag:/a"));
+        assert_eq!(chosen(&two, Some("/b")).as_deref(), Ok("/b"));
+        assert!(chosen(&[], None).unwrap_err().contains("it has no topic at all"));
+        assert!(chosen(&[("/a", joint, "cdr"), ("/a", other, "cdr")], None).unwrap_err().contains("several types"));
+    }
+
+    #[test]
+    fn other_encodings_are_refused_with_what_to_do() {
+        for (kind, encoding) in [("sensor_msgs/JointState", "ros1"), ("sensor_msgs/msg/JointState", "json")] {
+            for topic in [None, Some("/a")] {
+                let why = chosen(&[("/a", kind, encoding)], topic).unwrap_err();
+                assert!(why.starts_with(&format!("/a: messages are in `{encoding}`, and CDR is read here")), "{why}");
+            }
+        }
+        let why = chosen(&[("/a", "foxglove.JointStates", "protobuf")], None).unwrap_err();
+        assert!(why.contains("`protobuf`") && why.contains("convert or record them so"), "{why}");
+    }
+}

@@ -1,0 +1,64 @@
+//! Joint states from a bag of ROS 2.
+
+use super::messages::{JointState, Message as _};
+use super::told_positions::told_positions;
+use crate::error::{Error, Result, failed};
+use crate::recording::{BagReader, WantedTopic};
+use crate::source::{BagName, JointStates};
+
+/// What is read of a bag, where joint states are.
+pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
+    if let Some(kind) = bag.kind.as_deref().filter(|kind| *kind != JointState::TYPE) {
+        return Err(
+            failed!("joint states are {}, not {kind}; leave @{kind} out", JointState::TYPE).at(bag.path.display())
+        );
+    }
+    BagReader::open(&bag.path, &WantedTopic { topic: bag.topic.as_deref(), kinds: &[JointState::TYPE] })
+}
+
+impl JointStates {
+    /// Reads `sensor_msgs/msg/JointState` from a bag in MCAP: from the topic that is named, or the only one of that type.
+    ///
+    /// The time of a state is its stamp; that of one whose stamp is 0 is when it came, by the recorder's clock. Several
+    /// publishers may each tell of some joints. A position that is no finite number tells nothing, and is among
+    /// [`JointStates::losses`], as is what is damaged or cut off.
+    ///
+    /// # Errors
+    /// The bag cannot be read, or has no such topic, or several; no state has positions, or one has not as many as names.
+    pub fn open_bag(bag: &BagName) -> Result<Self> {
+        let mut reader = states_of(bag)?;
+        let name = format!("{}: {}", bag.path.display(), reader.topic());
+        let mut states = Self::named(name.clone());
+        let mut odd: Option<(u64, String)> = None;
+        while let Some(message) = reader.next()? {
+            let bytes = message.data.len();
+            let log_s = message.log_ns as f64 / 1e9;
+            let Some(state) = JointState::from_cdr(message.data) else {
+                reader.damaged(bytes);
+                continue;
+            };
+            let stamp = &state.header.stamp;
+            let t_s = if stamp.nanoseconds() == 0 { log_s } else { stamp.seconds() };
+            reader.saw(t_s);
+            for (joint, position) in told_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
+                if position.is_finite() {
+                    states.add(joint, t_s, position);
+                } else {
+                    let first = || (0, format!("the first of joint `{joint}` at {t_s} s: {position}"));
+                    odd.get_or_insert_with(first).0 += 1;
+                }
+            }
+        }
+        let mut losses = reader.losses().to_vec();
+        losses.extend(
+            odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")),
+        );
+        states.sort(losses);
+        if states.joint_names().is_empty() {
+            return Err(
+                Error::failed("no state in it has positions; name the topic that has: ros2-mcap:PATH:/TOPIC").at(name)
+            );
+        }
+        Ok(states)
+    }
+}
