@@ -17,8 +17,13 @@ const REPORT_DRIFT_S: f64 = 30.0;
 /// A larger offset means that the board's clock was set; it is then estimated anew, s.
 const JUMP_S: f64 = 2.0;
 /// A network may hold frames up for longer, s.
-#[cfg(feature = "zenoh")]
+#[cfg(any(test, feature = "zenoh"))]
 const NETWORK_LATE_S: f64 = 60.0;
+/// No board's clock is further off than this, nor a computer's than that: where most of what is remembered came late, its
+/// arrivals would feign a clock that runs at half the speed.
+const MAX_BOARD_DRIFT: f64 = 0.05;
+#[cfg(any(test, feature = "zenoh"))]
+const MAX_COMPUTER_DRIFT: f64 = 1e-3;
 
 #[derive(Clone, Debug)]
 pub(in crate::source) struct Clock {
@@ -32,25 +37,35 @@ pub(in crate::source) struct Clock {
     last: Option<(f64, f64)>,
     /// A frame that arrives later than this is of a clock that was set back, s.
     latest_s: f64,
+    /// The largest of `slope`, either way.
+    max_drift: f64,
 }
 
 impl Default for Clock {
     fn default() -> Self {
         let buckets = VecDeque::new();
-        Self { first_us: None, buckets, offset_s: 0.0, slope: 0.0, last: None, latest_s: JUMP_S }
+        Self {
+            first_us: None,
+            buckets,
+            offset_s: 0.0,
+            slope: 0.0,
+            last: None,
+            latest_s: JUMP_S,
+            max_drift: MAX_BOARD_DRIFT,
+        }
     }
 }
 
 impl Clock {
     /// Of a limb, whose network may hold frames up.
-    #[cfg(feature = "zenoh")]
+    #[cfg(any(test, feature = "zenoh"))]
     pub(in crate::source) fn of_limb() -> Self {
-        Self { latest_s: NETWORK_LATE_S, ..Self::default() }
+        Self { latest_s: NETWORK_LATE_S, max_drift: MAX_COMPUTER_DRIFT, ..Self::default() }
     }
 
     /// Begins anew.
     pub(in crate::source) fn restart(&mut self) {
-        *self = Self { latest_s: self.latest_s, ..Self::default() };
+        *self = Self { latest_s: self.latest_s, max_drift: self.max_drift, ..Self::default() };
     }
 
     /// The host time, s, of a frame read at board time `board_us` that arrived at `arrived_s`. Never before earlier frames,
@@ -125,6 +140,10 @@ impl Clock {
         let ((x0, y0), (x1, y1)) = (hull[right - 1], hull[right]);
         self.slope = (y1 - y0) / (x1 - x0);
         self.offset_s = y0 - self.slope * x0;
+        if self.slope.abs() > self.max_drift {
+            self.slope = self.max_drift.copysign(self.slope);
+            self.offset_s = self.buckets.iter().map(|&(x, y)| y - self.slope * x).fold(f64::INFINITY, f64::min);
+        }
     }
 }
 
@@ -176,6 +195,26 @@ mod tests {
         assert_eq!(clock.host_time_s(90_000_000, 3.02), 3.02, "ahead");
         assert_eq!(clock.host_time_s(5, 3.04), 3.04, "back");
         assert!((clock.host_time_s(20_005, 3.07) - 3.06).abs() < 1e-9, "late, and known to be");
+    }
+
+    #[test]
+    fn frames_that_a_network_held_back_keep_the_times_at_which_they_were_read() {
+        // A second as it should be; then the network holds back two seconds of frames, and brings them all at once.
+        let worst_of = |max_drift: f64| {
+            let mut clock = Clock { max_drift, ..Clock::of_limb() };
+            let mut worst = 0.0_f64;
+            for frame in 0..200_u32 {
+                let read_s = 0.02 * f64::from(frame);
+                let arrived_s = if (60..160).contains(&frame) { 3.22 } else { read_s + 0.02 };
+                let host_s = clock.host_time_s((read_s * 1e6).round() as u64, arrived_s);
+                worst = worst.max((host_s - read_s - 0.02).abs());
+            }
+            worst
+        };
+        // A thousandth of the four seconds.
+        assert!(worst_of(MAX_COMPUTER_DRIFT) <= 0.004, "{}", worst_of(MAX_COMPUTER_DRIFT));
+        // With any drift they would be dated as new.
+        assert!(worst_of(f64::INFINITY) > 0.5, "{}", worst_of(f64::INFINITY));
     }
 
     #[test]
