@@ -57,19 +57,13 @@ const SEGMENT = 2u;
 const BLOB = 3u;
 const KINDS = 4u;
 
-// As src/stage/footprint has them, rounded.
-const LN_USUAL_WIDTH = 0.18232156;
-const PER_WIDTH_VARIES = 1.0 / 0.3;
-const LONGEST = 1.5;
-const WIDEST = 4.0;
-const DAMPING = 0.01;
-const DAMPING_CHANGES = 10.0;
-const LEAST = 1e-12;
+// Its numbers come from src/stage/footprint, and are put before this text (src/backend/gpu/shaders.rs). Only single precision has its own
+// of these.
 const LEAST_FORCE = 1e-30;
 
 // e to the power of x, within ±87.
 fn exponential(x: f32) -> f32 {
-    let whole = round(x * 1.442695);
+    let whole = round(x * LOG2_E);
     // ln 2 in two parts, of which the first times a whole number is exact.
     let rest = (x - whole * 0.693359375) + whole * 2.1219444e-4;
     var sum = 1.0 / 5040.0;
@@ -86,23 +80,23 @@ fn exponential(x: f32) -> f32 {
 // Φ and φ of z, by Hart's quotient of polynomials. Beyond 12 nothing is left.
 fn normal(z: f32) -> vec2<f32> {
     let size = min(abs(z), 12.0);
-    let density = exponential(-0.5 * size * size) * 0.3989423;
-    var above = 3.5262496e-2;
-    above = above * size + 0.70038306;
-    above = above * size + 6.3739622;
-    above = above * size + 33.912866;
-    above = above * size + 112.07929;
-    above = above * size + 221.2136;
-    above = above * size + 220.20687;
-    var below = 8.8388348e-2;
-    below = below * size + 1.7556672;
-    below = below * size + 16.064178;
-    below = below * size + 86.780732;
-    below = below * size + 296.56425;
-    below = below * size + 637.33363;
-    below = below * size + 793.82651;
-    below = below * size + 440.41373;
-    let tail = density * above / below * 2.5066283;
+    let density = exponential(-0.5 * size * size) * PER_SQRT_TAU;
+    var above = ABOVE_0;
+    above = above * size + ABOVE_1;
+    above = above * size + ABOVE_2;
+    above = above * size + ABOVE_3;
+    above = above * size + ABOVE_4;
+    above = above * size + ABOVE_5;
+    above = above * size + ABOVE_6;
+    var below = BELOW_0;
+    below = below * size + BELOW_1;
+    below = below * size + BELOW_2;
+    below = below * size + BELOW_3;
+    below = below * size + BELOW_4;
+    below = below * size + BELOW_5;
+    below = below * size + BELOW_6;
+    below = below * size + BELOW_7;
+    let tail = density * above / below * SQRT_TAU;
     return vec2<f32>(select(1.0 - tail, tail, z < 0.0), density);
 }
 
@@ -349,7 +343,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         ends[end + LINE] = line;
         if start.is_long == 1u {
             // As much force as the line has on the segment's length.
-            line.force += start.half_length + 0.6931472;
+            line.force += start.half_length + LN_2;
             line.length = start.half_length;
             ends[end + SEGMENT] = descend(SEGMENT, touch, line, start.steps);
         }

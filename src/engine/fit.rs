@@ -8,7 +8,7 @@ use crate::backend::{Backend, RawBatch};
 use crate::error::Result;
 use crate::parallel;
 use crate::percept::{Column, Flags, Footprint, Host, Outputs, Percepts, Store};
-use crate::scene::{Plan, PlanField};
+use crate::scene::Plan;
 use crate::stage::footprint::{OVER_S, Taxel, Touch, Trail};
 use crate::stage::touches::Found;
 
@@ -41,7 +41,7 @@ pub(super) struct Waiting {
     cell: usize,
     /// The frame in the raw batch.
     offset: usize,
-    /// Of each of its touches the identity, and the members with those beside them.
+    /// Of each of its touches the identity, and the members.
     touches: Vec<(u64, Vec<u32>)>,
 }
 
@@ -53,47 +53,51 @@ struct Ready {
     touch: Touch,
 }
 
+/// Room for the taxels of a touch.
+#[derive(Default)]
+struct Room {
+    near: Vec<u32>,
+    is_near: Vec<bool>,
+    taxels: Vec<Taxel>,
+}
+
 impl Waiting {
-    /// The touches `found` in field `number`, which is `field`.
-    pub(super) fn new(field: &PlanField, (number, cell, offset): (usize, usize, usize), found: &[Found]) -> Self {
-        let around = |touch: &Found| {
-            let mut members: Vec<u32> = touch.members().collect();
-            for at in 0..members.len() {
-                members.extend_from_slice(&field.beside[members[at] as usize]);
-            }
-            members.sort_unstable();
-            members.dedup();
-            (touch.id, members)
-        };
-        Self { field: number, cell, offset, touches: found.iter().map(around).collect() }
+    /// The touches `found` in field `field`.
+    pub(super) fn new((field, cell, offset): (usize, usize, usize), found: &[Found]) -> Self {
+        let touches = found.iter().map(|touch| (touch.id, touch.members().collect())).collect();
+        Self { field, cell, offset, touches }
     }
 
-    /// Its touches as the fit takes them, of those taxels that can be used; only the one with the most pressure unless `all` are
-    /// asked for.
-    fn ready(&self, plan: &Plan, raw: &RawBatch<'_>, all: bool) -> Vec<Ready> {
+    /// Its touches as the fit takes them, with the members beside them, of those taxels that can be used; only the one with the most
+    /// pressure unless `all` are asked for.
+    fn ready(&self, plan: &Plan, raw: &RawBatch<'_>, all: bool, room: &mut Room) -> Vec<Ready> {
         let field = &plan.fields[self.field];
         let Ok(layer) = &field.layer else { return Vec::new() };
-        let taxel = |&member: &u32| {
-            let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
-            plan.pressed_taxel(field, member, raw.rows.value(self.offset, plan.channel_of(slot)))
-        };
-        let taxels_of = |(index, (_, members)): (usize, &(u64, Vec<u32>))| {
-            let taxels: Vec<Taxel> = members.iter().filter_map(taxel).collect();
-            (index, taxels.iter().map(|taxel| taxel.pressure).sum(), taxels)
-        };
-        let mut touches: Vec<(usize, f64, Vec<Taxel>)> = self.touches.iter().enumerate().map(taxels_of).collect();
-        if !all {
+        let Room { near, is_near, taxels } = room;
+        let mut ready = Vec::with_capacity(if all { self.touches.len() } else { 1 });
+        for (index, (_, members)) in self.touches.iter().enumerate() {
+            near.clone_from(members);
+            is_near.clear();
+            is_near.resize(field.count, false);
+            members.iter().for_each(|&member| is_near[member as usize] = true);
+            let beside = members.iter().flat_map(|&member| &field.beside[member as usize]);
+            near.extend(beside.filter(|&&beside| !std::mem::replace(&mut is_near[beside as usize], true)));
+            near.sort_unstable();
+            taxels.clear();
+            taxels.extend(near.iter().filter_map(|&member| {
+                let (member, slot) = (member as usize, plan.members_of(field)[member as usize].slot as usize);
+                plan.pressed_taxel(field, member, raw.rows.value(self.offset, plan.channel_of(slot)))
+            }));
+            let total = taxels.iter().map(|taxel| taxel.pressure).sum();
             // The first of those that are equal.
-            let strongest = touches.into_iter().rev().max_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
-            touches = strongest.into_iter().collect();
+            if total > 0.0 && (all || ready.last().is_none_or(|strongest: &Ready| total > strongest.total)) {
+                if !all {
+                    ready.clear();
+                }
+                ready.push(Ready { index, total, touch: Touch::new(taxels, layer) });
+            }
         }
-        touches.retain(|(_, total, _)| *total > 0.0);
-        let ready = |(index, total, taxels): (usize, f64, Vec<Taxel>)| Ready {
-            index,
-            total,
-            touch: Touch::new(&taxels, layer),
-        };
-        touches.into_iter().map(ready).collect()
+        ready
     }
 }
 
@@ -117,8 +121,9 @@ pub(super) fn all(
     let mut ready: Vec<Vec<Ready>> = waiting.iter().map(|_| Vec::new()).collect();
     let cells = waiting.chunks(CELLS).zip(ready.chunks_mut(CELLS));
     parallel::for_each(parallel::threads().min(cells.len()), cells, |(waiting, ready)| {
+        let mut room = Room::default();
         for (waiting, ready) in waiting.iter().zip(ready) {
-            *ready = waiting.ready(plan, raw, every);
+            *ready = waiting.ready(plan, raw, every, &mut room);
         }
     });
     let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();

@@ -138,7 +138,7 @@ impl Post<'_> {
                 let found = self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
                 match &field.layer {
                     _ if !stages.footprint || found.is_empty() => {}
-                    Ok(_) => state.fits.waiting.push(fit::Waiting::new(field, (number, cell, offset), found)),
+                    Ok(_) => state.fits.waiting.push(fit::Waiting::new((number, cell, offset), found)),
                     Err(reason) => {
                         percepts.flags[cell] |= *reason;
                         percepts.touches_mut(cell).iter_mut().for_each(|touch| touch.flags |= *reason);

@@ -209,7 +209,7 @@ fn on_curve(knots: &[Knot], x: f64) -> (f64, f64) {
 
 /// c(x), and on the way to it x − x₀, s and their product; `of` gives a knot's (raw, P).
 fn interpolate<K>(knots: &[K], of: impl Fn(&K) -> [f64; 2], x: f64) -> (f64, [f64; 3]) {
-    let after = knots.partition_point(|knot| of(knot)[0] <= x);
+    let after = knots_up_to(knots, |knot| of(knot)[0], x);
     let Some([start, low]) = after.checked_sub(1).map(|before| of(&knots[before])) else {
         return (of(&knots[0])[1], [0.0; 3]);
     };
@@ -221,6 +221,20 @@ fn interpolate<K>(knots: &[K], of: impl Fn(&K) -> [f64; 2], x: f64) -> (f64, [f6
         return (low, [0.0; 3]);
     }
     ((low + rise).clamp(low.min(high), low.max(high)), [run, slope, rise])
+}
+
+/// How many of `knots`, of which `raw` gives a knot's place, lie up to x. Most sensors' tables have them evenly: x is looked for first where
+/// it then is.
+fn knots_up_to<K>(knots: &[K], raw: impl Fn(&K) -> f64, x: f64) -> usize {
+    let last = knots.len() - 1;
+    let (from, to) = (raw(&knots[0]), raw(&knots[last]));
+    if x >= to {
+        return knots.len();
+    }
+    // Below the first knot, and of what is no number, 0.
+    let guess = ((x - from) * (last as f64 / (to - from))) as usize;
+    let is_there = guess < last && raw(&knots[guess]) <= x && x < raw(&knots[guess + 1]);
+    if is_there { guess + 1 } else { knots.partition_point(|knot| raw(knot) <= x) }
 }
 
 /// 2⁶⁰.
@@ -313,6 +327,17 @@ mod tests {
             let of_rounded = on_curve(&knots.rounded, raw);
             let most = of_rounded.1 + (of_rounded.0 - written).abs() + U * U * written;
             assert!(right.bound >= (of_rounded.0 - written).abs() && right.bound <= most, "{raw}: {right:?}");
+        }
+    }
+
+    #[test]
+    fn a_knot_is_found_wherever_knots_lie() {
+        let even: Vec<f64> = (0..=8).map(|i| 0.1 * f64::from(i)).collect();
+        for knots in [&even[..], &[-7.0, 0.0, 0.5, 90.0], &[2.0, 2.0, 3.0, 3.0, 4.0], &[1.0, 1.0], &[5.0]] {
+            let beside = knots.iter().flat_map(|x| [x.next_down(), *x, x.next_up(), x + 0.05]);
+            for x in beside.chain([f64::NEG_INFINITY, f64::INFINITY, f64::NAN]) {
+                assert_eq!(knots_up_to(knots, |&knot| knot, x), knots.partition_point(|&knot| knot <= x), "{x}");
+            }
         }
     }
 

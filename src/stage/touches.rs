@@ -106,6 +106,12 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    fn of(skin: &Skin<'_>, members: Vec<(u32, f64)>) -> Self {
+        let total: f64 = members.iter().map(|(_, pull)| pull).sum();
+        let moment: DVec3 = members.iter().map(|&(m, pull)| pull * skin.places[m as usize]).sum();
+        Self { id: 0, total, active: members.len() as u32, place: moment / total, members }
+    }
+
     /// Its members, by index, ascending.
     pub(crate) fn members(&self) -> impl Iterator<Item = u32> {
         self.members.iter().map(|&(member, _)| member)
@@ -209,14 +215,33 @@ impl Memory {
     }
 }
 
-/// The touches of a frame, still without identities.
+/// The touches of a frame, still without identities: the connected sets of pressed members, in the order of their first ones.
 fn found(skin: &Skin<'_>, pulls: &[f64]) -> Vec<Found> {
-    let touch = |members: Vec<(u32, f64)>| {
-        let total: f64 = members.iter().map(|(_, pull)| pull).sum();
-        let moment: DVec3 = members.iter().map(|&(m, pull)| pull * skin.places[m as usize]).sum();
-        Found { id: 0, total, active: members.len() as u32, place: moment / total, members }
-    };
-    components(skin.beside, pulls).into_iter().map(touch).collect()
+    let mut left = pulls.iter().filter(|pull| **pull > 0.0).count();
+    let mut seen = vec![false; pulls.len()];
+    let mut found = Vec::new();
+    for (first, &pull) in pulls.iter().enumerate() {
+        let is_first = pull > 0.0 && !std::mem::replace(&mut seen[first], true);
+        if !is_first {
+            continue;
+        }
+        let (mut members, mut at) = (Vec::with_capacity(left), 0);
+        members.push((first as u32, pull));
+        // Those beside each go to the end.
+        while let Some(&(member, _)) = members.get(at) {
+            at += 1;
+            for &next in &skin.beside[member as usize] {
+                let pull = pulls[next as usize];
+                if pull > 0.0 && !std::mem::replace(&mut seen[next as usize], true) {
+                    members.push((next, pull));
+                }
+            }
+        }
+        left -= members.len();
+        members.sort_unstable_by_key(|&(member, _)| member);
+        found.push(Found::of(skin, members));
+    }
+    found
 }
 
 /// Σ min(a, b) over the members in both; both ascend.
@@ -238,31 +263,6 @@ fn both(a: &[(u32, f64)], b: &[(u32, f64)], what: impl Fn(u32, f64, f64) -> f64)
         }
     }
     sum
-}
-
-/// The connected sets of pressed members, each ascending, in the order of their first members.
-fn components(beside: &[Vec<u32>], pulls: &[f64]) -> Vec<Vec<(u32, f64)>> {
-    let mut seen = vec![false; pulls.len()];
-    let mut components = Vec::new();
-    let mut to_visit = Vec::new();
-    for first in 0..pulls.len() {
-        if pulls[first] <= 0.0 || std::mem::replace(&mut seen[first], true) {
-            continue;
-        }
-        let mut members = Vec::new();
-        to_visit.push(first as u32);
-        while let Some(member) = to_visit.pop() {
-            members.push((member, pulls[member as usize]));
-            for &next in &beside[member as usize] {
-                if pulls[next as usize] > 0.0 && !std::mem::replace(&mut seen[next as usize], true) {
-                    to_visit.push(next);
-                }
-            }
-        }
-        members.sort_unstable_by_key(|&(member, _)| member);
-        components.push(members);
-    }
-    components
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::footprint::{Ends, Touch};
+use crate::stage::footprint::{Ends, Touch, numbers};
 use crate::stage::{layout, motion};
 
 /// The backend, with everything it needs on the device.
@@ -202,7 +202,7 @@ impl Gpu {
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
-        let descents = wanted.footprint.then(|| Descents::new(&device));
+        let descents = wanted.footprint.then(|| Descents::new(&device, &shaders::footprint(&numbers())));
         device.check()?;
         Ok(Self {
             plan: plan.clone(),

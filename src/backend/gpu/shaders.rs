@@ -4,6 +4,8 @@
 use std::borrow::Cow;
 
 use crate::percept::COLUMNS;
+#[cfg(test)]
+use crate::stage::footprint::numbers;
 use crate::stage::layout::PRESENT;
 
 /// A program's name, the stages that it computes, and its whole WGSL.
@@ -53,12 +55,12 @@ pub(crate) const CHANGE: Shader = shader!("change"; "four_frames", "marks");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion"; "angle");
 
-/// Descents of contacts: over touches, not over frames, and so without what the others share.
-pub(crate) const FOOTPRINT: Shader = Shader {
-    name: "footprint",
-    stages: &["footprint"],
-    source: Cow::Borrowed(include_str!("../../../shaders/footprint.wgsl")),
-};
+/// Descents of contacts, with [`crate::stage::footprint::numbers`]: over touches, not over frames, and so without what the others share.
+pub(crate) fn footprint(numbers: &[(String, f64)]) -> Shader {
+    let numbers: String = numbers.iter().map(|(name, number)| format!("const {name} = {number:?};\n")).collect();
+    let source = numbers + include_str!("../../../shaders/footprint.wgsl");
+    Shader { name: "footprint", stages: &["footprint"], source: source.into() }
+}
 
 /// Frames that an invocation of the program over fields takes at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,6 +136,6 @@ pub(crate) fn all() -> Vec<Shader> {
             }
         }
     }
-    all.extend([HYSTERESIS, MOTION, FOOTPRINT]);
+    all.extend([HYSTERESIS, MOTION, footprint(&numbers())]);
     all
 }

@@ -7,7 +7,7 @@ use naga::{Module, TypeInner};
 
 use super::columns::NOTHING;
 use super::pack::Form;
-use super::shaders::{Abreast, CALIBRATE, CHANGE, FOOTPRINT, Members, Shader, Values, all, narrow_fields, wide_fields};
+use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, footprint, narrow_fields, wide_fields};
 use super::skips::skip;
 use super::stage::{GROUP, folded, pipeline};
 
@@ -18,6 +18,7 @@ use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Percepts, Precision};
 use crate::scene::{Plan, Scene};
 use crate::signal::{Calibration, RawValue};
+use crate::stage::footprint::numbers;
 use crate::stage::layout::PRESENT;
 use crate::stage::{calibrate, layout};
 
@@ -54,7 +55,7 @@ fn structs_lie_as_naga_lays_them() {
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
     same_layout!(&module, Still { least, rounding, per_taxel });
-    let module = parse(&FOOTPRINT);
+    let module = parse(&footprint(&numbers()));
     same_layout!(&module, FitSensor { u, v, margin, pressure, variance, pressed });
     same_layout!(
         &module,
@@ -112,7 +113,9 @@ fn bits_have_one_meaning() {
     assert_eq!(Flags::all().bits() - shared, (of_host | of_sigma | of_footprint).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
-    assert_eq!(constant(&parse(&FOOTPRINT), "GROUP"), Some(GROUP));
+    let fits = parse(&footprint(&numbers()));
+    assert_eq!(constant(&fits, "GROUP"), Some(GROUP));
+    assert_eq!(constant(&fits, "KINDS"), Some(super::footprint::KINDS as u32));
     let one = parse(&narrow_fields(Abreast::One, Values::Raw, Members::Few));
     assert_eq!(constant(&one, "FIELDS_GROUP"), Some(super::stage::FIELDS_GROUP));
     assert_eq!(constant(&module, "CHARTED"), Some(layout::CHARTED));
@@ -132,6 +135,15 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
     assert_eq!(constant(&module, "MISSING"), Some(RawValue::MISSING.to_bits()));
+}
+
+#[test]
+fn a_fit_on_the_device_has_every_number_of_the_fit_beside_it() {
+    let text = include_str!("../../../shaders/footprint.wgsl");
+    for (name, _) in numbers() {
+        let uses = text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| *word == name).count();
+        assert!(uses > 0 && !text.contains(&format!("const {name} ")), "{name}");
+    }
 }
 
 #[test]

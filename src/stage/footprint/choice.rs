@@ -174,16 +174,15 @@ impl Candidate {
         self.variances[parameter as usize]
     }
 
-    fn all(fits: &Fits<f64>) -> Vec<Self> {
-        let mut all = vec![
+    fn each(fits: &Fits<f64>) -> impl Iterator<Item = Self> {
+        let short = [
             Self::of(ContactKind::Point, Point::FREE, &fits.point),
             Self::of(ContactKind::Line, Line::FREE, &fits.line),
         ];
-        if let Some([segment, blob]) = &fits.long {
-            all.push(Self::of(ContactKind::Segment, Segment::FREE, segment));
-            all.push(Self::of(ContactKind::Blob, Blob::FREE, blob));
-        }
-        all
+        let long = fits.long.as_ref().map(|[segment, blob]| {
+            [Self::of(ContactKind::Segment, Segment::FREE, segment), Self::of(ContactKind::Blob, Blob::FREE, blob)]
+        });
+        short.into_iter().chain(long.into_iter().flatten())
     }
 }
 
@@ -219,10 +218,9 @@ impl Touch {
 
     /// The kind with the least cost of those that the taxels are enough for.
     fn best(&self, fits: Option<&Fits<f64>>) -> Option<Candidate> {
-        let mut candidates = fits.map_or(Vec::new(), Candidate::all);
-        candidates.retain(|candidate| self.pressed > candidate.parameters);
+        let candidates = Candidate::each(fits?).filter(|candidate| self.pressed > candidate.parameters);
         let penalised = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
-        candidates.into_iter().min_by(|a, b| penalised(a).total_cmp(&penalised(b)))
+        candidates.min_by(|a, b| penalised(a).total_cmp(&penalised(b)))
     }
 
     /// The footprint of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.

@@ -53,3 +53,28 @@ pub(crate) use real::Real;
 pub(crate) use shape::Shape;
 pub(crate) use touch::{Layer, Start, Taxel, Touch};
 pub(crate) use trail::{OVER_S, Trail};
+
+/// The numbers that `shaders/footprint.wgsl` has from here, by the names that it has for them.
+#[cfg(feature = "gpu")]
+pub(crate) fn numbers() -> Vec<(String, f64)> {
+    let named = [
+        ("LN_USUAL_WIDTH", libm::log(USUAL_WIDTH)),
+        ("PER_WIDTH_VARIES", 1.0 / objective::WIDTH_VARIES),
+        ("LONGEST", shape::LONGEST),
+        ("WIDEST", shape::WIDEST),
+        ("DAMPING", descent::DAMPING),
+        ("DAMPING_CHANGES", descent::DAMPING_CHANGES),
+        ("LEAST", descent::LEAST),
+        ("LN_2", std::f64::consts::LN_2),
+        ("LOG2_E", std::f64::consts::LOG2_E),
+        ("PER_SQRT_TAU", real::PER_SQRT_TAU),
+        ("SQRT_TAU", real::SQRT_TAU),
+    ];
+    let [above, below] = real::MILLS;
+    let each = |name: &'static str, numbers: Vec<f64>| {
+        numbers.into_iter().enumerate().map(move |(k, number)| (format!("{name}_{k}"), number))
+    };
+    let named = named.map(|(name, number)| (name.to_owned(), number)).into_iter();
+    let below = [&below[..], &[real::MILLS_LAST]].concat();
+    named.chain(each("ABOVE", above.to_vec())).chain(each("BELOW", below)).collect()
+}

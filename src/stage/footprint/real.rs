@@ -59,7 +59,7 @@ pub(crate) trait Real:
     #[inline(always)]
     fn normal(self) -> (Self, Self) {
         let size = self.abs().at_most(30.0);
-        let density = (size * size * -0.5).exp() * PEAK;
+        let density = (size * size * -0.5).exp() * PER_SQRT_TAU;
         let (mut above, mut below) = (self.all(MILLS[0][0]), self.all(MILLS[1][0]));
         for k in 1..MILLS[0].len() {
             (above, below) = (above * size + MILLS[0][k], below * size + MILLS[1][k]);
@@ -92,10 +92,10 @@ const EXP: [f64; 14] = [
     1.0,
 ];
 /// 1/√2π and √2π.
-pub(super) const PEAK: f64 = 0.398_942_280_401_432_7;
-const SQRT_TAU: f64 = 2.506_628_274_631_000_7;
+pub(super) const PER_SQRT_TAU: f64 = 0.398_942_280_401_432_7;
+pub(super) const SQRT_TAU: f64 = 2.506_628_274_631_000_7;
 /// Mills' ratio Φ(−z)/φ(z) as a quotient of polynomials, by Hart, as West has it.
-const MILLS: [[f64; 7]; 2] = [
+pub(super) const MILLS: [[f64; 7]; 2] = [
     [
         3.526_249_659_989_11e-2,
         0.700_383_064_443_688,
@@ -115,7 +115,7 @@ const MILLS: [[f64; 7]; 2] = [
         793.826_512_519_948,
     ],
 ];
-const MILLS_LAST: f64 = 440.413_735_824_752;
+pub(super) const MILLS_LAST: f64 = 440.413_735_824_752;
 
 impl Real for f64 {
     type Mask = bool;
@@ -171,7 +171,7 @@ mod tests {
             let (up_to, density) = z.normal();
             let right = 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
             assert!((up_to - right).abs() < bound, "Φ({z}): {:e}", up_to - right);
-            assert!((density - PEAK * libm::exp(-0.5 * z * z)).abs() < bound);
+            assert!((density - PER_SQRT_TAU * libm::exp(-0.5 * z * z)).abs() < bound);
         }
         // Far out nothing is left, whatever is beyond.
         for z in [40.0, 1e300] {

@@ -6,7 +6,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::real::{PEAK, Real};
+use super::real::{PER_SQRT_TAU, Real};
 use crate::stage::U;
 
 /// A number, and how far single precision may be off in it.
@@ -162,14 +162,14 @@ impl Real for Running {
     /// above, one more of 1.
     fn normal(self) -> (Self, Self) {
         let z = self.value;
-        let density = PEAK * libm::exp(-0.5 * z * z);
+        let density = PER_SQRT_TAU * libm::exp(-0.5 * z * z);
         let tail = 0.5 * libm::erfc(z.abs() * std::f64::consts::FRAC_1_SQRT_2);
         // φ' = −zφ is at most 0.242, and falls off from √3 on.
         let steep = |at: f64| {
-            if at.abs() < 1.0 { 0.242 } else { at.abs() * PEAK * libm::exp(-0.5 * at * at) }
+            if at.abs() < 1.0 { 0.242 } else { at.abs() * PER_SQRT_TAU * libm::exp(-0.5 * at * at) }
         };
         let nearest = (z.abs() - self.off).max(0.0);
-        let most = PEAK * libm::exp(-0.5 * nearest * nearest);
+        let most = PER_SQRT_TAU * libm::exp(-0.5 * nearest * nearest);
         let own = 12.0 + z * z;
         let density_off = steep(nearest).max(steep(z)) * self.off;
         let of_tail = Self::made(tail, most * self.off, 30.0 + own);
