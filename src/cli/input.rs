@@ -128,14 +128,16 @@ impl Input {
         self.spec == Some(SourceSpec::Stdin)
     }
 
-    /// Identifies the recording: path, length and modification time. `None` for live input.
+    /// Identifies the recording: path, topic, length and modification time. `None` for live input.
     pub(super) fn recording(&self) -> Option<String> {
         let Some(spec) = &self.spec else { return Some(self.name.clone()) };
         let path = spec.file()?;
         let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let file = std::fs::metadata(path).ok();
+        // A bag has several topics.
+        let topic = if let SourceSpec::Ros2Mcap(bag) = spec { bag.to_string() } else { String::new() };
         Some(format!(
-            "{place:?} {:?} {:?}",
+            "{place:?}{topic} {:?} {:?}",
             file.as_ref().map(std::fs::Metadata::len),
             file.as_ref().map(|f| f.modified().ok())
         ))

@@ -109,7 +109,7 @@ mod tests {
         };
         assert!(files().unwrap_err().to_string().contains("no bag in this folder"), "{:?}", files());
         for name in ["b_10.mcap", "b_9.mcap", "a.mcap", "other.txt"] {
-            std::fs::write(folder.path().join(name), "").unwrap();
+            fs::write(folder.path().join(name), "").unwrap();
         }
         assert_eq!(files(), Ok(inside(&["a.mcap", "b_9.mcap", "b_10.mcap"])));
         for (list, expected) in [
@@ -119,7 +119,7 @@ mod tests {
         ] {
             let text =
                 format!("bag:\n  storage_identifier: mcap\n  compression_mode: \"\"\n  relative_file_paths:{list}");
-            std::fs::write(folder.path().join(BAG_METADATA), text).unwrap();
+            fs::write(folder.path().join(BAG_METADATA), text).unwrap();
             assert_eq!(files(), Ok(expected), "{list}");
         }
     }

@@ -1,10 +1,11 @@
 //! Joints that move the body's links.
 
-use somatic::robot::{JointOptions, JointedSource, Kinematics};
+use somatic::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
 use somatic::source::{JointStates, Source, SourceSpec};
 use somatic::{Body, Error, Result};
 
 use super::RunOptions;
+use super::joints_delay::JointsDelay;
 use crate::cli::states_topic::StatesFrom;
 use crate::cli::stdio::say;
 
@@ -42,6 +43,51 @@ impl RunOptions {
             return Err(Error::usage(format!("--joints-max-age {age} is not a time span; give seconds from 0")));
         }
         Ok(())
+    }
+
+    /// Whether what is asked for can be had, where the joints come from `states`.
+    fn check_delay(&self, states: Option<&StatesFrom<'_>>) -> Result<()> {
+        let refuse = |what: &str| Err(Error::usage(what));
+        match (self.joints_delay, states) {
+            (None, _) | (Some(JointsDelay::Seconds(_)), Some(StatesFrom::File(_) | StatesFrom::Bag(_))) => Ok(()),
+            (Some(JointsDelay::Auto), Some(StatesFrom::Topic(_))) => refuse(
+                "--joints-delay auto is not for live topics, whose states have the frame's own time; leave it out",
+            ),
+            (Some(_), None | Some(StatesFrom::Topic(_))) => refuse(
+                "--joints-delay is for a recording of joint states; states in frames and of topics have the frame's own time",
+            ),
+            (Some(JointsDelay::Auto), Some(StatesFrom::File(_))) => refuse(
+                "--joints-delay auto compares stamps with arrivals, and this file of --joint-states has no arrivals; give both \
+                 from one bag, --joint-states BAG and --source ros2-mcap:BAG, or the delay in seconds",
+            ),
+            (Some(JointsDelay::Auto), Some(StatesFrom::Bag(_))) => match self.first_source()? {
+                Some(SourceSpec::Ros2Mcap(_)) => Ok(()),
+                _ => refuse(
+                    "--joints-delay auto compares stamps with arrivals, and frames of this source have no arrivals; give both \
+                     from one bag, --source ros2-mcap:BAG and --joint-states BAG, or the delay in seconds",
+                ),
+            },
+        }
+    }
+
+    /// The delay to go by, s, where the joints come from `states`; an estimate is said.
+    fn delay_s(&self, states: Option<&StatesFrom<'_>>) -> Result<f64> {
+        match self.joints_delay {
+            None => Ok(0.0),
+            Some(JointsDelay::Seconds(seconds)) => Ok(seconds),
+            Some(JointsDelay::Auto) => {
+                let (Some(StatesFrom::Bag(joints)), Some(SourceSpec::Ros2Mcap(frames))) =
+                    (states, self.first_source()?)
+                else {
+                    return Err(Error::usage("--joints-delay auto is for frames and joint states from one bag"));
+                };
+                let estimate = DelayEstimate::of_bags(&frames, joints)?;
+                if !self.quiet {
+                    say(&format!("{}: {estimate}", joints.path.display()));
+                }
+                Ok(estimate.delay_s())
+            }
+        }
     }
 
     fn states_from(&self) -> Result<Option<StatesFrom<'_>>> {
