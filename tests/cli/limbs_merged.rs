@@ -41,7 +41,9 @@ fn frames_of_four_limbs_are_merged_and_every_one_is_accounted_for() {
             number(&account["replaced"]) + number(&account["dropped"]),
             "{account}: {missing:?}"
         );
-        assert!(seen.rows.is_subset(&expected) && seen.rows.len() >= 90, "{seen:?}");
+        // A frame that came after a younger one of another limb, as one of two does, waits for the next frame of the skin. Its
+        // own successor replaces it if that is the first of the four: an eighth of 100 in all, and five times the deviation of that.
+        assert!(seen.rows.is_subset(&expected) && seen.rows.len() >= 70, "{seen:?}");
     }
     // A comparison that sees nothing would hold, too.
     let mut other = lines.iter().rev().find(|line| line["fields"].as_array().unwrap().len() == 4).unwrap().clone();

@@ -258,6 +258,23 @@ fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
 }
 
 #[test]
+fn clouds_of_a_bag_come_back_with_the_taxels_that_are_missing() {
+    let (folder, flags) = arm_run();
+    let (_touch, touch) = file("touch.csv", "t,11,12,30\n1,900,,3\n1.05,5,700,\n1.1,,,8\n");
+    let bag = folder.path().join("gaps");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    let body = flags[2].as_str();
+    let run = |source: &str, more: &[&str]| {
+        let all =
+            [&["run", "--body", body, "--backend", "reference", "--source", source, "--sink", "-"][..], more].concat();
+        frames(&done(&all)).iter().map(|frame| frame["fields"].clone()).collect::<Vec<_>>()
+    };
+    let told = run(text_of(&touch), &["--sink", &sink]);
+    assert!(told.len() == 3 && told[0].to_string().contains("incomplete"), "{told:?}");
+    assert_eq!(run(&sink, &[]), told);
+}
+
+#[test]
 fn links_in_a_bag_are_where_joints_put_them_with_z_up() {
     let (folder, flags) = arm_run();
     let bag = folder.path().join("bag");

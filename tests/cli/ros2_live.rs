@@ -222,7 +222,7 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
     }
     let clouds = of("/left/somatic/taxels/fore_arm");
     assert!(clouds.len() * 1000 >= times.len() * 999, "{} of {} clouds", clouds.len(), times.len());
-    assert!(clouds.iter().all(|cloud| cloud["header"]["frame_id"] == "fore_arm" && cloud["point_step"] == 16));
+    assert!(clouds.iter().all(|cloud| cloud["header"]["frame_id"] == "fore_arm" && cloud["point_step"] == 20));
     // The spheres are the percepts, z up.
     let mut spheres = BTreeMap::new();
     let mut deleted = 0;

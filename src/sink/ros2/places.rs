@@ -13,10 +13,11 @@ use crate::signal::Pose;
 
 /// The frame of coordinates that links are in: z up, as REP 103 has it.
 pub(super) const WORLD: &str = "world";
-/// `FLOAT32` of `sensor_msgs/PointField`.
+/// `UINT32` and `FLOAT32` of `sensor_msgs/PointField`.
+const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
-/// x, y, z and pressure.
-const POINT_BYTES: u32 = 16;
+/// x, y, z and pressure, and the taxel's id.
+const POINT_BYTES: u32 = 20;
 
 /// Turns the body's world, whose y is up, to ROS's, whose z is up.
 pub(super) fn z_up_from_y_up() -> DQuat {
@@ -79,18 +80,25 @@ impl Clouds {
         for (id, pressure) in pressures {
             if let Some((cloud, place)) = self.taxels.get(id) {
                 let numbers = [place.x, place.y, place.z, *pressure];
-                self.points[*cloud].extend(numbers.into_iter().flat_map(|number| (number as f32).to_le_bytes()));
+                let points = &mut self.points[*cloud];
+                points.extend(numbers.into_iter().flat_map(|number| (number as f32).to_le_bytes()));
+                points.extend(id.to_le_bytes());
             }
         }
         self.links.iter().zip(&mut self.points).map(move |(link, points)| {
             let data = std::mem::take(points);
-            let field =
-                |(name, offset): (&str, u32)| PointField { name: name.to_owned(), offset, datatype: FLOAT32, count: 1 };
+            let field = |(name, offset, datatype): (&str, u32, u8)| PointField {
+                name: name.to_owned(),
+                offset,
+                datatype,
+                count: 1,
+            };
+            let of_point = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), ("pressure", 12, FLOAT32)];
             PointCloud2 {
                 header: header(time_ns, link),
                 height: 1,
                 width: data.len() as u32 / POINT_BYTES,
-                fields: [("x", 0), ("y", 4), ("z", 8), ("pressure", 12)].map(field).to_vec(),
+                fields: of_point.into_iter().chain([("taxel", 16, UINT32)]).map(field).collect(),
                 is_bigendian: false,
                 point_step: POINT_BYTES,
                 row_step: data.len() as u32,
