@@ -229,20 +229,35 @@ fn every_command_about_live_topics_of_ros_2_runs() {
         skip("ROS2_FEATURE", "this build has no feature `ros2`, which the commands of docs/ros2.md need");
         return;
     }
+    // A domain in which nobody else is.
+    let domain = format!("ROS_DOMAIN_ID={} ", std::process::id() % 101 + 1);
+    assert!(run_all("```sh ros2", &domain) >= 3);
+}
+
+#[test]
+fn every_command_about_limbs_runs() {
+    if cfg!(not(feature = "zenoh")) {
+        skip("ZENOH_FEATURE", "this build has no feature `zenoh`, which the commands of docs/many-machines.md need");
+        return;
+    }
+    assert!(run_all("```sh zenoh", "") >= 1);
+}
+
+/// Runs all commands of blocks that begin with `begin`, each after `before`. Gives their number.
+fn run_all(begin: &str, before: &str) -> usize {
     let folder = workplace();
     let mut run = 0;
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
-        for command in commands_of(&text, "```sh ros2") {
-            // A domain in which nobody else is.
-            let command = format!("ROS_DOMAIN_ID={} {command}", std::process::id() % 101 + 1);
+        for command in commands_of(&text, begin) {
+            let command = format!("{before}{command}");
             let output = shell(&command, folder.path());
             let said = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "{}: `{command}` ended with {}\n{said}", page.display(), output.status);
             run += 1;
         }
     }
-    assert!(run >= 3, "only {run} commands were found");
+    run
 }
 
 #[test]

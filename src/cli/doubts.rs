@@ -95,10 +95,12 @@ impl Doubts {
         let lacking: Vec<usize> = (0..fields).filter(lacks).collect();
         let &first = lacking.first()?;
         let (here, all) = self.among(plan, first, &there);
+        let are_several = [" boards", " limbs"].iter().any(|several| self.source.ends_with(several));
         Some(format!(
-            "{} has {} of the {} taxels of {}; {} of {} lack over half of theirs, such as {} ({here} of {all}); is it the \
+            "{} {} {} of the {} taxels of {}; {} of {} lack over half of theirs, such as {} ({here} of {all}); is it the \
              right body?",
             self.source,
+            if are_several { "have" } else { "has" },
             there.iter().filter(|there| **there).count(),
             self.taxels,
             self.body,
