@@ -153,6 +153,8 @@ mod tests {
         percept.total_sigma = percept.total;
         percept.centroid_sigma = percept.centroid;
         percept.axis_sigma = percept.axis;
+        // And their frames have no poses.
+        percept.speed_in_world = percept.speed;
         assert_eq!(outputs.columns().count(), outputs.iter().count());
         // Nor are they contacts, or have a unit.
         for column in (outputs - Outputs::FOOTPRINT - Outputs::FORCE).columns() {
