@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::bounds::CellBound;
 use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Percepts, Touch};
+use crate::stage::POSE_ROUNDING;
 use crate::stage::angle::{between_directions, between_lines};
 use crate::stage::limit::Limit;
 
@@ -226,7 +227,7 @@ fn apart_in_space(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 /// By how much the rounding of f64 in poses and far origins adds to a bound on places, on both sides.
 fn far(limit: Limit, place: Option<[f64; 3]>) -> Limit {
-    limit.map(|bound| bound + place.map_or(0.0, |place| 4e-15 * DVec3::from_array(place).length()))
+    limit.map(|bound| bound + place.map_or(0.0, |place| POSE_ROUNDING * DVec3::from_array(place).length()))
 }
 
 impl Cell<'_> {

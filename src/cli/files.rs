@@ -7,7 +7,7 @@ use somatic::output::OutputPaths;
 use somatic::source::{BagName, SimulatedSource, SourceSpec};
 
 use super::scene::RunOptions;
-use super::states_topic::StatesFrom;
+use super::states_from::StatesFrom;
 
 /// Files that a command reads, whether they are there or not.
 #[derive(Default)]

@@ -43,7 +43,7 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
-mod states_topic;
+mod states_from;
 mod stdio;
 mod table;
 mod tradeoff;

@@ -5,7 +5,7 @@ use super::places::{FRAME_TYPES, Places, not_read};
 use crate::body::Body;
 use crate::error::Result;
 use crate::recording::{BagReader, WantedTopic};
-use crate::signal::{Frame, RawValue};
+use crate::signal::Frame;
 use crate::source::{BagName, Source};
 
 /// What is read of a bag, where frames are.
@@ -52,8 +52,6 @@ impl Source for BagSource {
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
-            frame.clear();
-            frame.values.resize(self.places.ids().len(), RawValue::MISSING);
             let Some(message) = self.bag.next()? else { return Ok(false) };
             let (bytes, log_s) = (message.data.len(), message.log_ns as f64 / 1e9);
             let read = if self.is_cloud {

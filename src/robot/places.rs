@@ -43,11 +43,18 @@ impl Places {
         &self.ids
     }
 
-    /// Puts the values of a cloud into `frame`, whose values are missing, and its stamp.
+    /// Empties `frame`: every value is missing.
+    fn empty(&self, frame: &mut Frame) {
+        frame.clear();
+        frame.values.resize(self.ids.len(), RawValue::MISSING);
+    }
+
+    /// Puts the values of a cloud and its stamp into `frame`, in place of what that holds.
     ///
     /// # Errors
     /// Its points are no taxels of the body, or do not fit its bytes.
     pub(super) fn cloud(&self, cloud: &PointCloud2, frame: &mut Frame) -> Result<()> {
+        self.empty(frame);
         frame.t_s = cloud.header.stamp.seconds();
         let points = cloud.width as usize * cloud.height as usize;
         let named =
@@ -95,11 +102,12 @@ impl Places {
         Ok(())
     }
 
-    /// Puts the numbers of an array into `frame`, with the time `t_s` (s) at which it came.
+    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `t_s` (s) at which it came.
     ///
     /// # Errors
     /// It has not one number for each taxel.
     pub(super) fn array(&self, array: &Float32MultiArray, t_s: f64, frame: &mut Frame) -> Result<()> {
+        self.empty(frame);
         frame.t_s = t_s;
         let values = array.data.get(array.layout.data_offset as usize..).unwrap_or_default();
         if values.len() != self.ids.len() {

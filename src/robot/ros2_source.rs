@@ -7,7 +7,7 @@ use super::places::{Places, not_read};
 use crate::body::Body;
 use crate::dds::{Delivery, Node, Reader};
 use crate::error::{Result, failed};
-use crate::signal::{Frame, RawValue};
+use crate::signal::Frame;
 use crate::source::Source;
 
 /// How long a topic whose type is not named is looked for.
@@ -89,8 +89,6 @@ impl Source for Ros2Source {
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
-            frame.clear();
-            frame.values.resize(self.places.ids().len(), RawValue::MISSING);
             let read = match &mut self.topic {
                 Topic::Clouds(reader) => reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, frame)),
                 Topic::Arrays(reader) => reader.next(WAIT)?.map(|array| {

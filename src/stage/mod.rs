@@ -43,6 +43,9 @@ pub(crate) const DIVISION: f64 = 5.0 * U;
 
 /// Room for the terms of second and higher order that the bounds leave out: n·u stays under 0.1 for 10⁶ members.
 pub(crate) const SLACK: f64 = 1.1;
+/// How far a pose or a far origin puts a place wrong, as a share of its distance from the origin: some roundings of f64, on both
+/// sides of a comparison.
+pub(crate) const POSE_ROUNDING: f64 = 4e-15;
 
 /// What a stage gives for a field: an output, and its components if it has a value, a scalar first.
 pub(crate) type Given = (Outputs, Option<[f64; 2]>);

@@ -11,11 +11,8 @@
 use glam::DVec3;
 
 use super::limit::Limit;
-use super::{SLACK, U};
+use super::{POSE_ROUNDING, SLACK, U};
 use crate::percept::Flags;
-
-/// How far a pose puts a place wrong, as a share of its distance from the origin: some roundings of f64, on both sides.
-const ROUNDING: f64 = 4e-15;
 
 /// What is kept of a field from frame to frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,7 +45,7 @@ impl Memory {
             return Limit::default();
         };
         let moved = (now - before).length();
-        let rounding = ROUNDING * (now.length() + before.length()) + U * U * moved;
+        let rounding = POSE_ROUNDING * (now.length() + before.length()) + U * U * moved;
         Limit::Within(SLACK * (off[0] + off[1] + rounding) / dt_s)
     }
 }

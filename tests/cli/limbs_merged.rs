@@ -41,8 +41,9 @@ fn frames_of_four_limbs_are_merged_and_every_one_is_accounted_for() {
             number(&account["replaced"]) + number(&account["dropped"]),
             "{account}: {missing:?}"
         );
-        // A frame that came after a younger one of another limb, as one of two does, waits for the next frame of the skin. Its
-        // own successor replaces it if that is the first of the four: an eighth of 100 in all, and five times the deviation of that.
+        // A frame that comes after a younger one of another limb waits for the next frame of the skin; half of them do. It is
+        // replaced if the next frame to come is of its own limb, one of four. So an eighth of 100 are expected, with a deviation of 3.4;
+        // 30 is five deviations above that.
         assert!(seen.rows.is_subset(&expected) && seen.rows.len() >= 70, "{seen:?}");
     }
     // A comparison that sees nothing would hold, too.

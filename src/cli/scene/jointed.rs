@@ -6,7 +6,7 @@ use somatic::{Body, Error, Result};
 
 use super::RunOptions;
 use super::joints_delay::JointsDelay;
-use crate::cli::states_topic::StatesFrom;
+use crate::cli::states_from::StatesFrom;
 use crate::cli::stdio::say;
 
 impl RunOptions {

@@ -6,7 +6,7 @@ use somatic::Result;
 use somatic::sink::SinkSpec;
 use somatic::source::{BagName, SourceSpec};
 
-use crate::cli::states_topic::StatesFrom;
+use crate::cli::states_from::StatesFrom;
 
 fn there(folder: &Path, file: &Path) -> String {
     folder.join(file).display().to_string()

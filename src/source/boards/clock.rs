@@ -19,8 +19,8 @@ const JUMP_S: f64 = 2.0;
 /// A network may hold frames up for longer, s.
 #[cfg(any(test, feature = "zenoh"))]
 const NETWORK_LATE_S: f64 = 60.0;
-/// No board's clock is further off than this, nor a computer's than that: where most of what is remembered came late, its
-/// arrivals would feign a clock that runs at half the speed.
+/// The largest drift that is believed of a board's clock, and of a computer's. Without a limit, frames that a network held back
+/// would pass for a clock that runs slow.
 const MAX_BOARD_DRIFT: f64 = 0.05;
 #[cfg(any(test, feature = "zenoh"))]
 const MAX_COMPUTER_DRIFT: f64 = 1e-3;
@@ -213,7 +213,7 @@ mod tests {
         };
         // A thousandth of the four seconds.
         assert!(worst_of(MAX_COMPUTER_DRIFT) <= 0.004, "{}", worst_of(MAX_COMPUTER_DRIFT));
-        // With any drift they would be dated as new.
+        // Without the limit they are dated as new.
         assert!(worst_of(f64::INFINITY) > 0.5, "{}", worst_of(f64::INFINITY));
     }
 
