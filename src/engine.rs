@@ -103,6 +103,8 @@ pub struct Engine {
     /// Times and poses of frames that came in one slice, for the next such call.
     heads: Vec<Frame>,
     ids: Vec<u32>,
+    /// Per taxel of the body its channel of the plan, if it has one.
+    channel_of_taxel: Vec<Option<u32>>,
     links: Links,
     /// Where contacts are asked for.
     contacts: Option<Contacts>,
@@ -167,6 +169,9 @@ impl Engine {
             frames_done: 0,
             heads: Vec::new(),
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
+            channel_of_taxel: (0..body.taxels.len())
+                .map(|taxel| plan.body_taxels.binary_search(&taxel).ok().and_then(|channel| channel.try_into().ok()))
+                .collect(),
             links: Links {
                 posed: scene.coordinates == Coordinates::World,
                 in_link: scene
@@ -294,12 +299,10 @@ impl Engine {
     pub fn pressures(&self, frame: &Frame, to: &mut Vec<(u32, f64)>) {
         to.clear();
         for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
-            let Ok(channel) = self.plan.body_taxels.binary_search(&taxel) else { continue };
+            let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
             let curve = self.plan.curves.of(self.plan.taxels[channel].response);
-            let pressure = calibrate::reference(value, &self.plan.calibrations[channel], curve);
-            if pressure.status & calibrate::UNUSABLE == 0 {
-                to.push((self.ids[taxel], pressure.value));
-            }
+            let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
+            to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
         }
     }
 

@@ -179,8 +179,14 @@ struct Raw(Vec<u8>);
 
 impl Serialize for Raw {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut tuple = serializer.serialize_tuple(self.0.len() - CDR_HEADER_BYTES)?;
-        for byte in &self.0[CDR_HEADER_BYTES..] {
+        // Eight at a time, which stand at multiples of eight: CDR puts nothing between them. Byte by byte takes a third of the
+        // time that sending takes.
+        let (eights, rest) = self.0[CDR_HEADER_BYTES..].as_chunks::<8>();
+        let mut tuple = serializer.serialize_tuple(eights.len() + rest.len())?;
+        for eight in eights {
+            tuple.serialize_element(&u64::from_le_bytes(*eight))?;
+        }
+        for byte in rest {
             tuple.serialize_element(byte)?;
         }
         tuple.end()

@@ -213,7 +213,7 @@ macro_rules! columns {
         }
 
         impl Column {
-            $(const $output: Self = Self {
+            $(pub(crate) const $output: Self = Self {
                 output: Outputs::$output,
                 name: stringify!($name),
                 unit: Unit::$unit,

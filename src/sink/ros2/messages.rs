@@ -1,9 +1,8 @@
 //! The messages of a run and their topics: made here, written to a bag or sent.
 
-use std::collections::HashMap;
-
 use super::moment::Moment;
 use super::places::{Clouds, header, rest_poses, topic_part, transforms};
+use super::readings::Readings;
 use super::touches::Touches;
 use super::wrenches::{WrenchField, wrench_fields};
 use crate::error::{Error, Result};
@@ -56,7 +55,7 @@ pub(super) struct Messages {
     touches: Touches,
     at_rest: Vec<(String, Pose)>,
     links_told_s: Option<f64>,
-    pressure_of: HashMap<u32, f64>,
+    readings: Readings,
 }
 
 impl Messages {
@@ -75,8 +74,8 @@ impl Messages {
             TopicKind { is_optional: true, ..topic::<DiagnosticArray>("/diagnostics") },
         ];
         let first_cloud = topics.len();
-        let of_link = |link: &String| topic::<PointCloud2>(format!("/somatic/taxels/{}", topic_part(link)));
-        topics.extend(clouds.links().iter().map(of_link));
+        let of_link = |link: &str| topic::<PointCloud2>(format!("/somatic/taxels/{}", topic_part(link)));
+        topics.extend(clouds.links().map(of_link));
         let first_wrench = topics.len();
         let of_field =
             |field: &WrenchField| topic::<WrenchStamped>(format!("/somatic/wrench/{}", topic_part(&field.name)));
@@ -90,7 +89,7 @@ impl Messages {
             touches: Touches::new(session.names.iter().map(FieldNames::told_apart).collect()),
             at_rest: rest_poses(body),
             links_told_s: None,
-            pressure_of: HashMap::new(),
+            readings: Readings::new(body),
         })
     }
 
@@ -116,16 +115,13 @@ impl Messages {
             let state = JointState { header: header(time_ns, ""), name, position, ..JointState::default() };
             send(JOINTS, state.to_cdr())?;
         }
-        for (cloud, message) in self.clouds.messages(time_ns, &moment.pressures).enumerate() {
+        self.readings.read(&moment.pressures);
+        for (cloud, message) in self.clouds.messages(time_ns, &self.readings).enumerate() {
             send(Topic(self.first_cloud + cloud), message.to_cdr())?;
         }
-        if !self.wrenches.is_empty() {
-            self.pressure_of.clear();
-            self.pressure_of.extend(moment.pressures.iter().copied());
-            for (index, field) in self.wrenches.iter().enumerate() {
-                if let Some(wrench) = field.message(time_ns, &self.pressure_of) {
-                    send(Topic(self.first_wrench + index), wrench.to_cdr())?;
-                }
+        for (index, field) in self.wrenches.iter().enumerate() {
+            if let Some(wrench) = field.message(time_ns, &self.readings) {
+                send(Topic(self.first_wrench + index), wrench.to_cdr())?;
             }
         }
         if let Some(markers) = self.touches.message(time_ns, &moment.touched)

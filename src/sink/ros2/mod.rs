@@ -7,6 +7,7 @@ mod live;
 mod messages;
 mod moment;
 mod places;
+mod readings;
 mod touches;
 mod wrenches;
 

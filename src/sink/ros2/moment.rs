@@ -1,6 +1,6 @@
 //! What a frame gives, kept until its messages are made.
 
-use crate::percept::{Percept, Percepts};
+use crate::percept::{Column, Percepts};
 use crate::signal::{Frame, Pose};
 use crate::sink::Pressures;
 
@@ -16,7 +16,32 @@ pub(super) struct Moment {
     pub(super) joints: Vec<(String, f64)>,
     /// By taxel id; those that are missing or rejected are left out.
     pub(super) pressures: Vec<(u32, f64)>,
-    pub(super) touched: Vec<Percept>,
+    pub(super) touched: Vec<TouchedField>,
+}
+
+/// What markers show of a touched field. A percept is a kilobyte, and the engine's thread makes one for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct TouchedField {
+    /// As [`crate::Percept::field`].
+    pub(super) field: usize,
+    /// Position (m) and normal, in the world or in the field's link.
+    pub(super) position: Option<[f64; 3]>,
+    pub(super) normal: Option<[f64; 3]>,
+    pub(super) in_world: bool,
+    pub(super) area_m2: Option<f64>,
+}
+
+impl TouchedField {
+    pub(super) fn of(percepts: &Percepts, frame: usize, field: usize) -> Self {
+        let value = |column| percepts.value(frame, field, column);
+        Self {
+            field,
+            position: value(&Column::POSITION),
+            normal: value(&Column::NORMAL),
+            in_world: percepts.in_world(frame, field),
+            area_m2: value(&Column::AREA).map(|[area_m2, ..]| area_m2),
+        }
+    }
 }
 
 impl Moment {
@@ -33,7 +58,8 @@ impl Moment {
 
     /// Takes the percepts of frame `frame` of `percepts`, which are its own.
     pub(super) fn feel(&mut self, percepts: &Percepts, frame: usize) {
+        let touched = (0..percepts.fields()).filter(|&field| percepts.in_contact(frame, field));
         self.touched.clear();
-        self.touched.extend(percepts.touched(frame));
+        self.touched.extend(touched.map(|field| TouchedField::of(percepts, frame, field)));
     }
 }

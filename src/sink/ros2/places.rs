@@ -1,10 +1,10 @@
 //! Taxels as clouds of points, and links as transforms.
 
-use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DQuat, DVec3};
 
+use super::readings::Readings;
 use crate::body::Body;
 use crate::robot::messages::{
     Header, PointCloud2, PointField, Quaternion, TfMessage, Time, Transform, TransformStamped, Vector3,
@@ -16,8 +16,10 @@ pub(super) const WORLD: &str = "world";
 /// `UINT32` and `FLOAT32` of `sensor_msgs/PointField`.
 const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
-/// x, y, z and pressure, and the taxel's id.
-const POINT_BYTES: u32 = 20;
+/// A point: x, y, z, and at these bytes the pressure and the taxel's id.
+const POINT_BYTES: usize = 20;
+const PRESSURE: usize = 12;
+const TAXEL: usize = 16;
 
 /// Turns the body's world, whose y is up, to ROS's, whose z is up.
 pub(super) fn z_up_from_y_up() -> DQuat {
@@ -46,61 +48,66 @@ pub(super) fn topic_part(name: &str) -> String {
 }
 
 /// The links that have taxels, a cloud each.
-pub(super) struct Clouds {
-    /// By link with taxels.
-    links: Vec<String>,
-    /// By taxel id, the cloud and the position in its link, m.
-    taxels: HashMap<u32, (usize, DVec3)>,
-    points: Vec<Vec<u8>>,
+pub(super) struct Clouds(Vec<Cloud>);
+
+/// The taxels of a link.
+struct Cloud {
+    link: String,
+    /// Indices of the body, and points whose pressures are still to come.
+    taxels: Vec<(usize, [u8; POINT_BYTES])>,
 }
 
 impl Clouds {
     pub(super) fn new(body: &Body) -> Self {
-        let mut carriers: Vec<usize> = body.taxels.iter().map(|taxel| taxel.link).collect();
-        carriers.sort_unstable();
-        carriers.dedup();
-        let cloud_of = |link: usize| carriers.binary_search(&link).unwrap_or_default();
-        let taxels =
-            body.taxels.iter().map(|taxel| (taxel.id, (cloud_of(taxel.link), taxel.position_in_link))).collect();
-        let links: Vec<String> = carriers.iter().map(|&link| body.links[link].name.clone()).collect();
-        Self { points: vec![Vec::new(); links.len()], links, taxels }
-    }
-
-    pub(super) fn links(&self) -> &[String] {
-        &self.links
-    }
-
-    /// The cloud of each link: the taxels among `pressures`, in their link's frame.
-    pub(super) fn messages(
-        &mut self,
-        time_ns: u64,
-        pressures: &[(u32, f64)],
-    ) -> impl Iterator<Item = PointCloud2> + '_ {
-        self.points.iter_mut().for_each(Vec::clear);
-        for (id, pressure) in pressures {
-            if let Some((cloud, place)) = self.taxels.get(id) {
-                let numbers = [place.x, place.y, place.z, *pressure];
-                let points = &mut self.points[*cloud];
-                points.extend(numbers.into_iter().flat_map(|number| (number as f32).to_le_bytes()));
-                points.extend(id.to_le_bytes());
+        let mut clouds: Vec<Cloud> =
+            body.links.iter().map(|link| Cloud { link: link.name.clone(), taxels: Vec::new() }).collect();
+        for (index, taxel) in body.taxels.iter().enumerate() {
+            let mut point = [0; POINT_BYTES];
+            let place = taxel.position_in_link.as_vec3().to_array();
+            for (bytes, number) in point.chunks_exact_mut(4).zip(place) {
+                bytes.copy_from_slice(&number.to_le_bytes());
             }
+            point[TAXEL..].copy_from_slice(&taxel.id.to_le_bytes());
+            clouds[taxel.link].taxels.push((index, point));
         }
-        self.links.iter().zip(&mut self.points).map(move |(link, points)| {
-            let data = std::mem::take(points);
-            let field = |(name, offset, datatype): (&str, u32, u8)| PointField {
+        clouds.retain(|cloud| !cloud.taxels.is_empty());
+        Self(clouds)
+    }
+
+    pub(super) fn links(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|cloud| cloud.link.as_str())
+    }
+
+    /// The cloud of each link: the taxels that have a reading, in their link's frame.
+    pub(super) fn messages(&self, time_ns: u64, readings: &Readings) -> impl Iterator<Item = PointCloud2> {
+        self.0.iter().map(move |Cloud { link, taxels }| {
+            let mut data = Vec::with_capacity(taxels.len() * POINT_BYTES);
+            for (taxel, point) in taxels {
+                let Some(pressure) = readings.of(*taxel) else { continue };
+                let at = data.len() + PRESSURE;
+                data.extend_from_slice(point);
+                data[at..][..4].copy_from_slice(&(pressure as f32).to_le_bytes());
+            }
+            let field = |(name, offset, datatype): (&str, usize, u8)| PointField {
                 name: name.to_owned(),
-                offset,
+                offset: offset as u32,
                 datatype,
                 count: 1,
             };
-            let of_point = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), ("pressure", 12, FLOAT32)];
+            let of_point = [
+                ("x", 0, FLOAT32),
+                ("y", 4, FLOAT32),
+                ("z", 8, FLOAT32),
+                ("pressure", PRESSURE, FLOAT32),
+                ("taxel", TAXEL, UINT32),
+            ];
             PointCloud2 {
                 header: header(time_ns, link),
                 height: 1,
-                width: data.len() as u32 / POINT_BYTES,
-                fields: of_point.into_iter().chain([("taxel", 16, UINT32)]).map(field).collect(),
+                width: (data.len() / POINT_BYTES) as u32,
+                fields: of_point.map(field).into(),
                 is_bigendian: false,
-                point_step: POINT_BYTES,
+                point_step: POINT_BYTES as u32,
                 row_step: data.len() as u32,
                 data,
                 is_dense: true,

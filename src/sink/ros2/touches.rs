@@ -2,8 +2,8 @@
 
 use glam::{DQuat, DVec3};
 
+use super::moment::TouchedField;
 use super::places::{WORLD, header, quaternion, vector, z_up_from_y_up};
-use crate::percept::Percept;
 use crate::robot::messages::{Color, Marker, MarkerArray, Point, Pose};
 use crate::sink::FieldNames;
 
@@ -37,14 +37,14 @@ impl Touches {
 
     /// The markers of a frame: those of `touched` fields, and the ends of those that are no longer touched. `None` where there
     /// are neither.
-    pub(super) fn message(&mut self, time_ns: u64, touched: &[Percept]) -> Option<MarkerArray> {
+    pub(super) fn message(&mut self, time_ns: u64, touched: &[TouchedField]) -> Option<MarkerArray> {
         let mut shows = vec![[false; 2]; self.fields.len()];
         let mut markers = Vec::new();
-        for percept in touched {
-            let Some(position) = percept.position.map(DVec3::from) else { continue };
-            shows[percept.field] = [true, percept.normal.is_some()];
-            markers.push(self.sphere(time_ns, percept, position));
-            markers.extend(percept.normal.map(|normal| self.arrow(time_ns, percept, position, normal.into())));
+        for touch in touched {
+            let Some(position) = touch.position.map(DVec3::from) else { continue };
+            shows[touch.field] = [true, touch.normal.is_some()];
+            markers.push(self.sphere(time_ns, touch, position));
+            markers.extend(touch.normal.map(|normal| self.arrow(time_ns, touch, position, normal.into())));
         }
         for (field, (shows, shown)) in shows.iter().zip(&self.shown).enumerate() {
             for part in (0..2).filter(|&part| shown[part] && !shows[part]) {
@@ -64,16 +64,16 @@ impl Touches {
         }
     }
 
-    fn marker(&self, time_ns: u64, percept: &Percept, part: usize, position: DVec3, turn: DQuat) -> Marker {
-        let FieldNames { field: name, link, world, .. } = &self.fields[percept.field];
-        let frame = if percept.in_world { world } else { link };
+    fn marker(&self, time_ns: u64, touch: &TouchedField, part: usize, position: DVec3, turn: DQuat) -> Marker {
+        let FieldNames { field: name, link, world, .. } = &self.fields[touch.field];
+        let frame = if touch.in_world { world } else { link };
         // A link stays as the body has it, the world itself is z up.
-        let up = if percept.in_world && world == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
+        let up = if touch.in_world && world == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
         let (position, turn) = (up * position, up * turn);
         Marker {
             header: header(time_ns, frame),
             ns: name.clone(),
-            id: id(percept.field, part),
+            id: id(touch.field, part),
             action: ADD,
             pose: Pose {
                 position: Point { x: position.x, y: position.y, z: position.z },
@@ -81,26 +81,21 @@ impl Touches {
             },
             color: COLOUR,
             // It moves with its link until the next message.
-            frame_locked: !percept.in_world,
+            frame_locked: !touch.in_world,
             ..Marker::default()
         }
     }
 
-    fn sphere(&self, time_ns: u64, percept: &Percept, position: DVec3) -> Marker {
-        let area_m2 = percept.area.filter(|&area| area > 0.0);
+    fn sphere(&self, time_ns: u64, touch: &TouchedField, position: DVec3) -> Marker {
+        let area_m2 = touch.area_m2.filter(|&area| area > 0.0);
         let diameter_m = area_m2.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt());
-        let marker = self.marker(time_ns, percept, 0, position, DQuat::IDENTITY);
+        let marker = self.marker(time_ns, touch, 0, position, DQuat::IDENTITY);
         Marker { r#type: SPHERE, scale: vector(DVec3::splat(diameter_m)), ..marker }
     }
 
-    fn arrow(&self, time_ns: u64, percept: &Percept, position: DVec3, normal: DVec3) -> Marker {
-        let marker = self.marker(
-            time_ns,
-            percept,
-            1,
-            position,
-            DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X)),
-        );
+    fn arrow(&self, time_ns: u64, touch: &TouchedField, position: DVec3, normal: DVec3) -> Marker {
+        let marker =
+            self.marker(time_ns, touch, 1, position, DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X)));
         Marker { r#type: ARROW, scale: vector(ARROW_M.into()), ..marker }
     }
 }
@@ -113,20 +108,13 @@ fn id(field: usize, part: usize) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::percept::{Outputs, Percepts, Precision};
 
     #[test]
     fn a_marker_whose_end_was_not_sent_is_ended_with_the_next_message() {
-        let mut percepts = Percepts::new(Outputs::POSITION, 2, Precision::F64);
-        percepts.reset(1);
-        let touch = |field| {
-            let mut touch = percepts.get(0, field);
-            touch.position = Some([0.1, 0.0, 0.0]);
-            touch
-        };
+        let touch = |field| TouchedField { field, position: Some([0.1, 0.0, 0.0]), ..TouchedField::default() };
         let names = |field: &str| FieldNames { field: field.into(), link: "hand".into(), ..FieldNames::default() };
         let mut touches = Touches::new(["a", "b"].map(names).into());
-        let mut told = |touched: &[Percept], is_sent: bool| {
+        let mut told = |touched: &[TouchedField], is_sent: bool| {
             let markers = touches.message(0, touched).map_or_else(Vec::new, |message| message.markers);
             if !is_sent {
                 touches.was_refused();

@@ -1,10 +1,9 @@
 //! The force and torque on each leaf field, where they are known in newtons.
 
-use std::collections::{BTreeMap, HashMap};
-
 use glam::DVec3;
 
 use super::places::{header, vector};
+use super::readings::Readings;
 use crate::body::Body;
 use crate::robot::messages::{Wrench, WrenchStamped};
 use crate::scene::Plan;
@@ -14,8 +13,15 @@ use crate::signal::{Quantity, Receptor};
 pub(super) struct WrenchField {
     pub(super) name: String,
     link: String,
-    /// By taxel id: the force at P = 1 (N, into the skin) and the place, in the link.
-    taxels: BTreeMap<u32, (DVec3, DVec3)>,
+    taxels: Vec<WrenchTaxel>,
+}
+
+struct WrenchTaxel {
+    /// Index of the body.
+    taxel: usize,
+    /// The force at P = 1, into the skin, N.
+    force_at_one_in_link: DVec3,
+    position_in_link: DVec3,
 }
 
 /// The fields of `plan` that have a wrench: leaves, as nested ones would count twice, of sustained pressure in Pa with
@@ -35,15 +41,19 @@ pub(super) fn wrench_fields(body: &Body, plan: &Plan) -> Vec<WrenchField> {
         let taxels: Vec<_> = plan
             .members_of(field)
             .iter()
-            .map(|member| &body.taxels[plan.body_taxels[plan.channel_of(member.slot as usize)]])
+            .map(|member| plan.body_taxels[plan.channel_of(member.slot as usize)])
             .collect();
-        let Some(link) = taxels.first().map(|taxel| taxel.link).filter(|&link| taxels.iter().all(|t| t.link == link))
-        else {
-            continue;
-        };
+        let mut links: Vec<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
+        links.dedup();
+        let [link] = links[..] else { continue };
         let area_m2 = |area: f64| if field.quantity == Quantity::Pascal { area } else { 1.0 };
-        let of_taxel = |taxel: &&crate::body::Taxel| {
-            (taxel.id, (-taxel.normal_in_link * area_m2(taxel.area), taxel.position_in_link))
+        let of_taxel = |&index: &usize| {
+            let taxel = &body.taxels[index];
+            WrenchTaxel {
+                taxel: index,
+                force_at_one_in_link: -taxel.normal_in_link * area_m2(taxel.area),
+                position_in_link: taxel.position_in_link,
+            }
         };
         found.push(WrenchField {
             name: field.name.clone(),
@@ -55,13 +65,13 @@ pub(super) fn wrench_fields(body: &Body, plan: &Plan) -> Vec<WrenchField> {
 }
 
 impl WrenchField {
-    /// −Σ PᵢAᵢnᵢ and its torque about the link's origin, by taxels' `pressures`. `None` where one of them is missing.
-    pub(super) fn message(&self, time_ns: u64, pressures: &HashMap<u32, f64>) -> Option<WrenchStamped> {
+    /// −Σ PᵢAᵢnᵢ and its torque about the link's origin, `None` where a taxel has no reading.
+    pub(super) fn message(&self, time_ns: u64, readings: &Readings) -> Option<WrenchStamped> {
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
-        for (id, (force_at_one, place)) in &self.taxels {
-            let own = *force_at_one * *pressures.get(id)?;
+        for WrenchTaxel { taxel, force_at_one_in_link, position_in_link } in &self.taxels {
+            let own = force_at_one_in_link * readings.of(*taxel)?;
             force += own;
-            torque += place.cross(own);
+            torque += position_in_link.cross(own);
         }
         let wrench = Wrench { force: vector(force), torque: vector(torque) };
         Some(WrenchStamped { header: header(time_ns, &self.link), wrench })
