@@ -106,6 +106,10 @@ impl Running {
         Self { child, out, told, readers: vec![first, second] }
     }
 
+    pub fn take_input(&mut self) -> ChildStdin {
+        self.child.stdin.take().unwrap()
+    }
+
     /// Waits for its end; what it has told.
     pub fn end(mut self, codes: &[i32]) -> (Vec<String>, Vec<String>) {
         let code = code_of(&mut self.child);
@@ -158,7 +162,7 @@ impl Limb {
             "--all-fields",
         ];
         let mut running = Running::start(space, &arguments);
-        let input = running.child.stdin.take();
+        let input = Some(running.take_input());
         Self { running, input, taxels: taxels_of(field), begin: Instant::now(), written: Vec::new() }
     }
 
@@ -236,16 +240,17 @@ pub struct Head {
 
 impl Head {
     pub fn start(place: &Place, keys: &[&str], config: &str, more: &[&str]) -> Self {
+        let fields = ["--outputs", OUTPUTS, "--fields", "hand/midhand/*", "--all-fields"];
+        Self::start_with(place, keys, config, &[&fields, more].concat())
+    }
+
+    /// The same with any fields and outputs.
+    pub fn start_with(place: &Place, keys: &[&str], config: &str, more: &[&str]) -> Self {
         let summary = place.path("summary.json");
         let sources: Vec<String> =
             keys.iter().flat_map(|key| ["--source".to_owned(), format!("zenoh:{key}")]).collect();
         let mut arguments = vec![
             "run",
-            "--outputs",
-            OUTPUTS,
-            "--fields",
-            "hand/midhand/*",
-            "--all-fields",
             "--backend",
             "cpu",
             "--sink",

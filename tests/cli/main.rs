@@ -3,9 +3,11 @@
 mod author;
 mod bags;
 mod bench;
+#[cfg(feature = "page")]
+#[cfg(all(unix, any(feature = "ros2", feature = "zenoh")))]
+mod blocked_networks;
 #[cfg(unix)]
 mod board;
-#[cfg(feature = "page")]
 mod browser;
 mod calibrate;
 mod contacts;
@@ -42,8 +44,10 @@ mod relay;
 mod render;
 mod robots;
 mod ros2;
-#[cfg(feature = "ros2")]
+#[cfg(all(unix, feature = "ros2"))]
 mod ros2_live;
+#[cfg(all(unix, feature = "ros2"))]
+mod ros2_peer;
 mod run;
 #[cfg(unix)]
 mod serial;

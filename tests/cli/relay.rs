@@ -16,6 +16,8 @@ pub enum Link {
     Up,
     /// It holds everything back, as a network does on which packets are lost.
     Stalled,
+    /// It reads nothing, so that what the sender's system keeps for it fills up.
+    Blocked,
     /// Its connections are cut, and it takes no new ones.
     Cut,
 }
@@ -98,6 +100,9 @@ fn pass(state: &State, mut from: TcpStream, mut to: TcpStream) {
         });
         let mut buffer = [0; 1 << 16];
         loop {
+            while state.link.load(Ordering::Relaxed) == Link::Blocked as u8 {
+                thread::sleep(Duration::from_millis(2));
+            }
             match from.read(&mut buffer) {
                 Ok(0) | Err(_) => break,
                 Ok(count) => drop(sender.send((Instant::now() + state.delay(), buffer[..count].to_vec()))),

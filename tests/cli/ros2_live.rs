@@ -1,142 +1,18 @@
 //! Live topics of ROS 2, as cyclonedds in another process sees and sends them.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::python::python_with;
-use super::skips::skip;
-use super::{done, frames, somatic, stderr, text_of};
+use super::ros2_peer::{CLOUD, Peer, domain, ended, feed, python, run};
+use super::serial::Boards;
+use super::{done, frames, stderr, text_of};
 
 const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
-const CLOUD: &str = "sensor_msgs/msg/PointCloud2";
-
-/// Another process with cyclonedds, in a domain of its own.
-struct Peer {
-    child: Child,
-    input: Option<ChildStdin>,
-    output: BufReader<ChildStdout>,
-}
-
-/// A domain that no other test has: ports of domains up to 101 are below those that Linux gives away.
-fn domain() -> String {
-    static NEXT: AtomicU32 = AtomicU32::new(0);
-    ((std::process::id() * 11 + NEXT.fetch_add(1, Ordering::Relaxed)) % 101 + 1).to_string()
-}
-
-/// Python with cyclonedds, unless the test is skipped.
-fn python() -> Option<PathBuf> {
-    match python_with("ros2", "import cyclonedds.idl, mcap_ros2.reader, rosbags.rosbag2") {
-        Ok(python) => Some(python),
-        Err(why) => {
-            skip("ROS2", why);
-            None
-        }
-    }
-}
-
-impl Peer {
-    fn start(python: &Path, domain: &str, arguments: &[&str]) -> Self {
-        let mut child = Command::new(python)
-            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ros2/live.py"))
-            .args(arguments)
-            .env("ROS_DOMAIN_ID", domain)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let output = BufReader::new(child.stdout.take().unwrap());
-        Self { input: child.stdin.take(), output, child }
-    }
-
-    fn receive(python: &Path, domain: &str, topics: &[(&str, &str, &str)]) -> Self {
-        let named: Vec<String> = topics.iter().map(|(topic, kind, how)| format!("{topic}={kind}:{how}")).collect();
-        let mut arguments = vec!["receive"];
-        arguments.extend(named.iter().map(String::as_str));
-        let mut peer = Self::start(python, domain, &arguments);
-        peer.wait_for("listening");
-        peer
-    }
-
-    fn line(&mut self) -> String {
-        let mut line = String::new();
-        assert!(self.output.read_line(&mut line).unwrap() > 0, "the peer has ended");
-        line
-    }
-
-    fn wait_for(&mut self, word: &str) {
-        while self.line().trim() != word {}
-    }
-
-    fn say(&mut self, line: &str) {
-        writeln!(self.input.as_mut().unwrap(), "{line}").unwrap();
-    }
-
-    /// Everything that has come: topic, time (ns), message.
-    fn received(mut self) -> Vec<(String, u64, Value)> {
-        self.say("end");
-        loop {
-            let line = self.line();
-            if line.starts_with('[') {
-                assert!(self.child.wait().unwrap().success());
-                let all: Vec<(String, u64, Value)> = serde_json::from_str(&line).unwrap();
-                return all;
-            }
-        }
-    }
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// The command in `domain`. What it prints is read as it comes: a full pipe would hold it up.
-struct Running {
-    child: Child,
-    told: JoinHandle<String>,
-}
-
-fn run(domain: &str, arguments: &[&str]) -> Running {
-    let mut command = somatic(arguments);
-    command.env("ROS_DOMAIN_ID", domain).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap();
-    let mut output = child.stdout.take().unwrap();
-    let told = std::thread::spawn(move || {
-        let mut text = String::new();
-        output.read_to_string(&mut text).unwrap();
-        text
-    });
-    Running { child, told }
-}
-
-/// Sends `lines` to the command's standard input, one every `period`.
-fn feed(running: &mut Running, lines: &[String], period: Duration) {
-    let input = running.child.stdin.as_mut().unwrap();
-    let begin = Instant::now();
-    for (number, line) in lines.iter().enumerate() {
-        std::thread::sleep((period * number as u32).saturating_sub(begin.elapsed()));
-        writeln!(input, "{line}").unwrap();
-    }
-}
-
-/// What the command prints until its end, with its standard input closed; on standard error too.
-fn ended(running: Running) -> (String, String) {
-    let Running { mut child, told } = running;
-    drop(child.stdin.take());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    (told.join().unwrap(), stderr(&output))
-}
 
 /// The arm's body, and its frames with joint states as lines for standard input.
 fn arm() -> (TempDir, PathBuf, Vec<String>) {
@@ -464,4 +340,37 @@ fn a_thousand_taxels_at_250_hz_arrive() {
         "{} of {count} are missing: {missing:?}",
         missing.len()
     );
+}
+
+#[test]
+fn another_node_is_told_how_a_board_is_doing_until_it_falls_silent() {
+    let Some(python) = python() else { return };
+    let domain = domain();
+    let mut peer =
+        Peer::receive(&python, &domain, &[("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "reliable")]);
+    let boards = Boards::start(&["--wait", "--rate", "50", "--loop", "--for", "4s"]);
+    let source = format!("serial:{}", boards.ports[0]);
+    let child = run(&domain, &["run", "--source", &source, "--sink", "-", "--sink", "ros2", "--for", "8s"]);
+    peer.wait_for("matched");
+    let sent = boards.end()[0];
+    ended(child);
+    let told = peer.received();
+    let status: Vec<&Value> = told.iter().map(|(_, _, array)| &array["status"][0]).collect();
+    let value = |status: &Value, key: &str| -> Option<f64> {
+        let pair = status["values"].as_array().unwrap().iter().find(|pair| pair["key"] == key)?;
+        pair["value"].as_str().unwrap().parse().ok()
+    };
+    let frames: Vec<f64> = status.iter().map(|status| value(status, "frames").unwrap()).collect();
+    println!("{sent} frames, {} messages, the last {}", told.len(), status.last().unwrap());
+    assert!(frames.is_sorted() && told.windows(2).all(|pair| stamp_ns(&pair[0].2) <= stamp_ns(&pair[1].2)));
+    assert!(status.iter().all(|status| status["name"].as_str().unwrap().starts_with("somatic: ")), "{status:?}");
+    // OK while it speaks, at its rate; STALE from when it is silent, with its last count.
+    let [ok, stale] = [0, 3].map(|level| status.iter().filter(|status| status["level"] == level).collect::<Vec<_>>());
+    let rate_hz = ok.last().and_then(|status| value(status, "rate [Hz]")).unwrap();
+    // As many frames as its four seconds have.
+    let expected_hz = sent as f64 / 4.0;
+    assert!(ok.len() >= 3 && (rate_hz / expected_hz - 1.0).abs() < 0.15, "{rate_hz} of {expected_hz} Hz, {status:?}");
+    assert!(ok.iter().all(|status| status["message"] == "speaking"), "{ok:?}");
+    assert!(stale.len() >= 3 && *frames.last().unwrap() == sent as f64, "{sent} sent, {status:?}");
+    assert!(value(stale.last().unwrap(), "age [s]").unwrap() > 1.0, "{status:?}");
 }

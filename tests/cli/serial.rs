@@ -15,15 +15,15 @@ use super::{somatic, stderr, text_of};
 const CHANNELS: usize = 16;
 
 /// A running `somatic board --json`, each board with a link in a folder of its own.
-struct Boards {
+pub struct Boards {
     child: Child,
     told: BufReader<ChildStdout>,
-    ports: Vec<String>,
+    pub ports: Vec<String>,
     folder: tempfile::TempDir,
 }
 
 impl Boards {
-    fn start(arguments: &[&str]) -> Self {
+    pub fn start(arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         Self::start_in(folder, arguments)
     }
@@ -43,7 +43,7 @@ impl Boards {
     }
 
     /// Frames that each board sent, when it has ended.
-    fn end(mut self) -> Vec<u64> {
+    pub fn end(mut self) -> Vec<u64> {
         let mut line = String::new();
         self.told.read_line(&mut line).unwrap();
         assert!(self.child.wait().unwrap().success());
