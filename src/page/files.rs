@@ -28,6 +28,7 @@ const FILES: &[PageFile] = files![
     "camera.js",
     "chart.js",
     "choices.js",
+    "contacts.js",
     "dirty.js",
     "dom.js",
     "explain.js",

@@ -12,7 +12,7 @@ use super::poses::Poses;
 use super::scale::Scale;
 use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
-use crate::percept::{Column, Flags, Unit};
+use crate::percept::{Column, Flags, Outputs, Unit};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Quantity, Wiring};
 
@@ -103,6 +103,7 @@ impl PageScene {
             "fields": fields(body, plan),
             "columns": columns.iter().map(|column| column_json(column, plan)).collect::<Vec<_>>(),
             "flags": flag_names(),
+            "contacts": plan.outputs().contains(Outputs::CONTACTS),
             "colours": pressure_colours().to_vec(),
         });
         Self {

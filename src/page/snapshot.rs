@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::percept::{Percept, Touch};
+use crate::percept::{Contact, Percept, Touch};
 use crate::scene::Plan;
 use crate::signal::{Pose, RawValue};
 
@@ -30,6 +30,9 @@ pub(super) struct Snapshot {
     pub(super) percepts: Vec<Percept>,
     /// Of these fields, in their order.
     pub(super) touches: Vec<(u32, Touch)>,
+    /// Between links, where they are asked for and known.
+    pub(super) contacts: Vec<Contact>,
+    pub(super) contacts_are_known: bool,
 }
 
 impl Snapshot {
@@ -47,6 +50,8 @@ impl Snapshot {
             poses: Vec::new(),
             percepts: Vec::with_capacity(plan.fields.len()),
             touches: Vec::new(),
+            contacts: Vec::new(),
+            contacts_are_known: false,
         };
         snapshot.take_baselines(plan);
         snapshot

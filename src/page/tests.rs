@@ -183,7 +183,7 @@ impl Book {
 const ALL_LETTERS: [Receptor; 2] = [Receptor::Sustained, Receptor::Change];
 
 fn book() -> Book {
-    let outputs = Outputs::USUAL | Outputs::TOUCHES;
+    let outputs = Outputs::USUAL | Outputs::TOUCHES | Outputs::CONTACTS;
     let mut bench = Bench::new(outputs, &ALL_LETTERS, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();
@@ -231,6 +231,12 @@ fn book() -> Book {
     };
     bench.process(&[posed]);
     add_frame(&mut book, &mut bench, &mut viewer, "posed, and what is wrong with taxels");
+    // The hand where the arm is: its first taxel lies on the arm's first.
+    let at = |x: f64, z: f64| Pose { translation: DVec3::new(x, 0.0, z), rotation: DQuat::IDENTITY };
+    let pose = vec![("arm".to_owned(), at(1.0, 0.0)), ("hand".to_owned(), at(0.99, 0.01))];
+    let meeting = Frame { pose, ..bench.frame(0.08, [5.0, 0.0, 0.0, 3.0, 0.0]) };
+    bench.process(&[meeting]);
+    add_frame(&mut book, &mut bench, &mut viewer, "two links touch");
     let history = History {
         id: 7,
         from_s: 0.5,
@@ -307,10 +313,24 @@ fn frames_hold_what_the_engine_computed() {
         assert_eq!(unchanged[part], Value::Null, "{part}");
     }
     let length = |name: &str| book.entries.iter().find(|entry| entry["name"] == name).unwrap()["length"].clone();
-    assert_eq!(length("nothing is touched"), 64 + 32);
+    // Head, pressures with health, and that there is no contact.
+    assert_eq!(length("nothing is touched"), 64 + 32 + 8);
     let posed = &messages["posed, and what is wrong with taxels"];
     assert_eq!(posed["health"], json!([1, 3, 2, 0, 6]));
     assert!(posed["pose"].is_array() && posed["p50"].as_f64().is_some_and(|ms| (ms - 5.0).abs() < 1e-3));
+    let meeting = &messages["two links touch"]["contacts"];
+    let contact = &meeting["list"][0];
+    assert!(welcome["contacts"] == true && meeting["known"] == true, "{meeting}");
+    assert_eq!((&contact["sides"][0]["field"], &contact["sides"][1]["field"]), (&2.into(), &4.into()));
+    // Weights are 1 and 2: the totals are those of the one taxel on each side.
+    assert_eq!((&contact["sides"][0]["total"], &contact["sides"][1]["total"]), (&5.0.into(), &6.0.into()));
+    let origin = welcome["origin"].as_array().unwrap();
+    for (axis, place) in [1.01, 0.0, -0.01].into_iter().enumerate() {
+        let told = contact["position"][axis].as_f64().unwrap() + origin[axis].as_f64().unwrap();
+        assert!((told - place).abs() < 1e-6, "{contact}");
+    }
+    // Its frame has no pose: where touches are in the world is not known.
+    assert_eq!((&everything["contacts"]["known"], &unchanged["contacts"]), (&false.into(), &Value::Null));
     let events = &messages["events"]["events"];
     assert!(events.as_array().unwrap().iter().any(|event| event["text"] == "all/arm · sustained is touched"));
     assert_eq!((&events[0]["kind"], &events[0]["seq"]), (&"onset".into(), &1.into()));

@@ -7,9 +7,10 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use super::current::Current;
-use super::encode::{FrameHead, IN_WORLD, Writer, section, write_series};
+use super::encode::{FrameHead, IN_WORLD, UNKNOWN, Writer, section, write_series};
 use super::latency::Latencies;
 use super::series::{Series, Trail};
+use super::snapshot::Snapshot;
 use crate::percept::{Column, Outputs, Percept};
 
 /// Frames that may be under way.
@@ -62,6 +63,7 @@ struct Sent {
     poses: u64,
     percepts: Option<u64>,
     touches: u64,
+    contacts: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -182,10 +184,12 @@ impl Viewer {
         let poses = self.sent.poses != current.poses().changes();
         let percepts = self.sent.percepts != Some(current.percept_changes());
         let touches = self.sent.touches != current.touch_changes();
+        let contacts = self.sent.contacts != current.contact_changes();
         set(section::PRESSURES, pressures);
         set(section::POSES, poses);
         set(section::PERCEPTS, percepts);
         set(section::TOUCHES, touches);
+        set(section::CONTACTS, contacts);
         set(section::SERIES, !self.trail.is_empty());
         let head = FrameHead {
             sections,
@@ -218,6 +222,9 @@ impl Viewer {
         if touches {
             write_touches(&mut to, current);
         }
+        if contacts {
+            write_contacts(&mut to, current);
+        }
         if sections & section::SERIES != 0 {
             write_series(&mut to, &self.trail);
             self.trail.clear();
@@ -228,6 +235,7 @@ impl Viewer {
             poses: current.poses().changes(),
             percepts: Some(current.percept_changes()),
             touches: current.touch_changes(),
+            contacts: current.contact_changes(),
         };
         let arrived = is_new.then_some(snapshot.arrived);
         self.under_way.push_back(UnderWay { seq: self.seq, sent_at: Instant::now(), arrived });
@@ -276,6 +284,23 @@ fn write_touches(to: &mut Writer, current: &Current) {
         to.u32(touch.active);
         touch.centroid.map_or([f32::NAN; 2], |uv| uv.map(|x| x as f32)).into_iter().for_each(|x| to.f32(x));
         (0..3).for_each(|i| to.f32((touch.position[i] - from[i]) as f32));
+    }
+    to.pad();
+}
+
+fn write_contacts(to: &mut Writer, current: &Current) {
+    let Snapshot { contacts, contacts_are_known, .. } = current.snapshot();
+    to.u32(if *contacts_are_known { contacts.len() as u32 } else { UNKNOWN });
+    for contact in contacts {
+        to.u32(contact.id as u32);
+        for side in &contact.sides {
+            to.u32(side.field as u32);
+            to.u32(side.touch as u32);
+            to.f32(side.total as f32);
+        }
+        (0..3).for_each(|i| to.f32((contact.position[i] - current.origin()[i]) as f32));
+        to.f32(contact.distance as f32);
+        to.f32(contact.angle.map_or(f32::NAN, |angle| angle as f32));
     }
     to.pad();
 }

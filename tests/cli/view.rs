@@ -105,8 +105,9 @@ fn a_percept_is_explained_and_its_history_told() {
     let welcome = text(&mut viewer, "welcome", |_| true);
     let field = welcome["fields"].as_array().unwrap().iter().position(|field| field["name"] == "hand/back").unwrap();
     say(&mut viewer.socket, &json!({"type": "pause"}));
-    say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
+    // Before the seek: waiting for a text passes over frames.
     text(&mut viewer, "status", |status| status["playing"] == false);
+    say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
     frame(&mut viewer, 145);
     say(&mut viewer.socket, &json!({"type": "explain", "field": field}));
     let why = text(&mut viewer, "explain", |_| true);
@@ -169,8 +170,8 @@ fn percepts_that_a_recording_holds_are_compared_with_those_computed_now() {
         let fields = welcome["fields"].as_array().unwrap();
         let field = fields.iter().position(|field| field["name"] == "hand/back").unwrap();
         say(&mut viewer.socket, &json!({"type": "pause"}));
-        say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
         text(&mut viewer, "status", |status| status["playing"] == false);
+        say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
         frame(&mut viewer, 145);
         say(&mut viewer.socket, &json!({"type": "explain", "field": field}));
         let why = text(&mut viewer, "explain", |_| true);
@@ -211,4 +212,32 @@ fn what_cannot_be_shown_is_one_line() {
         let line = fails(code, arguments);
         assert!(line.contains(word) && line.lines().count() == 1, "{arguments:?}: {line}");
     }
+}
+
+#[test]
+fn joints_move_the_links_of_a_view_and_contacts_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("gripper.glb").display().to_string();
+    let example = |name: &str| format!("{}/examples/robots/{name}", env!("CARGO_MANIFEST_DIR"));
+    let urdf = example("gripper.urdf");
+    done(&["author", "--urdf-skin", &urdf, "-o", &body]);
+    let (touch, states) = (example("gripper-touch.csv"), example("gripper-joints.csv"));
+    let joints = ["--joints", &urdf, "--joint-states", &states, "--up", "z"];
+    let of_robot = ["--body", &body, "--source", &touch, "--outputs", "total,contacts"];
+    let mut view = Run::of(&[&VIEW[..], &of_robot, &joints].concat());
+    let mut viewer = view.viewer();
+    viewer.binary();
+    say(&mut viewer.socket, &json!({"type": "pause"}));
+    text(&mut viewer, "status", |status| status["playing"] == false);
+    for (t_s, number, contacts) in [(0.54, 27, 1), (1.62, 81, 0)] {
+        say(&mut viewer.socket, &json!({"type": "seek", "t_s": t_s}));
+        let frame = frame(&mut viewer, number);
+        let sections = u16::from_le_bytes([frame[2], frame[3]]);
+        // Pressures, poses, percepts, touches and contacts: all of them have changed.
+        assert_eq!(sections, 0b10_1111, "{sections:b}");
+        // The last section, 48 bytes each behind their number.
+        let section = (4_usize + 48 * contacts).next_multiple_of(8);
+        assert_eq!(u32_at(&frame, frame.len() - section) as usize, contacts, "at {t_s} s");
+    }
+    assert_eq!(view.interrupt(), Some(0));
 }

@@ -120,7 +120,7 @@ fn played(
     let mut frames = Vec::new();
     let mut on = "with every taxel pressed".to_owned();
     if let Some(input) = recorded {
-        let mut source = input.open(&ids, asked)?;
+        let mut source = asked.jointed(input.open(&ids, asked)?, body)?;
         let mut frame = Frame::missing(0.0, source.taxels().len());
         while frames.len() < batch.max(RECORDED_BATCH) && source.next_frame(&mut frame)? {
             frames.push(frame.clone());

@@ -192,7 +192,8 @@ impl Opening<'_> {
         let body = Arc::new(input.body(asked)?);
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let stop = stop_on_signal()?;
-        let Some(recording) = Recording::read(input.open(&ids, asked)?, &stop, asked.quiet)? else { return Ok(DONE) };
+        let source = asked.jointed(input.open(&ids, asked)?, &body)?;
+        let Some(recording) = Recording::read(source, &stop, asked.quiet)? else { return Ok(DONE) };
         let recording = Arc::new(recording);
         let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;
         let mut engine = Engine::new(&body, settled.options.clone())?;

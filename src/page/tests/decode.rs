@@ -74,7 +74,7 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     frame["newestEvent"] = newest.into();
     frame["engineMicroseconds"] = from.f32();
     let answers = from.u32();
-    for part in ["pressure", "health", "pose", "percepts", "touches", "samples"] {
+    for part in ["pressure", "health", "pose", "percepts", "touches", "contacts", "samples"] {
         frame[part] = Value::Null;
     }
     let taxels = scene.counts.taxels as u32;
@@ -103,6 +103,19 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
                    "position": from.f32s(3)})
         };
         frame["touches"] = (0..touches).map(&mut touch).collect::<Vec<_>>().into();
+        from.pad();
+    }
+    if sections & 32 != 0 {
+        let number = from.u32();
+        let mut contact = |_| {
+            let identity = from.u32();
+            let sides: Vec<Value> =
+                (0..2).map(|_| json!({"field": from.u32(), "touch": from.u32(), "total": from.f32()})).collect();
+            json!({"identity": identity, "sides": sides, "position": from.f32s(3), "distance": from.f32(), "angle": from.f32()})
+        };
+        let known = number != u32::MAX;
+        let contacts: Vec<Value> = (0..if known { number } else { 0 }).map(&mut contact).collect();
+        frame["contacts"] = json!({"known": known, "list": contacts});
         from.pad();
     }
     if sections & 16 != 0 {

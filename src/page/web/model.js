@@ -50,6 +50,8 @@ export class Model extends Observed {
     this.inContact = new Map();
     /** @type {import("./wire.js").Touch[]} */
     this.touches = [];
+    /** Touches of two links at one place. @type {import("./wire.js").Contacts} */
+    this.contacts = noContacts();
     /** The newest frame's head. @type {Frame | null} */
     this.frame = null;
     /** @type {import("./wire.js").Scale} */
@@ -97,6 +99,7 @@ export class Model extends Observed {
     this.percepts = null;
     this.inContact = new Map();
     this.touches = [];
+    this.contacts = noContacts();
     this.frame = null;
     this.boards = [];
     this.ended = null;
@@ -142,6 +145,10 @@ export class Model extends Observed {
       this.inContact = new Map(Array.from(frame.percepts.field, (field, k) => [field, k]));
     }
     if (frame.touches) this.touches = frame.touches;
+    if (frame.contacts) {
+      this.contacts = frame.contacts;
+      this.tell("contacts");
+    }
     if (frame.samples) {
       this.samples = frame.samples;
       this.tell("samples");
@@ -292,6 +299,10 @@ export class Model extends Observed {
     return likely ?? flags.join(", ");
   }
 }
+
+/** Before a frame has told of any.
+ * @returns {import("./wire.js").Contacts} */
+const noContacts = () => ({ known: false, list: [] });
 
 /** What is known of a recording before its first message. */
 function noTimeline() {

@@ -1,8 +1,8 @@
-/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion. */
+/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion, contacts between links. */
 
 import { cssColour, fitCanvas, paletteColour } from "./dom.js";
 import { withUnit } from "./format.js";
-import { dot, subtract } from "./math.js";
+import { dot, subtract, toWorld } from "./math.js";
 import {
   axisEllipse,
   motionArrow,
@@ -11,6 +11,7 @@ import {
   positionInWorld,
   tangentPlane,
 } from "./places.js";
+import { NO_LINK } from "./wire.js";
 
 /** @typedef {{x: number, y: number}} Point */
 
@@ -63,9 +64,10 @@ export class Marks {
   draw() {
     const { model, camera, choices } = this;
     const marked = choices.marked(model);
+    const contacts = choices.marks === "none" ? [] : model.contacts.list;
     this.places = [];
-    if (!marked.length && !this.drawn) return;
-    this.drawn = marked.join();
+    if (!marked.length && !contacts.length && !this.drawn) return;
+    this.drawn = marked.join() || (contacts.length ? "contacts" : "");
     const fitted = fitCanvas(this.canvas);
     if (!fitted) return;
     const { context } = fitted;
@@ -106,6 +108,7 @@ export class Marks {
       }
     }
     context.globalAlpha = 1;
+    for (const contact of contacts) this.contact(context, contact);
     // The strongest touches only, from the lowest place up, so that labels stand above what they name.
     labels.sort((a, b) => b.load - a.load).splice(LABELS_MAX);
     labels.sort((a, b) => b.at.y - a.at.y);
@@ -143,6 +146,21 @@ export class Marks {
     }
     const arrow = motionArrow(model, field);
     if (arrow) this.arrow(context, at(0, 0), at(arrow[0], arrow[1]), colour);
+  }
+
+  /**
+   * A diamond where two links touch, seen through the body: a contact lies between them.
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("./wire.js").Contact} contact
+   */
+  contact(context, contact) {
+    const { x, y } = this.camera.project(toWorld(this.model.rows, NO_LINK, contact.position, 1));
+    const corner = (/** @type {number} */ dx, /** @type {number} */ dy) => ({
+      x: x + 12 * dx,
+      y: y + 12 * dy,
+    });
+    const corners = [corner(0, -1), corner(1, 0), corner(0, 1), corner(-1, 0), corner(0, -1)];
+    this.line(context, corners, cssColour("meeting"), 2.5, []);
   }
 
   /**
