@@ -228,7 +228,7 @@ fn gather(
                 }
                 feed.give_back(frames);
             }
-            Some(Arrival::End(losses)) => return Ok(losses),
+            Some(Arrival::End(ending)) => return Ok(ending.losses),
             Some(Arrival::Failed(error)) => return Err(error),
             None | Some(Arrival::Woken) => {}
         }

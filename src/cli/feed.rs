@@ -12,10 +12,19 @@ pub(super) enum Arrival {
     /// The next frames, and information on them.
     Frames(Vec<Frame>, FrameInfo),
     /// The end; a line per kind of loss.
-    End(Vec<String>),
+    End(Ending),
     Failed(Error),
     /// Something came that is no frame: percepts of a limb.
     Woken,
+}
+
+/// What a source says at its end.
+#[derive(Debug, Default)]
+pub(super) struct Ending {
+    /// What was never processed.
+    pub(super) losses: Vec<String>,
+    /// Messages for the user since the last frames.
+    pub(super) notices: Vec<String>,
 }
 
 /// Information on frames.
@@ -144,7 +153,7 @@ fn read(
                     frames.push(frame);
                     info.read_at.extend(source.read_at());
                 }
-                Ok(false) => end = Some(Arrival::End(source.losses())),
+                Ok(false) => end = Some(Arrival::End(Ending { losses: source.losses(), notices: Vec::new() })),
                 Err(e) => end = Some(Arrival::Failed(e)),
             }
         }
@@ -156,8 +165,12 @@ fn read(
         if with_losses {
             info.losses = source.losses();
         }
+        match &mut end {
+            Some(Arrival::End(ending)) if frames.is_empty() => ending.notices = std::mem::take(&mut info.notices),
+            _ => {}
+        }
         if !frames.is_empty() && to.send(Arrival::Frames(frames, info)).is_err() {
-            return Arrival::End(Vec::new());
+            return Arrival::End(Ending::default());
         }
         if let Some(end) = end {
             return end;

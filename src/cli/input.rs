@@ -163,6 +163,12 @@ impl Input {
         Ok(OpenedLines { source: Box::new(source), lines, wiring })
     }
 
+    /// Opens it, or the requested part, for `body`, with poses of its links where joints are asked for.
+    pub(super) fn open_posed(&self, body: &Body, asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        asked.jointed(self.open(&ids, asked)?, body)
+    }
+
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]

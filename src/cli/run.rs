@@ -310,7 +310,10 @@ impl Pump {
                     feed.give_back(frames);
                     self.report_unfit()?;
                 }
-                Some(Arrival::End(losses)) => return Ok(losses),
+                Some(Arrival::End(ending)) => {
+                    ending.notices.iter().for_each(|notice| say(notice));
+                    return Ok(ending.losses);
+                }
                 Some(Arrival::Failed(error)) => return Err(error),
                 // Nothing comes, but something may be held back.
                 None if self.flush => self.each_sink(|sink| sink.flush())?,

@@ -110,7 +110,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(&body, &ids, 1)?;
     let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
-    let played = input.as_ref().map(|input| played(input, &asked, &ids, most)).transpose()?;
+    let played = input.as_ref().map(|input| played(input, &asked, &body, most)).transpose()?;
     let tested = Tested::new(&body, &options, played, most)?;
     let measure_options = measure_options(&asked, &options, arguments.seconds)?;
     let stop = stop_on_signal()?;

@@ -52,6 +52,7 @@ impl Mesh {
                 if mirrored { [a, c, b] } else { [a, b, c] }
             }));
         }
+        mesh.split_at_edges();
         mesh.normals = mesh.smooth_normals(body);
         mesh
     }
@@ -65,6 +66,34 @@ impl Mesh {
             Some(ends.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
         });
         box_of.map_or(DVec3::ZERO, |(low, high)| low + 0.5 * (high - low))
+    }
+
+    /// Gives each side of an edge vertices of its own: where triangles that share a vertex are turned against each other by more
+    /// than smooth ones are, as the sides of a box that has eight vertices.
+    fn split_at_edges(&mut self) {
+        // By vertex, the vertices that stand for it, each with the direction of its first triangle.
+        let mut sides: Vec<Vec<(u32, DVec3)>> = vec![Vec::new(); self.positions.len()];
+        for triangle in &mut self.triangles {
+            let [a, b, c] = triangle.map(|corner| self.positions[corner as usize]);
+            let Some(direction) = (b - a).cross(c - a).try_normalize() else { continue };
+            for corner in triangle {
+                let vertex = *corner as usize;
+                let alike = sides[vertex].iter().find(|(_, other)| other.dot(direction) >= SMOOTH_COSINE);
+                let alike = alike.map(|&(own, _)| own);
+                *corner = match alike {
+                    Some(own) => own,
+                    None if sides[vertex].is_empty() => *corner,
+                    None => {
+                        self.positions.push(self.positions[vertex]);
+                        self.links.push(self.links[vertex]);
+                        self.positions.len() as u32 - 1
+                    }
+                };
+                if alike.is_none() {
+                    sides[vertex].push((*corner, direction));
+                }
+            }
+        }
     }
 
     /// Area-weighted normals over the triangles around a place; across an edge those of its own side alone.
@@ -155,6 +184,36 @@ mod tests {
             assert!(volume > 0.0, "{name}: seen from outside");
             assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-9));
         }
+    }
+
+    #[test]
+    fn a_box_of_eight_vertices_has_flat_sides() {
+        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let mut mesh = Mesh {
+            positions: (0..8).map(corner).collect(),
+            normals: Vec::new(),
+            links: vec![0; 8],
+            triangles: sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        };
+        mesh.split_at_edges();
+        assert_eq!((mesh.positions.len(), mesh.links.len(), mesh.triangles.len()), (24, 24, 12));
+        for (side, triangles) in sides.iter().zip(mesh.triangles.chunks(2)) {
+            let own: std::collections::BTreeSet<u32> = triangles.iter().flatten().copied().collect();
+            let places = own.iter().map(|&vertex| mesh.positions[vertex as usize]);
+            assert!(own.len() == 4 && places.into_iter().all(|at| side.iter().any(|&i| corner(i as usize) == at)));
+        }
+        // What is smooth stays as it is.
+        let mut flat = Mesh {
+            positions: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.3]]
+                .map(DVec3::from_array)
+                .to_vec(),
+            normals: Vec::new(),
+            links: vec![0; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        flat.split_at_edges();
+        assert_eq!((flat.positions.len(), flat.triangles), (4, vec![[0, 1, 2], [0, 2, 3]]));
     }
 
     #[test]

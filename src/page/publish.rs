@@ -11,7 +11,7 @@ use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::Plan;
-use crate::signal::{BoardHealth, Frame, RawValue};
+use crate::signal::{BoardHealth, Frame, Pose, RawValue};
 
 /// Events that wait for their log at most.
 const MAX_WAITING_EVENTS: usize = 4096;
@@ -44,6 +44,8 @@ pub struct Publisher {
     /// By the plan's channels, where a frame has their values.
     value_of: Vec<Option<usize>>,
     index_of_link: HashMap<String, u32>,
+    /// Poses of the last frame that was not late with them.
+    last_poses: Vec<(u32, Pose)>,
     /// By field.
     in_contact: Vec<bool>,
     /// Whether the next frame does not follow the last one.
@@ -65,6 +67,7 @@ impl Publisher {
             is_new: false,
             value_of: scene.value_of.clone(),
             index_of_link: scene.index_of_link.clone(),
+            last_poses: Vec::new(),
             in_contact: vec![false; scene.plan.fields.len()],
             jumped: false,
             number: None,
@@ -98,9 +101,15 @@ impl Publisher {
                 _ => own,
             };
         }
+        // While joints are late, the links stay where they were seen last.
+        if input.frame.has_stale_pose {
+            snapshot.poses.clone_from(&self.last_poses);
+            return;
+        }
         snapshot.poses.clear();
         let links = input.frame.pose.iter();
         snapshot.poses.extend(links.filter_map(|(name, pose)| Some((*self.index_of_link.get(name)?, *pose))));
+        self.last_poses.clone_from(&snapshot.poses);
     }
 
     /// Takes the percepts of a call, and hands over its newest frame with them.

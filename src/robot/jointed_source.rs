@@ -25,6 +25,8 @@ pub struct JointOptions {
     pub max_age_s: f64,
 }
 
+/// Messages on late states are at least so far apart, s.
+const QUIET_S: f64 = 10.0;
 /// The default of [`JointOptions::max_age_s`].
 const DEFAULT_MAX_AGE_S: f64 = 0.1;
 
@@ -53,7 +55,31 @@ pub struct JointedSource {
     positions: Vec<Option<JointPosition>>,
     poses: Vec<Option<DAffine3>>,
     was_stale: bool,
+    /// Whether the last time that it became stale was told, and when that was, s.
+    is_stale_told: bool,
+    told_s: f64,
+    counts: Counts,
+    /// Whether a position that may be in degrees has been told of.
+    has_told_of_degrees: bool,
     notices: Vec<String>,
+}
+
+/// What became of the frames.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    frames: usize,
+    without_pose: usize,
+    /// Times of the first and the last, s.
+    span_s: Option<[f64; 2]>,
+}
+
+impl Counts {
+    fn see(&mut self, frame: &Frame) {
+        self.frames += 1;
+        self.without_pose += usize::from(frame.has_stale_pose);
+        let [first_s, _] = self.span_s.unwrap_or([frame.t_s; 2]);
+        self.span_s = Some([first_s, frame.t_s]);
+    }
 }
 
 impl JointedSource {
@@ -69,7 +95,14 @@ impl JointedSource {
             let missing = matches.needed.iter().find(|(joint, _)| recorded[*joint].is_none());
             if let Some((joint, link)) = missing {
                 let name = robot.joint_names().nth(*joint).unwrap_or_default();
-                return Err(failed!("no state has joint `{name}`, which moves `{link}`; add it").at(states.name()));
+                // What no joint of the robot is called may be meant.
+                let known: Vec<&str> = robot.joint_names().collect();
+                let strange = states.joint_names().iter().map(String::as_str).filter(|name| !known.contains(name));
+                let hint = crate::error::nearest(name, strange.filter(|name| !robot.has_joint(name)));
+                let what_to_do = hint.map_or("add it".to_owned(), |near| format!("is `{near}` meant?"));
+                return Err(
+                    failed!("no state has joint `{name}`, which moves `{link}`; {what_to_do}").at(states.name())
+                );
             }
         }
         let joints = robot.joint_names().len();
@@ -83,6 +116,10 @@ impl JointedSource {
             positions: vec![None; joints],
             poses: Vec::new(),
             was_stale: false,
+            is_stale_told: false,
+            told_s: f64::NEG_INFINITY,
+            counts: Counts::default(),
+            has_told_of_degrees: false,
             notices: Vec::new(),
             robot,
         })
@@ -119,13 +156,57 @@ impl JointedSource {
         Ok(())
     }
 
+    /// Tells, at the end, how many frames have no pose.
+    fn tell_of_counts(&mut self) {
+        let Counts { frames, without_pose, span_s } = std::mem::take(&mut self.counts);
+        let Some([first_s, last_s]) = span_s.filter(|_| without_pose > 0) else { return };
+        let mut line =
+            format!("{without_pose} of {frames} frames have no pose: states of joints were missing or too old");
+        if let Some([from_s, to_s]) = self.options.states.as_ref().and_then(JointStates::span_s) {
+            let from_s = from_s - self.options.delay_s;
+            let to_s = to_s - self.options.delay_s;
+            line += &format!(
+                "; states are of {from_s} to {to_s} s on the frames' clock, frames of {first_s} to {last_s} s"
+            );
+        }
+        self.notices.push(line);
+    }
+
+    /// Tells once of a joint that stands where only degrees would be: a joint with an end turns less than once around.
+    fn look_for_degrees(&mut self, frame: &Frame) {
+        if self.has_told_of_degrees {
+            return;
+        }
+        let turned = |joint: &usize| self.robot.is_limited_turn(*joint);
+        let far = (0..self.positions.len()).filter(turned).find_map(|joint| {
+            let position = self.positions[joint]?.position;
+            (position.abs() > std::f64::consts::TAU).then_some((joint, position))
+        });
+        let Some((joint, position)) = far else { return };
+        self.has_told_of_degrees = true;
+        let name = self.robot.joint_names().nth(joint).unwrap_or_default();
+        self.notices.push(format!(
+            "at {} s: joint `{name}` is at {position} rad, over a whole turn; are these degrees? Give radians",
+            frame.t_s
+        ));
+    }
+
     fn put_poses(&mut self, frame: &mut Frame) -> Result<()> {
         self.find_positions(frame)?;
+        self.look_for_degrees(frame);
         let max_age_s = self.options.max_age_s;
-        let known = |joint: usize| self.positions[joint].filter(|found| (0.0..=max_age_s).contains(&found.age_s));
+        // Times are rounded: what is as old as the limit to a nanosecond is not older.
+        let allowed_s = 0.0..=max_age_s + 1e-9;
+        let known = |joint: usize| self.positions[joint].filter(|found| allowed_s.contains(&found.age_s));
         let late = self.matches.needed.iter().find(|(joint, _)| known(*joint).is_none());
         frame.has_stale_pose = late.is_some();
-        if late.is_some() != self.was_stale {
+        let is_stale = late.is_some();
+        if is_stale && !self.was_stale {
+            // States that keep coming too late are told of now and then, and counted at the end.
+            self.is_stale_told = frame.t_s - self.told_s >= QUIET_S;
+            self.told_s = if self.is_stale_told { frame.t_s } else { self.told_s };
+        }
+        if is_stale != self.was_stale && self.is_stale_told {
             self.notices.push(match late {
                 Some((joint, link)) => {
                     let name = self.robot.joint_names().nth(*joint).unwrap_or_default();
@@ -139,8 +220,8 @@ impl JointedSource {
                 }
                 None => format!("at {} s: every joint has a state; positions are in the world from here on", frame.t_s),
             });
-            self.was_stale = late.is_some();
         }
+        self.was_stale = is_stale;
         if frame.has_stale_pose {
             frame.pose.clear();
             return Ok(());
@@ -171,9 +252,11 @@ impl Source for JointedSource {
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         if !self.source.next_frame(frame)? {
+            self.tell_of_counts();
             return Ok(false);
         }
         self.put_poses(frame)?;
+        self.counts.see(frame);
         Ok(true)
     }
 

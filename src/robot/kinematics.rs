@@ -46,6 +46,7 @@ enum Drive {
 struct RobotJoint {
     name: String,
     is_continuous: bool,
+    is_prismatic: bool,
 }
 
 impl Kinematics {
@@ -120,6 +121,7 @@ impl Kinematics {
         let joint = |joint: &&crate::author::mesh::RobotJoint| RobotJoint {
             name: joint.name.clone(),
             is_continuous: is_continuous(&joint.motion),
+            is_prismatic: matches!(joint.motion, JointMotion::Prismatic { .. }),
         };
         let is_other = |joint: &&crate::author::mesh::RobotJoint| !index_of.contains_key(joint.name.as_str());
         let other_joints = robot.joints.iter().filter(is_other).map(|joint| joint.name.clone()).collect();
@@ -135,6 +137,13 @@ impl Kinematics {
     /// The names of the links, a parent before its children: the order of poses.
     pub fn link_names(&self) -> impl ExactSizeIterator<Item = &str> {
         self.links.iter().map(|link| link.name.as_str())
+    }
+
+    /// Whether joint `joint` turns, and not without end.
+    #[must_use]
+    pub fn is_limited_turn(&self, joint: usize) -> bool {
+        let RobotJoint { is_continuous, is_prismatic, .. } = self.joints[joint];
+        !is_continuous && !is_prismatic
     }
 
     /// Whether joint `joint` turns without end, so that 0 and 2π are one position.

@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat};
 
 use super::kinematics::Kinematics;
 use crate::author::mesh::{Up, y_up_from};
-use crate::body::Body;
+use crate::body::{Body, Taxel};
 use crate::error::{Error, Result, failed};
 
 /// How far apart URDF and body may have a link at rest, m.
@@ -66,6 +66,15 @@ impl LinkMatches {
                 at = body.links[link].parent;
             }
         }
+        let is_alone = |taxel: &Taxel| !is_matched(&body.links[taxel.link].name);
+        if let Some(taxel) = body.taxels.iter().find(|taxel| is_alone(taxel)).filter(|_| needed.is_empty()) {
+            return Err(failed!(
+                "no joint of it moves a link with taxels of body `{}`, whose link `{}` it does not have; is it the URDF of this \
+                 robot?",
+                body.name,
+                body.links[taxel.link].name
+            ));
+        }
         let not_in_body = robot.link_names().len() - matched.len();
         let matches = Self { matched, unmatched, needed, not_in_body };
         matches.check_rest(robot, body, up)?;
@@ -112,7 +121,8 @@ impl LinkMatches {
             text += &format!("; not {}: they keep their places on the links above them", self.unmatched.join(", "));
         }
         if self.not_in_body > 0 {
-            text += &format!("; {} links of the URDF are not in the body", self.not_in_body);
+            let (links, are) = if self.not_in_body == 1 { ("link", "is") } else { ("links", "are") };
+            text += &format!("; {} {links} of the URDF {are} not in the body", self.not_in_body);
         }
         text
     }

@@ -54,6 +54,9 @@ impl JointStates {
         if states.names.is_empty() {
             return Err(Error::failed("it has no joints; write a CSV under t,<joint>,...").at(path.display()));
         }
+        if states.span_s().is_none() {
+            return Err(Error::failed("it has no states, only a header").at(path.display()));
+        }
         Ok(states)
     }
 
@@ -80,7 +83,7 @@ impl JointStates {
     }
 
     fn read_csv(&mut self, reader: impl std::io::Read) -> Result<()> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(reader);
         let header = reader.headers().map_err(|e| Error::failed(e.to_string()))?.clone();
         if header.get(0).map(|name| name.trim_start_matches('\u{feff}')) != Some("t") {
             return Err(Error::failed("its first column is not `t`; write a CSV under t,<joint>,...").at("header"));
@@ -99,6 +102,9 @@ impl JointStates {
                 text.parse::<f64>()
                     .map_err(|_| failed!("column `{}` is `{text}`; write a number", &header[column]).at(at()))
             };
+            if row.len() != header.len() {
+                return Err(failed!("{} cells, and the header has {}", row.len(), header.len()).at(at()));
+            }
             let t_s = number(0)?;
             // An empty cell is a joint of which nothing is told.
             for column in (1..header.len()).filter(|&column| !row[column].is_empty()) {
@@ -165,6 +171,13 @@ impl JointStates {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The times of the first and the last state, s; `None` without states.
+    #[must_use]
+    pub fn span_s(&self) -> Option<[f64; 2]> {
+        let ends = self.tracks.iter().filter_map(|track| Some([track.first()?.0, track.last()?.0]));
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
     /// The joints' names.

@@ -142,6 +142,7 @@ fn joints_in_frames_put_percepts_into_the_world() {
     assert_eq!(found.len(), 6);
     assert!(said.contains("at 0.9 s: joint `elbow`") || said.contains("at 0.9 s: joint `shoulder`"), "{said}");
     assert!(said.contains("0.750 s old") && said.contains("at 1 s: every joint has a state"), "{said}");
+    assert!(said.contains("1 of 6 frames have no pose") && !said.contains("degrees"), "{said}");
     // Who asks for the anchor gets it, and no flag.
     let flags = ["--joints", URDF, "--up", "z", "--coordinates", "anchor"];
     let anchored = run_lines(&body, &lines.concat(), &flags).0;
@@ -245,4 +246,47 @@ fn what_does_not_go_together_is_refused_in_one_line() {
     assert!(other.contains("none of its links is called as one of body `hand`"), "{other}");
     let looped = ["--joints", URDF, "--up", "z", "--joint-states", STATES, "--loop=2"];
     assert!(run(2, &looped).contains("--loop lets the time"));
+}
+
+#[test]
+fn states_that_cannot_be_meant_are_told_of() {
+    let (folder, body) = arm();
+    let touch = folder.path().join("touch.csv");
+    let rows: String = (0..100).map(|frame| format!("{},5\n", f64::from(frame) * 0.01)).collect();
+    std::fs::write(&touch, format!("t,11\n{rows}")).unwrap();
+    let states = folder.path().join("states.csv");
+    let said = |urdf: &str, text: &str| {
+        std::fs::write(&states, text).unwrap();
+        let output = super::somatic(&["run", "--backend", "reference", "--body", text_of(&body)])
+            .args(["--source", text_of(&touch), "--joints", urdf, "--joint-states", text_of(&states)])
+            .args(["--up", "z", "--sink", "-"])
+            .output()
+            .unwrap();
+        (output.status.code(), stderr(&output))
+    };
+    let (code, told) = said(URDF, "t,shoulder,elbow,grip\n0,28.6,0,0\n0.99,28.6,0,0\n");
+    assert!(code == Some(0) && told.matches("are these degrees?").count() == 1, "{told}");
+    assert!(told.contains("joint `shoulder` is at 28.6 rad"), "{told}");
+    // In ms instead of s; the states come too late again and again.
+    let (code, told) = said(URDF, "t,shoulder,elbow,grip\n0,0,0,0\n250,0,0,0\n500,0,0,0\n");
+    assert!(code == Some(0) && told.contains("89 of 100 frames have no pose"), "{told}");
+    assert!(told.contains("states are of 0 to 500 s on the frames' clock, frames of 0 to 0.99 s"), "{told}");
+    let slow: String = (0..5).map(|state| format!("{},0,0,0\n", f64::from(state) * 0.25)).collect();
+    let (_, told) = said(URDF, &format!("t,shoulder,elbow,grip\n{slow}"));
+    assert_eq!(told.matches("from here on").count(), 2, "{told}");
+    for (text, why) in [
+        ("t,shoulder,elbow,grip\n", "it has no states, only a header"),
+        ("t,shoulder,elbow,grip\n0,0,0,0\n1,0\n", "line 3: 2 cells, and the header has 4"),
+        ("t,shoulder,elbwo,grip\n0,0,0,0\n", "no state has joint `elbow`, which moves `fore_arm`; is `elbwo` meant?"),
+    ] {
+        let (code, told) = said(URDF, text);
+        assert!(code == Some(1) && told.contains(why), "{told}");
+    }
+    // The base of another robot is called alike.
+    let other = folder.path().join("other.urdf");
+    let urdf = "<robot name=\"other\"><link name=\"base\"/><link name=\"tool\"/><joint name=\"turn\" type=\"continuous\">\
+                <parent link=\"base\"/><child link=\"tool\"/></joint></robot>";
+    std::fs::write(&other, urdf).unwrap();
+    let (code, told) = said(text_of(&other), "t,turn\n0,0\n");
+    assert!(code == Some(1) && told.contains("is it the URDF of this robot?"), "{told}");
 }

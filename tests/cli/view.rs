@@ -208,6 +208,7 @@ fn what_cannot_be_shown_is_one_line() {
         (2, &["view", "--for", "soon"], "is not a time"),
         (2, &["view", "--sink", "a.ndjson"], "writes and compares nothing"),
         (2, &["view", "--verify"], "writes and compares nothing"),
+        (2, &["view", "hand", "--calibration", "none.toml"], "--calibration: it is about frames"),
     ] {
         let line = fails(code, arguments);
         assert!(line.contains(word) && line.lines().count() == 1, "{arguments:?}: {line}");

@@ -116,11 +116,10 @@ fn played(
     batch: usize,
     engines: &mut [Engine],
 ) -> Result<(Played, String)> {
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let mut frames = Vec::new();
     let mut on = "with every taxel pressed".to_owned();
     if let Some(input) = recorded {
-        let mut source = asked.jointed(input.open(&ids, asked)?, body)?;
+        let mut source = input.open_posed(body, asked)?;
         let mut frame = Frame::missing(0.0, source.taxels().len());
         while frames.len() < batch.max(RECORDED_BATCH) && source.next_frame(&mut frame)? {
             frames.push(frame.clone());
@@ -133,7 +132,7 @@ fn played(
         }
     }
     if frames.is_empty() {
-        frames = pressed(ids.len(), batch);
+        frames = pressed(body.taxels.len(), batch);
     }
     Ok((Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() }, on))
 }

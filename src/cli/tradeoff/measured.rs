@@ -46,7 +46,7 @@ pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f6
 }
 
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
-pub(super) fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize) -> Result<TestFrames> {
+pub(super) fn played(input: &Input, asked: &RunOptions, body: &Body, most: usize) -> Result<TestFrames> {
     let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
     fn next(played: &mut TestFrames, source: &mut dyn Source) -> Result<bool> {
         if played.frames.is_empty() {
@@ -63,7 +63,7 @@ pub(super) fn played(input: &Input, asked: &RunOptions, ids: &[u32], most: usize
             played.truth.push(source.truth().to_vec());
         }
     } else {
-        let mut source = input.open(ids, asked)?;
+        let mut source = input.open_posed(body, asked)?;
         while played.frames.len() < most && next(&mut played, &mut *source)? {}
     }
     if played.frames.is_empty() {

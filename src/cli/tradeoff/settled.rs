@@ -72,7 +72,7 @@ pub(in crate::cli) fn settled(asked: &RunOptions, input: Option<&Input>, body: &
         Some(report) => (report, when),
         None => {
             let again = input.filter(|input| input.is_recording());
-            let played = again.map(|input| played(input, asked, &ids, BRIEF_FRAMES)).transpose()?;
+            let played = again.map(|input| played(input, asked, body, BRIEF_FRAMES)).transpose()?;
             let played = played.unwrap_or_else(|| made_up(body, ids.clone()));
             let brief = measure_options(asked, &options, BRIEF_S)?;
             let mut tested = Tested::new(body, &options, Some(played), BRIEF_FRAMES)?;

@@ -190,9 +190,8 @@ impl Opening<'_> {
             return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
         }
         let body = Arc::new(input.body(asked)?);
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let stop = stop_on_signal()?;
-        let source = asked.jointed(input.open(&ids, asked)?, &body)?;
+        let source = input.open_posed(&body, asked)?;
         let Some(recording) = Recording::read(source, &stop, asked.quiet)? else { return Ok(DONE) };
         let recording = Arc::new(recording);
         let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;

@@ -41,7 +41,9 @@ impl Recording {
         let mut told = 0;
         loop {
             let mut frame = Frame::missing(0.0, taxels.len());
-            if !source.next_frame(&mut frame)? {
+            let is_there = source.next_frame(&mut frame)?;
+            source.notices().iter().filter(|_| !quiet).for_each(|notice| say(notice));
+            if !is_there {
                 break;
             }
             latest_s.push(latest_s.last().map_or(frame.t_s, |&latest: &f64| latest.max(frame.t_s)));

@@ -52,6 +52,22 @@ fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
         return Err(Error::usage(format!("`{what}` and --body {other}: give one of them")));
     }
     if asked.sources.is_empty() {
+        let about_frames = [
+            ("--joints", asked.joints.is_some()),
+            ("--joint-states", asked.joint_states.is_some()),
+            ("--calibration", asked.calibration.is_some()),
+            ("--outputs", !asked.outputs.is_empty()),
+            ("--fields", !asked.fields.is_empty()),
+            ("--from", asked.from.is_some()),
+            ("--to", asked.to.is_some()),
+            ("--speed", asked.speed.is_some()),
+            ("--rate", asked.rate.is_some()),
+            ("--wiring", asked.wiring.is_some()),
+        ];
+        if let Some((flag, _)) = about_frames.into_iter().find(|(_, is_given)| *is_given) {
+            let what_to_do = "it is about frames, and a body at rest has none; give their recording with --source";
+            return Err(Error::usage(what_to_do).at(flag));
+        }
         return Ok(Subject::Body(load_body(what)?));
     }
     let mut asked = asked.with(None)?;

@@ -80,7 +80,7 @@ export class PerceptPanel {
     for (const column of welcome.columns) {
       const row = this.rows.get(column.name);
       if (!row) continue;
-      const value = model.value(field, column.name);
+      const value = model.told(field, column.name);
       const text = value
         ? vectorWithUnit(value, column.unit, model.quantity)
         : `${ABSENT} ${touched ? model.reason(field, column.name).replaceAll("_", " ") : ""}`;

@@ -73,7 +73,8 @@ export function vectorWithUnit(value, unit, quantity) {
   const parts = Array.from(value);
   if (parts.length === 1) return withUnit(parts[0], unit, quantity);
   const by = scaleFor(unit, Math.max(...parts.map(Math.abs)), quantity);
-  const text = parts.map((x) => (by.unit === "mm" ? (x * by.factor).toFixed(2) : short(x * by.factor)));
+  const fixed = (/** @type {number} */ x) => x.toFixed(2).replace(/^-(0\.00)$/, "$1");
+  const text = parts.map((x) => (by.unit === "mm" ? fixed(x * by.factor) : short(x * by.factor)));
   return `${text.join(", ")}${by.unit ? ` ${by.unit}` : ""}`;
 }
 

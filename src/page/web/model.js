@@ -3,7 +3,7 @@
 import { Observed } from "./dom.js";
 import { withUnit } from "./format.js";
 import { poseToRows } from "./math.js";
-import { HEALTH } from "./wire.js";
+import { HEALTH, IN_WORLD_BIT } from "./wire.js";
 
 /** @typedef {import("./wire.js").Welcome} Welcome */
 /** @typedef {import("./wire.js").Frame} Frame */
@@ -248,6 +248,18 @@ export class Model extends Observed {
     if (!values || !((this.percepts.present[k] >>> index) & 1)) return null;
     const components = this.welcome.columns[index].components;
     return values.subarray(k * components, (k + 1) * components);
+  }
+
+  /**
+   * The same as people are told it: places in the world from the world's own origin, not from the picture's.
+   * @param {number} field
+   * @param {string} column
+   */
+  told(field, column) {
+    const value = this.value(field, column);
+    const present = this.percepts?.present[this.inContact.get(field) ?? 0] ?? 0;
+    if (!value || column !== "position" || !((present >>> IN_WORLD_BIT) & 1)) return value;
+    return value.map((x, i) => x + (this.welcome?.origin[i] ?? 0));
   }
 
   /** The column that says how hard a field is pressed: its force where that is computed, else the sum of its pressures. */

@@ -19,7 +19,7 @@ pub(super) struct Moment {
     pub(super) touched: Vec<TouchedField>,
 }
 
-/// What markers show of a touched field. A percept is a kilobyte, and the engine's thread makes one for each.
+/// What markers show of a touched field. A whole percept is a kilobyte: filling one for each field took most of handing over.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TouchedField {
     /// As [`crate::Percept::field`].

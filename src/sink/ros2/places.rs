@@ -16,10 +16,10 @@ pub(super) const WORLD: &str = "world";
 /// `UINT32` and `FLOAT32` of `sensor_msgs/PointField`.
 const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
-/// A point: x, y, z, and at these bytes the pressure and the taxel's id.
+/// A point: x, y, z, the pressure and the taxel's id; where the last two begin.
 const POINT_BYTES: usize = 20;
-const PRESSURE: usize = 12;
-const TAXEL: usize = 16;
+const PRESSURE_AT: usize = 12;
+const TAXEL_AT: usize = 16;
 
 /// Turns the body's world, whose y is up, to ROS's, whose z is up.
 pub(super) fn z_up_from_y_up() -> DQuat {
@@ -67,7 +67,7 @@ impl Clouds {
             for (bytes, number) in point.chunks_exact_mut(4).zip(place) {
                 bytes.copy_from_slice(&number.to_le_bytes());
             }
-            point[TAXEL..].copy_from_slice(&taxel.id.to_le_bytes());
+            point[TAXEL_AT..].copy_from_slice(&taxel.id.to_le_bytes());
             clouds[taxel.link].taxels.push((index, point));
         }
         clouds.retain(|cloud| !cloud.taxels.is_empty());
@@ -84,7 +84,7 @@ impl Clouds {
             let mut data = Vec::with_capacity(taxels.len() * POINT_BYTES);
             for (taxel, point) in taxels {
                 let Some(pressure) = readings.of(*taxel) else { continue };
-                let at = data.len() + PRESSURE;
+                let at = data.len() + PRESSURE_AT;
                 data.extend_from_slice(point);
                 data[at..][..4].copy_from_slice(&(pressure as f32).to_le_bytes());
             }
@@ -98,8 +98,8 @@ impl Clouds {
                 ("x", 0, FLOAT32),
                 ("y", 4, FLOAT32),
                 ("z", 8, FLOAT32),
-                ("pressure", PRESSURE, FLOAT32),
-                ("taxel", TAXEL, UINT32),
+                ("pressure", PRESSURE_AT, FLOAT32),
+                ("taxel", TAXEL_AT, UINT32),
             ];
             PointCloud2 {
                 header: header(time_ns, link),
