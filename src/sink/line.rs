@@ -19,26 +19,24 @@ struct Head {
     /// As JSON.
     field: String,
     link: String,
+    /// Letter and signal where they are named, as keys and values behind a comma.
+    letters: String,
 }
 
 impl Head {
     fn new(names: &FieldNames) -> Self {
-        let begin = |link: &str| {
-            let text = |text: &str| serde_json::Value::from(text).to_string();
-            let mut head = format!("{{\"field\":{},\"link\":{}", text(&names.field), text(link));
-            for (key, value) in [("letter", &names.letter), ("signal", &names.signal)] {
-                if let Some(value) = value {
-                    head += &format!(",\"{key}\":{}", text(value));
-                }
-            }
-            head + ",\"contact\":"
-        };
         let text = |text: &str| serde_json::Value::from(text).to_string();
+        let named = [("letter", &names.letter), ("signal", &names.signal)].into_iter();
+        let named = named.filter_map(|(key, value)| Some(format!(",\"{key}\":{}", text(value.as_ref()?))));
+        let letters: String = named.collect();
+        let begin =
+            |link: &str| format!("{{\"field\":{},\"link\":{}{letters},\"contact\":", text(&names.field), text(link));
         Self {
             in_anchor: begin(&names.link),
             in_world: begin(&names.world),
             field: text(&names.field),
             link: text(&names.link),
+            letters,
         }
     }
 }
@@ -101,6 +99,8 @@ impl LineWriter {
         for (index, contact) in contacts.iter().enumerate() {
             line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
             print(line, &contact.id);
+            // Both sides are of one letter.
+            line.extend_from_slice(self.heads[contact.sides[0].field].letters.as_bytes());
             for (name, of) in [("fields", true), ("links", false)] {
                 let [a, b] = contact.sides.map(|side| {
                     let head = &self.heads[side.field];

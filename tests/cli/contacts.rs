@@ -1,5 +1,6 @@
 //! Contacts between links, against a simulation in which both skins are pressed at a known place in the world.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -173,6 +174,23 @@ fn contacts_are_there_exactly_when_both_skins_press_on_each_other() {
             assert_eq!((&touch["id"], &touch["total"]), (&contact["touches"][side], &contact["totals"][side]));
         }
     }
+}
+
+#[test]
+fn contacts_of_several_letters_are_told_apart() {
+    let (plates, truth) = (Plates::new(), truth());
+    let found = plates.jointed(&plates.lines(&truth, 0.0), &["--letters", "sustained,change"]);
+    let mut letters = BTreeSet::new();
+    for frame in &found {
+        let of_frame: Vec<&str> = contacts(frame)
+            .iter()
+            .map(|contact| contact["letter"].as_str().unwrap_or_else(|| panic!("{contact}")))
+            .collect();
+        let different: BTreeSet<&str> = of_frame.iter().copied().collect();
+        assert_eq!(different.len(), of_frame.len(), "one contact of each: {frame}");
+        letters.extend(different);
+    }
+    assert_eq!(letters, BTreeSet::from(["change", "sustained"]));
 }
 
 #[test]

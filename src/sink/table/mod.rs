@@ -145,15 +145,21 @@ fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
             ValueOf::Link,
         ),
     ];
-    if names.iter().any(|name| name.letter.is_some()) {
-        let help = "Of what the percept is made: `sustained` or `change`.";
-        columns.push(TableColumn::new("letter", "", TableType::Word, help, ValueOf::Letter).or_absent());
-    }
-    if names.iter().any(|name| name.signal.is_some()) {
-        let help = "The signal of the sensors: `raw` or `linear`.";
-        columns.push(TableColumn::new("signal", "", TableType::Word, help, ValueOf::Signal).or_absent());
-    }
+    columns.extend(letters(names));
     columns
+}
+
+/// What tells percepts of one field apart, where there are several.
+fn letters(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
+    let letter = names.iter().any(|name| name.letter.is_some()).then(|| {
+        let help = "Of what the percept is made: `sustained` or `change`.";
+        TableColumn::new("letter", "", TableType::Word, help, ValueOf::Letter).or_absent()
+    });
+    let signal = names.iter().any(|name| name.signal.is_some()).then(|| {
+        let help = "The signal of the sensors: `raw` or `linear`.";
+        TableColumn::new("signal", "", TableType::Word, help, ValueOf::Signal).or_absent()
+    });
+    letter.into_iter().chain(signal)
 }
 
 /// The columns of the percepts of a session: keys, contact, a column for each component of its outputs, and flags.
@@ -241,6 +247,7 @@ pub fn contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
         TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
         TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId),
     ];
+    columns.extend(letters(&session.names));
     for (side, letter) in ["a", "b"].into_iter().enumerate() {
         let mut column = |name: &str, unit: &str, kind, help: &str, value| {
             columns.push(TableColumn::new(&format!("{name}_{letter}"), unit, kind, help, value));
