@@ -23,7 +23,7 @@ pub(super) enum Arrival {
 pub(super) struct Ending {
     /// What was never processed.
     pub(super) losses: Vec<String>,
-    /// Messages for the user since the last frames.
+    /// The last messages for the user.
     pub(super) notices: Vec<String>,
 }
 
@@ -165,9 +165,8 @@ fn read(
         if with_losses {
             info.losses = source.losses();
         }
-        match &mut end {
-            Some(Arrival::End(ending)) if frames.is_empty() => ending.notices = std::mem::take(&mut info.notices),
-            _ => {}
+        if let Some(Arrival::End(ending)) = &mut end {
+            ending.notices = std::mem::take(&mut info.notices);
         }
         if !frames.is_empty() && to.send(Arrival::Frames(frames, info)).is_err() {
             return Arrival::End(Ending::default());

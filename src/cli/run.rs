@@ -14,7 +14,7 @@ use super::describe::describe;
 use super::doubts::Doubts;
 #[cfg(feature = "page")]
 use super::explanation::LiveExplainer;
-use super::feed::{Arrival, Feed, ReadMode};
+use super::feed::{Arrival, Ending, Feed, ReadMode};
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
 use super::interrupt::stop_on_signal;
@@ -232,7 +232,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let is_ended = || stop.load(Ordering::Relaxed);
     let until = lasts.map(|span| Instant::now() + span);
     match pump.run(feed, is_ended, until) {
-        Ok(losses) => pump.finish(losses),
+        Ok(ending) => pump.finish(ending),
         Err(error) => {
             let Pump { view, live, .. } = pump;
             drop(view);
@@ -273,8 +273,8 @@ struct Call {
 }
 
 impl Pump {
-    /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source lost.
-    fn run(&mut self, mut feed: Feed, is_ended: impl Fn() -> bool, until: Option<Instant>) -> Result<Vec<String>> {
+    /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source says at its end.
+    fn run(&mut self, mut feed: Feed, is_ended: impl Fn() -> bool, until: Option<Instant>) -> Result<Ending> {
         let watched = self.view.is_table() || self.sinks.is_empty();
         let mut losses = Vec::new();
         while !is_ended() && until.is_none_or(|until| Instant::now() < until) {
@@ -310,10 +310,7 @@ impl Pump {
                     feed.give_back(frames);
                     self.report_unfit()?;
                 }
-                Some(Arrival::End(ending)) => {
-                    ending.notices.iter().for_each(|notice| say(notice));
-                    return Ok(ending.losses);
-                }
+                Some(Arrival::End(ending)) => return Ok(ending),
                 Some(Arrival::Failed(error)) => return Err(error),
                 // Nothing comes, but something may be held back.
                 None if self.flush => self.each_sink(|sink| sink.flush())?,
@@ -332,7 +329,7 @@ impl Pump {
             }
             self.view.draw();
         }
-        Ok(losses)
+        Ok(Ending { losses, notices: Vec::new() })
     }
 
     /// Reports taxels that are left out, or used again, to sinks and, unless a table fills the terminal, to people.
@@ -378,7 +375,7 @@ impl Pump {
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
-    fn finish(mut self, mut losses: Vec<String>) -> Result<u8> {
+    fn finish(mut self, Ending { mut losses, notices }: Ending) -> Result<u8> {
         for sink in self.sinks {
             sink.finish()?;
         }
@@ -389,6 +386,7 @@ impl Pump {
         self.unfit.changes(&self.engine).iter().for_each(|message| say(message));
         self.unfit.print_repeats();
         tell_doubts(&self.engine, &mut self.doubts);
+        notices.iter().for_each(|notice| say(notice));
         let code = tell_losses(&losses);
         if let Some(agreement) = self.agreement {
             say(&format!("backend {} {agreement}", self.engine.backend().0));

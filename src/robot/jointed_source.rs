@@ -58,22 +58,22 @@ pub struct JointedSource {
     /// Whether the last time that it became stale was told, and when that was, s.
     is_stale_told: bool,
     told_s: f64,
-    counts: Counts,
+    counts: PoseCounts,
     /// Whether a position that may be in degrees has been told of.
     has_told_of_degrees: bool,
     notices: Vec<String>,
 }
 
-/// What became of the frames.
+/// Frames that were read, and those of them without a pose.
 #[derive(Clone, Copy, Debug, Default)]
-struct Counts {
+struct PoseCounts {
     frames: usize,
     without_pose: usize,
     /// Times of the first and the last, s.
     span_s: Option<[f64; 2]>,
 }
 
-impl Counts {
+impl PoseCounts {
     fn see(&mut self, frame: &Frame) {
         self.frames += 1;
         self.without_pose += usize::from(frame.has_stale_pose);
@@ -118,7 +118,7 @@ impl JointedSource {
             was_stale: false,
             is_stale_told: false,
             told_s: f64::NEG_INFINITY,
-            counts: Counts::default(),
+            counts: PoseCounts::default(),
             has_told_of_degrees: false,
             notices: Vec::new(),
             robot,
@@ -157,8 +157,8 @@ impl JointedSource {
     }
 
     /// Tells, at the end, how many frames have no pose.
-    fn tell_of_counts(&mut self) {
-        let Counts { frames, without_pose, span_s } = std::mem::take(&mut self.counts);
+    fn tell_of_frames_without_pose(&mut self) {
+        let PoseCounts { frames, without_pose, span_s } = std::mem::take(&mut self.counts);
         let Some([first_s, last_s]) = span_s.filter(|_| without_pose > 0) else { return };
         let mut line =
             format!("{without_pose} of {frames} frames have no pose: states of joints were missing or too old");
@@ -252,7 +252,7 @@ impl Source for JointedSource {
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         if !self.source.next_frame(frame)? {
-            self.tell_of_counts();
+            self.tell_of_frames_without_pose();
             return Ok(false);
         }
         self.put_poses(frame)?;

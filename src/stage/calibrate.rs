@@ -124,11 +124,11 @@ pub(crate) struct Felt {
 
 /// The P of [`reference`] without its bound; none where `raw` cannot be used.
 pub(crate) fn pressure(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<f64> {
-    answer(raw, taxel, curve).map(|(_, here)| over_dead_band(here, taxel))
+    value_and_response(raw, taxel, curve).map(|(_, here)| over_dead_band(here, taxel))
 }
 
 /// The raw value that counts, and the P that it has whatever the dead band; none where `raw` cannot be used.
-fn answer(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<(f64, f64)> {
+fn value_and_response(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<(f64, f64)> {
     let value = usable(raw, taxel).ok()?;
     let value = if is_tiny(value) { 0.0 } else { value };
     let here = response(value, taxel, curve);
@@ -141,7 +141,7 @@ fn over_dead_band(pressure: f64, taxel: &TaxelCalibration) -> f64 {
 
 /// What a fit takes from a taxel that reads `raw`; none where that cannot be used.
 pub(crate) fn felt(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<Felt> {
-    let (value, here) = answer(raw, taxel, curve)?;
+    let (value, here) = value_and_response(raw, taxel, curve)?;
     let pressure = over_dead_band(here, taxel);
     let sigma = taxel.noise.map(|noise| {
         let [less, more] = [-noise, noise].map(|off| response(value + off, taxel, curve));

@@ -145,12 +145,12 @@ fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
             ValueOf::Link,
         ),
     ];
-    columns.extend(letters(names));
+    columns.extend(letter_columns(names));
     columns
 }
 
-/// What tells percepts of one field apart, where there are several.
-fn letters(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
+/// Letter and signal, where a field has percepts of several.
+fn letter_columns(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
     let letter = names.iter().any(|name| name.letter.is_some()).then(|| {
         let help = "Of what the percept is made: `sustained` or `change`.";
         TableColumn::new("letter", "", TableType::Word, help, ValueOf::Letter).or_absent()
@@ -247,7 +247,7 @@ pub fn contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
         TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
         TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId),
     ];
-    columns.extend(letters(&session.names));
+    columns.extend(letter_columns(&session.names));
     for (side, letter) in ["a", "b"].into_iter().enumerate() {
         let mut column = |name: &str, unit: &str, kind, help: &str, value| {
             columns.push(TableColumn::new(&format!("{name}_{letter}"), unit, kind, help, value));
