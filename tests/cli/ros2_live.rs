@@ -138,6 +138,30 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
 }
 
 #[test]
+fn another_node_finds_the_node_and_what_it_writes_and_reads_until_it_goes() {
+    let Some(python) = python() else { return };
+    let (_folder, body, _) = arm();
+    let urdf = format!("{ROBOT}/arm.urdf");
+    let domain = domain();
+    // Five topics, as nothing is in newtons, and the one that tells of the node.
+    let mut writes = Peer::start(&python, &domain, &["node", "/left/somatic", "6"]);
+    let mut reads = Peer::start(&python, &domain, &["node", "/somatic_joints", "2"]);
+    let body = body.display().to_string();
+    let flags = ["run", "-q", "--body", &body, "--source", "-", "--joints", &urdf, "--up", "z", "--sink", "ros2:/left"];
+    let child = run(&domain, &[&flags[..], &["--joint-states", "ros2:/joint_states"]].concat());
+    let topics = |peer: &mut Peer| -> [Vec<String>; 2] { serde_json::from_str(&peer.line()).unwrap() };
+    let names = ["diagnostics", "somatic/joint_states", "somatic/taxels/fore_arm", "somatic/touches", "tf"];
+    let of_left = names.iter().map(|name| format!("rt/left/{name}"));
+    let own = "ros_discovery_info".to_owned();
+    let written: Vec<String> = [own.clone()].into_iter().chain(of_left).collect();
+    assert_eq!(topics(&mut writes), [written, vec![]]);
+    assert_eq!(topics(&mut reads), [vec![own], vec!["rt/joint_states".to_owned()]]);
+    ended(child);
+    writes.wait_for("gone");
+    reads.wait_for("gone");
+}
+
+#[test]
 fn nobody_hears_another_domain_or_namespace() {
     let Some(python) = python() else { return };
     let (_folder, body, lines) = arm();

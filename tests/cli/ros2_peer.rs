@@ -62,7 +62,7 @@ impl Peer {
         peer
     }
 
-    fn line(&mut self) -> String {
+    pub fn line(&mut self) -> String {
         let mut line = String::new();
         assert!(self.output.read_line(&mut line).unwrap() > 0, "the peer has ended");
         line

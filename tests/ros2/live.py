@@ -2,11 +2,13 @@
 
     live.py receive TOPIC=TYPE:reliable|best_effort[:stamps] ...
     live.py send TOPIC TYPE reliable|best_effort
+    live.py node NAME COUNT
 
 The domain is that of ROS_DOMAIN_ID. `receive` prints `matched` each time every topic has a writer and `unmatched` each time one
 has none, until a line comes on its standard input; then a line of JSON: [topic, when it came in ns, message] each; with `stamps`
 the header's stamp in ns is all that is kept of a message. `send` prints `matched` once its topic has a reader, and sends each line
-of its standard input, a message as JSON.
+of its standard input, a message as JSON. `node` waits until the node NAME has COUNT writers and readers and all are found, and
+prints as JSON which topics of DDS it writes and reads; then `gone` once it says that it is no more.
 """
 
 import json
@@ -24,6 +26,7 @@ from cyclonedds.util import duration
 
 import read
 
+WITHIN_S = 60
 
 def topic(participant, name, typename, reliability):
     reliable = Policy.Reliability.Reliable(duration(seconds=2))
@@ -106,10 +109,46 @@ def send(name, typename, reliability):
     time.sleep(0.5)
 
 
+def node(full_name, count):
+    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    qos = Qos(
+        Policy.Reliability.Reliable(duration(seconds=2)),
+        Policy.Durability.TransientLocal,
+        Policy.History.KeepLast(1),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
+    kind = read.cyclonedds_type("rmw_dds_common/msg/ParticipantEntitiesInfo")
+    told = DataReader(participant, Topic(participant, "ros_discovery_info", kind, qos=qos), qos=qos)
+    found = [BuiltinDataReader(participant, kind) for kind in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)]
+    topics, entities = {}, None
+    until = time.monotonic() + WITHIN_S
+    while time.monotonic() < until:
+        for reader in found:
+            topics.update({sample.key.bytes: sample.topic_name for sample in reader.take(N=1000) if sample.key})
+        for message in told.take(N=100):
+            if not hasattr(message, "__dataclass_fields__") or not message.sample_info.valid_data:
+                continue
+            nodes = {f"{own.node_namespace.rstrip('/')}/{own.node_name}": own for own in message.node_entities_info_seq}
+            if full_name in nodes:
+                own = nodes[full_name]
+                entities = [[bytes(gid.data) for gid in gids] for gids in (own.writer_gid_seq, own.reader_gid_seq)]
+            elif entities == []:
+                return print("gone", flush=True)
+        if entities and sum(map(len, entities)) == count and all(gid in topics for gids in entities for gid in gids):
+            print(json.dumps([sorted(topics[gid] for gid in gids) for gids in entities]), flush=True)
+            entities = []
+        time.sleep(0.01)
+    raise SystemExit(f"{full_name}: after {WITHIN_S} s it has {entities}")
+
+
 match sys.argv[1:]:
     case ["receive", *topics]:
         receive(topics)
     case ["send", name, typename, reliability]:
         send(name, typename, reliability)
+    case ["node", name, count]:
+        node(name, int(count))
     case _:
         raise SystemExit(__doc__)

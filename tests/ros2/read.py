@@ -43,13 +43,18 @@ def cyclonedds_type(typename, known={}):
 
     numbers = {
         "int32": types.int32, "uint32": types.uint32, "float32": types.float32, "float64": types.float64,
-        "uint8": types.uint8, "byte": types.uint8, "octet": types.uint8, "bool": bool, "string": str,
+        "uint8": types.uint8, "byte": types.uint8, "octet": types.uint8, "char": types.uint8, "bool": bool, "string": str,
     }
     if typename not in known:
         fields = {}
         for name, (kind, detail) in STORE.fielddefs[typename][1]:
             base = lambda kind, detail: numbers[detail[0]] if kind.name == "BASE" else cyclonedds_type(detail)
-            fields[name] = types.sequence[base(*detail[0])] if kind.name == "SEQUENCE" else base(kind, detail)
+            if kind.name == "SEQUENCE":
+                fields[name] = types.sequence[base(*detail[0])]
+            elif kind.name == "ARRAY":
+                fields[name] = types.array[base(*detail[0]), detail[1]]
+            else:
+                fields[name] = base(kind, detail)
         package, _, short = typename.split("/")
         known[typename] = make_idl_struct(short, f"{package}.msg.dds_.{short}_", fields)
     return known[typename]

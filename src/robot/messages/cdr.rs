@@ -1,6 +1,8 @@
 //! Common Data Representation, as ROS 2 has messages in bags and on the wire: little-endian, numbers at multiples of their
 //! size from the header's end.
 
+use std::borrow::Cow;
+
 /// Plain CDR, little-endian, no options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
@@ -18,9 +20,10 @@ impl CdrWriter {
     }
 
     fn put<const SIZE: usize>(&mut self, bytes: [u8; SIZE]) {
-        let length = (self.0.len() - HEADER.len()).next_multiple_of(SIZE) + HEADER.len();
-        self.0.resize(length, 0);
-        self.0.extend(bytes);
+        let length = self.0.len() - HEADER.len();
+        let padding = length.next_multiple_of(SIZE) - length;
+        self.0.extend_from_slice(&[0; SIZE][..padding]);
+        self.0.extend_from_slice(&bytes);
     }
 
     /// A length: of a string with its end, or of a sequence.
@@ -157,9 +160,10 @@ impl Cdr for String {
 
     /// A zero ends a string: one within it would cut it short, and is left out.
     fn write(&self, to: &mut CdrWriter) {
-        let bytes = self.bytes().filter(|&byte| byte != 0);
-        to.length(bytes.clone().count() + 1);
-        to.0.extend(bytes.chain([0]));
+        let text = if self.contains('\0') { Cow::Owned(self.replace('\0', "")) } else { Cow::Borrowed(self.as_str()) };
+        to.length(text.len() + 1);
+        to.0.extend_from_slice(text.as_bytes());
+        to.0.push(0);
     }
 
     fn read(from: &mut CdrReader<'_>) -> Option<Self> {

@@ -1,6 +1,6 @@
 //! Live topics of ROS 2 as a sink.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::clock::RosClock;
 use super::messages::{BOARDS, Messages, Topic, of_boards};
@@ -11,17 +11,19 @@ use crate::percept::Percepts;
 use crate::recording::BagType;
 use crate::robot::messages::{Message as _, PointCloud2};
 use crate::signal::BoardHealth;
-use crate::sink::handover::{Carrier, Handover};
+use crate::sink::handover::{Carrier, Handover, tell};
 use crate::sink::{Flow, InputFrames, News, Session, Sink};
 
 /// The node's name.
 const NODE: &str = "somatic";
 /// Frames that wait for the network: a quarter of a second at 250 Hz.
 const ROOM: usize = 64;
-/// How long the end waits for what waits.
+/// How long the end waits for what waits to be sent.
 const END_WITHIN: Duration = Duration::from_secs(2);
-/// How long the node stays after its last message, for receipts of reliable readers and what they ask for again.
+/// How long the node stays after its last message, as that is sent by another thread; and then at most for receipts of reliable
+/// readers, and what they ask for again.
 const LINGER: Duration = Duration::from_millis(300);
+const RECEIPTS_WITHIN: Duration = Duration::from_secs(1);
 /// Clouds that are kept: with the 5 of ROS 2's profile for sensor data, frames that come together after a pause were lost. And
 /// messages of other topics.
 const CLOUD_DEPTH: usize = ROOM;
@@ -107,11 +109,16 @@ impl Carrier<Item> for Sender {
 
     fn end(&mut self) -> Result<()> {
         std::thread::sleep(LINGER);
+        let until = Instant::now() + RECEIPTS_WITHIN;
+        let left = || until.saturating_duration_since(Instant::now());
+        let without_receipt: u64 = self.writers.iter().map(|writer| writer.without_receipt(left())).sum();
         if self.refused > 0 {
-            crate::sink::handover::tell(&format!(
-                "{}: {} reliable messages were not sent, as a reader gave no receipts",
-                self.name, self.refused
-            ));
+            let what = "reliable messages were not sent, as a reader gave no receipts";
+            tell(&format!("{}: {} {what}", self.name, self.refused));
+        }
+        if without_receipt > 0 {
+            let what = "reliable messages may not have arrived, as a reader gave no receipts";
+            tell(&format!("{}: up to {without_receipt} {what}", self.name));
         }
         Ok(())
     }
@@ -154,6 +161,6 @@ impl Sink for Ros2Sink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        self.handover.finish(END_WITHIN).map(drop)
+        self.handover.finish(END_WITHIN + LINGER + RECEIPTS_WITHIN).map(drop)
     }
 }

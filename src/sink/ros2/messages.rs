@@ -124,8 +124,8 @@ impl Messages {
                 send(Topic(self.first_wrench + index), wrench.to_cdr())?;
             }
         }
-        if let Some(markers) = self.touches.message(time_ns, &moment.touched)
-            && !send(TOUCHES, markers.to_cdr())?
+        if let Some(markers) = self.touches.message(time_ns, &moment.touched).map(Message::to_cdr)
+            && !send(TOUCHES, markers)?
         {
             self.touches.was_refused();
         }

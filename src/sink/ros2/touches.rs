@@ -1,10 +1,12 @@
 //! Touched fields as markers with ids that stay.
 
+use std::mem::take;
+
 use glam::{DQuat, DVec3};
 
 use super::moment::TouchedField;
-use super::places::{WORLD, header, quaternion, vector, z_up_from_y_up};
-use crate::robot::messages::{Color, Marker, MarkerArray, Point, Pose};
+use super::places::{WORLD, quaternion, vector, z_up_from_y_up};
+use crate::robot::messages::{Color, Header, Marker, MarkerArray, Point, Time};
 use crate::sink::FieldNames;
 
 /// Types and actions of `visualization_msgs/Marker`.
@@ -27,34 +29,44 @@ pub(super) struct Touches {
     shown: Vec<[bool; 2]>,
     /// The same before the last message.
     before: Vec<[bool; 2]>,
+    /// The last message, whose memory the next one takes.
+    message: MarkerArray,
 }
 
 impl Touches {
     pub(super) fn new(fields: Vec<FieldNames>) -> Self {
         let none = vec![[false; 2]; fields.len()];
-        Self { shown: none.clone(), before: none, fields }
+        Self { shown: none.clone(), before: none, fields, message: MarkerArray::default() }
     }
 
     /// The markers of a frame: those of `touched` fields, and the ends of those that are no longer touched. `None` where there
     /// are neither.
-    pub(super) fn message(&mut self, time_ns: u64, touched: &[TouchedField]) -> Option<MarkerArray> {
-        let mut shows = vec![[false; 2]; self.fields.len()];
-        let mut markers = Vec::new();
+    pub(super) fn message(&mut self, time_ns: u64, touched: &[TouchedField]) -> Option<&MarkerArray> {
+        let Self { fields, shown, before, message } = self;
+        std::mem::swap(shown, before);
+        shown.fill([false; 2]);
+        let mut made = Made { markers: &mut message.markers, count: 0, time_ns };
         for touch in touched {
             let Some(position) = touch.position.map(DVec3::from) else { continue };
-            shows[touch.field] = [true, touch.normal.is_some()];
-            markers.push(self.sphere(time_ns, touch, position));
-            markers.extend(touch.normal.map(|normal| self.arrow(time_ns, touch, position, normal.into())));
-        }
-        for (field, (shows, shown)) in shows.iter().zip(&self.shown).enumerate() {
-            for part in (0..2).filter(|&part| shown[part] && !shows[part]) {
-                let FieldNames { field: name, link, .. } = &self.fields[field];
-                let (ns, id) = (name.clone(), id(field, part));
-                markers.push(Marker { header: header(time_ns, link), ns, id, action: DELETE, ..Marker::default() });
+            let names = &fields[touch.field];
+            shown[touch.field][0] = true;
+            let sphere = made.placed(names, touch, 0, position, DQuat::IDENTITY);
+            (sphere.r#type, sphere.scale) = (SPHERE, vector(DVec3::splat(diameter_m(touch.area_m2))));
+            if let Some(normal) = touch.normal.map(DVec3::from) {
+                shown[touch.field][1] = true;
+                let turn = DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X));
+                let arrow = made.placed(names, touch, 1, position, turn);
+                (arrow.r#type, arrow.scale) = (ARROW, vector(ARROW_M.into()));
             }
         }
-        self.before = std::mem::replace(&mut self.shown, shows);
-        (!markers.is_empty()).then_some(MarkerArray { markers })
+        for (field, (shown, before)) in shown.iter().zip(before).enumerate() {
+            for part in (0..2).filter(|&part| before[part] && !shown[part]) {
+                made.next(&fields[field], &fields[field].link, id(field, part)).action = DELETE;
+            }
+        }
+        let count = made.count;
+        message.markers.truncate(count);
+        (count > 0).then_some(message)
     }
 
     /// Says that the last message was not sent: what it ended is still shown.
@@ -63,41 +75,58 @@ impl Touches {
             (0..2).for_each(|part| shown[part] |= before[part]);
         }
     }
+}
 
-    fn marker(&self, time_ns: u64, touch: &TouchedField, part: usize, position: DVec3, turn: DQuat) -> Marker {
-        let FieldNames { field: name, link, world, .. } = &self.fields[touch.field];
-        let frame = if touch.in_world { world } else { link };
-        // A link stays as the body has it, the world itself is z up.
-        let up = if touch.in_world && world == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
-        let (position, turn) = (up * position, up * turn);
-        Marker {
-            header: header(time_ns, frame),
-            ns: name.clone(),
-            id: id(touch.field, part),
-            action: ADD,
-            pose: Pose {
-                position: Point { x: position.x, y: position.y, z: position.z },
-                orientation: quaternion(turn.normalize()),
-            },
-            color: COLOUR,
-            // It moves with its link until the next message.
-            frame_locked: !touch.in_world,
-            ..Marker::default()
+/// Markers that are made in the memory of older ones.
+struct Made<'a> {
+    markers: &'a mut Vec<Marker>,
+    count: usize,
+    time_ns: u64,
+}
+
+impl Made<'_> {
+    /// The next marker, of a field's part, in `frame`.
+    fn next(&mut self, names: &FieldNames, frame: &str, id: i32) -> &mut Marker {
+        if self.count == self.markers.len() {
+            self.markers.push(Marker::default());
         }
+        let marker = &mut self.markers[self.count];
+        self.count += 1;
+        let (mut frame_id, mut ns) = (take(&mut marker.header.frame_id), take(&mut marker.ns));
+        frame.clone_into(&mut frame_id);
+        names.field.clone_into(&mut ns);
+        let header = Header { stamp: Time::from_ns(self.time_ns), frame_id };
+        *marker = Marker { header, ns, id, action: ADD, ..Marker::default() };
+        marker
     }
 
-    fn sphere(&self, time_ns: u64, touch: &TouchedField, position: DVec3) -> Marker {
-        let area_m2 = touch.area_m2.filter(|&area| area > 0.0);
-        let diameter_m = area_m2.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt());
-        let marker = self.marker(time_ns, touch, 0, position, DQuat::IDENTITY);
-        Marker { r#type: SPHERE, scale: vector(DVec3::splat(diameter_m)), ..marker }
+    /// The next marker, at `position` and turned by `turn`, both in the frame that the touch is told in.
+    fn placed(
+        &mut self,
+        names: &FieldNames,
+        touch: &TouchedField,
+        part: usize,
+        position: DVec3,
+        turn: DQuat,
+    ) -> &mut Marker {
+        let frame = if touch.in_world { &names.world } else { &names.link };
+        // A link stays as the body has it, the world itself is z up.
+        let up = if touch.in_world && frame == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
+        let (position, turn) = (up * position, up * turn);
+        let marker = self.next(names, frame, id(touch.field, part));
+        marker.pose.position = Point { x: position.x, y: position.y, z: position.z };
+        marker.pose.orientation = quaternion(turn.normalize());
+        marker.color = COLOUR;
+        // It moves with its link until the next message.
+        marker.frame_locked = !touch.in_world;
+        marker
     }
+}
 
-    fn arrow(&self, time_ns: u64, touch: &TouchedField, position: DVec3, normal: DVec3) -> Marker {
-        let marker =
-            self.marker(time_ns, touch, 1, position, DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X)));
-        Marker { r#type: ARROW, scale: vector(ARROW_M.into()), ..marker }
-    }
+/// The diameter of a sphere that is as wide as a touch of this area.
+fn diameter_m(area_m2: Option<f64>) -> f64 {
+    let area_m2 = area_m2.filter(|&area| area > 0.0);
+    area_m2.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt())
 }
 
 /// The id of a field's sphere (0) or arrow (1): the same from onset to release, and in every run of the same scene.
@@ -115,11 +144,12 @@ mod tests {
         let names = |field: &str| FieldNames { field: field.into(), link: "hand".into(), ..FieldNames::default() };
         let mut touches = Touches::new(["a", "b"].map(names).into());
         let mut told = |touched: &[TouchedField], is_sent: bool| {
-            let markers = touches.message(0, touched).map_or_else(Vec::new, |message| message.markers);
+            let markers = touches.message(0, touched).map_or(&[][..], |message| &message.markers);
+            let told = markers.iter().map(|marker| (marker.ns.clone(), marker.action)).collect::<Vec<_>>();
             if !is_sent {
                 touches.was_refused();
             }
-            markers.iter().map(|marker| (marker.ns.clone(), marker.action)).collect::<Vec<_>>()
+            told
         };
         let [a, b] = ["a", "b"].map(str::to_owned);
         assert_eq!(told(&[touch(0)], true), [(a.clone(), ADD)]);
