@@ -1,6 +1,6 @@
-//! Warnings in the first second of a run: a source for another body, or sensors that are pressed at rest.
+//! Warnings in the first second of a run: a source for another body, sensors that are pressed at rest, or links that are nowhere.
 
-use somatic::{Body, Frame, Plan};
+use somatic::{Body, Frame, Outputs, Plan};
 
 use super::words::count;
 
@@ -32,6 +32,8 @@ pub(super) struct Doubts {
     begin_s: Option<f64>,
     is_over: bool,
     seen: Vec<ValueHistory>,
+    /// Whether any frame said where links are, or that this is not known for now.
+    has_poses: bool,
 }
 
 impl Doubts {
@@ -48,6 +50,7 @@ impl Doubts {
             begin_s: None,
             is_over: false,
             seen: vec![ValueHistory::default(); ids.len()],
+            has_poses: false,
         }
     }
 
@@ -62,6 +65,7 @@ impl Doubts {
             if self.is_over {
                 break;
             }
+            self.has_poses |= !frame.pose.is_empty() || frame.has_stale_pose;
             // The check starts with the first value.
             if self.begin_s.is_none() && frame.values.iter().all(|value| value.is_missing()) {
                 continue;
@@ -81,7 +85,25 @@ impl Doubts {
         // Single frames on standard input may have few taxels.
         let of_body = (self.holds_any && self.is_over).then(|| self.of_body(plan, |seen| seen.came)).flatten();
         let rests = self.is_raw.then(|| self.of_rest(plan)).flatten();
-        of_body.into_iter().chain(rests).collect()
+        of_body.into_iter().chain(rests).chain(self.of_poses(plan)).collect()
+    }
+
+    /// A warning if something is asked for that needs to know where links are, which no frame says.
+    fn of_poses(&self, plan: &Plan) -> Option<String> {
+        let asked = plan.outputs();
+        let what = [
+            (asked.contains(Outputs::CONTACTS), "contacts"),
+            (asked.contains(Outputs::SPEED_IN_WORLD), "speed_in_world"),
+            (plan.in_link().is_some(), "--in"),
+        ];
+        let needs: Vec<&str> = what.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect();
+        (!self.has_poses && self.begin_s.is_some() && !needs.is_empty()).then(|| {
+            format!(
+                "{}: no frame says where links are, as {} needs; give the robot's --joints, or frames with `pose`",
+                self.source,
+                needs.join(", ")
+            )
+        })
     }
 
     /// A warning if over half of the taxels of a field never deliver a value.

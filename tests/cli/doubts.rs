@@ -50,6 +50,28 @@ fn a_source_for_another_body_is_said_once() {
 }
 
 #[test]
+fn what_needs_poses_says_that_no_frame_has_any() {
+    let said_of = |more: &[&str]| said(&[&["--body", "hand", "--source", TOUCH][..], more].concat());
+    let text = said_of(&["--outputs", "contacts,speed_in_world"]);
+    let about =
+        "touch.csv: no frame says where links are, as contacts, speed_in_world needs; give the robot's --joints";
+    assert!(text.contains(about) && text.lines().count() == 1, "{text}");
+    assert!(said_of(&["--in", "thumb"]).contains("as --in needs; "));
+    assert_eq!(said_of(&["--outputs", "position"]), "");
+    // Joints that are late are told of elsewhere.
+    let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
+    let of_robot = |name: &str| format!("{robot}/{name}");
+    let (urdf, states, touch) = (of_robot("arm.urdf"), of_robot("arm-joints.csv"), of_robot("arm-touch.csv"));
+    let folder = tempfile::tempdir().unwrap();
+    let arm = folder.path().join("arm.glb");
+    done(&["author", "--urdf-skin", &urdf, "-o", text_of(&arm)]);
+    let of_arm = ["--body", text_of(&arm), "--source", &touch, "--outputs", "contacts"];
+    assert!(said(&of_arm).contains("no frame says where links are"));
+    let posed = [&of_arm[..], &["--joints", &urdf, "--joint-states", &states, "--up", "z"]].concat();
+    assert!(!said(&posed).contains("no frame says where links are"));
+}
+
+#[test]
 fn only_the_fields_that_are_asked_for_count() {
     let palm = taxels_of("hand/palm");
     let (_folder, path) = file("palm.csv", &recording(&palm, 3, |_, row| row as f64));
