@@ -16,6 +16,8 @@ mod ports;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod replay;
+#[cfg(any(feature = "serial", feature = "zenoh", feature = "mcap"))]
+pub(crate) mod send_rate;
 #[cfg(feature = "serial")]
 mod serial;
 mod simulated;

@@ -6,25 +6,12 @@
 
 use std::sync::Arc;
 
-use crate::signal::{Frame, RawValue};
-
 use super::clock::Clock;
+use crate::signal::{Frame, RawValue};
+use crate::source::send_rate::{DEFAULT_PERIOD_S, TAKEOVER_SHARE, max_age_s, takes_over, updated_period_s, wait_s};
 
-/// Default maximum age of a value, periods of its board.
-const MAX_AGE_PERIODS: f64 = 3.0;
-/// Minimum of the maximum age, since USB adapters and schedulers delay frames, s.
-const MIN_MAX_AGE_S: f64 = 0.05;
-/// The assumed period of a board before it is measured, s.
-const DEFAULT_PERIOD_S: f64 = 0.1;
 /// Period of frames without values while all boards are silent, s.
 const SILENT_PERIOD_S: f64 = 0.1;
-/// A board takes over the pace if its period is below this share of the leader's.
-const TAKEOVER_SHARE: f64 = 0.8;
-
-/// A merged frame waits for other boards of the same rate that are about to send, at most this long, s, and this share of
-/// the period. Otherwise a board that sends at the same time would sometimes miss a frame and lose it to its next one.
-const MAX_WAIT_S: f64 = 0.005;
-const MAX_WAIT_PERIODS: f64 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::source) enum Pace {
@@ -85,7 +72,7 @@ struct Board {
 
 impl Board {
     fn max_age_s(&self, asked: Option<f64>) -> f64 {
-        asked.unwrap_or((MAX_AGE_PERIODS * self.period_s).max(MIN_MAX_AGE_S))
+        max_age_s(self.period_s, asked)
     }
 
     fn is_sending(&self, now_s: f64, asked: Option<f64>) -> bool {
@@ -107,10 +94,7 @@ impl Board {
         if let Some((before_us, _)) = self.last {
             let frames = f64::from(frame.lost) + 1.0;
             let step = frame.board_us.saturating_sub(before_us) as f64 * 1e-6 / frames;
-            // A pause is not a period.
-            if step > 0.0 && step < 8.0 * self.period_s {
-                self.period_s += 0.1 * (step - self.period_s);
-            }
+            self.period_s = updated_period_s(self.period_s, step);
         }
         self.last = Some((frame.board_us, at));
         self.arrived_s = frame.arrived_s;
@@ -174,7 +158,7 @@ impl Merge {
         // While all boards are silent, frames come without input once the values are too old.
         let longest = self.boards.iter().map(|board| board.max_age_s(self.max_age_s)).fold(0.0, f64::max);
         self.due_s = Some(frame.arrived_s + longest + SILENT_PERIOD_S);
-        let until = frame.arrived_s + (MAX_WAIT_PERIODS * self.boards[frame.board].period_s).min(MAX_WAIT_S);
+        let until = frame.arrived_s + wait_s(self.boards[frame.board].period_s);
         // The next frame ends the wait for the one before.
         let is_waiting = self.held_s.take().is_none() && at > self.last_s && self.expects_frame(frame.arrived_s, until);
         self.held_s = is_waiting.then_some((at, until));
@@ -201,7 +185,7 @@ impl Merge {
         let leads = match self.leader {
             Some(leader) if self.boards[leader].is_sending(now_s, self.max_age_s) => {
                 let (own, theirs) = (self.boards[board].period_s, self.boards[leader].period_s);
-                if own < TAKEOVER_SHARE * theirs { board } else { leader }
+                if takes_over(own, theirs) { board } else { leader }
             }
             _ => board,
         };
@@ -261,6 +245,7 @@ impl Merge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::send_rate::MAX_WAIT_S;
 
     fn frame(board: usize, at_s: f64, values: &[(u32, u16)]) -> BoardFrame {
         let board_us = (at_s * 1e6).round() as u64;
