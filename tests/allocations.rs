@@ -52,6 +52,52 @@ fn allocations_are_counted() {
     assert!(made.count_total > 100, "{made:?}");
 }
 
+/// Frames of a hand that a joint turns, each emptied by its source as sources do.
+#[cfg(feature = "meshes")]
+struct Emptied(u32);
+
+#[cfg(feature = "meshes")]
+impl somatic::source::Source for Emptied {
+    fn taxels(&self) -> &[u32] {
+        &[]
+    }
+
+    fn next_frame(&mut self, frame: &mut somatic::Frame) -> somatic::Result<bool> {
+        frame.clear();
+        frame.t_s = f64::from(self.0) * 0.01;
+        self.0 += 1;
+        Ok(true)
+    }
+}
+
+#[cfg(feature = "meshes")]
+#[test]
+fn positions_of_joints_in_a_frame_allocate_nothing() {
+    use somatic::author::mesh::Up;
+    use somatic::robot::{JointOptions, JointedSource, Kinematics};
+    use somatic::source::{JointStates, Source as _};
+    let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+    // What hangs on the grip is no link of the body.
+    let urdf = r#"<robot name="r"><link name="arm"/><link name="hand"/><link name="tool"/>
+        <joint name="wrist" type="continuous"><parent link="arm"/><child link="hand"/><axis xyz="1 0 0"/></joint>
+        <joint name="grip" type="continuous"><parent link="hand"/><child link="tool"/><axis xyz="1 0 0"/></joint></robot>"#;
+    let allocations = |joint: &str, joints: usize| {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), format!("t,wrist,{joint}\n0,0,0\n9,1,1\n")).unwrap();
+        let mut options = JointOptions::new(Up::Y);
+        (options.states, options.max_age_s) = (Some(JointStates::open(file.path()).unwrap()), 10.0);
+        let robot = Kinematics::from_urdf("r", urdf).unwrap();
+        let mut source = JointedSource::new(Box::new(Emptied(0)), robot, &body, options).unwrap();
+        let mut frame = somatic::Frame::default();
+        let mut read = || assert!(source.next_frame(&mut frame).unwrap());
+        (0..10).for_each(|_| read());
+        let made = allocation_counter::measure(|| (0..100).for_each(|_| read())).count_total;
+        assert_eq!((frame.joints.len(), frame.pose.len()), (joints, 1));
+        made
+    };
+    assert_eq!(allocations("grip", 2), allocations("other", 1));
+}
+
 /// What is shared among cores is a task for each other core, twice a frame.
 #[cfg(feature = "cli")]
 #[test]

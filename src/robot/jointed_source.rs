@@ -42,6 +42,8 @@ impl JointOptions {
 ///
 /// A frame's own pose of a link stands, and what hangs on that link goes from there: so a floating base is given. Where a
 /// joint that moves a link with taxels has no state, or an old one, the frame has no poses and [`Frame::has_stale_pose`].
+///
+/// With [`JointOptions::states`], a frame with poses has the positions that these are of as [`Frame::joints`].
 pub struct JointedSource {
     source: Box<dyn Source + Send>,
     robot: Kinematics,
@@ -61,6 +63,8 @@ pub struct JointedSource {
     counts: PoseCounts,
     /// Whether a position that may be in degrees has been told of.
     has_told_of_degrees: bool,
+    /// Whether it has been told that frames carry states that are not used.
+    has_told_of_carried: bool,
     notices: Vec<String>,
 }
 
@@ -120,6 +124,7 @@ impl JointedSource {
             told_s: f64::NEG_INFINITY,
             counts: PoseCounts::default(),
             has_told_of_degrees: false,
+            has_told_of_carried: false,
             notices: Vec::new(),
             robot,
         })
@@ -191,8 +196,46 @@ impl JointedSource {
         ));
     }
 
-    fn put_poses(&mut self, frame: &mut Frame) -> Result<()> {
+    /// Tells once that frames carry states, and that those of the recording are used.
+    fn look_for_carried(&mut self, frame: &Frame) {
+        let Some(states) = self.options.states.as_ref().filter(|_| !frame.joints.is_empty()) else { return };
+        if !std::mem::replace(&mut self.has_told_of_carried, true) {
+            self.notices.push(format!(
+                "at {} s: frames carry joint states of their own; those of {} are used, as --joint-states names it",
+                frame.t_s,
+                states.name()
+            ));
+        }
+    }
+
+    /// Puts the positions of joints that are not older than allowed into `frame`; their names go where those of an earlier
+    /// frame in `names` were.
+    fn put_joints(
+        &self,
+        known: impl Fn(usize) -> Option<JointPosition>,
+        mut names: Vec<(String, f64)>,
+        frame: &mut Frame,
+    ) {
+        let mut count = 0;
+        for (joint, name) in self.robot.joint_names().enumerate() {
+            let Some(JointPosition { position, .. }) = known(joint) else { continue };
+            match names.get_mut(count) {
+                Some(own) => {
+                    name.clone_into(&mut own.0);
+                    own.1 = position;
+                }
+                None => names.push((name.to_owned(), position)),
+            }
+            count += 1;
+        }
+        names.truncate(count);
+        frame.joints = names;
+    }
+
+    /// `names` are the joints of an earlier frame.
+    fn put_poses(&mut self, names: Vec<(String, f64)>, frame: &mut Frame) -> Result<()> {
         self.find_positions(frame)?;
+        self.look_for_carried(frame);
         self.look_for_degrees(frame);
         let max_age_s = self.options.max_age_s;
         // Times are rounded: what is as old as the limit to a nanosecond is not older.
@@ -222,19 +265,26 @@ impl JointedSource {
             });
         }
         self.was_stale = is_stale;
+        let is_recorded = self.options.states.is_some();
         if frame.has_stale_pose {
             frame.pose.clear();
+            if is_recorded {
+                frame.joints.clear();
+            }
             return Ok(());
         }
-        let names: Vec<&str> = self.robot.link_names().collect();
+        if is_recorded {
+            self.put_joints(known, names, frame);
+        }
+        let links: Vec<&str> = self.robot.link_names().collect();
         let given = |link: usize| {
-            let own = frame.pose.iter().find(|(name, _)| name == names[link]);
+            let own = frame.pose.iter().find(|(name, _)| name == links[link]);
             own.map(|(_, pose)| Some(DAffine3::from_rotation_translation(pose.rotation, pose.translation)))
         };
         let position_of = |joint: usize| known(joint).map(|found| found.position);
         self.robot.poses_into(position_of, given, &self.world_from_root, &mut self.poses);
         // What the URDF does not know goes on to the engine, which knows the body's links.
-        frame.pose.retain(|(name, _)| !names.contains(&name.as_str()));
+        frame.pose.retain(|(name, _)| !links.contains(&name.as_str()));
         for (link, name) in &self.matches.matched {
             if let Some(world_from_link) = self.poses[*link] {
                 let rotation = DQuat::from_mat3(&world_from_link.matrix3).normalize();
@@ -251,11 +301,13 @@ impl Source for JointedSource {
     }
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        // Sources empty their frames, and names would be allocated for each.
+        let names = if self.options.states.is_some() { std::mem::take(&mut frame.joints) } else { Vec::new() };
         if !self.source.next_frame(frame)? {
             self.tell_of_frames_without_pose();
             return Ok(false);
         }
-        self.put_poses(frame)?;
+        self.put_poses(names, frame)?;
         self.counts.see(frame);
         Ok(true)
     }

@@ -1,7 +1,7 @@
 //! Joints that move the body's links.
 
 use somatic::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
-use somatic::source::{JointStates, Source, SourceSpec};
+use somatic::source::{BagName, JointStates, Source, SourceSpec};
 use somatic::{Body, Error, Result};
 
 use super::RunOptions;
@@ -29,16 +29,19 @@ impl RunOptions {
         if self.up.is_none() {
             return refuse("--joints needs to know which axis points up in the URDF; add --up z, or --up y");
         }
-        if self.joint_states.is_none() && self.sources != ["-"] && !self.sources.iter().any(|s| is_mcap(s)) {
+        let states = self.states_from()?;
+        if states.is_none() && self.sources != ["-"] && !self.sources.iter().any(|s| is_mcap(s)) {
             return refuse(
                 "frames of this source carry no joint states; give a recording of them: --joint-states FILE, a CSV under \
                  t,<joint>,..., NDJSON or a bag of ROS 2",
             );
         }
-        if self.joint_states.is_some() && self.repeat.is_some() {
-            return refuse("--loop lets the time of frames go on, and --joint-states ends; leave one of them out");
+        if states.is_some() && self.repeat.is_some() {
+            return refuse(
+                "--loop lets the time of frames go on, and the recording of joint states ends; leave --loop out",
+            );
         }
-        self.check_delay(self.states_from()?.as_ref())?;
+        self.check_delay(states.as_ref())?;
         if let Some(age) = self.joints_max_age.filter(|age| age.is_nan() || *age < 0.0) {
             return Err(Error::usage(format!("--joints-max-age {age} is not a time span; give seconds from 0")));
         }
@@ -91,7 +94,14 @@ impl RunOptions {
     }
 
     fn states_from(&self) -> Result<Option<StatesFrom<'_>>> {
-        self.joint_states.as_deref().map(StatesFrom::named).transpose()
+        if let Some(states) = &self.joint_states {
+            return StatesFrom::named(states).map(Some);
+        }
+        // Frames of a bag carry no joints, and the bag has them beside.
+        Ok(match self.first_source()? {
+            Some(SourceSpec::Ros2Mcap(bag)) => Some(StatesFrom::Bag(BagName::new(bag.path))),
+            _ => None,
+        })
     }
 
     /// `source`, with poses of the links of `body` where joints are asked for.
@@ -109,7 +119,11 @@ impl RunOptions {
             None => source,
             Some(StatesFrom::Topic(topic)) => live(source, topic)?,
             Some(StatesFrom::Bag(bag)) => {
-                options.states = Some(JointStates::open_bag(&bag)?);
+                let failed = |e: Error| match self.joint_states {
+                    Some(_) => e,
+                    None => Error::failed(format!("{e}; or give joint states of another file: --joint-states FILE")),
+                };
+                options.states = Some(JointStates::open_bag(&bag).map_err(failed)?);
                 source
             }
             Some(StatesFrom::File(file)) => {

@@ -27,9 +27,9 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
         if let Some(other) = asked.sources.first() {
             return Err(Error::usage(format!("`{what}` and --source {other}: give one of them")));
         }
-        let mut asked = asked.with(None)?;
-        asked.sources = vec![if kind.is_empty() { what.to_owned() } else { format!("{kind}:{what}") }];
-        Ok(Subject::Recording(Box::new(asked)))
+        let source = if kind.is_empty() { what.to_owned() } else { format!("{kind}:{what}") };
+        let asked = RunOptions { sources: vec![source], ..asked.clone() };
+        Ok(Subject::Recording(Box::new(asked.with(None)?)))
     };
     match ending.as_deref() {
         _ if what.starts_with("ros2-mcap:") => as_source(""),
