@@ -46,7 +46,7 @@ pub(super) struct RunOptions {
     #[arg(long, value_name = "BODY")]
     pub(super) body: Option<String>,
 
-    /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
+    /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
     /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
@@ -257,7 +257,7 @@ pub(super) struct RunOptions {
     pub(super) joints: Option<PathBuf>,
 
     /// Joint states in a recording of their own: a CSV under t,<joint>,..., NDJSON, a bag of ROS 2 in MCAP (a .mcap, a folder, or
-    /// ros2-mcap:PATH:/TOPIC), or ros2:/TOPIC, live [default: those in the frames].
+    /// ros2-mcap:PATH:/TOPIC), or ros2:/TOPIC, live [default: those in the frames, or in their bag].
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(super) joint_states: Option<PathBuf>,
 

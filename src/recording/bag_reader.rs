@@ -1,4 +1,4 @@
-//! One topic of a bag of ROS 2 being read: an MCAP, or several one after the other.
+//! Topics of a bag of ROS 2 being read: an MCAP, or several one after the other.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -10,23 +10,27 @@ use crate::error::{Error, Result, failed};
 /// The encoding of messages that is read.
 const CDR: &str = "cdr";
 
-/// Which topic of a bag is read.
-pub(crate) struct WantedTopic<'a> {
-    /// Its name; without one, it is the only topic of these types.
-    pub(crate) topic: Option<&'a str>,
-    /// The types that its messages may have, such as `sensor_msgs/msg/JointState`.
+/// Which topics of a bag are read.
+pub(crate) struct WantedTopics<'a> {
+    /// Their names; without any, it is the only topic of these types, or all of type `merged`.
+    pub(crate) topics: &'a [String],
+    /// The types that their messages may have, such as `sensor_msgs/msg/JointState`.
     pub(crate) kinds: &'a [&'a str],
+    /// The type of which several topics are read together; of others, one is.
+    pub(crate) merged: Option<&'a str>,
 }
 
 /// A message as it was recorded.
 pub(crate) struct BagMessage<'a> {
+    /// The place of its topic in [`BagReader::topics`].
+    pub(crate) topic: usize,
     /// When it came, by the recorder's clock, ns.
     pub(crate) log_ns: u64,
     /// The message, in CDR.
     pub(crate) data: &'a [u8],
 }
 
-/// Reads the messages of a topic, in the order of the files.
+/// Reads the messages of topics, in the order of the files.
 pub(crate) struct BagReader {
     files: Vec<PathBuf>,
     /// Their lengths, bytes.
@@ -34,7 +38,7 @@ pub(crate) struct BagReader {
     /// How many files have been opened.
     opened: usize,
     reader: Option<Reader>,
-    topic: String,
+    topics: Vec<String>,
     kind: String,
     losses: Vec<String>,
 }
@@ -46,17 +50,17 @@ impl BagReader {
     /// Opens the bag at `path`, an MCAP file or a folder of such.
     ///
     /// # Errors
-    /// It cannot be read, is no bag in MCAP, or has no such topic, or several; its messages are not in CDR.
-    pub(crate) fn open(path: &Path, wanted: &WantedTopic<'_>) -> Result<Self> {
+    /// It cannot be read, is no bag in MCAP, or has no such topics, or too many; their messages are not in CDR.
+    pub(crate) fn open(path: &Path, wanted: &WantedTopics<'_>) -> Result<Self> {
         let files = bag_files(path)?;
-        let (topic, kind) = choose(&topics_of(&files)?, wanted, path).map_err(|e| e.at(path.display()))?;
+        let (topics, kind) = choose(&topics_of(&files)?, wanted, path).map_err(|e| e.at(path.display()))?;
         let length = |file: &PathBuf| std::fs::metadata(file).map_or(0, |there| there.len());
         let mut reader = Self {
             lengths: files.iter().map(length).collect(),
             files,
             opened: 0,
             reader: None,
-            topic,
+            topics,
             kind,
             losses: Vec::new(),
         };
@@ -76,12 +80,12 @@ impl BagReader {
         Ok(())
     }
 
-    /// The topic's name.
-    pub(crate) fn topic(&self) -> &str {
-        &self.topic
+    /// The topics' names.
+    pub(crate) fn topics(&self) -> &[String] {
+        &self.topics
     }
 
-    /// The type of its messages.
+    /// The type of their messages.
     pub(crate) fn kind(&self) -> &str {
         &self.kind
     }
@@ -96,22 +100,29 @@ impl BagReader {
     /// # Errors
     /// A file cannot be read.
     pub(crate) fn next(&mut self) -> Result<Option<BagMessage<'_>>> {
-        let message = loop {
+        let (topic, message) = loop {
             let Some(reader) = &mut self.reader else { return Ok(None) };
             let Some(message) = reader.next_message()? else {
                 self.open_next()?;
                 continue;
             };
             match reader.channels.get(&message.channel) {
-                Some(channel) if channel.topic == self.topic => break message,
-                Some(_) => {}
+                Some(channel) => {
+                    if let Some(topic) = self.topics.iter().position(|topic| *topic == channel.topic) {
+                        break (topic, message);
+                    }
+                }
                 None => {
                     let bytes = reader.data(&message).len() as u64;
                     reader.damaged(bytes);
                 }
             }
         };
-        Ok(self.reader.as_ref().map(|reader| BagMessage { log_ns: message.log_time, data: reader.data(&message) }))
+        Ok(self.reader.as_ref().map(|reader| BagMessage {
+            topic,
+            log_ns: message.log_time,
+            data: reader.data(&message),
+        }))
     }
 
     /// Notes that the last message was whole, and of the time `t_s`.
@@ -171,52 +182,88 @@ fn whole(kind: &str) -> String {
     }
 }
 
-/// The topic that is `wanted` of the bag at `path`, and its type.
-fn choose(topics: &Topics, wanted: &WantedTopic<'_>, path: &Path) -> Result<(String, String)> {
-    let kinds = wanted.kinds.join(" or ");
-    let is_read = |kind: &str| wanted.kinds.contains(&kind);
-    let listed = || match topics.is_empty() {
-        true => "it has no topic at all".to_owned(),
-        false => {
-            let kind = |all: &BTreeSet<(String, String)>| all.first().map_or("", |(kind, _)| kind.as_str()).to_owned();
-            let words: Vec<String> = topics.iter().map(|(name, all)| format!("{name} ({})", kind(all))).collect();
-            format!("it has {}", words.join(", "))
+/// The topics that are `wanted` of the bag at `path`, and their type.
+fn choose(topics: &Topics, wanted: &WantedTopics<'_>, path: &Path) -> Result<(Vec<String>, String)> {
+    let names = if wanted.topics.is_empty() { fitting(topics, wanted, path)? } else { named(topics, wanted)? };
+    let kinds = names.iter().map(|name| kind_of(topics, wanted, name)).collect::<Result<Vec<String>>>()?;
+    let other = names.iter().zip(&kinds).find(|(_, kind)| Some(kind.as_str()) != wanted.merged);
+    match (kinds.first(), other, wanted.merged) {
+        (Some(_), Some((name, kind)), Some(merged)) if names.len() > 1 => {
+            Err(failed!("its messages are {kind}; of several topics {merged} is read, so name it alone").at(name))
         }
-    };
-    let name = match wanted.topic {
-        Some(name) if !topics.contains_key(name) => {
+        (Some(kind), ..) => Ok((names, kind.clone())),
+        (None, ..) => Err(Error::failed("no topic is named")),
+    }
+}
+
+/// The topics in words, with their types.
+fn listed(topics: &Topics) -> String {
+    if topics.is_empty() {
+        return "it has no topic at all".to_owned();
+    }
+    let kind = |all: &BTreeSet<(String, String)>| all.first().map_or("", |(kind, _)| kind.as_str()).to_owned();
+    let words: Vec<String> = topics.iter().map(|(name, all)| format!("{name} ({})", kind(all))).collect();
+    format!("it has {}", words.join(", "))
+}
+
+/// The topics that `wanted` names.
+fn named(topics: &Topics, wanted: &WantedTopics<'_>) -> Result<Vec<String>> {
+    for (index, name) in wanted.topics.iter().enumerate() {
+        if !topics.contains_key(name) {
             let near = crate::error::nearest(name, topics.keys().map(String::as_str));
             let hint = near.map_or(String::new(), |near| format!("; did you mean {near}?"));
-            return Err(failed!("there is no topic {name}: {}{hint}", listed()));
+            return Err(failed!("there is no topic {name}: {}{hint}", listed(topics)));
         }
-        Some(name) => name.to_owned(),
-        None => {
-            let fit = topics.iter().filter(|(_, all)| all.iter().any(|(kind, _)| is_read(kind)));
-            let names: Vec<&String> = fit.map(|(name, _)| name).collect();
-            match &names[..] {
-                [name] => (*name).clone(),
-                [] => {
-                    let other = topics.values().flatten().find(|(_, encoding)| encoding != CDR);
-                    let why = other.map_or(String::new(), |(_, encoding)| format!("; {}", not_cdr(encoding)));
-                    return Err(failed!("there is no topic of {kinds}: {}{why}", listed()));
-                }
-                [first, ..] => {
-                    let names: Vec<&str> = names.iter().map(|name| name.as_str()).collect();
-                    return Err(failed!(
-                        "there are several topics of {kinds}: {}; name one: ros2-mcap:{}:{first}",
-                        names.join(", "),
-                        path.display()
-                    ));
-                }
-            }
+        if wanted.topics[..index].contains(name) {
+            return Err(failed!("topic {name} is named twice; name it once"));
         }
-    };
-    let all: Vec<&(String, String)> = topics.get(&name).into_iter().flatten().collect();
-    let place = |e: Error| e.at(&name);
+    }
+    match wanted.topics {
+        [_, second, ..] if wanted.merged.is_none() => {
+            Err(failed!("one topic of {} is read; leave out {second}", wanted.kinds.join(" or ")))
+        }
+        names => Ok(names.to_vec()),
+    }
+}
+
+/// Without a name, the only topic of the types that are `wanted` of the bag at `path`, or all where they are merged.
+fn fitting(topics: &Topics, wanted: &WantedTopics<'_>, path: &Path) -> Result<Vec<String>> {
+    let kinds = wanted.kinds.join(" or ");
+    let fits = |(kind, _): &&(String, String)| wanted.kinds.contains(&kind.as_str());
+    let fit = topics.iter().filter(|(_, all)| all.iter().any(|of| fits(&of)));
+    let names: Vec<String> = fit.clone().map(|(name, _)| name.clone()).collect();
+    let is_merged = |kind: &str| wanted.merged == Some(kind);
+    match &names[..] {
+        [_] => Ok(names),
+        [] => {
+            let other = topics.values().flatten().find(|(_, encoding)| encoding != CDR);
+            let why = other.map_or(String::new(), |(_, encoding)| format!("; {}", not_cdr(encoding)));
+            Err(failed!("there is no topic of {kinds}: {}{why}", listed(topics)))
+        }
+        _ if fit.clone().all(|(_, all)| all.iter().all(|(kind, _)| is_merged(kind))) => Ok(names),
+        [first, ..] => {
+            let path = path.display();
+            let merged = fit.flat_map(|(_, all)| all).find(|(kind, _)| is_merged(kind));
+            let or_all =
+                merged.map_or(String::new(), |(kind, _)| format!(", or all of {kind}: ros2-mcap:{path}@{kind}"));
+            Err(failed!(
+                "there are several topics of {kinds}: {}; name one: ros2-mcap:{path}:{first}{or_all}",
+                names.join(", ")
+            ))
+        }
+    }
+}
+
+/// The type of the messages of topic `name`, where it can be read.
+fn kind_of(topics: &Topics, wanted: &WantedTopics<'_>, name: &str) -> Result<String> {
+    let all: Vec<&(String, String)> = topics.get(name).into_iter().flatten().collect();
+    let place = |e: Error| e.at(name);
     match &all[..] {
         [(_, encoding)] if encoding != CDR => Err(place(Error::failed(not_cdr(encoding)))),
-        [(kind, _)] if !is_read(kind) => Err(place(failed!("its messages are {kind}; {kinds} is read"))),
-        [(kind, _)] => Ok((name, kind.clone())),
+        [(kind, _)] if !wanted.kinds.contains(&kind.as_str()) => {
+            Err(place(failed!("its messages are {kind}; {} is read", wanted.kinds.join(" or "))))
+        }
+        [(kind, _)] => Ok(kind.clone()),
         _ => {
             let kinds: Vec<String> = all.iter().map(|(kind, encoding)| format!("{kind} in {encoding}")).collect();
             Err(place(failed!(
@@ -248,8 +295,9 @@ mod tests {
     }
 
     fn chosen(all: &[(&str, &str, &str)], topic: Option<&str>) -> Result<String, String> {
-        let wanted = WantedTopic { topic, kinds: &["sensor_msgs/msg/JointState"] };
-        choose(&topics(all), &wanted, Path::new("bag")).map(|(name, _)| name).map_err(|e| e.to_string())
+        let named: Vec<String> = topic.into_iter().map(str::to_owned).collect();
+        let wanted = WantedTopics { topics: &named, kinds: &["sensor_msgs/msg/JointState"], merged: None };
+        choose(&topics(all), &wanted, Path::new("bag")).map(|(names, _)| names.concat()).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -269,6 +317,29 @@ mod tests {
         assert_eq!(chosen(&two, Some("/b")).as_deref(), Ok("/b"));
         assert!(chosen(&[], None).unwrap_err().contains("it has no topic at all"));
         assert!(chosen(&[("/a", joint, "cdr"), ("/a", other, "cdr")], None).unwrap_err().contains("several types"));
+    }
+
+    #[test]
+    fn all_topics_of_the_merged_type_are_chosen_where_there_are_no_others() {
+        let (cloud, array) = ("sensor_msgs/msg/PointCloud2", "std_msgs/msg/Float32MultiArray");
+        let chosen = |all: &[(&str, &str, &str)], named: &[&str]| {
+            let named: Vec<String> = named.iter().map(|&name| name.to_owned()).collect();
+            let wanted = WantedTopics { topics: &named, kinds: &[cloud, array], merged: Some(cloud) };
+            let found = choose(&topics(all), &wanted, Path::new("bag"));
+            found.map(|(names, kind)| (names.join(","), kind)).map_err(|e| e.to_string())
+        };
+        let two = [("/b", cloud, "cdr"), ("/a", cloud, "cdr"), ("/joints", "sensor_msgs/msg/JointState", "cdr")];
+        assert_eq!(chosen(&two, &[]), Ok(("/a,/b".to_owned(), cloud.to_owned())));
+        assert_eq!(chosen(&two, &["/b"]), Ok(("/b".to_owned(), cloud.to_owned())));
+        assert_eq!(chosen(&two, &["/b", "/a"]), Ok(("/b,/a".to_owned(), cloud.to_owned())));
+        assert_eq!(chosen(&two, &["/b", "/b"]).unwrap_err(), "topic /b is named twice; name it once");
+        let mixed = [("/a", cloud, "cdr"), ("/b", array, "cdr")];
+        let why = chosen(&mixed, &[]).unwrap_err();
+        assert!(why.ends_with("; name one: ros2-mcap:bag:/a, or all of sensor_msgs/msg/PointCloud2: ros2-mcap:bag@sensor_msgs/msg/PointCloud2"), "{why}");
+        let why = chosen(&mixed, &["/a", "/b"]).unwrap_err();
+        assert!(why.starts_with("/b: its messages are std_msgs/msg/Float32MultiArray; of several topics"), "{why}");
+        let arrays = [("/a", array, "cdr"), ("/b", array, "cdr")];
+        assert!(chosen(&arrays, &[]).unwrap_err().ends_with("/a, /b; name one: ros2-mcap:bag:/a"));
     }
 
     #[test]

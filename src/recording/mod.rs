@@ -20,7 +20,7 @@ mod unpack;
 mod view;
 
 pub(crate) use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
-pub(crate) use self::bag_reader::{BagReader, WantedTopic};
+pub(crate) use self::bag_reader::{BagMessage, BagReader, WantedTopics};
 pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;

@@ -3,7 +3,7 @@
 use super::messages::{JointState, Message as _};
 use super::told_positions::told_positions;
 use crate::error::{Error, Result, failed};
-use crate::recording::{BagReader, WantedTopic};
+use crate::recording::{BagReader, WantedTopics};
 use crate::source::{BagName, JointStates};
 
 /// What is read of a bag, where joint states are.
@@ -13,7 +13,7 @@ pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
             failed!("joint states are {}, not {kind}; leave @{kind} out", JointState::TYPE).at(bag.path.display())
         );
     }
-    BagReader::open(&bag.path, &WantedTopic { topic: bag.topic.as_deref(), kinds: &[JointState::TYPE] })
+    BagReader::open(&bag.path, &WantedTopics { topics: &bag.topics, kinds: &[JointState::TYPE], merged: None })
 }
 
 impl JointStates {
@@ -27,7 +27,7 @@ impl JointStates {
     /// The bag cannot be read, or has no such topic, or several; no state has positions, or one has not as many as names.
     pub fn open_bag(bag: &BagName) -> Result<Self> {
         let mut reader = states_of(bag)?;
-        let name = format!("{}: {}", bag.path.display(), reader.topic());
+        let name = format!("{}: {}", bag.path.display(), reader.topics().join(", "));
         let mut states = Self::named(name.clone());
         let mut odd: Option<(u64, String)> = None;
         while let Some(message) = reader.next()? {

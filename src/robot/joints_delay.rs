@@ -52,7 +52,8 @@ impl DelayEstimate {
     /// They are of two bags, or messages of one have no stamps; or as for reading them.
     pub fn of_bags(frames: &BagName, joints: &BagName) -> Result<Self> {
         let (mut of_frames, mut of_joints) = (frames_of(frames)?, states_of(joints)?);
-        let place = |name: &BagName, reader: &BagReader| format!("{}: {}", name.path.display(), reader.topic());
+        let place =
+            |name: &BagName, reader: &BagReader| format!("{}: {}", name.path.display(), reader.topics().join(", "));
         let (frames_at, joints_at) = (place(frames, &of_frames), place(joints, &of_joints));
         if of_frames.kind() == Float32MultiArray::TYPE {
             let what = "messages of std_msgs/msg/Float32MultiArray have no stamps, and --joints-delay auto compares stamps; \
@@ -84,8 +85,8 @@ impl fmt::Display for DelayEstimate {
         let Self { frames, joints } = self;
         write!(
             f,
-            "--joints-delay auto is {:.6} s, from {} frames and {} states, as if the fastest of each took equally long to the \
-             recorder; at the median, frames took {:.1} ms longer than their fastest, and states {:.1} ms",
+            "--joints-delay auto is {:.6} s, from {} clouds and {} states, as if the fastest of each took equally long to the \
+             recorder; at the median, clouds took {:.1} ms longer than their fastest, and states {:.1} ms",
             self.delay_s(),
             frames.messages,
             joints.messages,
@@ -124,8 +125,8 @@ mod tests {
         assert!((estimate.delay_s() - 0.25).abs() < 1e-12);
         assert!((estimate.frames.spread_s() - 0.003).abs() < 1e-12);
         let line = estimate.to_string();
-        assert!(line.starts_with("--joints-delay auto is 0.250000 s, from 3 frames and 3 states"), "{line}");
-        assert!(line.ends_with("frames took 3.0 ms longer than their fastest, and states 2.0 ms"), "{line}");
+        assert!(line.starts_with("--joints-delay auto is 0.250000 s, from 3 clouds and 3 states"), "{line}");
+        assert!(line.ends_with("clouds took 3.0 ms longer than their fastest, and states 2.0 ms"), "{line}");
         assert_eq!(of(&[]), None);
     }
 }

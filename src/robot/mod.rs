@@ -19,6 +19,8 @@
 mod bag_source;
 #[cfg(feature = "mcap")]
 mod bag_states;
+#[cfg(feature = "mcap")]
+mod cloud_merge;
 #[cfg(feature = "meshes")]
 mod jointed_source;
 #[cfg(feature = "mcap")]

@@ -49,13 +49,21 @@ impl Places {
         frame.values.resize(self.ids.len(), RawValue::MISSING);
     }
 
-    /// Puts the values of a cloud and its stamp into `frame`, in place of what that holds.
+    /// Puts the values of a cloud into `frame`, in place of what that holds, with the time `t_s` (s).
+    ///
+    /// # Errors
+    /// As [`Places::points`].
+    pub(super) fn cloud(&self, cloud: &PointCloud2, t_s: f64, frame: &mut Frame) -> Result<()> {
+        self.empty(frame);
+        frame.t_s = t_s;
+        self.points(cloud, |index, value| frame.values[index] = value)
+    }
+
+    /// Gives `put` the index in a frame and the value of each point of a cloud.
     ///
     /// # Errors
     /// Its points are no taxels of the body, or do not fit its bytes.
-    pub(super) fn cloud(&self, cloud: &PointCloud2, frame: &mut Frame) -> Result<()> {
-        self.empty(frame);
-        frame.t_s = cloud.header.stamp.seconds();
+    pub(super) fn points(&self, cloud: &PointCloud2, mut put: impl FnMut(usize, RawValue)) -> Result<()> {
         let points = cloud.width as usize * cloud.height as usize;
         let named =
             |names: &[&str]| names.iter().find_map(|name| cloud.fields.iter().find(|field| field.name == *name));
@@ -70,7 +78,7 @@ impl Places {
             for point in 0..points {
                 let own = id.at(point);
                 match self.index_of.get(&(own as u32)).filter(|_| own == f64::from(own as u32)) {
-                    Some(&index) => frame.values[index] = RawValue::new(value.at(point)),
+                    Some(&index) => put(index, RawValue::new(value.at(point))),
                     None => unknown.push(own),
                 }
             }
@@ -97,7 +105,7 @@ impl Places {
             ));
         };
         for (point, &index) in taxels.iter().enumerate() {
-            frame.values[index] = RawValue::new(value.at(point));
+            put(index, RawValue::new(value.at(point)));
         }
         Ok(())
     }
@@ -231,7 +239,7 @@ mod tests {
 
     fn read(places: &Places, cloud: &PointCloud2) -> Result<Frame> {
         let mut frame = Frame::missing(0.0, places.ids.len());
-        places.cloud(cloud, &mut frame).map(|()| frame)
+        places.cloud(cloud, cloud.header.stamp.seconds(), &mut frame).map(|()| frame)
     }
 
     #[test]

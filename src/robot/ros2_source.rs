@@ -90,7 +90,9 @@ impl Source for Ros2Source {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             let read = match &mut self.topic {
-                Topic::Clouds(reader) => reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, frame)),
+                Topic::Clouds(reader) => {
+                    reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, cloud.header.stamp.seconds(), frame))
+                }
                 Topic::Arrays(reader) => reader.next(WAIT)?.map(|array| {
                     // It has no stamp: its time is when it came.
                     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

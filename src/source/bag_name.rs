@@ -6,13 +6,13 @@ use std::str::FromStr;
 
 use crate::error::{Error, Result, failed};
 
-/// A topic of a bag of ROS 2 as people name it: `PATH[:/TOPIC][@TYPE]`.
+/// Topics of a bag of ROS 2 as people name them: `PATH[:/TOPIC[,/TOPIC]...][@TYPE]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BagName {
     /// An MCAP file, or a folder of such.
     pub path: PathBuf,
-    /// The topic's name, from `/` on; without one, the only topic that fits is meant.
-    pub topic: Option<String>,
+    /// The topics' names, from `/` on; without any, what fits is meant.
+    pub topics: Vec<String>,
     /// The type of its messages, such as `sensor_msgs/msg/PointCloud2`.
     pub kind: Option<String>,
 }
@@ -21,7 +21,7 @@ impl BagName {
     /// The bag at `path`, without a topic.
     #[must_use]
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self { path: path.into(), topic: None, kind: None }
+        Self { path: path.into(), topics: Vec::new(), kind: None }
     }
 
     /// Whether `path` is a bag rather than another file: a folder, or a file with the ending of MCAP.
@@ -51,22 +51,26 @@ impl FromStr for BagName {
             Some((rest, Some(kind))) => (rest, Some(kind)),
             _ => (text, None),
         };
-        let (path, topic) = match rest.rsplit_once(":/") {
-            // `C:/` is the drive of Windows.
-            Some((path, topic)) if path.len() > 1 && !topic.is_empty() => (path, Some(format!("/{topic}"))),
-            _ => (rest, None),
+        let (path, topics) = match rest.rsplit_once(":/") {
+            // `C:/` is the drive of Windows. Names of topics have no commas.
+            Some((path, topics)) if path.len() > 1 && !topics.is_empty() => {
+                (path, format!("/{topics}").split(',').map(str::to_owned).collect())
+            }
+            _ => (rest, Vec::new()),
         };
         if path.is_empty() {
             return Err(failed!("`{text}` names no bag; write ros2-mcap:PATH or ros2-mcap:PATH:/TOPIC"));
         }
-        Ok(Self { path: path.into(), topic, kind })
+        Ok(Self { path: path.into(), topics, kind })
     }
 }
 
 impl fmt::Display for BagName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.path.display())?;
-        self.topic.iter().try_for_each(|topic| write!(f, ":{topic}"))?;
+        if !self.topics.is_empty() {
+            write!(f, ":{}", self.topics.join(","))?;
+        }
         self.kind.iter().try_for_each(|kind| write!(f, "@{kind}"))
     }
 }
@@ -78,19 +82,21 @@ mod tests {
     #[test]
     fn names_come_apart_and_together() {
         let cloud = "sensor_msgs/msg/PointCloud2";
-        for (text, path, topic, kind) in [
-            ("bag", "bag", None, None),
-            ("a/b.mcap", "a/b.mcap", None, None),
-            ("bag:/arm/skin", "bag", Some("/arm/skin"), None),
-            ("bag:/skin@sensor_msgs/msg/PointCloud2", "bag", Some("/skin"), Some(cloud)),
-            ("bag@sensor_msgs/msg/PointCloud2", "bag", None, Some(cloud)),
-            ("C:/bag:/skin", "C:/bag", Some("/skin"), None),
-            ("C:/bag", "C:/bag", None, None),
-            ("me@home/bag:2", "me@home/bag:2", None, None),
-            ("/2026-01-01 12:30/b.mcap", "/2026-01-01 12:30/b.mcap", None, None),
+        for (text, path, topics, kind) in [
+            ("bag", "bag", &[][..], None),
+            ("a/b.mcap", "a/b.mcap", &[], None),
+            ("bag:/arm/skin", "bag", &["/arm/skin"], None),
+            ("bag:/left/skin,/right/skin", "bag", &["/left/skin", "/right/skin"], None),
+            ("bag:/skin@sensor_msgs/msg/PointCloud2", "bag", &["/skin"], Some(cloud)),
+            ("bag@sensor_msgs/msg/PointCloud2", "bag", &[], Some(cloud)),
+            ("C:/bag:/skin", "C:/bag", &["/skin"], None),
+            ("C:/bag", "C:/bag", &[], None),
+            ("me@home/bag:2", "me@home/bag:2", &[], None),
+            ("/2026-01-01 12:30/b.mcap", "/2026-01-01 12:30/b.mcap", &[], None),
         ] {
             let name: BagName = text.parse().unwrap();
-            assert_eq!((name.path.to_str(), name.topic.as_deref(), name.kind.as_deref()), (Some(path), topic, kind));
+            assert_eq!((name.path.to_str(), name.kind.as_deref()), (Some(path), kind));
+            assert_eq!(name.topics, topics);
             assert_eq!(name.to_string(), text);
         }
         let short: BagName = "bag:/skin@sensor_msgs/PointCloud2".parse().unwrap();

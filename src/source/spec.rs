@@ -14,7 +14,7 @@ const FORMS: [(&str, &str); 10] = [
     ("ros2", "ros2:/TOPIC[@TYPE]"),
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
-    ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC][@TYPE]"),
+    ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC,...][@TYPE]"),
     ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
     ("-", "- for NDJSON on standard input"),
@@ -48,7 +48,7 @@ pub enum SourceSpec {
     Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
     Mcap(PathBuf),
-    /// `ros2-mcap:PATH[:/TOPIC][@TYPE]`: a topic of a bag of ROS 2.
+    /// `ros2-mcap:PATH[:/TOPIC,...][@TYPE]`: topics of a bag of ROS 2.
     Ros2Mcap(BagName),
     /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
     /// export.
@@ -256,7 +256,7 @@ mod tests {
         assert_eq!(parsed("csv:a/b.txt"), SourceSpec::Csv("a/b.txt".into()));
         assert_eq!(parsed("a/b.CSV"), SourceSpec::Csv("a/b.CSV".into()));
         assert_eq!(parsed("C:\\b.csv"), SourceSpec::Csv("C:\\b.csv".into()));
-        let bag = BagName { topic: Some("/arm/skin".into()), ..BagName::new("a/bag") };
+        let bag = BagName { topics: vec!["/arm/skin".into()], ..BagName::new("a/bag") };
         assert_eq!(parsed("ros2-mcap:a/bag:/arm/skin"), SourceSpec::Ros2Mcap(bag));
         assert_eq!(parsed("-"), SourceSpec::Stdin);
         assert_eq!(parsed("csv:-"), SourceSpec::CsvStdin);
@@ -283,7 +283,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

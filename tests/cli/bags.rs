@@ -17,20 +17,20 @@ use super::random::Random;
 use super::skips::skip;
 use super::{done, fails, file, frames, output, stderr, text_of};
 
-const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
+pub(super) const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 const MS: u64 = 1_000_000;
 
 /// A message as a recorder has it.
 #[derive(Clone, Debug)]
-struct Said {
-    topic: &'static str,
-    log_ns: u64,
-    stamp_ns: u64,
-    what: What,
+pub(super) struct Said {
+    pub(super) topic: &'static str,
+    pub(super) log_ns: u64,
+    pub(super) stamp_ns: u64,
+    pub(super) what: What,
 }
 
 #[derive(Clone, Debug)]
-enum What {
+pub(super) enum What {
     /// Names and positions.
     Joints(Vec<String>, Vec<f64>),
     /// Taxels and their values.
@@ -71,7 +71,7 @@ impl Said {
         }
     }
 
-    fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         let mut said = json!({"topic": self.topic, "log_ns": self.log_ns, "stamp_ns": self.stamp_ns});
         match &self.what {
             What::Joints(name, position) => (said["name"], said["position"]) = (json!(name), json!(position)),
@@ -85,7 +85,7 @@ impl Said {
 }
 
 /// Writes `said`, in the order in which they came, to an MCAP at `path`, with messages in `encoding`.
-fn write_mcap(path: &Path, said: &[Said], encoding: &str) {
+pub(super) fn write_mcap(path: &Path, said: &[Said], encoding: &str) {
     let to = BufWriter::new(File::create(path).unwrap());
     let options = mcap::WriteOptions::new().compression(None).profile("ros2").chunk_size(Some(4096));
     let mut writer = options.create(to).unwrap();
@@ -101,7 +101,7 @@ fn write_mcap(path: &Path, said: &[Said], encoding: &str) {
 }
 
 /// The rows of an example's table: the time in ns, and the cells by the names of their columns.
-fn rows(name: &str) -> Vec<(u64, Vec<(String, f64)>)> {
+pub(super) fn rows(name: &str) -> Vec<(u64, Vec<(String, f64)>)> {
     let text = std::fs::read_to_string(format!("{ROBOT}/{name}")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let names = lines.next().unwrap();
@@ -171,7 +171,7 @@ fn run_of(body: &Path, source: &str, states: &str) -> Vec<String> {
     all.into_iter().chain(named).map(str::to_owned).collect()
 }
 
-fn with<'a>(arguments: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
+pub(super) fn with<'a>(arguments: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
     arguments.iter().map(String::as_str).chain(more.iter().copied()).collect()
 }
 
@@ -183,7 +183,7 @@ fn of_tables(body: &Path) -> String {
 }
 
 /// The error, of one line, of a run that must end with `code`.
-fn refused(code: i32, arguments: &[&str]) -> String {
+pub(super) fn refused(code: i32, arguments: &[&str]) -> String {
     let why = fails(code, arguments);
     let told: Vec<&str> = why.lines().filter(|line| line.starts_with("somatic: error: ")).collect();
     assert_eq!(told.len(), 1, "{why}");
@@ -306,7 +306,7 @@ fn the_delay_between_two_clocks_is_estimated_within_the_difference_of_the_least_
     };
     let (estimated, said) = run("auto");
     let line = said.lines().find(|line| line.contains("--joints-delay auto is ")).unwrap_or_else(|| panic!("{said}"));
-    assert!(line.contains("from 101 frames and 94 states") && line.contains("longer than their fastest"), "{line}");
+    assert!(line.contains("from 101 clouds and 94 states") && line.contains("longer than their fastest"), "{line}");
     let after = line.split("--joints-delay auto is ").nth(1).unwrap();
     let estimate_s: f64 = after.split(' ').next().unwrap().parse().unwrap();
     let off_s = (estimate_s - true_s).abs();

@@ -2,6 +2,7 @@
 
 mod author;
 mod bags;
+mod bags_merged;
 mod bench;
 #[cfg(feature = "page")]
 #[cfg(all(unix, any(feature = "ros2", feature = "zenoh")))]
