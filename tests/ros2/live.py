@@ -5,10 +5,11 @@
     live.py node NAME COUNT
 
 The domain is that of ROS_DOMAIN_ID. `receive` prints `matched` each time every topic has a writer and `unmatched` each time one
-has none, until a line comes on its standard input; then a line of JSON: [topic, when it came in ns, message] each; with `stamps`
-the header's stamp in ns is all that is kept of a message. `send` prints `matched` once its topic has a reader, and sends each line
-of its standard input, a message as JSON. `node` waits until the node NAME has COUNT writers and readers and all are found, and
-prints as JSON which topics of DDS it writes and reads; then `gone` once it says that it is no more.
+has none, and `received` with the first message, until a line comes on its standard input; then a line of JSON: [topic, when it
+came in ns, message] each; with `stamps` the header's stamp in ns is all that is kept of a message. `send` prints `matched` once
+its topic has a reader, and sends each line of its standard input, a message as JSON. `node` waits until the node NAME has COUNT
+writers and readers and all are found, and prints as JSON which topics of DDS it writes and reads; then `gone` once it says that
+it is no more.
 """
 
 import json
@@ -77,6 +78,8 @@ def receive(topics):
                 # Where a writer has gone there is a sample without data.
                 if hasattr(message, "__dataclass_fields__") and message.sample_info.valid_data:
                     found = True
+                    if not messages:
+                        print("received", flush=True)
                     messages.append([name, time.time_ns(), kept(message, only_stamps)])
         if not found:
             time.sleep(0.001)
@@ -116,7 +119,8 @@ def node(full_name, count):
     qos = Qos(
         Policy.Reliability.Reliable(duration(seconds=2)),
         Policy.Durability.TransientLocal,
-        Policy.History.KeepLast(1),
+        # As ROS 2 reads it: it has no keys, and of two nodes the last to tell would be kept.
+        Policy.History.KeepAll,
         Policy.DataRepresentation(use_cdrv0_representation=True),
     )
     kind = read.cyclonedds_type("rmw_dds_common/msg/ParticipantEntitiesInfo")
