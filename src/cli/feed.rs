@@ -40,6 +40,8 @@ pub(super) struct FrameInfo {
     pub(super) notices: Vec<String>,
     /// What has been lost so far, if requested.
     pub(super) losses: Vec<String>,
+    /// What is to be said if these are the last frames.
+    pub(super) closing: Vec<String>,
 }
 
 #[derive(Clone, Copy)]
@@ -113,6 +115,7 @@ impl Feed {
                     info.has_stale |= further.has_stale;
                     info.notices.extend(further.notices);
                     info.losses = further.losses;
+                    info.closing = further.closing;
                 }
                 Ok(other) => {
                     self.next = Some(other);
@@ -141,6 +144,7 @@ fn read(
     let width = source.taxels().len();
     let mut pool: Vec<Frame> = Vec::new();
     let mut clock = mode.speed.map(Clock::new);
+    let mut is_empty = true;
     loop {
         pool.extend(used.try_iter().flatten());
         let mut frames = Vec::with_capacity(together);
@@ -165,8 +169,14 @@ fn read(
         if with_losses {
             info.losses = source.losses();
         }
+        info.closing = source.closing();
+        is_empty &= frames.is_empty();
         if let Some(Arrival::End(ending)) = &mut end {
-            ending.notices = std::mem::take(&mut info.notices);
+            if is_empty {
+                ending.notices.push("the source has ended without a frame".to_owned());
+            }
+            ending.notices.append(&mut info.notices);
+            ending.notices.append(&mut info.closing);
         }
         if !frames.is_empty() && to.send(Arrival::Frames(frames, info)).is_err() {
             return Arrival::End(Ending::default());

@@ -177,13 +177,16 @@ impl LineReport {
             summary.write(text.as_bytes())?;
         }
         if !answered {
-            let what = match accounts.iter().any(|account| account.limb.is_some()) {
-                true => "no limb was heard; do they run, under these keys, and does the network reach this computer?",
-                false => {
-                    "no board has answered; are they powered, and the ports right? `somatic devices` shows the ports"
-                }
-            };
-            return Err(Error::failed(what));
+            let limbs: Vec<&str> = accounts.iter().filter_map(|account| account.limb.as_deref()).collect();
+            return Err(Error::failed(if limbs.is_empty() {
+                "no board has answered; are they powered, and the ports right? `somatic devices` shows the ports"
+                    .to_owned()
+            } else {
+                let keys = limbs.join(", ");
+                format!(
+                    "no limb was heard; do they run, with the keys {keys}, and does the network reach this computer?"
+                )
+            }));
         }
         Ok(self.lines.losses())
     }

@@ -276,12 +276,12 @@ impl Pump {
     /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source says at its end.
     fn run(&mut self, mut feed: Feed, is_ended: impl Fn() -> bool, until: Option<Instant>) -> Result<Ending> {
         let watched = self.view.is_table() || self.sinks.is_empty();
-        let mut losses = Vec::new();
+        let (mut losses, mut closing) = (Vec::new(), Vec::new());
         while !is_ended() && until.is_none_or(|until| Instant::now() < until) {
             match feed.next(Duration::from_millis(40)) {
                 Some(Arrival::Frames(frames, told)) => {
                     told.notices.iter().filter(|_| !self.view.is_table()).for_each(|notice| say(notice));
-                    losses = told.losses;
+                    (losses, closing) = (told.losses, told.closing);
                     if told.has_stale && !std::mem::replace(&mut self.heeds_stale, true) {
                         self.engine.track_stale();
                     }
@@ -329,7 +329,7 @@ impl Pump {
             }
             self.view.draw();
         }
-        Ok(Ending { losses, notices: Vec::new() })
+        Ok(Ending { losses, notices: closing })
     }
 
     /// Reports taxels that are left out, or used again, to sinks and, unless a table fills the terminal, to people.

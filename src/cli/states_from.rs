@@ -21,6 +21,10 @@ impl<'a> StatesFrom<'a> {
         // A path that is no text has no such beginning.
         let text = states.to_str().unwrap_or_default();
         if let Some(topic) = text.strip_prefix("ros2:") {
+            if !topic.starts_with('/') {
+                return Err(Error::usage(format!("`{topic}` is no topic; it begins with /: ros2:/{topic}"))
+                    .at("--joint-states"));
+            }
             return Ok(Self::Topic(topic));
         }
         if let Some(name) = text.strip_prefix("ros2-mcap:") {

@@ -90,7 +90,7 @@ impl Kind {
     fn read(
         &mut self,
         message: &BagMessage<'_>,
-        places: &Places,
+        places: &mut Places,
         topics: &[String],
         frame: &mut Frame,
     ) -> Option<Result<f64>> {
@@ -146,7 +146,7 @@ impl Source for BagSource {
                 continue;
             };
             let (topic, bytes, log_s) = (message.topic, message.data.len(), message.log_ns as f64 / 1e9);
-            match self.kind.read(&message, &self.places, &self.topics, frame) {
+            match self.kind.read(&message, &mut self.places, &self.topics, frame) {
                 Some(Ok(t_s)) => self.bag.saw(t_s),
                 Some(Err(e)) => return Err(self.placed(e, topic, log_s)),
                 None => {
@@ -175,7 +175,10 @@ impl Source for BagSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.notices)
+        let of_places = std::mem::take(&mut self.places.notices);
+        let mut notices: Vec<String> = of_places.into_iter().map(|what| format!("{}: {what}", self.path)).collect();
+        notices.append(&mut self.notices);
+        notices
     }
 
     fn losses(&self) -> Vec<String> {

@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use glam::{DAffine3, DQuat};
 
+use super::joint_remarks::JointRemarks;
 use super::kinematics::Kinematics;
 use super::matching::LinkMatches;
 use crate::author::mesh::{Up, y_up_from};
 use crate::body::Body;
-use crate::error::{Error, Result, failed};
+use crate::error::{Result, failed};
 use crate::signal::{Frame, Pose};
 use crate::source::{JointPosition, JointStates, Source};
 
@@ -25,6 +26,8 @@ pub struct JointOptions {
     pub max_age_s: f64,
 }
 
+/// Names of joints that a message has at most.
+const MOST_NAMED: usize = 8;
 /// Messages on late states are at least so far apart, s.
 const QUIET_S: f64 = 10.0;
 /// The default of [`JointOptions::max_age_s`].
@@ -61,11 +64,7 @@ pub struct JointedSource {
     is_stale_told: bool,
     told_s: f64,
     counts: PoseCounts,
-    /// Whether a position that may be in degrees has been told of.
-    has_told_of_degrees: bool,
-    /// Whether it has been told that frames carry states that are not used.
-    has_told_of_carried: bool,
-    notices: Vec<String>,
+    remarks: JointRemarks,
 }
 
 /// Frames that were read, and those of them without a pose.
@@ -103,7 +102,9 @@ impl JointedSource {
                 let known: Vec<&str> = robot.joint_names().collect();
                 let strange = states.joint_names().iter().map(String::as_str).filter(|name| !known.contains(name));
                 let hint = crate::error::nearest(name, strange.filter(|name| !robot.has_joint(name)));
-                let what_to_do = hint.map_or("add it".to_owned(), |near| format!("is `{near}` meant?"));
+                let others = || states.joint_names().iter().take(MOST_NAMED).map(|name| format!("`{name}`"));
+                let add = || format!("add it to its {}", others().collect::<Vec<_>>().join(", "));
+                let what_to_do = hint.map_or_else(add, |near| format!("is `{near}` meant?"));
                 return Err(
                     failed!("no state has joint `{name}`, which moves `{link}`; {what_to_do}").at(states.name())
                 );
@@ -123,9 +124,7 @@ impl JointedSource {
             is_stale_told: false,
             told_s: f64::NEG_INFINITY,
             counts: PoseCounts::default(),
-            has_told_of_degrees: false,
-            has_told_of_carried: false,
-            notices: Vec::new(),
+            remarks: JointRemarks::default(),
             robot,
         })
     }
@@ -137,17 +136,13 @@ impl JointedSource {
     }
 
     /// Fills in where each joint is at the time of `frame`.
-    fn find_positions(&mut self, frame: &Frame) -> Result<()> {
+    fn find_positions(&mut self, frame: &Frame) {
         for (name, position) in &frame.joints {
             match self.robot.joint_names().position(|known| known == name) {
                 Some(joint) => self.carried[joint] = Some((frame.t_s, *position)),
                 // One that mimics another, or is fixed, adds nothing.
                 None if self.robot.has_joint(name) => {}
-                None => {
-                    let near = crate::error::nearest(name, self.robot.joint_names());
-                    let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                    return Err(Error::failed(format!("at {} s: the URDF has no joint `{name}`{hint}", frame.t_s)));
-                }
+                None => self.remarks.strange_joint(&self.robot, name, frame.t_s),
             }
         }
         for joint in 0..self.positions.len() {
@@ -158,54 +153,27 @@ impl JointedSource {
                 None => self.carried[joint].map(|(t_s, position)| JointPosition { position, age_s: frame.t_s - t_s }),
             };
         }
-        Ok(())
     }
 
-    /// Tells, at the end, how many frames have no pose.
-    fn tell_of_frames_without_pose(&mut self) {
-        let PoseCounts { frames, without_pose, span_s } = std::mem::take(&mut self.counts);
-        let Some([first_s, last_s]) = span_s.filter(|_| without_pose > 0) else { return };
-        let mut line =
-            format!("{without_pose} of {frames} frames have no pose: states of joints were missing or too old");
+    /// How many frames have no pose so far, if any.
+    fn frames_without_pose(&self) -> Option<String> {
+        let PoseCounts { frames, without_pose, span_s } = self.counts;
+        let [first_s, last_s] = span_s.filter(|_| without_pose > 0)?;
+        let mut line = format!(
+            "{without_pose} of {frames} frames have no pose: states of joints were missing, or older than --joints-max-age {}",
+            self.options.max_age_s
+        );
         if let Some([from_s, to_s]) = self.options.states.as_ref().and_then(JointStates::span_s) {
             let from_s = from_s - self.options.delay_s;
             let to_s = to_s - self.options.delay_s;
             line += &format!(
                 "; states are of {from_s} to {to_s} s on the frames' clock, frames of {first_s} to {last_s} s"
             );
+            if from_s > last_s || to_s < first_s {
+                line += "; where these are two clocks, give --joints-delay";
+            }
         }
-        self.notices.push(line);
-    }
-
-    /// Tells once of a joint that stands where only degrees would be: a joint with an end turns less than once around.
-    fn look_for_degrees(&mut self, frame: &Frame) {
-        if self.has_told_of_degrees {
-            return;
-        }
-        let turned = |joint: &usize| self.robot.is_limited_turn(*joint);
-        let far = (0..self.positions.len()).filter(turned).find_map(|joint| {
-            let position = self.positions[joint]?.position;
-            (position.abs() > std::f64::consts::TAU).then_some((joint, position))
-        });
-        let Some((joint, position)) = far else { return };
-        self.has_told_of_degrees = true;
-        let name = self.robot.joint_names().nth(joint).unwrap_or_default();
-        self.notices.push(format!(
-            "at {} s: joint `{name}` is at {position} rad, over a whole turn; are these degrees? Give radians",
-            frame.t_s
-        ));
-    }
-
-    /// Tells once that frames carry states, and that those of the recording are used.
-    fn look_for_carried(&mut self, frame: &Frame) {
-        let Some(states) = self.options.states.as_ref().filter(|_| !frame.joints.is_empty()) else { return };
-        if !std::mem::replace(&mut self.has_told_of_carried, true) {
-            self.notices.push(format!(
-                "at {} s: frames carry joint states of their own; those of {} are used, as --joint-states names it",
-                frame.t_s,
-                states.name()
-            ));
-        }
+        Some(line)
     }
 
     /// Puts the positions of joints that are not older than allowed into `frame`; their names go where those of an earlier
@@ -233,10 +201,13 @@ impl JointedSource {
     }
 
     /// `names` are the joints of an earlier frame.
-    fn put_poses(&mut self, names: Vec<(String, f64)>, frame: &mut Frame) -> Result<()> {
-        self.find_positions(frame)?;
-        self.look_for_carried(frame);
-        self.look_for_degrees(frame);
+    fn put_poses(&mut self, names: Vec<(String, f64)>, frame: &mut Frame) {
+        self.find_positions(frame);
+        if let Some(states) = self.options.states.as_ref().filter(|_| !frame.joints.is_empty()) {
+            self.remarks.carried(states.name(), frame.t_s);
+        }
+        let position_of = |joint: usize| self.positions[joint].map(|found| found.position);
+        self.remarks.units(&self.robot, position_of, frame.t_s);
         let max_age_s = self.options.max_age_s;
         // Times are rounded: what is as old as the limit to a nanosecond is not older.
         let allowed_s = 0.0..=max_age_s + 1e-9;
@@ -250,7 +221,7 @@ impl JointedSource {
             self.told_s = if self.is_stale_told { frame.t_s } else { self.told_s };
         }
         if is_stale != self.was_stale && self.is_stale_told {
-            self.notices.push(match late {
+            self.remarks.notices.push(match late {
                 Some((joint, link)) => {
                     let name = self.robot.joint_names().nth(*joint).unwrap_or_default();
                     let age = self.positions[*joint].map_or("no state so far".to_owned(), |found| {
@@ -271,7 +242,7 @@ impl JointedSource {
             if is_recorded {
                 frame.joints.clear();
             }
-            return Ok(());
+            return;
         }
         if is_recorded {
             self.put_joints(known, names, frame);
@@ -291,7 +262,6 @@ impl JointedSource {
                 frame.pose.push((name.clone(), Pose { translation: world_from_link.translation, rotation }));
             }
         }
-        Ok(())
     }
 }
 
@@ -304,10 +274,9 @@ impl Source for JointedSource {
         // Sources empty their frames, and names would be allocated for each.
         let names = if self.options.states.is_some() { std::mem::take(&mut frame.joints) } else { Vec::new() };
         if !self.source.next_frame(frame)? {
-            self.tell_of_frames_without_pose();
             return Ok(false);
         }
-        self.put_poses(names, frame)?;
+        self.put_poses(names, frame);
         self.counts.see(frame);
         Ok(true)
     }
@@ -334,8 +303,14 @@ impl Source for JointedSource {
 
     fn notices(&mut self) -> Vec<String> {
         let mut notices = self.source.notices();
-        notices.append(&mut self.notices);
+        notices.append(&mut self.remarks.notices);
         notices
+    }
+
+    fn closing(&self) -> Vec<String> {
+        let mut closing = self.source.closing();
+        closing.extend(self.frames_without_pose());
+        closing
     }
 
     fn losses(&self) -> Vec<String> {

@@ -47,6 +47,8 @@ struct RobotJoint {
     name: String,
     is_continuous: bool,
     is_prismatic: bool,
+    /// Of its positions, rad or m, where the file has a range.
+    limits: Option<[f64; 2]>,
 }
 
 impl Kinematics {
@@ -122,6 +124,7 @@ impl Kinematics {
             name: joint.name.clone(),
             is_continuous: is_continuous(&joint.motion),
             is_prismatic: matches!(joint.motion, JointMotion::Prismatic { .. }),
+            limits: joint.limits.filter(|_| !is_continuous(&joint.motion)),
         };
         let is_other = |joint: &&crate::author::mesh::RobotJoint| !index_of.contains_key(joint.name.as_str());
         let other_joints = robot.joints.iter().filter(is_other).map(|joint| joint.name.clone()).collect();
@@ -144,6 +147,18 @@ impl Kinematics {
     pub fn is_limited_turn(&self, joint: usize) -> bool {
         let RobotJoint { is_continuous, is_prismatic, .. } = self.joints[joint];
         !is_continuous && !is_prismatic
+    }
+
+    /// The least and the greatest position that the URDF gives joint `joint`, rad or m.
+    #[must_use]
+    pub fn limits(&self, joint: usize) -> Option<[f64; 2]> {
+        self.joints[joint].limits
+    }
+
+    /// The unit of the positions of joint `joint`.
+    #[must_use]
+    pub fn unit(&self, joint: usize) -> &'static str {
+        if self.joints[joint].is_prismatic { "m" } else { "rad" }
     }
 
     /// Whether joint `joint` turns without end, so that 0 and 2π are one position.

@@ -1,7 +1,7 @@
 //! Joint states from a topic of ROS 2, carried by the frames of another source.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::messages::{JointState, Message as _};
 use super::told_positions::told_positions;
@@ -12,6 +12,8 @@ use crate::source::Source;
 
 /// States that are kept until the next frame reads them.
 const DEPTH: usize = 64;
+/// How long the first state may take before that is told.
+const COMES_WITHIN: Duration = Duration::from_secs(5);
 /// The node's name.
 const NODE: &str = "somatic_joints";
 
@@ -19,9 +21,13 @@ const NODE: &str = "somatic_joints";
 pub struct LiveJoints {
     source: Box<dyn Source + Send>,
     name: String,
-    /// It stays as long as what reads from it.
-    _node: Node,
+    node: Node,
+    topic: String,
     states: Reader<JointState>,
+    /// When it began to wait for the first state; nothing once that has come.
+    waits_since: Option<Instant>,
+    /// Whether it was told that nothing comes.
+    has_told: bool,
     /// Joints that have arrived since the last frame.
     arrived: BTreeMap<String, f64>,
 }
@@ -36,14 +42,36 @@ impl LiveJoints {
         let at = |e: Error| e.at(&name);
         let mut node = Node::new("", NODE).map_err(at)?;
         let states = node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH }).map_err(at)?;
-        Ok(Self { source, name, _node: node, states, arrived: BTreeMap::new() })
+        let waits_since = Some(Instant::now());
+        let topic = topic.to_owned();
+        Ok(Self { source, name, node, topic, states, waits_since, has_told: false, arrived: BTreeMap::new() })
     }
 
     fn read_states(&mut self) -> Result<()> {
         while let Some(state) = self.states.take()? {
             take_state(&state, &mut self.arrived)?;
+            self.waits_since = None;
         }
         Ok(())
+    }
+
+    /// That no state has come so far, and where others send some.
+    fn nothing_came(&self) -> Option<String> {
+        let waited_s = self.waits_since?.elapsed().as_secs_f64();
+        let mut others = self.node.topics();
+        // A reader makes its own topic known, too.
+        others.retain(|(topic, kind)| kind == JointState::TYPE && *topic != self.topic);
+        let others: Vec<String> = others.into_iter().map(|(topic, _)| topic).collect();
+        let there = if others.is_empty() {
+            "no other topic has any".to_owned()
+        } else {
+            format!("there is {}", others.join(", "))
+        };
+        Some(format!(
+            "{}: no state has come in {waited_s:.1} s in domain {} (ROS_DOMAIN_ID); {there}",
+            self.name,
+            self.node.domain()
+        ))
     }
 }
 
@@ -94,7 +122,20 @@ impl Source for LiveJoints {
     }
 
     fn notices(&mut self) -> Vec<String> {
-        self.source.notices()
+        let mut notices = self.source.notices();
+        if !self.has_told && self.waits_since.is_some_and(|since| since.elapsed() > COMES_WITHIN) {
+            self.has_told = true;
+            notices.extend(self.nothing_came());
+        }
+        notices
+    }
+
+    fn closing(&self) -> Vec<String> {
+        let mut closing = self.source.closing();
+        if !self.has_told {
+            closing.extend(self.nothing_came());
+        }
+        closing
     }
 
     fn losses(&self) -> Vec<String> {

@@ -22,6 +22,8 @@ mod bag_states;
 #[cfg(feature = "mcap")]
 mod cloud_merge;
 #[cfg(feature = "meshes")]
+mod joint_remarks;
+#[cfg(feature = "meshes")]
 mod jointed_source;
 #[cfg(feature = "mcap")]
 mod joints_delay;

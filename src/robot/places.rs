@@ -1,6 +1,6 @@
 //! Frames from messages of ROS 2: a cloud of points, or numbers in the order of the body's taxels.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::messages::{Float32MultiArray, Message as _, PointCloud2, PointField};
 use crate::body::Body;
@@ -25,6 +25,11 @@ pub(super) struct Places {
     /// By link, its taxels in the body's order.
     of_link: BTreeMap<String, Vec<usize>>,
     all: Vec<usize>,
+    body: String,
+    /// Frames of coordinates that clouds may be in: the body's links, and others that were told of.
+    frames: BTreeSet<String>,
+    /// What is odd about messages, a line each.
+    pub(super) notices: Vec<String>,
 }
 
 impl Places {
@@ -35,7 +40,9 @@ impl Places {
             of_link.entry(body.links[taxel.link].name.clone()).or_default().push(index);
         }
         let index_of = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
-        Self { all: (0..ids.len()).collect(), ids, index_of, of_link }
+        let frames = body.links.iter().map(|link| link.name.clone()).collect();
+        let body = body.name.clone();
+        Self { all: (0..ids.len()).collect(), ids, index_of, of_link, body, frames, notices: Vec::new() }
     }
 
     /// The ids of a frame's values, in their order: all of the body.
@@ -53,7 +60,7 @@ impl Places {
     ///
     /// # Errors
     /// As [`Places::points`].
-    pub(super) fn cloud(&self, cloud: &PointCloud2, t_s: f64, frame: &mut Frame) -> Result<()> {
+    pub(super) fn cloud(&mut self, cloud: &PointCloud2, t_s: f64, frame: &mut Frame) -> Result<()> {
         self.empty(frame);
         frame.t_s = t_s;
         self.points(cloud, |index, value| frame.values[index] = value)
@@ -63,7 +70,7 @@ impl Places {
     ///
     /// # Errors
     /// Its points are no taxels of the body, or do not fit its bytes.
-    pub(super) fn points(&self, cloud: &PointCloud2, mut put: impl FnMut(usize, RawValue)) -> Result<()> {
+    pub(super) fn points(&mut self, cloud: &PointCloud2, mut put: impl FnMut(usize, RawValue)) -> Result<()> {
         let points = cloud.width as usize * cloud.height as usize;
         let named =
             |names: &[&str]| names.iter().find_map(|name| cloud.fields.iter().find(|field| field.name == *name));
@@ -73,6 +80,7 @@ impl Places {
         };
         let value = Column::new(cloud, value)?;
         if let Some(id) = named(&ID_FIELDS) {
+            self.look_at_frame(&cloud.header.frame_id);
             let id = Column::new(cloud, id)?;
             let mut unknown = Vec::new();
             for point in 0..points {
@@ -85,7 +93,7 @@ impl Places {
             return match unknown.first() {
                 None => Ok(()),
                 Some(first) => Err(failed!(
-                    "{} of {points} points are of taxels that the body does not have, the first of {first}; give the body that \
+                    "{} of {points} points are of taxels that the body does not have, taxel {first} first; give the body that \
                      has them",
                     unknown.len()
                 )),
@@ -108,6 +116,17 @@ impl Places {
             put(index, RawValue::new(value.at(point)));
         }
         Ok(())
+    }
+
+    /// Tells once of clouds that are in the frame of no link: they may be of another robot, whose ids fit.
+    fn look_at_frame(&mut self, frame_id: &str) {
+        let link = frame_id.trim_start_matches('/');
+        if !link.is_empty() && !self.frames.contains(link) {
+            self.frames.insert(link.to_owned());
+            let body = &self.body;
+            self.notices
+                .push(format!("clouds are in frame `{link}`, which is no link of {body}; is it the right body?"));
+        }
     }
 
     /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `t_s` (s) at which it came.
@@ -237,14 +256,14 @@ mod tests {
         }
     }
 
-    fn read(places: &Places, cloud: &PointCloud2) -> Result<Frame> {
+    fn read(places: &mut Places, cloud: &PointCloud2) -> Result<Frame> {
         let mut frame = Frame::missing(0.0, places.ids.len());
         places.cloud(cloud, cloud.header.stamp.seconds(), &mut frame).map(|()| frame)
     }
 
     #[test]
     fn points_with_ids_go_to_their_taxels() {
-        let (places, _) = places();
+        let (mut places, _) = places();
         let (first, last) = (places.ids[0], *places.ids.last().unwrap());
         let mut data = Vec::new();
         for (id, value) in [(last, 2.5_f32), (first, f32::NAN)] {
@@ -253,47 +272,47 @@ mod tests {
         }
         let mut cloud = cloud("anywhere", &[("taxel", 0, 4), ("value", 2, 7)], 6, data);
         cloud.is_bigendian = true;
-        let frame = read(&places, &cloud).unwrap();
+        let frame = read(&mut places, &cloud).unwrap();
         assert_eq!(frame.t_s, 7.5);
         assert_eq!(frame.values.last().unwrap().number(), Some(2.5));
         assert_eq!(frame.values[0], RawValue::FAULTY);
         assert!(frame.values[1..places.ids.len() - 1].iter().all(|value| value.is_missing()));
         cloud.is_bigendian = false;
-        let why = read(&places, &cloud).unwrap_err().to_string();
+        let why = read(&mut places, &cloud).unwrap_err().to_string();
         assert!(why.contains("of 2 points"), "{why}");
     }
 
     #[test]
     fn points_without_ids_are_the_links_or_all_in_order_or_refused_with_counts() {
-        let (places, body) = places();
-        let (link, taxels) = places.of_link.iter().next().unwrap();
+        let (mut places, body) = places();
+        let (link, taxels) = places.of_link.clone().into_iter().next().unwrap();
         let of = |count: usize| (0..count).flat_map(|at| (at as f32).to_le_bytes()).collect::<Vec<u8>>();
         let field = [("pressure", 0, 7)];
-        let frame = read(&places, &cloud(link, &field, 4, of(taxels.len()))).unwrap();
+        let frame = read(&mut places, &cloud(&link, &field, 4, of(taxels.len()))).unwrap();
         for (at, &index) in taxels.iter().enumerate() {
             assert_eq!(frame.values[index].number(), Some(at as f64));
         }
         let all = body.taxels.len();
-        let frame = read(&places, &cloud("map", &field, 4, of(all))).unwrap();
+        let frame = read(&mut places, &cloud("map", &field, 4, of(all))).unwrap();
         assert!(frame.values.iter().enumerate().all(|(at, value)| value.number() == Some(at as f64)));
-        let why = read(&places, &cloud(link, &field, 4, of(all + 1))).unwrap_err().to_string();
+        let why = read(&mut places, &cloud(&link, &field, 4, of(all + 1))).unwrap_err().to_string();
         assert!(
             why.contains(&format!("{} points", all + 1)) && why.contains(&format!("{} taxels", taxels.len())),
             "{why}"
         );
-        let why = read(&places, &cloud(link, &[("x", 0, 7), ("y", 0, 7)], 4, of(all))).unwrap_err().to_string();
+        let why = read(&mut places, &cloud(&link, &[("x", 0, 7), ("y", 0, 7)], 4, of(all))).unwrap_err().to_string();
         assert!(why.contains("have x, y"), "{why}");
     }
 
     #[test]
     fn sizes_that_do_not_fit_are_refused() {
-        let (places, _) = places();
+        let (mut places, _) = places();
         let whole = cloud("map", &[("value", 0, 7)], 4, vec![0; 4 * places.ids.len()]);
-        assert!(read(&places, &whole).is_ok());
-        let refused = |change: &dyn Fn(&mut PointCloud2)| {
+        assert!(read(&mut places, &whole).is_ok());
+        let mut refused = |change: &dyn Fn(&mut PointCloud2)| {
             let mut other = whole.clone();
             change(&mut other);
-            read(&places, &other).unwrap_err().to_string()
+            read(&mut places, &other).unwrap_err().to_string()
         };
         assert!(refused(&|cloud| cloud.data.truncate(9)).contains("does not fit"));
         assert!(refused(&|cloud| cloud.fields[0].offset = u32::MAX).contains("does not fit"));

@@ -6,7 +6,7 @@ use super::messages::{Float32MultiArray, Message, PointCloud2};
 use super::places::{Places, not_read};
 use crate::body::Body;
 use crate::dds::{Delivery, Node, Reader};
-use crate::error::{Result, failed};
+use crate::error::{Error, Result, failed};
 use crate::signal::Frame;
 use crate::source::Source;
 
@@ -46,6 +46,9 @@ impl Ros2Source {
     }
 
     fn begin(topic: &str, kind: Option<&str>, body: &Body, name: String) -> Result<Self> {
+        if topic.contains(',') {
+            return Err(Error::usage("one topic is read live; clouds of several are merged of a bag"));
+        }
         let mut node = Node::new("", NODE)?;
         let kind = match kind {
             Some(kind) => kind.to_owned(),
@@ -108,5 +111,10 @@ impl Source for Ros2Source {
 
     fn read_at(&mut self) -> Option<Instant> {
         self.read_at.take()
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        let of_places = std::mem::take(&mut self.places.notices);
+        of_places.into_iter().map(|what| format!("{}: {what}", self.name)).collect()
     }
 }

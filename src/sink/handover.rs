@@ -128,7 +128,11 @@ impl<T: Default + Send + 'static> Handover<T> {
         self.handed.left_out += 1;
         let now = Instant::now();
         if self.last_left_out.replace(now).is_none_or(|last| now - last > QUIET) {
-            tell(&format!("{}: {} come faster than they can be sent; older ones are left out", self.name, self.what));
+            tell(&format!(
+                "{}: {} come faster than they can be sent; older ones are left out; --speed 1 gives a \
+                 recording its own pace",
+                self.name, self.what
+            ));
         }
     }
 

@@ -86,7 +86,11 @@ impl JointStates {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(reader);
         let header = reader.headers().map_err(|e| Error::failed(e.to_string()))?.clone();
         if header.get(0).map(|name| name.trim_start_matches('\u{feff}')) != Some("t") {
-            return Err(Error::failed("its first column is not `t`; write a CSV under t,<joint>,...").at("header"));
+            let what = match header.get(0) {
+                None | Some("") => "it is empty".to_owned(),
+                Some(other) => format!("its first column is `{other}`, not `t`"),
+            };
+            return Err(failed!("{what}; write a CSV under t,<joint>,...").at("header"));
         }
         for name in header.iter().skip(1) {
             if self.index_of.contains_key(name) {

@@ -85,6 +85,11 @@ pub trait Source {
         Vec::new()
     }
 
+    /// What is to be said if no further frame is read, a line each.
+    fn closing(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Input that was never processed, such as a truncated last row; reported to the user, exit code 3.
     fn losses(&self) -> Vec<String> {
         Vec::new()

@@ -171,6 +171,10 @@ impl Source for Replay {
         self.source.notices()
     }
 
+    fn closing(&self) -> Vec<String> {
+        self.source.closing()
+    }
+
     fn losses(&self) -> Vec<String> {
         self.losses.clone()
     }

@@ -371,3 +371,21 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     let used = JointStates::open(&states).unwrap();
     assert_eq!(written.at(0, 0.5, false), used.at(0, 0.5, false));
 }
+
+#[test]
+fn a_bag_of_another_robot_whose_ids_fit_is_told() {
+    let (folder, gripper) = gripper();
+    let arm = folder.path().join("arm.glb");
+    done(&["author", "--urdf-skin", &example("arm.urdf"), "-o", text_of(&arm)]);
+    let bag = folder.path().join("drive");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    done(&["run", "--body", text_of(&arm), "--source", &example("arm-touch.csv"), "--sink", &sink]);
+    let run = |body: &Path| {
+        let arguments = run_of(body, &format!("ros2-mcap:{}", text_of(&bag)));
+        stderr(&output(&arguments.iter().map(String::as_str).collect::<Vec<_>>()))
+    };
+    let told = run(&gripper);
+    assert_eq!(told.matches("clouds are in frame `fore_arm`, which is no link of ").count(), 1, "{told}");
+    assert!(told.contains("gripper.glb; is it the right body?"), "{told}");
+    assert!(!run(&arm).contains("clouds are in frame"));
+}

@@ -49,6 +49,60 @@ fn has_flag(frame: &Value, flag: &str) -> bool {
 }
 
 #[test]
+fn a_joint_that_the_urdf_does_not_have_is_left_out_and_told_once() {
+    let (_folder, body) = arm();
+    let line = |t: f64, more: &str| {
+        format!("{{\"t\":{t},\"values\":{{\"11\":5}},\"joints\":{{\"shoulder\":0.3,\"elbow\":-0.4{more}}}}}\n")
+    };
+    let flags = ["--joints", URDF, "--up", "z"];
+    let without = run_lines(&body, &(line(0.0, "") + &line(0.1, "")), &flags);
+    let with = run_lines(&body, &(line(0.0, ",\"elbwo\":2,\"lift\":0.1") + &line(0.1, ",\"lift\":0.1")), &flags);
+    assert!(with.0 == without.0 && !with.0.is_empty());
+    for what in
+        ["at 0 s: the URDF has no joint `lift`, which is left out", "`elbwo`, which is left out; did you mean `elbow`?"]
+    {
+        assert!(with.1.matches(what).count() == 1 && !without.1.contains(what), "{}", with.1);
+    }
+}
+
+#[test]
+fn frames_without_a_pose_are_counted_where_a_run_is_stopped_too() {
+    let (_folder, body) = arm();
+    let (_other, states) = file("states.csv", "t,shoulder,elbow,grip\n100,0,0,0\n101,0,0,0\n");
+    let output = super::output(&[
+        "run",
+        "--body",
+        text_of(&body),
+        "--source",
+        TOUCH,
+        "--joints",
+        URDF,
+        "--joint-states",
+        text_of(&states),
+        "--up",
+        "z",
+        "--backend",
+        "reference",
+        "--speed",
+        "0.5",
+        "--for",
+        "0.5s",
+        "--sink",
+        "-",
+    ]);
+    assert_eq!(output.status.code(), Some(0));
+    let said = stderr(&output);
+    assert!(said.matches(" frames have no pose: ").count() == 1, "{said}");
+}
+
+#[test]
+fn a_source_without_a_frame_is_told() {
+    let (_folder, path) = file("touch.csv", "t,4\n");
+    let output = super::output(&["run", "--body", "hand", "--source", text_of(&path), "--sink", "-"]);
+    assert!(stderr(&output).contains("the source has ended without a frame"), "{}", stderr(&output));
+}
+
+#[test]
 fn links_are_where_pinocchio_and_yourdfpy_have_them() {
     const CONFIGURATIONS: usize = 1000;
     let python = match python_with("kinematics", "import pinocchio, yourdfpy") {
@@ -282,6 +336,25 @@ fn states_that_cannot_be_meant_are_told_of() {
         let (code, told) = said(URDF, text);
         assert!(code == Some(1) && told.contains(why), "{told}");
     }
+    let (_, told) = said(URDF, "t,joint1,joint2\n0,0,0\n");
+    assert!(
+        told.contains("no state has joint `elbow`, which moves `fore_arm`; add it to its `joint1`, `joint2`"),
+        "{told}"
+    );
+    // Degrees that are less than a whole turn, and millimetres.
+    for (row, what) in [
+        ("6,0,0", "joint `shoulder` is at 6 rad, and its limits in the URDF are "),
+        ("0,0,19.48", "joint `grip` is at 19.48 m, and its limits in the URDF are 0 to "),
+    ] {
+        let (code, told) = said(URDF, &format!("t,shoulder,elbow,grip\n0,{row}\n0.99,{row}\n"));
+        assert!(code == Some(0) && told.matches(what).count() == 1 && told.contains("are its states in "), "{told}");
+    }
+    // Two clocks.
+    let (_, told) = said(URDF, "t,shoulder,elbow,grip\n1700000000,0,0,0\n1700000001,0,0,0\n");
+    assert!(
+        told.contains("100 of 100 frames have no pose") && told.contains("two clocks, give --joints-delay"),
+        "{told}"
+    );
     // The base of another robot is called alike.
     let other = folder.path().join("other.urdf");
     let urdf = "<robot name=\"other\"><link name=\"base\"/><link name=\"tool\"/><joint name=\"turn\" type=\"continuous\">\

@@ -250,7 +250,7 @@ fn a_topic_that_does_not_fit_or_is_not_there_is_told_with_counts() {
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", "sensor_msgs/msg/JointState", Value::Null)));
     assert!(why.contains("its messages are sensor_msgs/msg/JointState"), "{why}");
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", CLOUD, cloud(1.0, &[(0, 1.0), (77, 1.0)]))));
-    assert!(why.contains("1 of 2 points are of taxels that the body does not have, the first of 77"), "{why}");
+    assert!(why.contains("1 of 2 points are of taxels that the body does not have, taxel 77 first"), "{why}");
     let array = json!({"layout": {"dim": [], "data_offset": 0}, "data": [1.0, 2.0, 3.0]});
     let why = refused(&domain(), "ros2:/skin", Some(("/skin", "std_msgs/msg/Float32MultiArray", array)));
     assert!(why.contains("an array has 3 numbers, and the body 40 taxels"), "{why}");
@@ -307,9 +307,12 @@ fn joint_states_of_a_topic_put_percepts_into_the_world() {
     assert!(told.iter().any(|frame| frame["fields"][0]["link"] == "world"));
     // Nobody sends: positions stay in links.
     let mut silent = run(&domain, &[&flags[..], &["--joint-states", "ros2:/nobody"]].concat());
+    std::thread::sleep(Duration::from_secs(1));
     feed(&mut silent, &without, Duration::ZERO);
     let (told, said) = ended(silent);
     assert!(said.contains("no state so far") && !told.contains("\"link\":\"world\""), "{said}");
+    let about = "joint states `ros2:/nobody`: no state has come in ";
+    assert!(said.matches(about).count() == 1 && said.contains("; there is /joint_states"), "{said}");
 }
 
 #[test]

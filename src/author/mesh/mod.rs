@@ -62,7 +62,11 @@ pub fn open(path: &Path, options: &MeshOptions) -> Result<Original> {
     };
     let mut file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;
     if size_m > MAX_LIKELY_SIZE_M {
-        file.notes.push(format!("it is {size_m:.0} m across: if its numbers are millimetres, give --unit mm"));
+        let what_to_do = match ending(path).as_str() {
+            "urdf" | "xacro" => "write metres into the URDF, or a `scale` of its meshes",
+            _ => "give --unit mm",
+        };
+        file.notes.push(format!("it is {size_m:.0} m across: if its numbers are millimetres, {what_to_do}"));
     }
     Ok(file)
 }

@@ -47,6 +47,8 @@ pub(crate) struct RobotJoint {
     /// At rest.
     pub(crate) parent_from_child: DAffine3,
     pub(crate) motion: JointMotion,
+    /// The least and the greatest position, rad or m, where the file has a range.
+    pub(crate) limits: Option<[f64; 2]>,
     /// The joint that it follows, if any.
     pub(crate) mimic: Option<JointMimic>,
     pub(crate) line: u32,
@@ -236,6 +238,7 @@ impl Reader<'_> {
             child: link("child")?,
             parent_from_child: self.origin(node)?,
             motion: self.motion(node)?,
+            limits: node.children().find(|child| child.has_tag_name("limit")).and_then(limits),
             mimic: node
                 .children()
                 .find(|child| child.has_tag_name("mimic"))
@@ -403,4 +406,11 @@ impl Reader<'_> {
         }
         Ok(self.folder.join(plain))
     }
+}
+
+/// The range of a `<limit>`: what is not there is 0, and no range is none.
+fn limits(node: Node<'_, '_>) -> Option<[f64; 2]> {
+    let number = |name: &str| node.attribute(name).map_or(Some(0.0), |text| text.trim().parse::<f64>().ok());
+    let range = [number("lower")?, number("upper")?];
+    (range[0] < range[1]).then_some(range)
 }
