@@ -1,11 +1,12 @@
 //! `somatic info`: what is in a recording.
 
+mod bag;
 mod contacts;
 
 use clap::Args;
 use console::style;
 use serde_json::{Value, json};
-use somatic::recording::{Attached, Reader, Rhythm, Survey};
+use somatic::recording::{Attached, BagSurvey, Reader, Rhythm, Survey};
 use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
 use somatic::{Body, Calibration, Error, Frame, Result};
 
@@ -23,6 +24,7 @@ Examples:
   somatic info touch.mcap
   somatic info touch.csv --json | jq .rate_hz
   somatic info insoles.csv                    a pressure system's export, by its content
+  somatic info ros2-mcap:bag                  the topics of a bag of ROS 2
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
 
@@ -30,7 +32,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording co
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: mcap:FILE, csv:FILE or a pressure system's export, or just the file.
+    /// The recording: mcap:FILE, csv:FILE, ros2-mcap:PATH for a bag of ROS 2, a pressure system's export, or just the file.
     #[arg(value_name = "FILE")]
     recording: String,
 
@@ -59,7 +61,7 @@ struct Known {
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
     let options = arguments.export.options()?;
-    let recording = source_of(&arguments.recording, Some(&["csv", "mcap", "export"]), &options);
+    let recording = source_of(&arguments.recording, Some(&["csv", "mcap", "ros2-mcap", "export"]), &options);
     let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
             if arguments.export.rate.is_some() {
@@ -79,6 +81,14 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 survey,
             }
         }
+        SourceSpec::Ros2Mcap(bag) => {
+            let mut survey = BagSurvey::of(&bag.path, |share| bar.show(share))?;
+            survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
+            drop(bar);
+            let json = arguments.json.then(|| format!("{}\n", bag::as_json(&survey)));
+            print(&json.unwrap_or_else(|| bag::text(&arguments.recording, &survey)))?;
+            return Ok(ended(&survey.losses));
+        }
         SourceSpec::Csv(path) => {
             let mut source = CsvSource::open(&path, options.rate_hz)?;
             of_frames("CSV", size(&path), &mut source, None, None, &mut bar)?
@@ -96,10 +106,13 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     };
     drop(bar);
     print(&if arguments.json { format!("{}\n", as_json(&known)) } else { text(&arguments.recording, &known) })?;
-    for loss in &known.losses {
-        say(loss);
-    }
-    Ok(if known.losses.is_empty() { DONE } else { LOST })
+    Ok(ended(&known.losses))
+}
+
+/// Says what was lost; gives the exit code.
+fn ended(losses: &[String]) -> u8 {
+    losses.iter().for_each(|loss| say(loss));
+    if losses.is_empty() { DONE } else { LOST }
 }
 
 /// What a recording of nothing but frames has, which is read to its end.

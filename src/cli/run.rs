@@ -376,12 +376,13 @@ impl Pump {
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
     fn finish(mut self, Ending { mut losses, notices }: Ending) -> Result<u8> {
-        for sink in self.sinks {
-            sink.finish()?;
-        }
         self.view.finish();
+        // Where nobody was heard, no file is left.
         if let Some(live) = self.live {
             losses = live.finish()?;
+        }
+        for sink in self.sinks {
+            sink.finish()?;
         }
         self.unfit.changes(&self.engine).iter().for_each(|message| say(message));
         self.unfit.print_repeats();

@@ -175,7 +175,7 @@ fn topics_of(files: &[PathBuf]) -> Result<Topics> {
 }
 
 /// A type as ROS 2 spells it; ROS 1 has no `msg` in it.
-fn whole(kind: &str) -> String {
+pub(super) fn whole(kind: &str) -> String {
     match kind.split('/').count() {
         2 => kind.replacen('/', "/msg/", 1),
         _ => kind.to_owned(),

@@ -7,6 +7,7 @@ mod account;
 mod bag;
 mod bag_files;
 mod bag_reader;
+mod bag_survey;
 mod entries;
 mod frames;
 mod percepts;
@@ -21,6 +22,7 @@ mod view;
 
 pub(crate) use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
 pub(crate) use self::bag_reader::{BagMessage, BagReader, WantedTopics};
+pub use self::bag_survey::{BagSurvey, SurveyedTopic};
 pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;

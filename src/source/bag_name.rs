@@ -24,6 +24,12 @@ impl BagName {
         Self { path: path.into(), topics: Vec::new(), kind: None }
     }
 
+    /// Whether `path` is the folder of a bag.
+    #[must_use]
+    pub fn is_folder(path: &Path) -> bool {
+        path.join("metadata.yaml").is_file()
+    }
+
     /// Whether `path` is a bag rather than another file: a folder, or a file with the ending of MCAP.
     #[must_use]
     pub fn is_bag(path: &Path) -> bool {

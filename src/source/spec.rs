@@ -98,6 +98,7 @@ impl SourceSpec {
                 (kind, rest)
             }
             _ if text == "-" => ("-", text),
+            _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
             _ if EXPORTS.iter().any(|wanted| ending(wanted)) => ("export", text),

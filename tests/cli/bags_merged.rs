@@ -103,9 +103,12 @@ fn our_own_bag_of_two_links_is_the_run_that_made_it() {
             // A stamp of 0 is none.
             assert!(stderr(&auto).contains("from 200 clouds and 100 states"), "{}", stderr(&auto));
             done(&["plan", "--body", text_of(&body), "--source", &sink]);
+            // Its folder is known as a bag.
+            let by_folder = done(&with(&run_of(&body, text_of(&bag)), &[&joints[..], &outputs].concat()));
+            assert!(by_folder == first);
             if cfg!(feature = "page") {
                 let view =
-                    ["view", sink.as_str(), "--body", text_of(&body), "--listen", "127.0.0.1:0", "--for", "0.1s"];
+                    ["view", text_of(&bag), "--body", text_of(&body), "--listen", "127.0.0.1:0", "--for", "0.1s"];
                 done(&[&view[..], &joints].concat());
             }
             let part = done(&with(&run_of(&body, &sink), &["--from", "0.5", "--to", "1.5", "--outputs", "total"]));
@@ -388,4 +391,38 @@ fn a_bag_of_another_robot_whose_ids_fit_is_told() {
     assert_eq!(told.matches("clouds are in frame `fore_arm`, which is no link of ").count(), 1, "{told}");
     assert!(told.contains("gripper.glb; is it the right body?"), "{told}");
     assert!(!run(&arm).contains("clouds are in frame"));
+}
+
+#[test]
+fn info_lists_the_topics_of_a_bag() {
+    let (folder, body) = gripper();
+    let bag = folder.path().join("bag");
+    let sink = format!("ros2-mcap:{}", text_of(&bag));
+    let (touch, states) = (example("gripper-touch.csv"), example("gripper-joints.csv"));
+    let joints = joints();
+    let joints = joints.each_ref().map(String::as_str);
+    done(&with(&run_of(&body, &touch), &[&joints[..], &["--joint-states", &states, "--sink", &sink]].concat()));
+    let info = |name: &str| -> Value { serde_json::from_str(&done(&["info", name, "--json"])).unwrap() };
+    let known = info(&sink);
+    let row = |topic: &str| {
+        let topics = known["topics"].as_array().unwrap();
+        let found = topics.iter().find(|known| known["topic"] == topic).unwrap_or_else(|| panic!("{known}"));
+        (found["type"].as_str().unwrap(), found["messages"].as_u64().unwrap(), found["read_as"].as_str())
+    };
+    for link in ["left", "right"] {
+        assert_eq!(row(&format!("/somatic/taxels/{link}")), (CLOUD, 101, Some("frames")));
+    }
+    assert_eq!(row("/joint_states"), ("sensor_msgs/msg/JointState", 101, Some("joint states")));
+    assert_eq!(row("/tf").2, None);
+    let rate_hz = known["topics"][0]["rate_hz"].as_f64().unwrap();
+    assert!((rate_hz - 50.0).abs() < 1e-6, "{known}");
+    assert_eq!(info(text_of(&bag)), known, "its folder is known as a bag");
+    assert_eq!(info(&format!("{sink}:/tf"))["topics"].as_array().unwrap().len(), 1);
+    let text = done(&["info", &sink]);
+    assert!(text.contains("bag of ROS 2, 1 file, ") && text.contains("read as"), "{text}");
+    // A bag that was cut off gives what is whole in it.
+    let file = bag.join("bag_0.mcap");
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+    fails(3, &["info", &sink]);
 }

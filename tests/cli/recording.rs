@@ -160,10 +160,7 @@ fn conversion_comes_back_with_every_bit() {
     assert!(fails(2, &["convert", "-", text_of(&csv)]).contains("only a recording"));
     for text in ["-", "x.ndjson", "sim:a.toml", "serial:/dev/ttyUSB0"] {
         let why = fails(2, &["info", text]);
-        assert!(
-            why.contains("this should be csv:FILE, mcap:FILE or a pressure system's .csv") && why.contains(text),
-            "{why}"
-        );
+        assert!(why.contains("this should be csv:FILE, mcap:FILE, ros2-mcap:PATH") && why.contains(text), "{why}");
     }
     let why = fails(2, &["convert", text_of(&csv), "b.parquet"]);
     assert!(why.ends_with("output `b.parquet`: this should be csv:FILE or mcap:FILE\n"), "{why}");

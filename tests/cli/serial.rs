@@ -384,7 +384,12 @@ fn another_device_and_nobody_are_told_apart() {
     let (line, code) = named(&[&format!("serial:{name}")], &[]);
     // A run in which no board has ever answered has failed.
     assert!(line.contains("nothing answers") && line.contains("powered") && code == Some(1), "{line}");
-    let told = stderr(&somatic(&["run", "--source", &format!("serial:{name}"), "--for", "1s"]).output().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let percepts = folder.path().join("percepts.ndjson");
+    let sink = format!("ndjson:{}", percepts.display());
+    let run = ["run", "--source", &format!("serial:{name}"), "--for", "1s", "--sink", &sink];
+    let told = stderr(&somatic(&run).output().unwrap());
+    assert!(!percepts.exists(), "an empty file would be in the way of the next run");
     let last = told.lines().last().unwrap_or_default();
     assert!(last.contains("no board has answered") && !told.contains("no packets from"), "{told}");
 }

@@ -88,7 +88,7 @@ fn csv_on_standard_input_is_the_same_as_from_a_file() {
     assert!(stderr(&bad).contains("stdin: line 2: taxel 4: `x` is no number"), "{}", stderr(&bad));
     assert!(fails(2, &["run", "--source", "csv:-", "--loop=2"]).contains("--loop is for recordings in files"));
     assert!(fails(2, &["run", "--source", "csv:-", "--source", "-"]).contains("only serial lines"));
-    assert!(fails(2, &["info", "csv:-"]).contains("should be csv:FILE, mcap:FILE or a pressure system's"));
+    assert!(fails(2, &["info", "csv:-"]).contains("should be csv:FILE, mcap:FILE, ros2-mcap:PATH"));
     assert!(fails(2, &["convert", "csv:-", "a.mcap"]).contains("should be csv:FILE, mcap:FILE, a pressure system's"));
     assert!(fails(2, &["tradeoff", "--source", "csv:-"]).contains("a recording or a simulation"));
 }

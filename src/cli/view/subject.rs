@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use somatic::source::SimulatedSource;
+use somatic::source::{BagName, SimulatedSource};
 use somatic::{Body, Error, Result, bundled};
 
 use super::super::bodies::load_body;
@@ -33,6 +33,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
     };
     match ending.as_deref() {
         _ if what.starts_with("ros2-mcap:") => as_source(""),
+        _ if BagName::is_folder(Path::new(what)) => as_source("ros2-mcap"),
         Some("mcap") => as_source("mcap"),
         Some("csv") => as_source("csv"),
         Some("asf" | "lst" | "asc" | "txt" | "tsv") => as_source(""),

@@ -1,0 +1,62 @@
+//! What is in a bag of ROS 2, for people and machines.
+
+use console::style;
+use serde_json::{Value, json};
+use somatic::recording::{BagSurvey, SurveyedTopic};
+use somatic::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
+
+use super::super::table::{plain, shown};
+use super::super::words::{count, number, span};
+use super::size_words;
+
+/// What runs read messages of the type `kind` as, if they do.
+fn read_as(kind: &str) -> Option<&'static str> {
+    match kind {
+        PointCloud2::TYPE | Float32MultiArray::TYPE => Some("frames"),
+        JointState::TYPE => Some("joint states"),
+        _ => None,
+    }
+}
+
+pub(super) fn text(name: &str, survey: &BagSurvey) -> String {
+    let spans: Vec<[f64; 2]> = survey.topics.iter().filter_map(|topic| topic.span_s).collect();
+    let first_s = spans.iter().map(|span| span[0]).fold(f64::INFINITY, f64::min);
+    let last_s = spans.iter().map(|span| span[1]).fold(f64::NEG_INFINITY, f64::max);
+    let mut text = format!("{}\n", style(name).bold());
+    let files = count(survey.files as u64, "file");
+    text += &format!("  {:<12}bag of ROS 2, {files}, {}\n", "kind", size_words(survey.bytes));
+    if !spans.is_empty() {
+        let duration_s = last_s - first_s;
+        text += &format!(
+            "  {:<12}{} ({duration_s} s from {first_s} s, by when messages came)\n",
+            "duration",
+            span(duration_s)
+        );
+    }
+    let mut table = plain(["topic", "type", "messages", "Hz", "read as"], 2..4);
+    for topic in &survey.topics {
+        table.add_row([
+            topic.name.clone(),
+            topic.kind.clone(),
+            topic.messages.to_string(),
+            topic.rate_hz().map_or(String::new(), number),
+            read_as(&topic.kind).unwrap_or_default().to_owned(),
+        ]);
+    }
+    text += "\n";
+    text += &shown(&table);
+    text
+}
+
+pub(super) fn as_json(survey: &BagSurvey) -> Value {
+    let BagSurvey { files, bytes, topics, losses } = survey;
+    let topic = |topic: &SurveyedTopic| {
+        json!({
+            "topic": topic.name, "type": topic.kind, "encoding": topic.encoding, "messages": topic.messages,
+            "bytes": topic.bytes, "start": topic.span_s.map(|span| span[0]), "end": topic.span_s.map(|span| span[1]),
+            "rate_hz": topic.rate_hz(), "read_as": read_as(&topic.kind),
+        })
+    };
+    let topics: Vec<Value> = topics.iter().map(topic).collect();
+    json!({"kind": "bag of ROS 2", "files": files, "bytes": bytes, "topics": topics, "losses": losses})
+}

@@ -1,0 +1,94 @@
+//! What is in a bag of ROS 2.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::bag_files::bag_files;
+use super::bag_reader::whole;
+use super::reader::Reader;
+use crate::error::Result;
+
+/// What is in a bag of ROS 2: all of it, whether it is read as touch or not.
+#[derive(Clone, Debug, Default)]
+pub struct BagSurvey {
+    /// How many files it has, and their bytes.
+    pub files: usize,
+    /// The bytes of all its files.
+    pub bytes: u64,
+    /// Its topics, by their names.
+    pub topics: Vec<SurveyedTopic>,
+    /// What could not be read, a line each.
+    pub losses: Vec<String>,
+}
+
+/// A topic of a bag, with the messages of one type.
+#[derive(Clone, Debug, Default)]
+pub struct SurveyedTopic {
+    /// Its name.
+    pub name: String,
+    /// The type of its messages, such as `sensor_msgs/msg/JointState`.
+    pub kind: String,
+    /// The encoding of its messages: `cdr` in bags of ROS 2.
+    pub encoding: String,
+    /// How many messages there are.
+    pub messages: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// When the first and the last message came, by the recorder's clock, s.
+    pub span_s: Option<[f64; 2]>,
+}
+
+impl SurveyedTopic {
+    /// Messages a second, where there are two at least.
+    #[must_use]
+    pub fn rate_hz(&self) -> Option<f64> {
+        let [first_s, last_s] = self.span_s?;
+        (self.messages > 1 && last_s > first_s).then(|| (self.messages - 1) as f64 / (last_s - first_s))
+    }
+}
+
+impl BagSurvey {
+    /// Reads the bag at `path`, an MCAP file or a folder of such, to its end; `progress` gets the share that has been read.
+    ///
+    /// # Errors
+    /// It cannot be read, or is no bag in MCAP.
+    pub fn of(path: &Path, mut progress: impl FnMut(f64)) -> Result<Self> {
+        let files = bag_files(path)?;
+        let mut survey = Self { files: files.len(), ..Self::default() };
+        let mut topics: BTreeMap<(String, String), SurveyedTopic> = BTreeMap::new();
+        for (index, file) in files.iter().enumerate() {
+            let mut reader = Reader::open_any(file)?;
+            survey.bytes += std::fs::metadata(file).map_or(0, |there| there.len());
+            let mut count = 0_u64;
+            while let Some(message) = reader.next_message()? {
+                let bytes = reader.data(&message).len() as u64;
+                let Some(channel) = reader.channels.get(&message.channel) else {
+                    reader.damaged(bytes);
+                    continue;
+                };
+                let kind = whole(reader.schemas.get(&channel.schema).map_or("", String::as_str));
+                let topic = topics.entry((channel.topic.clone(), kind)).or_default();
+                topic.encoding.clone_from(&channel.encoding);
+                topic.messages += 1;
+                topic.bytes += bytes;
+                let log_s = message.log_time as f64 / 1e9;
+                let [first_s, last_s] = topic.span_s.unwrap_or([log_s; 2]);
+                topic.span_s = Some([first_s.min(log_s), last_s.max(log_s)]);
+                reader.saw(log_s);
+                count += 1;
+                if count.is_multiple_of(1024) {
+                    progress((index as f64 + reader.progress()) / files.len() as f64);
+                }
+            }
+            // Topics that have no message yet.
+            for channel in reader.channels.values() {
+                let kind = whole(reader.schemas.get(&channel.schema).map_or("", String::as_str));
+                let topic = topics.entry((channel.topic.clone(), kind)).or_default();
+                topic.encoding.clone_from(&channel.encoding);
+            }
+            survey.losses.extend(reader.losses());
+        }
+        survey.topics = topics.into_iter().map(|((name, kind), topic)| SurveyedTopic { name, kind, ..topic }).collect();
+        Ok(survey)
+    }
+}
