@@ -119,8 +119,8 @@ impl Doubts {
         let (here, all) = self.among(plan, first, &there);
         let are_several = [" boards", " limbs"].iter().any(|several| self.source.ends_with(several));
         Some(format!(
-            "{} {} {} of the {} taxels of {}; {} of {} lack over half of theirs, such as {} ({here} of {all}); is it the \
-             right body?",
+            "{} {} {} of the {} taxels of {}; {} of {} lack over half of theirs, such as {} ({here} of {all}); {}is it \
+             the right body?",
             self.source,
             if are_several { "have" } else { "has" },
             there.iter().filter(|there| **there).count(),
@@ -128,7 +128,8 @@ impl Doubts {
             self.body,
             lacking.len(),
             count(fields as u64, "field"),
-            plan.label(first)
+            plan.label(first),
+            if are_several { "are these all, and " } else { "" }
         ))
     }
 
