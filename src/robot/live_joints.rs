@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use super::messages::{JointState, Message as _};
+use super::stamped_states::StampedStates;
 use super::told_positions::told_positions;
 use crate::dds::{Delivery, Node, Reader};
 use crate::error::{Error, Result, failed};
@@ -14,10 +15,27 @@ use crate::source::Source;
 const DEPTH: usize = 64;
 /// How long the first state may take before that is told.
 const COMES_WITHIN: Duration = Duration::from_secs(5);
+/// How far stamps of one clock may be from the time of the frame that comes with them, s.
+const ONE_CLOCK_S: f64 = 1.0;
 /// The node's name.
 const NODE: &str = "somatic_joints";
 
-/// Frames of another source, each with the joint states that have come since the one before.
+/// Which states belong to a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StatesTime {
+    /// Those that have come since the frame before: the clocks have nothing in common.
+    Arrival,
+    /// Those of its time: a position is between those of two stamps, or the last where no later one has come.
+    Stamp {
+        /// How much later the joints' clock stamps an instant than the frames' clock, s.
+        delay_s: f64,
+    },
+    /// [`StatesTime::Stamp`] without a delay where the first stamp is within a second of its frame's time, else
+    /// [`StatesTime::Arrival`].
+    Found,
+}
+
+/// Frames of another source with the joint states of a topic.
 pub struct LiveJoints {
     source: Box<dyn Source + Send>,
     name: String,
@@ -28,8 +46,12 @@ pub struct LiveJoints {
     waits_since: Option<Instant>,
     /// Whether it was told that nothing comes.
     has_told: bool,
+    time: StatesTime,
     /// Joints that have arrived since the last frame.
     arrived: BTreeMap<String, f64>,
+    /// The states by their stamps.
+    stamped: StampedStates,
+    notice: Option<String>,
 }
 
 impl LiveJoints {
@@ -37,22 +59,53 @@ impl LiveJoints {
     ///
     /// # Errors
     /// There is no network, or the name is none of a topic.
-    pub fn open(source: Box<dyn Source + Send>, topic: &str) -> Result<Self> {
+    pub fn open(source: Box<dyn Source + Send>, topic: &str, time: StatesTime) -> Result<Self> {
         let name = format!("joint states `ros2:{topic}`");
         let at = |e: Error| e.at(&name);
         let mut node = Node::new("", NODE).map_err(at)?;
         let states = node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH }).map_err(at)?;
-        let waits_since = Some(Instant::now());
-        let topic = topic.to_owned();
-        Ok(Self { source, name, node, topic, states, waits_since, has_told: false, arrived: BTreeMap::new() })
+        Ok(Self {
+            source,
+            node,
+            topic: topic.to_owned(),
+            states,
+            waits_since: Some(Instant::now()),
+            has_told: false,
+            time,
+            arrived: BTreeMap::new(),
+            stamped: StampedStates::default(),
+            notice: None,
+            name,
+        })
     }
 
     fn read_states(&mut self) -> Result<()> {
         while let Some(state) = self.states.take()? {
-            take_state(&state, &mut self.arrived)?;
+            let stamp_s = state.header.stamp.seconds();
+            take_state(&state, |joint, position| {
+                if self.time != StatesTime::Arrival {
+                    self.stamped.add(joint, stamp_s, position);
+                }
+                self.arrived.insert(joint.to_owned(), position);
+            })?;
             self.waits_since = None;
         }
         Ok(())
+    }
+
+    /// Finds out whether the stamps are of the clock of `frame`, once there are any.
+    fn compare_clocks(&mut self, frame: &Frame) {
+        let Some(apart_s) = self.stamped.newest_s().map(|newest_s| newest_s - frame.t_s) else { return };
+        if apart_s.abs() <= ONE_CLOCK_S {
+            self.time = StatesTime::Stamp { delay_s: 0.0 };
+            return;
+        }
+        self.time = StatesTime::Arrival;
+        self.notice = Some(format!(
+            "{}: its stamps are {apart_s:.3} s after the times of frames, as of another clock; a state holds from the frame after \
+             it came, or by its stamp with --joints-delay S",
+            self.name
+        ));
     }
 
     /// That no state has come so far, and where others send some.
@@ -75,13 +128,13 @@ impl LiveJoints {
     }
 }
 
-/// Adds the positions of `state` to `arrived`. A state without positions tells of none.
-fn take_state(state: &JointState, arrived: &mut BTreeMap<String, f64>) -> Result<()> {
+/// Gives `put` each joint of `state` and its position. A state without positions tells of none.
+fn take_state(state: &JointState, mut put: impl FnMut(&str, f64)) -> Result<()> {
     for (joint, position) in told_positions(state)? {
         if !position.is_finite() {
             return Err(failed!("joint `{joint}` is at {position}; send finite numbers"));
         }
-        arrived.insert(joint.clone(), position);
+        put(joint, position);
     }
     Ok(())
 }
@@ -96,8 +149,16 @@ impl Source for LiveJoints {
             return Ok(false);
         }
         self.read_states().map_err(|e| e.at(&self.name))?;
+        if self.time == StatesTime::Found {
+            self.compare_clocks(frame);
+        }
         frame.joints.clear();
-        frame.joints.extend(std::mem::take(&mut self.arrived));
+        if let StatesTime::Stamp { delay_s } = self.time {
+            self.arrived.clear();
+            self.stamped.at(frame.t_s + delay_s, |joint, position| frame.joints.push((joint.to_owned(), position)));
+        } else {
+            frame.joints.extend(std::mem::take(&mut self.arrived));
+        }
         Ok(true)
     }
 
@@ -123,6 +184,7 @@ impl Source for LiveJoints {
 
     fn notices(&mut self) -> Vec<String> {
         let mut notices = self.source.notices();
+        notices.extend(self.notice.take());
         if !self.has_told && self.waits_since.is_some_and(|since| since.elapsed() > COMES_WITHIN) {
             self.has_told = true;
             notices.extend(self.nothing_came());
@@ -155,11 +217,16 @@ mod tests {
             position: position.to_vec(),
             ..JointState::default()
         };
-        take_state(&state(&["a", "b"], &[1.0, 2.0]), &mut arrived).unwrap();
-        take_state(&state(&["b"], &[3.0]), &mut arrived).unwrap();
-        take_state(&state(&["a"], &[]), &mut arrived).unwrap();
+        let mut take = |state: &JointState| {
+            take_state(state, |joint, position| {
+                arrived.insert(joint.to_owned(), position);
+            })
+        };
+        take(&state(&["a", "b"], &[1.0, 2.0])).unwrap();
+        take(&state(&["b"], &[3.0])).unwrap();
+        take(&state(&["a"], &[])).unwrap();
         assert_eq!(arrived.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>(), [("a", 1.0), ("b", 3.0)]);
-        let why = |state| take_state(&state, &mut BTreeMap::new()).unwrap_err().to_string();
+        let why = |state| take_state(&state, |_, _| {}).unwrap_err().to_string();
         assert_eq!(why(state(&["a", "b"], &[1.0])), "a state has 2 names and 1 positions; send one for each");
         assert!(why(state(&["a"], &[f64::NAN])).contains("joint `a` is at NaN"));
     }

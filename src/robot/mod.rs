@@ -38,6 +38,8 @@ pub mod messages;
 mod places;
 #[cfg(feature = "ros2")]
 mod ros2_source;
+#[cfg(feature = "ros2")]
+mod stamped_states;
 #[cfg(any(feature = "mcap", feature = "ros2"))]
 mod told_positions;
 
@@ -50,7 +52,7 @@ pub use joints_delay::{DelayEstimate, Transport};
 #[cfg(feature = "meshes")]
 pub use kinematics::Kinematics;
 #[cfg(feature = "ros2")]
-pub use live_joints::LiveJoints;
+pub use live_joints::{LiveJoints, StatesTime};
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
 #[cfg(feature = "ros2")]

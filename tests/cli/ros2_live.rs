@@ -316,6 +316,85 @@ fn joint_states_of_a_topic_put_percepts_into_the_world() {
 }
 
 #[test]
+fn states_of_a_topic_are_those_of_the_clouds_stamps() {
+    const CLOUDS: usize = 40;
+    let Some(python) = python() else { return };
+    let (folder, body, _) = arm();
+    let (body, urdf) = (body.display().to_string(), format!("{ROBOT}/arm.urdf"));
+    // A state each 20 ms, and a cloud half-way to the next.
+    let shoulder = |at: usize| 0.3 * (at as f64 * 0.3).sin();
+    let write = |name: &str, head: &str, rows: usize, row: &dyn Fn(usize) -> String| {
+        let path = folder.path().join(name).display().to_string();
+        let rows: Vec<String> = (0..rows).map(row).collect();
+        std::fs::write(&path, format!("{head}\n{}\n", rows.join("\n"))).unwrap();
+        path
+    };
+    let ms = |at: usize, offset: usize| 1_000_000 + 20 * at + offset;
+    let touch = write("touch.csv", "t,11", CLOUDS, &|at| format!("{},5", ms(at, 10) as f64 / 1e3));
+    let states = write("states.csv", "t,shoulder,elbow,grip", CLOUDS + 1, &|at| {
+        format!("{},{},-0.4,0.01", ms(at, 0) as f64 / 1e3, shoulder(at))
+    });
+    let flags =
+        ["--body", &body, "--joints", &urdf, "--up", "z", "--backend", "reference", "--outputs", "total,position"];
+    let domain = domain();
+    let recorded = ["run", "-q", "--source", &touch, "--joint-states", &states, "--sink", "-"];
+    let expected = frames(&ended(run(&domain, &[&recorded[..], &flags].concat())).0);
+    assert_eq!(expected.len(), CLOUDS);
+    let place = |frame: &Value| {
+        let field = &frame["fields"][0];
+        let position = [0, 1, 2].map(|axis| field["position"][axis].as_f64().unwrap());
+        (field["link"] == "world").then_some(position)
+    };
+    let live = |ahead_s: usize, more: &[&str]| {
+        let mut skin = Peer::start(&python, &domain, &["send", "/skin", CLOUD, "reliable"]);
+        let kind = "sensor_msgs/msg/JointState";
+        let mut joints = Peer::start(&python, &domain, &["send", "/joint_states", kind, "reliable"]);
+        let topics =
+            ["run", "--source", "ros2:/skin@sensor_msgs/msg/PointCloud2", "--joint-states", "ros2:/joint_states"];
+        let child = run(&domain, &[&topics[..], &flags, &["--sink", "-", "--for", "5s"], more].concat());
+        skin.wait_for("matched");
+        joints.wait_for("matched");
+        std::thread::sleep(Duration::from_millis(500));
+        for at in 0..=CLOUDS {
+            let stamp_ms = ms(at, 0) + 1000 * ahead_s;
+            let stamp = json!({"sec": stamp_ms / 1000, "nanosec": stamp_ms % 1000 * 1_000_000});
+            let state = json!({
+                "header": {"stamp": stamp, "frame_id": ""}, "name": ["shoulder", "elbow", "grip"],
+                "position": [shoulder(at), -0.4, 0.01], "velocity": [], "effort": [],
+            });
+            joints.say(&state.to_string());
+            std::thread::sleep(Duration::from_millis(15));
+            if at > 0 {
+                skin.say(&cloud(ms(at - 1, 10) as f64 / 1e3, &[(11, 5.0)]).to_string());
+                std::thread::sleep(Duration::from_millis(15));
+            }
+        }
+        let (told, said) = ended(child);
+        let told = frames(&told);
+        // How far each place is from where the recordings have it at that time.
+        let mut apart_m: Vec<f64> = Vec::new();
+        for (frame, other) in told
+            .iter()
+            .filter_map(|frame| expected.iter().find(|other| other["t"] == frame["t"]).map(|other| (frame, other)))
+        {
+            if let (Some(own), Some(other)) = (place(frame), place(other)) {
+                apart_m.push((0..3).map(|axis| (own[axis] - other[axis]).powi(2)).sum::<f64>().sqrt());
+            }
+        }
+        assert!(apart_m.len() >= CLOUDS - 8, "{} of {CLOUDS} in the world: {said}", apart_m.len());
+        apart_m.sort_by(f64::total_cmp);
+        (apart_m[apart_m.len() * 3 / 4], said)
+    };
+    let (apart_m, said) = live(0, &[]);
+    assert!(apart_m < 1e-9 && !said.contains("another clock"), "{apart_m} m: {said}");
+    // By another clock: as they come, half a step late, or by the delay that is given.
+    let (apart_m, said) = live(100, &[]);
+    assert!(apart_m > 1e-3 && said.matches("as of another clock").count() == 1, "{apart_m} m: {said}");
+    let (apart_m, said) = live(100, &["--joints-delay", "100"]);
+    assert!(apart_m < 1e-9 && !said.contains("another clock"), "{apart_m} m: {said}");
+}
+
+#[test]
 fn a_thousand_taxels_at_250_hz_arrive() {
     let Some(python) = python() else { return };
     let seconds: usize = std::env::var("SOMATIC_ROS2_SECONDS").map_or(4, |text| text.parse().unwrap());

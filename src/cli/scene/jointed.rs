@@ -52,13 +52,13 @@ impl RunOptions {
     fn check_delay(&self, states: Option<&StatesFrom<'_>>) -> Result<()> {
         let refuse = |what: &str| Err(Error::usage(what));
         match (self.joints_delay, states) {
-            (None, _) | (Some(JointsDelay::Seconds(_)), Some(StatesFrom::File(_) | StatesFrom::Bag(_))) => Ok(()),
+            (None, _) | (Some(JointsDelay::Seconds(_)), Some(_)) => Ok(()),
             (Some(JointsDelay::Auto), Some(StatesFrom::Topic(_))) => refuse(
-                "--joints-delay auto is not for live topics, whose states have the frame's own time; leave it out",
+                "--joints-delay auto is not for live topics; estimate it once from a bag of both, and give it in seconds",
             ),
-            (Some(_), None | Some(StatesFrom::Topic(_))) => refuse(
-                "--joints-delay is for a recording of joint states; states in frames and of topics have the frame's own time",
-            ),
+            (Some(_), None) => {
+                refuse("--joints-delay is for --joint-states; states in frames have the frame's own time")
+            }
             (Some(JointsDelay::Auto), Some(StatesFrom::File(_))) => refuse(
                 "--joints-delay auto compares stamps with arrivals, and this file of --joint-states has no arrivals; give both \
                  from one bag, --joint-states BAG and --source ros2-mcap:BAG, or the delay in seconds",
@@ -117,7 +117,10 @@ impl RunOptions {
         options.delay_s = self.delay_s(states.as_ref())?;
         let source = match states {
             None => source,
-            Some(StatesFrom::Topic(topic)) => live(source, topic)?,
+            Some(StatesFrom::Topic(topic)) => {
+                let is_stamped = matches!(self.first_source()?, Some(SourceSpec::Ros2 { .. }));
+                live(source, topic, self.joints_delay.is_some().then_some(options.delay_s), is_stamped)?
+            }
             Some(StatesFrom::Bag(bag)) => {
                 let failed = |e: Error| match self.joint_states {
                     Some(_) => e,
@@ -140,14 +143,26 @@ impl RunOptions {
     }
 }
 
-/// The frames of `source`, with the joint states of `topic` as they come.
+/// The frames of `source`, with the joint states of `topic`: by their stamps with the delay that is given, or where frames are
+/// stamped by a robot, too.
 #[cfg(feature = "ros2")]
-fn live(source: Box<dyn Source + Send>, topic: &str) -> Result<Box<dyn Source + Send>> {
-    Ok(Box::new(somatic::robot::LiveJoints::open(source, topic)?))
+fn live(
+    source: Box<dyn Source + Send>,
+    topic: &str,
+    delay_s: Option<f64>,
+    is_stamped: bool,
+) -> Result<Box<dyn Source + Send>> {
+    use somatic::robot::{LiveJoints, StatesTime};
+    let time = match delay_s {
+        Some(delay_s) => StatesTime::Stamp { delay_s },
+        None if is_stamped => StatesTime::Found,
+        None => StatesTime::Arrival,
+    };
+    Ok(Box::new(LiveJoints::open(source, topic, time)?))
 }
 
 #[cfg(not(feature = "ros2"))]
-fn live(_: Box<dyn Source + Send>, topic: &str) -> Result<Box<dyn Source + Send>> {
+fn live(_: Box<dyn Source + Send>, topic: &str, _: Option<f64>, _: bool) -> Result<Box<dyn Source + Send>> {
     let what = "built without the feature `ros2`: cargo install somatic --features ros2";
     Err(Error::failed(what).at(format!("joint states `ros2:{topic}`")))
 }

@@ -1,0 +1,123 @@
+//! Where joints are at a frame's time, by the stamps of states that come live. No I/O.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::f64::consts::{PI, TAU};
+
+/// How long states are kept, s: frames that are later than that on their way are not matched with states.
+const KEPT_S: f64 = 2.0;
+
+/// The states that have come, by joint.
+#[derive(Debug, Default)]
+pub(super) struct StampedStates {
+    joints: BTreeMap<String, Track>,
+}
+
+/// The states of a joint.
+#[derive(Debug, Default)]
+struct Track {
+    /// Stamps (s) and positions, in the order of the stamps.
+    states: VecDeque<(f64, f64)>,
+    /// Whether the newest has been given to no frame.
+    is_new: bool,
+}
+
+impl StampedStates {
+    /// Adds a state.
+    pub(super) fn add(&mut self, joint: &str, stamp_s: f64, position: f64) {
+        if !self.joints.contains_key(joint) {
+            self.joints.insert(joint.to_owned(), Track::default());
+        }
+        let Some(track) = self.joints.get_mut(joint) else { return };
+        let newest_s = track.states.back().map_or(f64::NEG_INFINITY, |state| state.0);
+        if stamp_s < newest_s - KEPT_S {
+            // The clock was set back, as a simulation's that starts anew.
+            track.states.clear();
+        } else if stamp_s <= newest_s {
+            // Of two publishers one may be late; what is between is known already.
+            return;
+        }
+        track.states.push_back((stamp_s, position));
+        track.is_new = true;
+        while track.states.front().is_some_and(|state| state.0 < stamp_s - KEPT_S) {
+            track.states.pop_front();
+        }
+    }
+
+    /// The stamp of the newest state, s.
+    pub(super) fn newest_s(&self) -> Option<f64> {
+        let newest = self.joints.values().filter_map(|track| track.states.back());
+        newest.map(|state| state.0).reduce(f64::max)
+    }
+
+    /// Gives `put` each joint whose position at `t_s` is known: between two states, or the newest, which holds on, once.
+    pub(super) fn at(&mut self, t_s: f64, mut put: impl FnMut(&str, f64)) {
+        for (joint, track) in &mut self.joints {
+            let later = track.states.partition_point(|state| state.0 < t_s);
+            let position = match (later.checked_sub(1).map(|earlier| track.states[earlier]), track.states.get(later)) {
+                (_, Some(&(stamp_s, position))) if stamp_s == t_s => position,
+                (Some(earlier), Some(&later)) => between(earlier, later, t_s),
+                (Some((_, newest)), None) if track.is_new => newest,
+                _ => continue,
+            };
+            track.is_new = track.is_new && later < track.states.len();
+            put(joint, position);
+        }
+    }
+}
+
+/// The position at `t_s` between two states; over ±π the short way, as joints that turn without end jump there.
+fn between((from_s, from): (f64, f64), (to_s, to): (f64, f64), t_s: f64) -> f64 {
+    let step = match to - from {
+        step if step > PI => step - TAU,
+        step if step < -PI => step + TAU,
+        step => step,
+    };
+    from + step * ((t_s - from_s) / (to_s - from_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(states: &mut StampedStates, t_s: f64) -> Vec<(String, f64)> {
+        let mut found = Vec::new();
+        states.at(t_s, |joint, position| found.push((joint.to_owned(), position)));
+        found
+    }
+
+    #[test]
+    fn a_position_is_between_two_states_and_the_newest_is_given_once() {
+        let mut states = StampedStates::default();
+        for at in 0..5 {
+            states.add("a", f64::from(at), f64::from(at) * 10.0);
+        }
+        states.add("b", 1.0, 7.0);
+        let a = |position: f64| ("a".to_owned(), position);
+        assert_eq!(found(&mut states, 0.0), []);
+        assert_eq!(states.newest_s(), Some(4.0));
+        // The first two are too old to be kept.
+        assert_eq!(found(&mut states, 2.25), [a(22.5), ("b".to_owned(), 7.0)]);
+        assert_eq!(found(&mut states, 3.0), [a(30.0)]);
+        assert_eq!(found(&mut states, 4.5), [a(40.0)]);
+        assert_eq!(found(&mut states, 4.6), []);
+        states.add("a", 5.0, 50.0);
+        // What is late or told twice changes nothing.
+        states.add("a", 4.9, 0.0);
+        states.add("a", 5.0, 0.0);
+        assert_eq!(found(&mut states, 4.75), [a(47.5)]);
+        assert_eq!(found(&mut states, 5.5), [a(50.0)]);
+        // A clock that starts anew.
+        states.add("a", 0.0, 1.0);
+        states.add("a", 1.0, 2.0);
+        assert_eq!(found(&mut states, 0.5), [a(1.5)]);
+    }
+
+    #[test]
+    fn a_joint_without_end_goes_the_short_way_over_half_a_turn() {
+        let mut states = StampedStates::default();
+        states.add("a", 0.0, 3.0);
+        states.add("a", 1.0, -3.0);
+        let expected = 3.0 + (TAU - 6.0) * 0.5;
+        assert!((found(&mut states, 0.5)[0].1 - expected).abs() < 1e-15);
+    }
+}
