@@ -263,7 +263,7 @@ mod tests {
         assert!(why("a,t\n0,1\n").contains("header: its first column"));
         assert!(why("t,a\n0,inf\n").contains("finite"));
         assert!(why("{\"t\":0,\"joints\":{}}\n{\"t\":1}\n").contains("line 2: missing field `joints`"));
-        assert!(why("").contains("first column"));
+        assert!(why("").contains("header: it is empty; write a CSV under t,<joint>"));
         assert!(why("t\n0\n").contains("no joints"));
     }
 }
