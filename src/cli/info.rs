@@ -17,7 +17,7 @@ use super::exports::ExportFlags;
 use super::first_source::source_of;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
-use super::words::{number, span};
+use super::words::{number, size_words, span};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -254,13 +254,4 @@ fn text(name: &str, known: &Known) -> String {
         text += &shown(&table);
     }
     text
-}
-
-fn size_words(bytes: u64) -> String {
-    match bytes as f64 {
-        size if size < 1e3 => format!("{size} B"),
-        size if size < 1e6 => format!("{:.1} kB", size / 1e3),
-        size if size < 1e9 => format!("{:.1} MB", size / 1e6),
-        size => format!("{:.1} GB", size / 1e9),
-    }
 }

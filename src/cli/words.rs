@@ -35,6 +35,16 @@ pub(super) fn count(count: u64, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
+/// `bytes` as people say them.
+pub(super) fn size_words(bytes: u64) -> String {
+    match bytes as f64 {
+        size if size < 1e3 => format!("{size} B"),
+        size if size < 1e6 => format!("{:.1} kB", size / 1e3),
+        size if size < 1e9 => format!("{:.1} MB", size / 1e6),
+        size => format!("{:.1} GB", size / 1e9),
+    }
+}
+
 /// A time span as short as it can be understood.
 pub(super) fn span(seconds: f64) -> String {
     match seconds {

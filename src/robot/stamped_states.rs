@@ -89,23 +89,23 @@ mod tests {
     fn a_position_is_between_two_states_and_the_newest_is_given_once() {
         let mut states = StampedStates::default();
         for at in 0..5 {
-            states.add("a", f64::from(at), f64::from(at) * 10.0);
+            states.add("a", f64::from(at), f64::from(at) * 0.5);
         }
         states.add("b", 1.0, 7.0);
         let a = |position: f64| ("a".to_owned(), position);
         assert_eq!(found(&mut states, 0.0), []);
         assert_eq!(states.newest_s(), Some(4.0));
         // The first two are too old to be kept.
-        assert_eq!(found(&mut states, 2.25), [a(22.5), ("b".to_owned(), 7.0)]);
-        assert_eq!(found(&mut states, 3.0), [a(30.0)]);
-        assert_eq!(found(&mut states, 4.5), [a(40.0)]);
+        assert_eq!(found(&mut states, 2.25), [a(1.125), ("b".to_owned(), 7.0)]);
+        assert_eq!(found(&mut states, 3.0), [a(1.5)]);
+        assert_eq!(found(&mut states, 4.5), [a(2.0)]);
         assert_eq!(found(&mut states, 4.6), []);
-        states.add("a", 5.0, 50.0);
+        states.add("a", 5.0, 2.5);
         // What is late or told twice changes nothing.
         states.add("a", 4.9, 0.0);
         states.add("a", 5.0, 0.0);
-        assert_eq!(found(&mut states, 4.75), [a(47.5)]);
-        assert_eq!(found(&mut states, 5.5), [a(50.0)]);
+        assert_eq!(found(&mut states, 4.75), [a(2.375)]);
+        assert_eq!(found(&mut states, 5.5), [a(2.5)]);
         // A clock that starts anew.
         states.add("a", 0.0, 1.0);
         states.add("a", 1.0, 2.0);

@@ -6,8 +6,7 @@ use somatic::recording::{BagSurvey, SurveyedTopic};
 use somatic::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
 
 use super::super::table::{plain, shown};
-use super::super::words::{count, number, span};
-use super::size_words;
+use super::super::words::{count, number, size_words, span};
 
 /// What runs read messages of the type `kind` as, if they do.
 fn read_as(kind: &str) -> Option<&'static str> {
