@@ -32,7 +32,7 @@ pub enum StatesTime {
     },
     /// [`StatesTime::Stamp`] without a delay where the first stamp is within a second of its frame's time, else
     /// [`StatesTime::Arrival`].
-    Found,
+    Auto,
 }
 
 /// Frames of another source with the joint states of a topic.
@@ -149,7 +149,7 @@ impl Source for LiveJoints {
             return Ok(false);
         }
         self.read_states().map_err(|e| e.at(&self.name))?;
-        if self.time == StatesTime::Found {
+        if self.time == StatesTime::Auto {
             self.compare_clocks(frame);
         }
         frame.joints.clear();

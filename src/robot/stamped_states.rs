@@ -1,7 +1,8 @@
 //! Where joints are at a frame's time, by the stamps of states that come live. No I/O.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::f64::consts::{PI, TAU};
+
+use crate::source::position_between;
 
 /// How long states are kept, s: frames that are later than that on their way are not matched with states.
 const KEPT_S: f64 = 2.0;
@@ -55,7 +56,8 @@ impl StampedStates {
             let later = track.states.partition_point(|state| state.0 < t_s);
             let position = match (later.checked_sub(1).map(|earlier| track.states[earlier]), track.states.get(later)) {
                 (_, Some(&(stamp_s, position))) if stamp_s == t_s => position,
-                (Some(earlier), Some(&later)) => between(earlier, later, t_s),
+                // No joint turns half a turn from one state to the next; those without end jump there.
+                (Some(earlier), Some(&later)) => position_between(earlier, later, t_s, true),
                 (Some((_, newest)), None) if track.is_new => newest,
                 _ => continue,
             };
@@ -63,16 +65,6 @@ impl StampedStates {
             put(joint, position);
         }
     }
-}
-
-/// The position at `t_s` between two states; over ±π the short way, as joints that turn without end jump there.
-fn between((from_s, from): (f64, f64), (to_s, to): (f64, f64), t_s: f64) -> f64 {
-    let step = match to - from {
-        step if step > PI => step - TAU,
-        step if step < -PI => step + TAU,
-        step => step,
-    };
-    from + step * ((t_s - from_s) / (to_s - from_s))
 }
 
 #[cfg(test)]
@@ -117,7 +109,7 @@ mod tests {
         let mut states = StampedStates::default();
         states.add("a", 0.0, 3.0);
         states.add("a", 1.0, -3.0);
-        let expected = 3.0 + (TAU - 6.0) * 0.5;
+        let expected = 3.0 + (std::f64::consts::TAU - 6.0) * 0.5;
         assert!((found(&mut states, 0.5)[0].1 - expected).abs() < 1e-15);
     }
 }

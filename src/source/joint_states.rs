@@ -207,12 +207,23 @@ impl JointStates {
         let Some((after_s, after)) = track.get(next).copied() else {
             return Some(JointPosition { position: before, age_s });
         };
-        let mut way = after - before;
-        if is_continuous {
-            way -= (way / std::f64::consts::TAU).round() * std::f64::consts::TAU;
-        }
-        Some(JointPosition { position: before + way * (age_s / (after_s - before_s)), age_s })
+        let position = position_between((before_s, before), (after_s, after), t_s, is_continuous);
+        Some(JointPosition { position, age_s })
     }
+}
+
+/// The position at `t_s` between two states, each a time (s) and a position; the shorter way around if asked.
+pub(crate) fn position_between(
+    (before_s, before): (f64, f64),
+    (after_s, after): (f64, f64),
+    t_s: f64,
+    shorter_way: bool,
+) -> f64 {
+    let mut way = after - before;
+    if shorter_way {
+        way -= (way / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+    }
+    before + way * ((t_s - before_s) / (after_s - before_s))
 }
 
 #[cfg(test)]

@@ -30,6 +30,8 @@ pub use self::csv::CsvSource;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 pub use boards::{BoardAccount, BoardState, ChannelTap, LimbPercepts, Lines, Notice, TapTrouble};
 pub use csv_file::CsvFile;
+#[cfg(feature = "ros2")]
+pub(crate) use joint_states::position_between;
 pub use joint_states::{JointPosition, JointStates};
 #[cfg(feature = "zenoh")]
 pub use limbs::{LimbOptions, LimbSource};

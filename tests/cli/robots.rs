@@ -69,27 +69,9 @@ fn a_joint_that_the_urdf_does_not_have_is_left_out_and_told_once() {
 fn frames_without_a_pose_are_counted_where_a_run_is_stopped_too() {
     let (_folder, body) = arm();
     let (_other, states) = file("states.csv", "t,shoulder,elbow,grip\n100,0,0,0\n101,0,0,0\n");
-    let output = super::output(&[
-        "run",
-        "--body",
-        text_of(&body),
-        "--source",
-        TOUCH,
-        "--joints",
-        URDF,
-        "--joint-states",
-        text_of(&states),
-        "--up",
-        "z",
-        "--backend",
-        "reference",
-        "--speed",
-        "0.5",
-        "--for",
-        "0.5s",
-        "--sink",
-        "-",
-    ]);
+    let run = ["run", "--body", text_of(&body), "--source", TOUCH, "--backend", "reference", "--sink", "-"];
+    let jointed = ["--joints", URDF, "--joint-states", text_of(&states), "--up", "z"];
+    let output = super::output(&[&run[..], &jointed, &["--speed", "0.5", "--for", "0.5s"]].concat());
     assert_eq!(output.status.code(), Some(0));
     let said = stderr(&output);
     assert!(said.matches(" frames have no pose: ").count() == 1, "{said}");

@@ -155,7 +155,7 @@ fn live(
     use somatic::robot::{LiveJoints, StatesTime};
     let time = match delay_s {
         Some(delay_s) => StatesTime::Stamp { delay_s },
-        None if is_stamped => StatesTime::Found,
+        None if is_stamped => StatesTime::Auto,
         None => StatesTime::Arrival,
     };
     Ok(Box::new(LiveJoints::open(source, topic, time)?))

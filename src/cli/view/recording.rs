@@ -59,6 +59,7 @@ impl Recording {
                 }
             }
         }
+        source.closing().iter().filter(|_| !quiet).for_each(|line| say(line));
         if frames.is_empty() {
             return Err(Error::failed("the recording has no frames"));
         }
