@@ -81,6 +81,7 @@ mod ink;
 mod keys;
 mod length;
 mod limb;
+pub mod limits;
 pub mod output;
 #[cfg(feature = "page")]
 pub mod page;

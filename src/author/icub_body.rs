@@ -9,6 +9,7 @@ use super::icub::{IcubFile, IcubTaxel};
 use super::skin::{Authored, PlaceReport};
 use crate::body::{Glb, Original, Taxel};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_TABLE_BYTES};
 
 /// Ids of the second file begin at a multiple of this, and so on.
 const ID_STEP: u32 = 1000;
@@ -28,7 +29,7 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
     let (mut first_id, mut left_m) = (0_u32, 0.0);
     for path in files {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
         let file = IcubFile::read(&text).map_err(|e| e.at(path.display()))?;
         if !parts.insert(file.part.clone()) {
             return Err(failed!("another file is of the part `{}` too; give one of each", file.part).at(path.display()));

@@ -12,6 +12,7 @@ use super::{recipe, voronoi};
 use crate::body::{Body, Modality, SurfaceIndex, read_taxel_table};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::geodesic::barycentric;
+use crate::limits::{self, MAX_TABLE_BYTES};
 
 pub(super) struct GivenPoint {
     pub(super) id: Option<u32>,
@@ -77,7 +78,7 @@ pub(super) fn of_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Ve
 }
 
 fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
-    let file = std::fs::File::open(path).map_err(|e| match e.kind() {
+    let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file; it is looked for beside the recipe"),
         _ => Error::failed(e.to_string()),
     })?;
@@ -109,7 +110,7 @@ pub(super) fn of_icub(
     first_id: u32,
 ) -> Result<(Vec<GivenPoint>, Vec<String>)> {
     let place = |e: Error| e.at(path.display());
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let text = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
     let mut file = IcubFile::read(&text).map_err(place)?;
     let link = find_link(rest_surface.body, link.unwrap_or(&file.part))?;
     let world_from_link = rest_surface.body.links[link].world_from_link;

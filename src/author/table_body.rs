@@ -9,6 +9,7 @@ use super::recipe::Recipe;
 use super::skin::{Authored, PlaceReport, author};
 use crate::body::{Glb, Original, Taxel, TaxelRow, read_taxel_table};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_TABLE_BYTES};
 
 /// Between links that lie side by side, m.
 const GAP_M: f64 = 0.05;
@@ -20,7 +21,7 @@ const GAP_M: f64 = 0.05;
 /// # Errors
 /// The file cannot be read, is no such table, or leaves out a normal; with the line.
 pub fn author_csv_skin(path: &Path) -> Result<Authored> {
-    let file = std::fs::File::open(path).map_err(|e| Error::io(path, &e))?;
+    let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
     let rows = read_taxel_table(file, false).map_err(|e| e.at(path.display()))?;
     place(&rows, path).map_err(|e| e.at(path.display()))
 }

@@ -12,6 +12,7 @@ use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, Validate};
 
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_BODY_BYTES};
 
 /// Maximum number of elements of an accessor without data; more mean a damaged file.
 const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
@@ -360,5 +361,5 @@ pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
         // A device may be endless.
         return Err(Error::failed("this is no plain file; save the buffer beside the body").at(path.display()));
     }
-    std::fs::read(&path).map_err(|e| Error::io(&path, &e))
+    limits::read(&path, MAX_BODY_BYTES).map_err(|e| Error::io(&path, &e))
 }

@@ -13,6 +13,7 @@ use super::glb::{BaseFile, Glb, container};
 use super::json_edit::JsonEdit;
 use super::model::Body;
 use crate::error::{Error, Result};
+use crate::limits::{self, MAX_BODY_BYTES};
 use crate::output::OutputPath;
 
 const LAYOUT_LISTS: [&str; 4] = ["accessors", "bufferViews", "meshes", "nodes"];
@@ -40,7 +41,7 @@ impl Original {
     /// The file cannot be read or is no valid glTF.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;
         Self::from_bytes(&path.display().to_string(), &bytes, path.parent())
     }
 

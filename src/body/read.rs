@@ -15,6 +15,7 @@ use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
 use super::primitives::{attribute, custom, has_mode, is_taxels};
 use super::repair;
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_BODY_BYTES};
 
 /// Places in the file of what was read, for writing.
 #[derive(Default)]
@@ -49,7 +50,7 @@ impl Body {
     /// The file cannot be read, is no valid glTF, is compressed, or its layout is inconsistent; with the place.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;
         let name = path.display().to_string();
         read(&name, &bytes, path.parent()).map_err(|e| e.at(name))
     }

@@ -7,6 +7,8 @@ use serde_json::Value;
 use super::document::split;
 use super::model::Body;
 
+use crate::limits::{self, MAX_BODY_BYTES};
+
 impl Body {
     /// The file at `path` and the files of its buffers and images, as far as it can be read. A program that reads the body
     /// must not overwrite them.
@@ -15,7 +17,7 @@ impl Body {
         let path = path.as_ref();
         let mut files = vec![path.to_owned()];
         // A device may be endless.
-        let bytes = if path.is_file() { std::fs::read(path).unwrap_or_default() } else { Vec::new() };
+        let bytes = if path.is_file() { limits::read(path, MAX_BODY_BYTES).unwrap_or_default() } else { Vec::new() };
         let Ok(root) = split(&bytes).map(|(text, _)| serde_json::from_slice::<Value>(text).unwrap_or_default()) else {
             return files;
         };

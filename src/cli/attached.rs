@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use somatic::body::Original;
+use somatic::limits::{self, MAX_BODY_BYTES};
 use somatic::recording::{BODY, CALIBRATION, Reader};
 use somatic::{Error, Result, bundled};
 
@@ -30,7 +31,7 @@ pub(super) fn body_bytes(name: &str) -> Result<Vec<u8>> {
     {
         return Ok(bytes.to_vec());
     }
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+    let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;
     // A .glb may refer to buffers in other files; writing it anew embeds them.
     Original::from_bytes(name, &bytes, path.parent())?.to_glb().map_err(|e| e.at(name))
 }

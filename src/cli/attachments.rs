@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::recording::{BODY, CALIBRATION, SCENE};
 use somatic::{Body, Error, Result};
 
@@ -14,7 +15,7 @@ pub(super) fn attachments(
     body: &Body,
     scene: Option<&Path>,
 ) -> Result<Vec<(String, String, Vec<u8>)>> {
-    let text = |path: &Path| std::fs::read(path).map_err(|e| Error::io(path, &e));
+    let text = |path: &Path| limits::read(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e));
     let recording = asked.recording()?;
     let inherited = match recording.as_deref() {
         Some(recording) => attached::body(recording)?,

@@ -9,6 +9,7 @@ use crate::experiments::dump;
 use crate::experiments::shape::Shape;
 use clap::Args;
 use serde_json::json;
+use somatic::limits::{self, MAX_SYSTEM_BYTES};
 use somatic::output::OutputFolder;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 
@@ -169,7 +170,7 @@ fn check_memory(shape: &Shape, outputs: Outputs) -> Result<()> {
 
 /// Memory that is free or can be freed, where the system says so in Linux's way.
 fn available_bytes() -> Option<u128> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let text = limits::read_to_string("/proc/meminfo", MAX_SYSTEM_BYTES).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kib: u128 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib * 1024)

@@ -7,6 +7,7 @@ use std::slice;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
 use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
@@ -170,7 +171,7 @@ fn files(
         files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
     }
     if let Some(path) = &arguments.calibration {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, &e))?;
+        let bytes = limits::read(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
     }
     if let SourceSpec::Sim(path) = from {

@@ -17,6 +17,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use somatic::author::mesh::Up;
 use somatic::error::parse_toml;
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::scene::{Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{RecordPart, RosTime, SinkSpec};
@@ -325,7 +326,7 @@ pub(super) struct RunOptions {
 impl RunOptions {
     /// What the scene file at `path` asks for, its paths made relative to where we are.
     fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         let mut asked: Self = parse_toml(&text).map_err(|e| e.at(path.display()))?;
         asked.check_accuracy().map_err(|(key, e)| Accuracy::placed(&text, key, e).at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::bag::BAG_METADATA;
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_METADATA_BYTES};
 
 /// What a bag is made of MCAP by.
 const CONVERTED: &str = "convert it: rosbags-convert --src BAG --dst OUT --dst-storage mcap";
@@ -20,7 +21,7 @@ pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
         return Ok(vec![path.to_owned()]);
     }
     let metadata = path.join(BAG_METADATA);
-    match fs::read_to_string(&metadata) {
+    match limits::read_to_string(&metadata, MAX_METADATA_BYTES) {
         Ok(text) => {
             let names = names_in(&text).map_err(|e| e.at(metadata.display()))?;
             // Older recorders put the folder before the name.

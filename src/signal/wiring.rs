@@ -10,6 +10,7 @@ use toml::Spanned;
 
 use crate::error::{Error, Result};
 use crate::keys::Text;
+use crate::limits::{self, MAX_TOML_BYTES};
 
 const MAX_CHANNELS: i64 = 256;
 
@@ -70,7 +71,7 @@ impl Wiring {
     /// The file cannot be read, or something in it makes no sense; the message has the line and the key.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         Self::from_text(&text).map_err(|e| e.at(path.display()))
     }
 

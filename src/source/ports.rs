@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serialport::{SerialPortInfo, SerialPortType};
 
 use crate::error::{Result, failed};
+use crate::limits::{self, MAX_SYSTEM_BYTES};
 
 /// A serial port, and whether it can be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,7 +97,7 @@ fn problem(_: &Path) -> Option<String> {
 
 #[cfg(unix)]
 fn groups() -> String {
-    std::fs::read_to_string("/etc/group").unwrap_or_default()
+    limits::read_to_string("/etc/group", MAX_SYSTEM_BYTES).unwrap_or_default()
 }
 
 /// The name of the group `gid` in `groups`, the text of /etc/group.

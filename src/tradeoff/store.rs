@@ -9,6 +9,7 @@ use super::Report;
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
+use crate::limits::{self, MAX_SYSTEM_BYTES};
 use crate::output::OutputPaths;
 use crate::scene::Knobs;
 
@@ -85,7 +86,7 @@ impl Store {
     #[must_use]
     pub fn find(&self, body: &Body, options: &Options, driver: &str, recording: Option<&str>) -> Found {
         let path = self.file(body, options);
-        let Ok(text) = std::fs::read_to_string(&path) else { return Found::Nothing };
+        let Ok(text) = limits::read_to_string(&path, MAX_SYSTEM_BYTES) else { return Found::Nothing };
         let useless = |why: &str| Found::Useless(format!("{}: kept measurements {why}", path.display()));
         let now = Key::new(body, options, driver);
         // Another version may have another structure.
@@ -159,7 +160,7 @@ fn requested(options: &Options) -> String {
 /// The processor and its number of threads.
 fn machine() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let told = limits::read_to_string("/proc/cpuinfo", MAX_SYSTEM_BYTES).unwrap_or_default();
     let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let name = name.map_or("", |(_, name)| name.trim());
     format!("{} {} {name} {threads}", std::env::consts::OS, std::env::consts::ARCH)

@@ -15,6 +15,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("output", vec!["error"]),
         ("keys", vec!["error"]),
         ("length", vec![]),
+        ("limits", vec![]),
         ("setters", vec![]),
         ("words", vec!["error"]),
         ("parallel", vec![]),
@@ -60,6 +61,9 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
     ])
 }
+
+/// What every module may use, and which use nothing.
+const FOR_ALL: [&str; 1] = ["limits"];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -116,7 +120,7 @@ fn arrows_point_one_way() {
         }
         let may = allowed.get(room_of).unwrap_or_else(|| panic!("say in this test what `{room_of}` may use"));
         for other in used {
-            let is_allowed = room(other) == room_of || may.contains(&room(other));
+            let is_allowed = room(other) == room_of || FOR_ALL.contains(&room(other)) || may.contains(&room(other));
             assert!(is_allowed, "{} uses {}; see the arrows in this test", file.display(), other.display());
         }
     }
@@ -264,6 +268,37 @@ fn only_outputs_are_written() {
         }
     }
     for word in ["File::options", "create_new", "symlink(", "persist", "tempfile"] {
+        assert!(seen.contains(&word), "{word} is not even seen where it is");
+    }
+}
+
+#[test]
+fn files_are_read_whole_within_limits_only() {
+    let mut seen = Vec::new();
+    for (_, path, text) in sources() {
+        if path.ends_with("tests.rs") {
+            continue;
+        }
+        // Some tests are of one system only.
+        let text = text.split("mod tests {").next().unwrap();
+        let code: Vec<&str> = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect();
+        // What is taken of a reader has an end; `limits::read` has it too.
+        let whole = |line: &&str| {
+            let line = line.replace("limits::read", "");
+            ["fs::read(", "fs::read_to_string(", "read_to_end(", "read_to_string(", "File::open("]
+                .into_iter()
+                .find(|word| line.contains(word) && !line.contains(".take("))
+        };
+        for word in code.iter().filter_map(whole) {
+            // Recordings, line by line or record by record.
+            let streams = ["source", "recording"].iter().any(|folder| path.starts_with(folder));
+            let allowed =
+                path == Path::new("limits.rs") || (streams && ["File::open(", "read_to_end("].contains(&word));
+            assert!(allowed, "{} says {word}; a file is read whole by src/limits.rs alone", path.display());
+            seen.push(word);
+        }
+    }
+    for word in ["read_to_end(", "read_to_string(", "File::open("] {
         assert!(seen.contains(&word), "{word} is not even seen where it is");
     }
 }

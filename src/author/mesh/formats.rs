@@ -9,10 +9,11 @@ use super::options::{Up, check_unit, ending};
 use super::triangles::Triangles;
 use super::{guarded, ply};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_MESH_BYTES};
 
 /// The mesh at `path` in metres, and which axis points up if the file says so. `unit_m` is its unit, for formats without one.
 pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Option<Up>)> {
-    let bytes = std::fs::read(path).map_err(|e| match e.kind() {
+    let bytes = limits::read(path, MAX_MESH_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file"),
         _ => Error::failed(e.to_string()),
     })?;

@@ -7,6 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::options::{Geometry, MeshOptions};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_XML_BYTES};
 
 /// The parts of a URDF that make its shape.
 #[derive(Debug)]
@@ -108,7 +109,7 @@ impl Robot {
     /// # Errors
     /// It is no URDF, or a xacro, or names a package that is not given; with the line.
     pub(crate) fn load(path: &Path, options: &MeshOptions) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_XML_BYTES).map_err(|e| Error::io(path, &e))?;
         let read = Reader { folder: path.parent().unwrap_or(Path::new("")), options, text: &text };
         read.robot(path).map_err(|e| e.at(path.display()))
     }

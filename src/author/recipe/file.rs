@@ -16,6 +16,7 @@ use crate::author::region::Region;
 use crate::body::{MAX_TAXEL_ID, Modality};
 use crate::error::{Error, Result, suggestion};
 use crate::keys::Text;
+use crate::limits::{self, MAX_TOML_BYTES};
 
 /// Default maximum distance of a given place from the surface, m.
 const DEFAULT_WITHIN_M: f64 = 0.01;
@@ -117,7 +118,7 @@ impl Recipe {
     /// The file cannot be read, is not TOML, or is inconsistent. One line says where.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         Self::parse(&path.display().to_string(), &text, path.parent().unwrap_or(Path::new("")))
     }
 

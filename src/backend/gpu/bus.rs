@@ -4,6 +4,8 @@ use std::path::Path;
 
 use super::AdapterSummary;
 
+use crate::limits::{self, MAX_SYSTEM_BYTES};
+
 /// The GPUs on the PCI bus whose maker none of `answering` has: maker and place of each, and how to make it answer. Empty where
 /// the system does not tell (it does on Linux).
 #[must_use]
@@ -17,7 +19,7 @@ fn on_bus(devices: &Path, answering: &[AdapterSummary]) -> Vec<(String, &'static
         .flatten()
         .filter_map(|entry| {
             let number = |file: &str| {
-                let text = std::fs::read_to_string(entry.path().join(file)).ok()?;
+                let text = limits::read_to_string(entry.path().join(file), MAX_SYSTEM_BYTES).ok()?;
                 u32::from_str_radix(text.trim().trim_start_matches("0x"), 16).ok()
             };
             // Class 03 is display controllers, with a screen or without.

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use somatic::author::recipe_values::Length;
 use somatic::author::{Authored, GridOrder, SheetGrid, author_sheets};
+use somatic::limits::{self, MAX_TABLE_BYTES};
 use somatic::{Error, Result};
 
 const HEADING: &str = "A flat sheet: a mat, an insole, an array";
@@ -89,7 +90,7 @@ impl GridArguments {
         };
         grid.regions = self.regions.map(|Pair(regions)| regions);
         if let Some(path) = &self.cells {
-            let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+            let text = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
             grid = grid.with_mask(&path.display().to_string(), &text)?;
         }
         author_sheets(&format!("{name}.glb"), &[grid.sheet(name).map_err(|e| usage(&e).at("--grid"))?])

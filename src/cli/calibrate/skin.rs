@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use serde_json::json;
 use somatic::gains::{SkinEstimate, SkinSurvey};
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::source::{SourceSpec, VendorOptions};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
@@ -41,7 +42,7 @@ pub(super) fn calibrate(
             "--skin improves a calibration; name the one with baselines and dead bands as --calibration",
         ));
     };
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&text, &ids).map_err(|e| e.at(path.display()))?;
     let spec: SourceSpec = recording.parse()?;

@@ -1,5 +1,6 @@
 //! Writes the selected combination into a scene file in place of the target; keeps everything else, comments too.
 
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
 use somatic::tradeoff::{Combination, Target, Words};
 use somatic::{BackendKind, Error, OutputPath, Result};
@@ -7,7 +8,7 @@ use toml_edit::{DocumentMut, Item, Table, value};
 
 pub(super) fn write(scene: OutputPath, combination: &Combination, target: &Target) -> Result<()> {
     let path = scene.name();
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
     let text = with(&text, combination, target).map_err(|e| e.at(path.display()))?;
     scene.write(text.as_bytes())
 }

@@ -12,6 +12,7 @@ use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
 use crate::error::{Error, Result, failed};
 use crate::keys::Text;
+use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::upkeep::UpkeepKeys;
 
 #[derive(Deserialize)]
@@ -43,7 +44,7 @@ impl Calibration {
     /// names a taxel that the body does not have. The message has the line.
     pub fn load(path: impl AsRef<Path>, ids: &[u32]) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         Self::parse(&text, ids).map_err(|e| e.at(path.display()))
     }
 

@@ -36,6 +36,7 @@ use crate::bundled;
 use crate::error::{Error, Result, failed};
 use crate::field::FieldSet;
 use crate::keys::Text;
+use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::{Frame, RawValue};
 
 /// A source of frames of simulated touches.
@@ -76,7 +77,7 @@ impl SimulatedSource {
     /// The file or its body cannot be read, or something in it makes no sense; the message has line and key.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_text(&path.display().to_string(), &text, folder)
     }
@@ -84,7 +85,7 @@ impl SimulatedSource {
     /// Whether the file at `path` has the keys of a simulation, and so is no scene.
     #[must_use]
     pub fn is_named(path: impl AsRef<Path>) -> bool {
-        let keys = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+        let keys = limits::read_to_string(path, MAX_TOML_BYTES).ok().and_then(|text| text.parse::<toml::Table>().ok());
         keys.is_some_and(|keys| keys.contains_key("duration_s") || keys.contains_key("touch"))
     }
 
@@ -93,7 +94,11 @@ impl SimulatedSource {
     pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
         let path = path.as_ref();
         let mut files = vec![path.to_owned()];
-        let text = if path.is_file() { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
+        let text = if path.is_file() {
+            limits::read_to_string(path, MAX_TOML_BYTES).unwrap_or_default()
+        } else {
+            String::new()
+        };
         if let Ok(File { body: Some(body), .. }) = Text(&text).parse() {
             files.extend(Body::files(path.parent().unwrap_or(Path::new("")).join(body.get_ref())));
         }

@@ -8,6 +8,7 @@ use roxmltree::{Document, Node};
 
 use super::pose::{Angles, ORIENTATIONS};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_XML_BYTES};
 
 /// How deep files may include others.
 const MAX_INCLUDES: u32 = 32;
@@ -15,7 +16,7 @@ const MAX_INCLUDES: u32 = 32;
 /// The text of the file at `path`, with the content of included files in place of each `<include>`.
 pub(super) fn included(path: &Path) -> Result<String> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+    let text = limits::read_to_string(path, MAX_XML_BYTES).map_err(|e| Error::io(path, &e))?;
     let with = with_includes(text, folder, MAX_INCLUDES);
     with.map_err(|e| e.at(path.display()))
 }
@@ -32,7 +33,7 @@ fn with_includes(text: String, folder: &Path, depth: u32) -> Result<String> {
             return Err(at(failed!("files include each other over {MAX_INCLUDES} deep, as `{name}`")));
         }
         let path = folder.join(name);
-        let inner = std::fs::read_to_string(&path).map_err(|e| at(Error::io(&path, &e)))?;
+        let inner = limits::read_to_string(&path, MAX_XML_BYTES).map_err(|e| at(Error::io(&path, &e)))?;
         // The paths in an included file are relative to the first one.
         let inner = with_includes(inner, folder, depth - 1).map_err(|e| at(e.at(path.display())))?;
         let inner_document = parse(&inner).map_err(|e| at(e.at(path.display())))?;

@@ -11,6 +11,7 @@ use super::document::{Defaults, numbers, three};
 use crate::author::mesh::formats;
 use crate::author::mesh::triangles::Triangles;
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_MESH_BYTES};
 
 /// The name of the asset `node` and its mesh, as it stands in a geom, m.
 pub(super) fn read(
@@ -68,7 +69,7 @@ fn of_file(path: &Path) -> Result<Triangles> {
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
         return Ok(shared(&formats::load(path, None)?.0));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+    let text = limits::read_to_string(path, MAX_MESH_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file"),
         _ => Error::failed(e.to_string()),
     })?;
