@@ -3,9 +3,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x8, mask64x8};
 
-use super::{Level, with_widest};
+use super::Level;
 use crate::parallel;
-use crate::stage::footprint::{Ends, Fits, Real, Sensor, Start, Touch, fit};
+use crate::stage::footprint::{Ends, Fits, Real, Sensor, Start, Touch, fit, fit_alone};
 
 /// Touches side by side.
 const ABREAST: usize = 8;
@@ -24,47 +24,25 @@ pub(crate) fn judge_each<T: Send>(
     ends: &[Option<Ends<f64>>],
     of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
 ) -> Vec<T> {
-    each(Level::new(), touches, |index| ends[index], of)
+    each(Level::new(), touches, |index| ends[index].as_ref().map(Ends::start), of)
 }
 
-/// What a touch's fits are made of.
-trait Origin: Copy + Send {
-    /// The fits of up to eight touches, the last of which stands in for those that are not there.
-    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>>;
-    /// Those of one.
-    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64>;
+/// A touch that can be fitted.
+struct Startable<'a> {
+    /// Its place in the group.
+    at: usize,
+    touch: &'a Touch,
+    start: Start<f64>,
 }
 
-impl Origin for Start<f64> {
-    #[inline(always)]
-    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>> {
-        fit(sensors, &Start::abreast(of, |numbers| f64x8::simd_from(simd, numbers)))
-    }
-
-    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64> {
-        fit(sensors, self)
-    }
-}
-
-impl Origin for Ends<f64> {
-    #[inline(always)]
-    fn fits_abreast<S: Simd>(simd: S, sensors: &[Sensor<f64x8<S>>], of: [&Self; ABREAST]) -> Fits<f64x8<S>> {
-        Ends::abreast(of, |numbers| f64x8::simd_from(simd, numbers)).judged(sensors)
-    }
-
-    fn fits(&self, sensors: &[Sensor<f64>]) -> Fits<f64> {
-        self.judged(sensors)
-    }
-}
-
-fn each<O: Origin, T: Send>(
+fn each<T: Send>(
     level: Level,
     touches: &[&Touch],
-    origin: impl Fn(usize) -> Option<O> + Sync,
+    start: impl Fn(usize) -> Option<Start<f64>> + Sync,
     of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
 ) -> Vec<T> {
     if touches.len() < FASTER_ABREAST {
-        let fits = |index: usize| origin(index).map(|origin| origin.fits(touches[index].sensors()));
+        let fits = |index: usize| start(index).map(|start| fit_alone(touches[index].sensors(), &start));
         return touches.iter().enumerate().map(|(index, touch)| of(touch, fits(index).as_ref())).collect();
     }
     // Those with as many taxels side by side: the others wait for the one with most.
@@ -73,13 +51,11 @@ fn each<O: Origin, T: Send>(
     let mut made: Vec<Option<T>> = order.iter().map(|_| None).collect();
     let groups = order.chunks(ABREAST).zip(made.chunks_mut(ABREAST));
     parallel::for_each(parallel::threads().min(groups.len()), groups, |(group, made)| {
-        let fitted: Vec<(usize, &Touch, O)> =
-            group.iter().enumerate().filter_map(|(at, &index)| Some((at, touches[index], origin(index)?))).collect();
-        if !fitted.is_empty() {
-            let lanes = with_widest!(level, simd => abreast(simd, &fitted));
-            for (&(at, touch, _), fits) in fitted.iter().zip(&lanes) {
-                made[at] = Some(of(touch, Some(fits)));
-            }
+        let startable =
+            |(at, &index): (usize, &usize)| start(index).map(|start| Startable { at, touch: touches[index], start });
+        let group_startable: Vec<Startable<'_>> = group.iter().enumerate().filter_map(startable).collect();
+        for (&Startable { at, touch, .. }, fits) in group_startable.iter().zip(fits_of(level, &group_startable)) {
+            made[at] = Some(of(touch, Some(&fits)));
         }
         for (&index, made) in group.iter().zip(made) {
             made.get_or_insert_with(|| of(touches[index], None));
@@ -90,19 +66,45 @@ fn each<O: Origin, T: Send>(
     places.into_iter().filter_map(|at| made[at].take()).collect()
 }
 
-/// The fits of up to eight touches.
+/// The fits of up to eight touches, with the widest instructions that there are. The fit is compiled here and in [`fit_alone`] only: it
+/// is a tenth of the library's code. SSE2 gains nothing from lanes of eight: a touch alone has the same bits.
+#[inline(never)]
+fn fits_of(level: Level, group: &[Startable<'_>]) -> Vec<Fits<f64>> {
+    if group.is_empty() {
+        return Vec::new();
+    }
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = level.as_avx512() {
+        simd.vectorize(
+            #[inline(always)]
+            || abreast(simd, group),
+        )
+    } else if let Some(simd) = level.as_avx2() {
+        simd.vectorize(
+            #[inline(always)]
+            || abreast(simd, group),
+        )
+    } else {
+        group.iter().map(|startable| fit_alone(startable.touch.sensors(), &startable.start)).collect()
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    fearless_simd::dispatch!(level, simd => abreast(simd, group))
+}
+
+/// The same in lanes; the last touch stands in for those that are not there.
 #[inline(always)]
-fn abreast<S: Simd, O: Origin>(simd: S, group: &[(usize, &Touch, O)]) -> [Fits<f64>; ABREAST] {
+fn abreast<S: Simd>(simd: S, group: &[Startable<'_>]) -> Vec<Fits<f64>> {
     let lanes = |numbers: [f64; ABREAST]| f64x8::simd_from(simd, numbers);
     let of_lane = |lane: usize| &group[lane.min(group.len() - 1)];
-    let most = group.iter().map(|(_, touch, _)| touch.sensors().len()).max().unwrap_or(0);
+    let most = group.iter().map(|startable| startable.touch.sensors().len()).max().unwrap_or(0);
     let mut sensors = Vec::with_capacity(most);
     for index in 0..most {
-        let of = std::array::from_fn(|lane| of_lane(lane).1.sensors().get(index).unwrap_or(&Sensor::NONE));
+        let of = std::array::from_fn(|lane| of_lane(lane).touch.sensors().get(index).unwrap_or(&Sensor::NONE));
         sensors.push(Sensor::abreast(of, lanes));
     }
-    let fits = O::fits_abreast(simd, &sensors, std::array::from_fn(|lane| &of_lane(lane).2));
-    std::array::from_fn(|lane| fits.map(|numbers| numbers[lane]))
+    let start = Start::abreast(std::array::from_fn(|lane| &of_lane(lane).start), lanes);
+    let fits = fit(&sensors, &start);
+    (0..group.len()).map(|lane| fits.map(|numbers| numbers[lane])).collect()
 }
 
 impl<S: Simd> Real for f64x8<S> {

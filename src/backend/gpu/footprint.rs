@@ -9,7 +9,7 @@ use super::adapter::Device;
 use super::shaders::Shader;
 use super::stage::{GROUP, pipeline};
 use crate::error::Result;
-use crate::stage::footprint::{Ends, Sensor, Shape, Start, Touch, fit};
+use crate::stage::footprint::{Ends, Sensor, Shape, Start, Touch, fit_alone};
 use crate::stage::layout::{FitSensor, FitShape, FitStart, WIDE};
 
 /// Kinds of contact, as the shader counts them.
@@ -114,7 +114,7 @@ impl Descents {
         for (index, touch) in touches.iter().enumerate() {
             match touch.start() {
                 Some(start) if touch.sensors().len() > MOST => {
-                    ends[index] = Some(fit(touch.sensors(), &start).ends(start.gain_variance));
+                    ends[index] = Some(fit_alone(touch.sensors(), &start).ends(start.gain_variance));
                 }
                 Some(start) => started.push((index, start)),
                 None => {}
@@ -210,7 +210,7 @@ mod tests {
     use crate::backend::gpu::adapter;
     use crate::stage::footprint::made_up::{LAYER, touches};
     use crate::stage::footprint::running::Running;
-    use crate::stage::footprint::{Blob, Fits, Kind, Layer, Line, Point, Segment, descend, numbers};
+    use crate::stage::footprint::{Blob, Fits, Kind, Layer, Line, Point, Segment, descend, fit, numbers};
 
     fn device() -> Option<Device> {
         adapter::shared().inspect_err(|_| skip("GPU", "no adapter answers")).ok()
@@ -329,8 +329,8 @@ mod tests {
             let lane = |sensor: &Sensor<f64>| Sensor::abreast([sensor], |[number]| Running::rounded(number));
             let sensors: Vec<Sensor<Running>> = touch.sensors().iter().map(lane).collect();
             let ends = found.ends(gains);
-            let ends = Ends::abreast([&ends], |[number]| Running::exact(number));
-            let rounded = ends.judged(&sensors).reached();
+            let start = Start::abreast([&ends.start()], |[number]| Running::exact(number));
+            let rounded = fit(&sensors, &start).reached();
             for ((found, right), rounded) in found.reached().iter().zip(right.reached()).zip(rounded) {
                 all.push([found.0, found.1, right.0, right.1, rounded.0.off]);
             }

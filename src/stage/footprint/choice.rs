@@ -36,34 +36,15 @@ pub(crate) struct Ends<R> {
     pub(crate) gain_variance: R,
 }
 
-impl<R: Real> Ends<R> {
-    /// Several side by side, of numbers that `lanes` puts side by side. Those of which only some have all kinds have the shapes of the
-    /// others in place of those.
+impl<R: Copy> Ends<R> {
+    /// A start that is there already: from it, a fit says how good it is.
     #[inline(always)]
-    pub(crate) fn abreast<const N: usize>(ends: [&Ends<f64>; N], lanes: impl Fn([f64; N]) -> R + Copy) -> Self {
-        let long = |kind: usize| {
-            Shape::abreast(ends.map(|ends| ends.long.as_ref().map_or(&ends.point, |long| &long[kind])), lanes)
-        };
-        Self {
-            point: Shape::abreast(ends.map(|ends| &ends.point), lanes),
-            line: Shape::abreast(ends.map(|ends| &ends.line), lanes),
-            long: ends.iter().any(|ends| ends.long.is_some()).then(|| [long(0), long(1)]),
-            gain_variance: lanes(ends.map(|ends| ends.gain_variance)),
-        }
-    }
-
-    /// The fits there, of `sensors`.
-    #[inline(always)]
-    pub(crate) fn judged(&self, sensors: &[Sensor<R>]) -> Fits<R> {
-        let gains = self.gain_variance;
-        let long = self.long.map(|[segment, blob]| {
-            [descend::<R, Segment, 6>(sensors, gains, segment, 0), descend::<R, Blob, 6>(sensors, gains, blob, 0)]
-        });
-        Fits {
-            point: descend::<R, Point, 4>(sensors, gains, self.point, 0),
-            line: descend::<R, Line, 4>(sensors, gains, self.line, 0),
-            long,
-        }
+    pub(crate) fn start(&self) -> Start<R> {
+        let Self { point, line, long, gain_variance } = *self;
+        let [segment, blob] = long.unwrap_or([line, point]);
+        let half_length = segment.length;
+        let reached = Some(segment);
+        Start { point, line, blob, half_length, gain_variance, steps: 0, is_long: long.is_some(), reached }
     }
 }
 
@@ -71,19 +52,29 @@ impl<R: Real> Ends<R> {
 #[inline(always)]
 pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
     let (gains, steps) = (start.gain_variance, start.steps);
-    let point = descend::<R, Point, 4>(sensors, gains, with_force::<R, Point, 4>(sensors, start.point), steps);
-    let line = descend::<R, Line, 4>(sensors, gains, with_force::<R, Line, 4>(sensors, start.line), steps);
+    let is_reached = start.reached.is_some();
+    let point = if is_reached { start.point } else { with_force::<R, Point, 4>(sensors, start.point) };
+    let point = descend::<R, Point, 4>(sensors, gains, point, steps);
+    let line = if is_reached { start.line } else { with_force::<R, Line, 4>(sensors, start.line) };
+    let line = descend::<R, Line, 4>(sensors, gains, line, steps);
     let mut long = None;
     if start.is_long {
         // As much force as the line has on the segment's length.
         let force = line.shape.force + start.half_length + std::f64::consts::LN_2;
-        let segment = Shape { force, length: start.half_length, ..line.shape };
+        let segment = start.reached.unwrap_or(Shape { force, length: start.half_length, ..line.shape });
+        let blob = if is_reached { start.blob } else { with_force::<R, Blob, 6>(sensors, start.blob) };
         long = Some([
             descend::<R, Segment, 6>(sensors, gains, segment, steps),
-            descend::<R, Blob, 6>(sensors, gains, with_force::<R, Blob, 6>(sensors, start.blob), steps),
+            descend::<R, Blob, 6>(sensors, gains, blob, steps),
         ]);
     }
     Fits { point, line, long }
+}
+
+/// The same of one touch alone: compiled once, as it is long.
+#[inline(never)]
+pub(crate) fn fit_alone(sensors: &[Sensor<f64>], start: &Start<f64>) -> Fits<f64> {
+    fit(sensors, start)
 }
 
 /// `shape`, which has a force of 1, with the force that explains the pressed sensors best.

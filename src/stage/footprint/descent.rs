@@ -34,11 +34,16 @@ pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
     start: Shape<R>,
     steps: usize,
 ) -> Fitted<R, K> {
-    let (mut shape, mut now) = (start, Objective::at::<M>(sensors, gain_variance, &start));
-    let mut damping = now.cost.all(DAMPING);
-    for _ in 0..steps {
-        let tried = shape.moved(M::FREE, Factor::of(&now.a, damping).solve(now.g));
+    let zero = start.force.all(0.0);
+    let (mut shape, mut now, mut damping) = (start, Objective::none(zero), zero.all(DAMPING));
+    // The objective stands in the code once: it is long, and there are eight of it side by side.
+    for step in 0..=steps {
+        let tried = if step == 0 { start } else { shape.moved(M::FREE, Factor::of(&now.a, damping).solve(now.g)) };
         let then = Objective::at::<M>(sensors, gain_variance, &tried);
+        if step == 0 {
+            now = then;
+            continue;
+        }
         let better = then.cost.is_below(now.cost);
         shape = Shape::choose(better, &tried, &shape);
         now = Objective::choose(better, &then, &now);

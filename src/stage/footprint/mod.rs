@@ -25,7 +25,7 @@
 //!
 //! This stage starts from raw values, in f64. [`Real`] lets it fit several touches side by side, with the bits of one alone. On
 //! backend `gpu` the descents are the device's, in f32 (`shaders/footprint.wgsl`); what they reach is judged here, in f64
-//! ([`Ends::judged`]), so that kind, covariance and reasons for absence are decided alike everywhere.
+//! ([`Ends::start`]), so that kind, covariance and reasons for absence are decided alike everywhere.
 
 mod choice;
 mod descent;
@@ -41,7 +41,7 @@ mod shape;
 mod touch;
 mod trail;
 
-pub(crate) use choice::{Ends, Fits, fit};
+pub(crate) use choice::{Ends, Fits, fit, fit_alone};
 pub(crate) use descent::STEPS;
 #[cfg(test)]
 pub(crate) use descent::descend;

@@ -54,11 +54,17 @@ pub(crate) struct Objective<R, const K: usize> {
 }
 
 impl<R: Real, const K: usize> Objective<R, K> {
+    /// Of no sensors and no prior.
+    #[inline(always)]
+    pub(super) fn none(zero: R) -> Self {
+        Self { cost: zero, chi_squared: zero, a: [[zero; K]; K], g: [zero; K] }
+    }
+
     /// The objective of kind M at `shape`; gains vary with `gain_variance`.
     #[inline(always)]
     pub(crate) fn at<M: Kind<K>>(sensors: &[Sensor<R>], gain_variance: R, shape: &Shape<R>) -> Self {
         let (zero, one) = (shape.force.all(0.0), shape.force.all(1.0));
-        let mut sum = Self { cost: zero, chi_squared: zero, a: [[zero; K]; K], g: [zero; K] };
+        let mut sum = Self::none(zero);
         let contact = Contact::of(shape);
         for sensor in sensors {
             let (felt, by) = M::felt(&contact, sensor.at, sensor.margin);
