@@ -65,10 +65,20 @@ limits! {
 
     /// Elements of an XML file within each other
     MAX_XML_DEPTH: usize = 256;
+    /// Nodes of an XML file: elements, and texts between them
+    MAX_XML_NODES: u32 = 20_000_000;
+    /// Attributes of an XML element
+    MAX_XML_ATTRIBUTES: usize = 128;
+    /// `xmlns` attributes of an XML file
+    MAX_XML_NAMESPACES: usize = 1000;
     /// Files of an MJCF that include each other, one within the other
     MAX_INCLUDE_DEPTH: usize = 32;
-    /// Files that an MJCF includes, each as often as it is included
+    /// Files that an MJCF includes
     MAX_INCLUDES: usize = 1000;
+    /// Attributes that the `<default>` classes of an MJCF have from those above them
+    MAX_DEFAULTS: usize = 1_000_000;
+    /// Triangles that the bins of the touch grids of an MJCF are compared with
+    MAX_RAY_TESTS: usize = 1_000_000_000;
     /// Nodes of a glTF
     MAX_NODES: usize = 1_000_000;
     /// Nodes of a glTF within each other

@@ -85,7 +85,8 @@ fn open(shape: &Path, recipe: &mut Recipe) -> somatic::Result<Original> {
         return Original::from_bytes(name, bytes, None);
     }
     if mesh::is_mesh(shape) {
-        let options = MeshOptions { unit_m: recipe.take_unit(), ..MeshOptions::default() };
+        let mut options = MeshOptions::default().with_ros_packages();
+        options.unit_m = recipe.take_unit();
         return mesh::open(shape, &options);
     }
     Original::open(shape)

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::author::mesh::{JointMotion, Robot, order};
-use crate::error::{Error, Result, failed};
+use crate::author::mesh::{Driver, JointMotion, Robot, RobotJoint as UrdfJoint, followed, order};
+use crate::error::Result;
 
 /// A robot's links and joints, a parent before its children.
 #[derive(Clone, Debug)]
@@ -70,17 +70,19 @@ impl Kinematics {
     }
 
     fn of(robot: &Robot) -> Result<Self> {
-        let driven =
-            |motion: &JointMotion| matches!(motion, JointMotion::Revolute { .. } | JointMotion::Prismatic { .. });
-        let mut by_name = BTreeMap::new();
-        for joint in &robot.joints {
-            if by_name.insert(joint.name.as_str(), joint).is_some() {
-                return Err(failed!("two joints are called `{}`", joint.name).at(format!("line {}", joint.line)));
-            }
-        }
-        let own: Vec<_> = robot.joints.iter().filter(|joint| driven(&joint.motion) && joint.mimic.is_none()).collect();
+        let drivers = followed(robot)?;
+        let is_own = |index: usize, joint: &UrdfJoint| joint.is_driven() && drivers[index].joint == index;
+        let own: Vec<&UrdfJoint> = robot
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(index, joint)| is_own(*index, joint))
+            .map(|(_, joint)| joint)
+            .collect();
         let index_of: BTreeMap<&str, usize> =
             own.iter().enumerate().map(|(index, joint)| (&joint.name[..], index)).collect();
+        let driver_of: BTreeMap<&str, Driver> =
+            robot.joints.iter().zip(&drivers).map(|(joint, driver)| (&joint.name[..], *driver)).collect();
         let mut place_of = BTreeMap::new();
         let mut links = Vec::new();
         for (link, joint) in order(robot)? {
@@ -92,26 +94,9 @@ impl Kinematics {
                         JointMotion::Fixed => Drive::Nothing,
                         JointMotion::Free => Drive::Free,
                         motion => {
-                            // A joint that mimics may be mimicked itself.
-                            let (mut at, mut multiplier, mut offset) = (joint, 1.0, 0.0);
-                            let mut steps = 0;
-                            while let Some(mimic) = &at.mimic {
-                                let wrong = |what: String| Error::failed(what).at(format!("line {}", at.line));
-                                offset += multiplier * mimic.offset;
-                                multiplier *= mimic.multiplier;
-                                steps += 1;
-                                if steps > robot.joints.len() {
-                                    return Err(wrong(format!("`{}` mimics itself", joint.name)));
-                                }
-                                let other = by_name.get(mimic.joint.as_str()).filter(|other| driven(&other.motion));
-                                at = other.ok_or_else(|| {
-                                    wrong(format!(
-                                        "`{}` mimics `{}`, which is no joint that moves",
-                                        at.name, mimic.joint
-                                    ))
-                                })?;
-                            }
-                            Drive::Joint { joint: index_of[at.name.as_str()], multiplier, offset, motion }
+                            let Driver { joint: other, multiplier, offset } = driver_of[joint.name.as_str()];
+                            let joint = index_of[robot.joints[other].name.as_str()];
+                            Drive::Joint { joint, multiplier, offset, motion }
                         }
                     };
                     (Some(place_of[joint.parent.as_str()]), joint.parent_from_child, drive)
@@ -120,13 +105,13 @@ impl Kinematics {
             links.push(RobotLink { name: link.name.clone(), parent, parent_from_link, drive });
         }
         let is_continuous = |motion: &JointMotion| matches!(motion, JointMotion::Revolute { is_continuous: true, .. });
-        let joint = |joint: &&crate::author::mesh::RobotJoint| RobotJoint {
+        let joint = |joint: &&UrdfJoint| RobotJoint {
             name: joint.name.clone(),
             is_continuous: is_continuous(&joint.motion),
             is_prismatic: matches!(joint.motion, JointMotion::Prismatic { .. }),
             limits: joint.limits.filter(|_| !is_continuous(&joint.motion)),
         };
-        let is_other = |joint: &&crate::author::mesh::RobotJoint| !index_of.contains_key(joint.name.as_str());
+        let is_other = |joint: &&UrdfJoint| !index_of.contains_key(joint.name.as_str());
         let other_joints = robot.joints.iter().filter(is_other).map(|joint| joint.name.clone()).collect();
         Ok(Self { links, joints: own.iter().map(joint).collect(), other_joints })
     }

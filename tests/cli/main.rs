@@ -28,6 +28,7 @@ mod limbs_network;
 mod limbs_others;
 mod live;
 mod mjcf;
+mod other_readers;
 mod outputs;
 #[cfg(all(unix, feature = "page"))]
 mod page;

@@ -200,7 +200,6 @@ fn each_heavy_dependency_has_one_door() {
         ("tungstenite", "page/socket.rs"),
         ("httparse", "page/http.rs"),
         ("getrandom", "page/token.rs"),
-        ("mesh_loader", "author/mesh/formats.rs"),
         ("roxmltree", "author/mesh"),
         ("mcap", "recording"),
         ("crc32fast", "recording"),

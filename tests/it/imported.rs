@@ -213,6 +213,32 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
     let middle = DVec3::new(0.01, 0.02, -0.03);
     assert!(made.body.taxels.iter().all(|t| (t.position_in_link - middle).dot(t.normal_in_link) > 0.0));
     assert_eq!(files(&path, &with), [path.clone(), folder.path().join("meshes/box.stl")]);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let hand_of = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        let notes = open(&path, &with).unwrap().notes;
+        (measured(&body(&path, &with), "hand"), notes)
+    };
+    let ((low, high, _), notes) = hand_of(&text.replace("package://", "package:///"));
+    assert!(low.distance(DVec3::new(0.96, 1.94, -0.02)) < 1e-6 && notes.is_empty(), "{low} {high} {notes:?}");
+    // A glTF and a COLLADA file are in the axes of the URDF, whatever points up in them.
+    let stl = folder.path().join("meshes/box.stl");
+    std::fs::write(folder.path().join("meshes/box.glb"), open(&stl, &unit(1.0)).unwrap().to_glb().unwrap()).unwrap();
+    std::fs::write(folder.path().join("meshes/box.dae"), dae("Y_UP", 1.0)).unwrap();
+    for other in ["box.glb", "box.dae"] {
+        let ((low, high, _), _) = hand_of(&text.replace("box.stl", other));
+        assert!(
+            low.distance(DVec3::new(0.96, 1.94, -0.02)) < 1e-6 && high.distance(DVec3::new(1.0, 2.0, 0.0)) < 1e-6,
+            "{other}"
+        );
+    }
+    // Without its scale it is in millimetres.
+    let (_, notes) = hand_of(&text.replace(" scale=\"0.001 0.001 -0.001\"", ""));
+    assert!(
+        notes.len() == 1 && notes[0].starts_with("link `hand` is 75 m across: if its numbers are millimetres"),
+        "{notes:?}"
+    );
+    std::fs::write(&path, &text).unwrap();
     // The coarse shapes instead.
     with.geometry = Geometry::Collision;
     let coarse = body(&path, &with);
@@ -251,6 +277,12 @@ fn what_a_robot_lacks_is_said_with_its_line() {
         whole.replace("</robot>", "<joint name=\"r\"><parent link=\"tool\"/><child link=\"base\"/></joint></robot>");
     std::fs::write(&path, ring).unwrap();
     assert!(why(&path, &with).contains("ring"));
+    let roots = whole.replace("</robot>", "<link name=\"other\"/></robot>");
+    std::fs::write(&path, roots).unwrap();
+    assert!(why(&path, &with).contains("two roots, `base` and `other`"));
+    let mimic = whole.replace("rpy=\"0 0 1.5707963267948966\"/>", "/><mimic joint=\"wrist\"/>");
+    std::fs::write(&path, mimic).unwrap();
+    assert!(why(&path, &with).contains("line 11: `wrist` mimics itself"));
     let xacro = folder.path().join("robot.urdf.xacro");
     std::fs::write(&xacro, &whole).unwrap();
     assert!(why(&xacro, &with).contains("xacro robot.urdf.xacro > robot.urdf"));

@@ -123,6 +123,16 @@ fn a_sound_plate_is_clean() {
 }
 
 #[test]
+fn a_link_of_millimetres_is_asked_about() {
+    let mut plate = Plate::flat();
+    plate.add(100, 40.0, 0.0, 0.0);
+    let body = plate.body();
+    let findings = lint(&body, &FieldSet::new(&body).unwrap().fields);
+    let large = findings.iter().find(|finding| finding.kind == FindingKind::LargeLink).unwrap();
+    assert!(large.to_string().contains("up to 40 m; millimetres?"), "{large}");
+}
+
+#[test]
 fn each_defect_is_found_where_it_is_and_nothing_else() {
     let near = |worst: Option<f64>, expected: f64| (worst.unwrap() - expected).abs() < 1e-6;
 

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::super::placed::COINCIDENT_M;
 use super::super::surface_search::SurfaceSearch;
 use super::finding::{Finding, FindingKind};
+use super::large::large;
 use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed, point_tree};
 use crate::field::{Field, Unroller};
 
@@ -36,6 +37,7 @@ pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
     findings.extend(crowding(body));
     findings.extend(against_surface(body));
     findings.extend(stale_charts(body));
+    findings.extend(large(body));
     findings
 }
 

@@ -29,6 +29,8 @@ pub enum FindingKind {
     IsolatedTaxel,
     /// (u, v) of a geodesic chart are not what the surface gives.
     StaleChart,
+    /// A link is so large that its numbers are probably millimetres.
+    LargeLink,
 }
 
 impl FindingKind {
@@ -36,7 +38,7 @@ impl FindingKind {
     #[must_use]
     pub fn unit(self) -> Option<&'static str> {
         match self {
-            Self::OffSurface | Self::IsolatedTaxel | Self::StaleChart => Some("m"),
+            Self::OffSurface | Self::IsolatedTaxel | Self::StaleChart | Self::LargeLink => Some("m"),
             Self::InwardNormal | Self::StaleNormal => Some("rad"),
             _ => None,
         }
@@ -54,7 +56,7 @@ pub struct Finding {
     pub fields: Vec<String>,
     /// The worst value, in [`FindingKind::unit`].
     pub worst: Option<f64>,
-    /// The place of the worst value: a taxel and its link, or a field.
+    /// The place of the worst value: a taxel and its link, a link, or a field.
     pub place: Option<String>,
     pub(super) what: String,
 }
@@ -72,6 +74,7 @@ impl Finding {
             FindingKind::InwardNormal => "flip it, or the triangles below it",
             FindingKind::StaleNormal | FindingKind::StaleChart => "recompute it with `somatic author BODY -o OUT`",
             FindingKind::IsolatedTaxel => "check its place",
+            FindingKind::LargeLink => "author it again in its unit: `--unit mm`, or a `scale` in the URDF",
         }
     }
 

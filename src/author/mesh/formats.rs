@@ -2,18 +2,36 @@
 
 use std::path::Path;
 
-use glam::DVec3;
-use mesh_loader::Scene;
-
 use super::options::{Up, check_unit, ending};
 use super::triangles::Triangles;
-use super::{guarded, ply};
+use super::{collada, obj, ply, stl};
+use crate::body::Original;
 use crate::error::{Error, Result, failed};
-use crate::limits::{self, MAX_MESH_BYTES};
+use crate::limits::{self, MAX_MESH_BYTES, MAX_XML_BYTES};
+
+pub(super) fn is_gltf(path: &Path) -> bool {
+    matches!(ending(path).as_str(), "glb" | "gltf")
+}
+
+/// The mesh at `path` that is a part of a robot, in the axes that it has, in metres.
+pub(super) fn load_part(path: &Path) -> Result<Triangles> {
+    if !is_gltf(path) {
+        return Ok(load(path, None)?.0);
+    }
+    let (body, _) = Original::open(path)?.read()?;
+    let mut mesh = Triangles::default();
+    for (_, corners) in body.triangles_at_rest() {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(corners);
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    Ok(mesh)
+}
 
 /// The mesh at `path` in metres, and which axis points up if the file says so. `unit_m` is its unit, for formats without one.
 pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Option<Up>)> {
-    let bytes = limits::read(path, MAX_MESH_BYTES).map_err(|e| match e.kind() {
+    let most = if ending(path) == "dae" { MAX_XML_BYTES } else { MAX_MESH_BYTES };
+    let bytes = limits::read(path, most).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file"),
         _ => Error::failed(e.to_string()),
     })?;
@@ -21,26 +39,17 @@ pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Optio
         return Err(Error::failed("the file is empty"));
     }
     let (mut mesh, up) = match ending(path).as_str() {
-        "stl" => (of_scene(&mesh_loader::stl::from_slice(&bytes), "STL")?, None),
-        "obj" => (
-            of_scene(
-                &mesh_loader::obj::from_slice(&bytes, None::<&Path>, |_| {
-                    Err::<Vec<u8>, _>(std::io::ErrorKind::NotFound.into())
-                }),
-                "OBJ",
-            )?,
-            None,
-        ),
+        "stl" => (stl::read(&bytes)?, None),
+        "obj" => (obj::read(&bytes)?, None),
         "ply" => (ply::read(&bytes)?, None),
         "dae" => {
             if unit_m.is_some() {
                 return Err(Error::usage("a COLLADA file says its unit itself; leave --unit out"));
             }
-            let scene = guarded::call(|| mesh_loader::collada::from_slice(&bytes));
-            let scene = scene.unwrap_or_else(|| Err(std::io::Error::other("an index leads nowhere")));
-            (of_scene(&scene, "COLLADA")?, up_of(&bytes))
+            let (mesh, up) = collada::read(&bytes)?;
+            (mesh, Some(up))
         }
-        other => return Err(failed!("a mesh `.{other}` is not read; give .stl, .obj, .dae, .ply or .glb")),
+        other => return Err(failed!("a mesh `.{other}` is not read; give .stl, .obj, .dae, .ply, .glb or .gltf")),
     };
     if let Some(unit_m) = unit_m {
         let metres = check_unit(unit_m)?;
@@ -50,35 +59,4 @@ pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Optio
         return Err(Error::failed("it has a corner that is no number or is not there; export it again"));
     }
     Ok((mesh, up))
-}
-
-fn of_scene(scene: &std::io::Result<Scene>, kind: &str) -> Result<Triangles> {
-    let scene = scene.as_ref().map_err(|e| failed!("not a valid {kind} mesh: {}", one_line(&e.to_string())))?;
-    let mut all = Triangles::default();
-    for mesh in &scene.meshes {
-        all.extend(&Triangles {
-            positions: mesh.vertices.iter().map(|&p| DVec3::from_array(p.map(f64::from))).collect(),
-            triangles: mesh.faces.clone(),
-        });
-    }
-    Ok(all)
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// The `<up_axis>` of a COLLADA file, which is y where it says nothing.
-fn up_of(bytes: &[u8]) -> Option<Up> {
-    let text = std::str::from_utf8(bytes).ok()?;
-    let document = roxmltree::Document::parse(text).ok()?;
-    let asset = document
-        .root_element()
-        .children()
-        .find(|node| node.has_tag_name((node.tag_name().namespace().unwrap_or(""), "asset")));
-    let up = asset.and_then(|asset| asset.children().find(|node| node.tag_name().name() == "up_axis"));
-    match up.and_then(|up| up.text()).map(str::trim) {
-        Some("Z_UP") => Some(Up::Z),
-        _ => Some(Up::Y),
-    }
 }

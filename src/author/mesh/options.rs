@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat};
 
+use super::ros_packages::PackageRoots;
 use crate::error::{Result, failed};
 
 words! {"axis that points up",
@@ -40,6 +41,23 @@ pub struct MeshOptions {
     pub packages: BTreeMap<String, PathBuf>,
     /// The geometry of a URDF.
     pub geometry: Geometry,
+    /// Where packages are looked for that `packages` has not.
+    pub(super) package_roots: PackageRoots,
+}
+
+impl MeshOptions {
+    /// Searches for packages that `packages` has not in the environment: below the folders of `ROS_PACKAGE_PATH`, and in
+    /// `share` of those of `AMENT_PREFIX_PATH`.
+    #[must_use]
+    pub fn with_ros_packages(mut self) -> Self {
+        self.package_roots = PackageRoots::of_environment();
+        self
+    }
+}
+
+/// Asks whether `what`, which has `size_m`, is in millimetres if it is over `most_m`.
+pub(super) fn doubt(what: &str, size_m: f64, most_m: f64) -> Option<String> {
+    (size_m > most_m).then(|| format!("{what} is {size_m:.0} m across: if its numbers are millimetres"))
 }
 
 pub(super) fn ending(path: &Path) -> String {

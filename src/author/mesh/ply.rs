@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::triangles::Triangles;
+use super::triangles::{Triangles, whole};
 use crate::error::{Error, Result, failed};
 
 /// The type of a property's numbers.
@@ -38,8 +38,10 @@ enum Format {
 /// The triangles of a PLY file; faces of more corners are divided into triangles.
 pub(super) fn read(bytes: &[u8]) -> Result<Triangles> {
     let (format, elements, body) = header(bytes)?;
-    let mut numbers = Numbers { rest: body, format };
+    let line = 1 + bytes[..bytes.len() - body.len()].iter().filter(|&&byte| byte == b'\n').count();
+    let mut numbers = Numbers { rest: body, format, line };
     let mut mesh = Triangles::default();
+    let mut face: Vec<u32> = Vec::new();
     for element in &elements {
         let place = |name: &str| element.properties.iter().position(|property| property.name == name);
         let is_vertex = element.name == "vertex";
@@ -49,27 +51,41 @@ pub(super) fn read(bytes: &[u8]) -> Result<Triangles> {
             _ => [0; 3],
         };
         let corners = place("vertex_indices").or(place("vertex_index")).filter(|_| element.name == "face");
+        if element.properties.is_empty() {
+            // Of these nothing is stored, however many there are.
+            continue;
+        }
         for row in 0..element.count {
+            let at = |what: String| match format {
+                Format::Text => Error::failed(what),
+                _ => Error::failed(what).at(format!("{} {row}", element.name)),
+            };
             let mut position = DVec3::ZERO;
             for (index, property) in element.properties.iter().enumerate() {
                 let damaged =
                     || failed!("it ends in {} {row} of {}; copy or export it again", element.name, element.count);
                 let count = match property.length {
                     None => 1,
-                    Some(length) => numbers.next(length).ok_or_else(damaged)? as u64,
+                    Some(length) => {
+                        let number = numbers.next(length, damaged)?;
+                        whole(number).ok_or_else(|| {
+                            numbers.at(at(format!("a list of {number} `{}`; export it again", property.name)))
+                        })?
+                    }
                 };
-                let mut face: Vec<u32> = Vec::new();
+                face.clear();
                 for _ in 0..count {
-                    let number = numbers.next(property.number).ok_or_else(damaged)?;
+                    let number = numbers.next(property.number, damaged)?;
                     if is_vertex && let Some(axis) = xyz.iter().position(|&own| own == index) {
                         position[axis] = number;
                     }
                     if Some(index) == corners {
-                        face.push(number as u32);
+                        face.push(whole(number).ok_or_else(|| {
+                            numbers.at(at(format!("a corner is vertex {number}; give its number, from 0 on")))
+                        })?);
                     }
                 }
-                // A fan: right for convex faces, as nearly all are.
-                mesh.triangles.extend((2..face.len()).map(|corner| [face[0], face[corner - 1], face[corner]]));
+                mesh.fan(&face);
             }
             if is_vertex {
                 mesh.positions.push(position);
@@ -145,17 +161,31 @@ fn type_of(word: &str) -> Option<Number> {
 struct Numbers<'a> {
     rest: &'a [u8],
     format: Format,
+    /// Of what was read last, in a text.
+    line: usize,
 }
 
 impl Numbers<'_> {
-    fn next(&mut self, number: Number) -> Option<f64> {
+    /// `error` at the line of what was read last, in a text.
+    fn at(&self, error: Error) -> Error {
+        if self.format == Format::Text { error.at(format!("line {}", self.line)) } else { error }
+    }
+
+    /// The next number, or the error `damaged` at the end of the file.
+    fn next(&mut self, number: Number, damaged: impl Fn() -> Error) -> Result<f64> {
         if self.format == Format::Text {
-            let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
-            let word = &self.rest[start..];
+            let begin = self.rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or_else(&damaged)?;
+            self.line += self.rest[..begin].iter().filter(|&&byte| byte == b'\n').count();
+            let word = &self.rest[begin..];
             let end = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
             self.rest = &word[end..];
-            return std::str::from_utf8(&word[..end]).ok()?.parse().ok();
+            let word = String::from_utf8_lossy(&word[..end]);
+            return word.parse().map_err(|_| self.at(failed!("`{word}` is no number; export it again")));
         }
+        self.binary(number).ok_or_else(damaged)
+    }
+
+    fn binary(&mut self, number: Number) -> Option<f64> {
         let (Number::Signed(size) | Number::Unsigned(size) | Number::Float(size)) = number;
         let (own, rest) = self.rest.split_at_checked(size)?;
         self.rest = rest;
@@ -222,8 +252,32 @@ mod tests {
             let why = read(&whole[..end]).unwrap_err().to_string();
             assert!(!why.contains('\n') && why.len() > 10, "{why}");
         }
+        // Nor does a count of what is stored nowhere take time.
+        let ghost = b"ply\nformat ascii 1.0\nelement ghost 1000000000000\nelement vertex 1\nproperty float x\nproperty float y\n\
+                      property float z\nend_header\n1 2 3\n";
+        assert_eq!(read(ghost).unwrap().positions.len(), 1);
         assert!(read(b"solid\n").unwrap_err().to_string().contains("not a PLY"));
         let huge = b"ply\nformat ascii 1.0\nelement vertex 99999999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
         assert!(read(huge).unwrap_err().to_string().contains("ends in vertex 1"));
+    }
+
+    #[test]
+    fn a_face_names_vertices_by_whole_numbers() {
+        let with = |face: &str| {
+            let header = HEADER.replace("uchar int", "char float");
+            let text = format!("ply\nformat ascii 1.0\n{header}0 0 7 0\n1 0 7 0\n1 1 7 0\n0 1 7 0\n{face}\n");
+            read(text.as_bytes()).map(|mesh| mesh.triangles).map_err(|e| e.to_string())
+        };
+        assert_eq!(with("3 0 1 2"), Ok(vec![[0, 1, 2]]));
+        for wrong in ["-1", "2.9", "nan", "inf", "4294967296"] {
+            let why = with(&format!("3 0 1 {wrong}")).unwrap_err().to_lowercase();
+            assert!(why.starts_with(&format!("line 15: a corner is vertex {wrong}; ")), "{why}");
+        }
+        assert!(with("-3 0 1 2").unwrap_err().starts_with("line 15: a list of -3 `vertex_indices`"));
+        assert!(with("3 0 1 two").unwrap_err().starts_with("line 15: `two` is no number"));
+        let mut bytes = binary(false);
+        let end = bytes.len();
+        bytes[end - 4..].fill(0xFF);
+        assert!(read(&bytes).unwrap_err().to_string().starts_with("face 0: a corner is vertex -1"));
     }
 }

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 
 use crate::body::MeshData;
+use crate::error::{Result, failed};
+use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 
 /// A triangle mesh, m.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +22,27 @@ impl Triangles {
         let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|v| v + first)));
+    }
+
+    /// Adds another mesh where `way` puts it; what was outside stays outside, also if `way` mirrors.
+    pub(super) fn extend_placed(&mut self, other: &Self, way: &DAffine3) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions.iter().map(|&p| way.transform_point3(p)));
+        let is_mirror = way.matrix3.determinant() < 0.0;
+        self.triangles.extend(other.triangles.iter().map(|&[a, b, c]| {
+            let triangle = if is_mirror { [a, c, b] } else { [a, b, c] };
+            triangle.map(|v| v + first)
+        }));
+    }
+
+    /// Whether `other` can be added, within the limits of a body.
+    pub(super) fn check_room_for(&self, other: &Self) -> Result<()> {
+        Room { triangles: self.triangles.len(), vertices: self.positions.len() }.take(other)
+    }
+
+    /// Adds a face of any number of corners as triangles around its first one: right for convex faces, as nearly all are.
+    pub(super) fn fan(&mut self, corners: &[u32]) {
+        self.triangles.extend((2..corners.len()).map(|at| [corners[0], corners[at - 1], corners[at]]));
     }
 
     /// Transforms it; what was outside stays outside, also if `way` mirrors.
@@ -78,6 +101,34 @@ impl Triangles {
             normals.into_iter().map(|n| n.try_normalize().unwrap_or(DVec3::Y).as_vec3().to_array()).collect();
         mesh
     }
+}
+
+/// How much the meshes of a file have together.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    triangles: usize,
+    vertices: usize,
+}
+
+impl Room {
+    /// Counts `mesh`, unless that is beyond the limits of a body.
+    pub(super) fn take(&mut self, mesh: &Triangles) -> Result<()> {
+        self.triangles += mesh.triangles.len();
+        self.vertices += mesh.positions.len();
+        for (have, most, what) in
+            [(self.triangles, MAX_TRIANGLES, "triangles"), (self.vertices, MAX_VERTICES, "vertices")]
+        {
+            if have > most {
+                return Err(failed!("its meshes have over {most} {what} where they are placed; reduce them"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `number` as a count or an index, if it is one.
+pub(super) fn whole(number: f64) -> Option<u32> {
+    (number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number)).then_some(number as u32)
 }
 
 #[cfg(test)]

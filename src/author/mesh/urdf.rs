@@ -1,44 +1,58 @@
 //! A robot in URDF as a glTF: its links as nodes, with their geometry.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 
-use super::options::{MeshOptions, Up, y_up_from};
+use super::options::{MeshOptions, Up, doubt, y_up_from};
 use super::triangles::Triangles;
-use super::urdf_file::{Robot, RobotJoint, RobotLink, ShapeKind};
+use super::urdf_file::{Robot, RobotLink, ShapeKind};
+use super::urdf_tree::order;
 use super::{formats, shapes};
+use crate::author::lint::MAX_LIKELY_LINK_M;
 use crate::body::Glb;
-use crate::error::{Error, Result, failed};
+use crate::error::{Error, Result};
 
-/// The robot at `path`, and its size at rest, m.
-pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, f64)> {
+/// A robot of over this size was probably not meant in metres, m.
+const MAX_LIKELY_ROBOT_M: f64 = 20.0;
+
+/// A robot's links as nodes.
+pub(super) struct Linked {
+    pub(super) glb: Glb,
+    /// By name.
+    pub(super) nodes: BTreeMap<String, usize>,
+    /// What is doubtful.
+    pub(super) notes: Vec<String>,
+    has_triangles: bool,
+}
+
+/// The robot at `path`, and what is doubtful.
+pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, Vec<String>)> {
     if options.unit_m.is_some() {
         return Err(
             Error::usage("a URDF is in metres, and scales its meshes itself; leave --unit out").at(path.display())
         );
     }
     let robot = Robot::load(path, options)?;
-    build(&robot, options.up.unwrap_or(Up::Z)).map_err(|e| e.at(path.display()))
-}
-
-fn build(robot: &Robot, up: Up) -> Result<(Glb, f64)> {
-    let (glb, whole, _) = links(robot, up)?;
-    if whole.triangles.is_empty() {
-        return Err(Error::failed("none of its links has geometry of this kind; try --geometry visual or collision"));
+    let Linked { glb, notes, has_triangles, .. } =
+        links(&robot, options.up.unwrap_or(Up::Z)).map_err(|e| e.at(path.display()))?;
+    if has_triangles {
+        return Ok((glb, notes));
     }
-    Ok((glb, whole.size_m()))
+    let what = "none of its links has geometry of this kind; try --geometry visual or collision";
+    Err(Error::failed(what).at(path.display()))
 }
 
-/// The links of `robot` as nodes, what they look like together, and their nodes by name.
-pub(super) fn links(robot: &Robot, up: Up) -> Result<(Glb, Triangles, BTreeMap<String, usize>)> {
+/// The links of `robot` as nodes, with what they look like.
+pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
     let order = order(robot)?;
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
     let mut nodes: BTreeMap<&str, (usize, DAffine3)> = BTreeMap::new();
     let mut known: BTreeMap<PathBuf, Triangles> = BTreeMap::new();
     let mut whole = Triangles::default();
+    let mut doubts = Vec::new();
     for (link, joint) in order {
         let above = joint.and_then(|joint| Some((nodes.get(joint.parent.as_str())?, joint)));
         // URDF is z up, glTF y up: the roots are turned, and with them all below.
@@ -50,52 +64,22 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<(Glb, Triangles, BTreeMap<S
         };
         let node = glb.placed_node(&link.name, parent, parent_from_link);
         nodes.insert(&link.name, (node, world_from_link));
-        let mut mesh = geometry(link, &mut known)?;
+        let mesh = geometry(link, &mut known)?;
         if mesh.triangles.is_empty() {
             continue;
         }
         glb.mesh(node, &link.name, &mesh.clone().into_mesh_data(), Some(material), None);
-        mesh.transform(&world_from_link);
-        whole.extend(&mesh);
+        doubts.extend(doubt(&format!("link `{}`", link.name), mesh.size_m(), MAX_LIKELY_LINK_M));
+        whole.check_room_for(&mesh)?;
+        whole.extend_placed(&mesh, &world_from_link);
     }
     let nodes = nodes.into_iter().map(|(name, (node, _))| (name.to_owned(), node)).collect();
-    Ok((glb, whole, nodes))
-}
-
-/// The links, a parent before its children, each with the joint to its parent.
-pub(crate) fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint>)>> {
-    let mut names = BTreeSet::new();
-    for link in &robot.links {
-        if !names.insert(link.name.as_str()) {
-            return Err(failed!("two links are called `{}`", link.name));
-        }
+    if doubts.is_empty() {
+        doubts.extend(doubt("it", whole.size_m(), MAX_LIKELY_ROBOT_M));
     }
-    let mut joint_of = BTreeMap::new();
-    for joint in &robot.joints {
-        let at = |what: String| Error::failed(what).at(format!("line {}", joint.line));
-        if let Some(unknown) = [&joint.parent, &joint.child].into_iter().find(|name| !names.contains(name.as_str())) {
-            return Err(at(format!("there is no link `{unknown}`")));
-        }
-        if joint_of.insert(joint.child.as_str(), joint).is_some() {
-            return Err(at(format!("`{}` is the child of two joints; a link has one parent", joint.child)));
-        }
-    }
-    let mut ordered = Vec::new();
-    let mut done = BTreeSet::new();
-    while ordered.len() < robot.links.len() {
-        let before = ordered.len();
-        for link in &robot.links {
-            let joint = joint_of.get(link.name.as_str()).copied();
-            let is_ready = joint.is_none_or(|joint| done.contains(joint.parent.as_str()));
-            if is_ready && done.insert(link.name.as_str()) {
-                ordered.push((link, joint));
-            }
-        }
-        if ordered.len() == before {
-            return Err(Error::failed("its joints go round in a ring; a link cannot be above itself"));
-        }
-    }
-    Ok(ordered)
+    let what_to_do = "write metres into the URDF, or a `scale` of its meshes";
+    let notes = doubts.into_iter().map(|doubt| format!("{doubt}, {what_to_do}")).collect();
+    Ok(Linked { glb, nodes, notes, has_triangles: !whole.triangles.is_empty() })
 }
 
 /// The geometry of a link in its frame. Meshes that are used again are read once.
@@ -109,11 +93,8 @@ fn geometry(link: &RobotLink, known: &mut BTreeMap<PathBuf, Triangles>) -> Resul
             ShapeKind::Mesh { path, scale } => {
                 if !known.contains_key(path) {
                     let at = |e: Error| e.at(path.display()).at(format!("line {}: link `{}`", shape.line, link.name));
-                    let (mut mesh, up) = formats::load(path, None).map_err(at)?;
-                    // A COLLADA file with y up is turned to the z up of the URDF.
-                    if up == Some(Up::Y) {
-                        mesh.transform(&y_up_from(Up::Z).inverse());
-                    }
+                    // What a COLLADA file says is up does not count, as in RViz: many that say y up are z up. Nor is a glTF turned.
+                    let mesh = formats::load_part(path).map_err(at)?;
                     known.insert(path.clone(), mesh);
                 }
                 let mut mesh = known[path].clone();
@@ -122,6 +103,7 @@ fn geometry(link: &RobotLink, known: &mut BTreeMap<PathBuf, Triangles>) -> Resul
             }
         };
         mesh.transform(&shape.link_from_shape);
+        all.check_room_for(&mesh).map_err(|e| e.at(format!("line {}: link `{}`", shape.line, link.name)))?;
         all.extend(&mesh);
     }
     Ok(all)

@@ -6,8 +6,10 @@ use glam::{DAffine3, DQuat, DVec3, EulerRot};
 use roxmltree::{Document, Node};
 
 use super::options::{Geometry, MeshOptions};
+use super::ros_packages;
+use super::xml::{self, Lines};
 use crate::error::{Error, Result, failed};
-use crate::limits::{self, MAX_XML_BYTES};
+use crate::limits::{MAX_CELLS, MAX_TAXELS};
 
 /// The parts of a URDF that make its shape.
 #[derive(Debug)]
@@ -101,7 +103,7 @@ pub(super) struct SensorTaxel {
 }
 
 /// Most taxels of an array.
-const MAX_ARRAY_TAXELS: u64 = 1_000_000;
+const MAX_ARRAY_TAXELS: u64 = MAX_CELLS as u64;
 
 impl Robot {
     /// Reads the URDF at `path`.
@@ -109,9 +111,9 @@ impl Robot {
     /// # Errors
     /// It is no URDF, or a xacro, or names a package that is not given; with the line.
     pub(crate) fn load(path: &Path, options: &MeshOptions) -> Result<Self> {
-        let text = limits::read_to_string(path, MAX_XML_BYTES).map_err(|e| Error::io(path, &e))?;
-        let read = Reader { folder: path.parent().unwrap_or(Path::new("")), options, text: &text };
-        read.robot(path).map_err(|e| e.at(path.display()))
+        let text = xml::text_of(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        read(&text, path, folder, options).map_err(|e| e.at(path.display()))
     }
 
     /// Reads links and joints alone of the URDF at `path`.
@@ -125,7 +127,7 @@ impl Robot {
     /// The same of a URDF in `text`.
     pub(crate) fn joints_of(text: &str) -> Result<Self> {
         let options = MeshOptions { geometry: Geometry::None, ..MeshOptions::default() };
-        Reader { folder: Path::new(""), options: &options, text }.robot(Path::new(""))
+        read(text, Path::new(""), Path::new(""), &options)
     }
 
     /// The meshes that it names.
@@ -147,21 +149,26 @@ fn without_comments(text: &str) -> String {
     parts.fold(before, |kept, part| kept + part.split_once("-->").map_or("", |(_, after)| after))
 }
 
+/// The robot in `text`, whose meshes are beside `folder`.
+fn read(text: &str, path: &Path, folder: &Path, options: &MeshOptions) -> Result<Robot> {
+    let is_xacro = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xacro"))
+        || ["<xacro:", "\"${"].iter().any(|sign| without_comments(text).contains(sign));
+    if is_xacro {
+        let what = "it is a xacro, a program that writes a URDF; run it first: xacro robot.urdf.xacro > robot.urdf";
+        return Err(Error::failed(what));
+    }
+    let document = xml::parse(text)?;
+    Reader { folder, options, lines: Lines::of(&document) }.robot(&document)
+}
+
 struct Reader<'a> {
     folder: &'a Path,
     options: &'a MeshOptions,
-    text: &'a str,
+    lines: Lines,
 }
 
 impl Reader<'_> {
-    fn robot(&self, path: &Path) -> Result<Robot> {
-        let is_xacro = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xacro"))
-            || ["<xacro:", "\"${"].iter().any(|sign| without_comments(self.text).contains(sign));
-        if is_xacro {
-            let what = "it is a xacro, a program that writes a URDF; run it first: xacro robot.urdf.xacro > robot.urdf";
-            return Err(Error::failed(what));
-        }
-        let document = Document::parse(self.text).map_err(|e| failed!("not valid XML: {e}"))?;
+    fn robot(&self, document: &Document<'_>) -> Result<Robot> {
         let root = document.root_element();
         if root.tag_name().name() != "robot" {
             return Err(failed!("not a URDF: its root is <{}>, not <robot>", root.tag_name().name()));
@@ -173,12 +180,20 @@ impl Reader<'_> {
             return Err(Error::failed("it has no <link>"));
         }
         let is_tactile = |node: &Node<'_, '_>| node.children().any(|child| child.has_tag_name("tactile"));
-        let sensors = named("sensor").filter(is_tactile).map(|node| self.sensor(node)).collect::<Result<Vec<_>>>()?;
+        let (mut sensors, mut taxels) = (Vec::new(), 0);
+        for node in named("sensor").filter(is_tactile) {
+            let sensor = self.sensor(node)?;
+            taxels += sensor.taxels.len();
+            if taxels > MAX_TAXELS {
+                return Err(self.at(node, format!("its sensors have over {MAX_TAXELS} taxels; give fewer")));
+            }
+            sensors.push(sensor);
+        }
         Ok(Robot { links, joints, sensors })
     }
 
     fn line(&self, node: Node<'_, '_>) -> u32 {
-        node.document().text_pos_at(node.range().start).row
+        self.lines.line(node)
     }
 
     fn at(&self, node: Node<'_, '_>, what: impl Into<String>) -> Error {
@@ -234,7 +249,7 @@ impl Reader<'_> {
     fn joint(&self, node: Node<'_, '_>) -> Result<RobotJoint> {
         let link = |tag: &str| self.child(node, tag).and_then(|child| self.attribute(child, "link").map(str::to_owned));
         Ok(RobotJoint {
-            name: node.attribute("name").unwrap_or_default().to_owned(),
+            name: self.attribute(node, "name")?.to_owned(),
             parent: link("parent")?,
             child: link("child")?,
             parent_from_child: self.origin(node)?,
@@ -392,14 +407,8 @@ impl Reader<'_> {
     /// The file that `name` means.
     fn resolve(&self, node: Node<'_, '_>, name: &str) -> Result<PathBuf> {
         if let Some(rest) = name.strip_prefix("package://") {
-            let (package, rest) = rest.split_once('/').unwrap_or((rest, ""));
-            let folder = self.options.packages.get(package).ok_or_else(|| {
-                self.at(
-                    node,
-                    format!("`{name}` is in the package `{package}`; say where that is: --package {package}=FOLDER"),
-                )
-            })?;
-            return Ok(folder.join(rest));
+            return ros_packages::resolve(rest, &self.options.packages, &self.options.package_roots)
+                .map_err(|e| self.at(node, e.to_string()));
         }
         let plain = name.strip_prefix("file://").unwrap_or(name);
         if plain.contains("://") {

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::options::{MeshOptions, Up};
-use super::urdf;
+use super::urdf::{self, Linked};
 use super::urdf_file::Robot;
 use crate::author::recipe::Recipe;
 use crate::author::skin::{Authored, PlaceReport, author};
@@ -30,7 +30,7 @@ fn place(robot: &Robot, path: &Path, up: Up) -> Result<Authored> {
         ));
     }
     let first_of = first_ids(robot)?;
-    let (mut glb, _, nodes) = urdf::links(robot, up)?;
+    let Linked { mut glb, nodes, notes, .. } = urdf::links(robot, up)?;
     let mut used = BTreeSet::new();
     let (mut places, mut by_link) = (Vec::new(), BTreeMap::<&str, Vec<Taxel>>::new());
     for sensor in &robot.sensors {
@@ -67,16 +67,19 @@ fn place(robot: &Robot, path: &Path, up: Up) -> Result<Authored> {
         glb.taxels(&format!("{link} taxels"), nodes.get(*link).copied(), taxels, None);
     }
     let file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;
-    let made = author(file, &Recipe::none(), |_| {})?;
+    let mut made = author(file, &Recipe::none(), |_| {})?;
+    made.notes.extend(notes);
     Ok(Authored { places, ..made })
 }
 
 /// By channel, the id of index 0.
 fn first_ids(robot: &Robot) -> Result<BTreeMap<&str, u32>> {
     let mut lengths: Vec<(&str, u64)> = Vec::new();
+    let mut known: BTreeMap<&str, usize> = BTreeMap::new();
     for sensor in &robot.sensors {
         let length = sensor.taxels.iter().map(|taxel| u64::from(taxel.index) + 1).max().unwrap_or(0);
-        match lengths.iter_mut().find(|(channel, _)| *channel == sensor.channel) {
+        let index = *known.entry(&sensor.channel).or_insert(lengths.len());
+        match lengths.get_mut(index) {
             Some((_, known)) => *known = length.max(*known),
             None => lengths.push((&sensor.channel, length)),
         }

@@ -21,7 +21,8 @@ pub(super) struct MeshArguments {
     #[arg(long, value_name = "AXIS", help_heading = HEADING)]
     up: Option<UpWord>,
 
-    /// Where a package of a .urdf is, for its package://NAME/…; may be repeated.
+    /// Where a package of a .urdf is, for its package://NAME/…; may be repeated. Others are searched in the folders of
+    /// ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
     #[arg(long = "package", value_name = "NAME=FOLDER", help_heading = HEADING)]
     packages: Vec<String>,
 
@@ -90,7 +91,7 @@ impl MeshArguments {
             Some(GeometryWord::None) => Geometry::None,
             _ => Geometry::Visual,
         };
-        let mut options = MeshOptions::default();
+        let mut options = MeshOptions::default().with_ros_packages();
         (options.unit_m, options.up, options.packages, options.geometry) = (unit_m, up, packages, geometry);
         Ok(options)
     }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::model::TouchGrid;
 use crate::author::mesh::triangles::Triangles;
 use crate::error::{Error, Result, failed};
+use crate::limits::MAX_CELLS;
 
 /// Most vertices along one side.
 const MAX_SIDE: f64 = 4096.0;
@@ -17,6 +18,11 @@ pub(super) fn make(kind: &str, params: &[f64]) -> Result<Triangles> {
     };
     let grid =
         |x: f64, y: f64, fov_deg, gamma| Ok::<_, Error>(TouchGrid { size: [side(x)?, side(y)?], fov_deg, gamma });
+    if let &[x, y, ..] = params
+        && x * y > MAX_CELLS as f64
+    {
+        return Err(failed!("`params` has {x} × {y} vertices; give at most {MAX_CELLS}"));
+    }
     match (kind, params) {
         ("plate", &[x, y]) => Ok(plate(side(x)?, side(y)?)),
         ("wedge", &[x, y, fov_x, fov_y, gamma]) => Ok(wedge(&grid(x, y, [fov_x, fov_y], gamma)?)),
@@ -78,6 +84,7 @@ mod tests {
             let wedge = make("wedge", &[3.0, 5.0, 45.0, 30.0, gamma]).unwrap();
             assert!((0.3 * wedge.positions[index]).distance(DVec3::from_array(place)) < 1e-5, "{gamma}, {index}");
         }
+        assert!(make("plate", &[4000.0, 4000.0]).unwrap_err().to_string().contains("at most 1000000"));
         assert!(make("plate", &[3.0]).is_err() && make("plate", &[1.0, 3.0]).is_err());
         assert!(make("cone", &[3.0]).unwrap().positions.is_empty());
     }

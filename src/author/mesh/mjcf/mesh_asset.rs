@@ -9,9 +9,8 @@ use roxmltree::Node;
 use super::builtin;
 use super::document::{Defaults, numbers, three};
 use crate::author::mesh::formats;
-use crate::author::mesh::triangles::Triangles;
+use crate::author::mesh::triangles::{Triangles, whole};
 use crate::error::{Error, Result, failed};
-use crate::limits::{self, MAX_MESH_BYTES};
 
 /// The name of the asset `node` and its mesh, as it stands in a geom, m.
 pub(super) fn read(
@@ -66,38 +65,9 @@ pub(super) fn read(
 
 /// The mesh at `path`, with the vertices that MuJoCo has: those of an `.obj` in its order, of others each place once.
 fn of_file(path: &Path) -> Result<Triangles> {
-    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj")) {
-        return Ok(shared(&formats::load(path, None)?.0));
-    }
-    let text = limits::read_to_string(path, MAX_MESH_BYTES).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::failed("no such file"),
-        _ => Error::failed(e.to_string()),
-    })?;
-    let mut mesh = Triangles::default();
-    for (line, number) in text.lines().zip(1..) {
-        let wrong = || failed!("it is not a valid line of an .obj file").at(format!("line {number}"));
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let place: Option<Vec<f64>> = words.take(3).map(|word| word.parse().ok()).collect();
-                let place = place.filter(|place| place.len() == 3).ok_or_else(wrong)?;
-                mesh.positions.push(DVec3::from_slice(&place));
-            }
-            Some("f") => {
-                let count = mesh.positions.len() as i64;
-                // From 1 on, or back from the last one; what follows a slash is no place.
-                let index = |word: &str| -> Option<u32> {
-                    let index: i64 = word.split('/').next()?.parse().ok()?;
-                    u32::try_from(if index < 0 { count + index } else { index - 1 }).ok()
-                };
-                let corners: Option<Vec<u32>> = words.map(index).collect();
-                let corners = corners.filter(|corners| corners.len() >= 3).ok_or_else(wrong)?;
-                mesh.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
-            }
-            _ => {}
-        }
-    }
-    Ok(mesh)
+    let (mesh, _) = formats::load(path, None)?;
+    let is_obj = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj"));
+    Ok(if is_obj { mesh } else { shared(&mesh) })
 }
 
 /// The vertices that stand in the file itself, and the faces if there are any.
@@ -107,9 +77,12 @@ fn inline(node: Node<'_, '_>, text: &str) -> Result<Triangles> {
     if coordinates.len() % 3 != 0 || faces.len() % 3 != 0 {
         return Err(Error::failed("`vertex` and `face` have three numbers for each"));
     }
+    let corner =
+        |&number: &f64| whole(number).ok_or_else(|| failed!("`face` has vertex {number}; give its number, from 0 on"));
+    let corners = faces.iter().map(corner).collect::<Result<Vec<u32>>>()?;
     Ok(Triangles {
         positions: coordinates.chunks_exact(3).map(DVec3::from_slice).collect(),
-        triangles: faces.chunks_exact(3).map(|face| [face[0] as u32, face[1] as u32, face[2] as u32]).collect(),
+        triangles: corners.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect(),
     })
 }
 

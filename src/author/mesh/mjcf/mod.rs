@@ -8,6 +8,7 @@ mod builtin;
 mod document;
 mod mesh_asset;
 mod model;
+mod places;
 mod pose;
 mod ray;
 mod read;
@@ -18,14 +19,16 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 
 use self::model::{Geom, GeomShape, MjSensor, Model, SensorKind, TouchGrid};
+use self::places::{Places, Shape};
 use self::ray::{Exit, last_exit};
 use super::options::{Geometry, MeshOptions, Up, y_up_from};
 use super::shapes;
-use super::triangles::Triangles;
+use super::triangles::{Room, Triangles};
 use crate::author::recipe::Recipe;
 use crate::author::skin::{Authored, PlaceReport, author};
 use crate::body::{Glb, MAX_TAXEL_ID, Modality, Original, Taxel};
 use crate::error::{Error, Result, failed};
+use crate::limits::{MAX_RAY_TESTS, MAX_TAXELS};
 
 /// A ray that meets a surface flatter than this tells no area of it.
 const MIN_COSINE: f64 = 0.2;
@@ -56,11 +59,14 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
         return Err(Error::failed(what));
     }
     let mut skin = Skin::default();
+    let mut places = Places::of(model);
     let mut first_id = 0_u64;
     for sensor in &model.sensors {
-        let taxels =
-            place(model, sensor, first_id as u32, &mut skin).map_err(|e| e.at(format!("line {}", sensor.line)))?;
-        first_id += u64::from(taxels);
+        let at = |e: Error| e.at(format!("line {}", sensor.line));
+        first_id += u64::from(place(&mut places, sensor, first_id as u32, &mut skin).map_err(at)?);
+        if first_id > MAX_TAXELS as u64 {
+            return Err(at(failed!("its sensors have over {MAX_TAXELS} taxels; give fewer")));
+        }
         if first_id > u64::from(MAX_TAXEL_ID) + 1 {
             return Err(failed!("its taxels reach {first_id}, over the {MAX_TAXEL_ID} that a file can hold"));
         }
@@ -72,6 +78,7 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
     let y_up = y_up_from(options.up.unwrap_or(Up::Z));
     let mut nodes: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut room = Room::default();
     for (index, body) in model.bodies.iter().enumerate() {
         // Of the world only what has skin is of use.
         if index == 0 && !skin.by_body.contains_key(&0) {
@@ -82,6 +89,7 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
         let node = glb.placed_node(&body.name, parent, way);
         nodes.insert(index, node);
         let mesh = looks(model, &body.geoms, options.geometry, skin.shaped.contains(&index))?;
+        room.take(&mesh)?;
         if !mesh.triangles.is_empty() {
             glb.mesh(node, &body.name, &mesh.into_mesh_data(), Some(material), None);
         }
@@ -97,10 +105,11 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
 }
 
 /// Places the taxels of `sensor`, whose ids go on from `first_id`; gives how many ids are its own.
-fn place(model: &Model, sensor: &MjSensor, first_id: u32, skin: &mut Skin) -> Result<u32> {
+fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut Skin) -> Result<u32> {
+    let model = places.model;
     let (count, placed) = match &sensor.kind {
-        SensorKind::Tactile { geom, mesh } => on_vertices(model, sensor, geom, mesh)?,
-        SensorKind::TouchGrid { site, grid } => in_bins(model, sensor, site, grid)?,
+        SensorKind::Tactile { geom, mesh } => on_vertices(places, sensor, geom, mesh)?,
+        SensorKind::TouchGrid { site, grid } => in_bins(places, sensor, site, grid)?,
     };
     let mut links: BTreeMap<String, usize> = BTreeMap::new();
     let mut ids = Vec::new();
@@ -140,14 +149,12 @@ fn place(model: &Model, sensor: &MjSensor, first_id: u32, skin: &mut Skin) -> Re
 type PlacedTaxels = (u32, Vec<(u32, usize, Taxel)>);
 
 /// A taxel at each vertex of `mesh` on `geom`: it feels along the vertex's normal and has a third of the triangles around it.
-fn on_vertices(model: &Model, sensor: &MjSensor, geom: &str, mesh: &str) -> Result<PlacedTaxels> {
+fn on_vertices(places: &Places<'_>, sensor: &MjSensor, geom: &str, mesh: &str) -> Result<PlacedTaxels> {
     let unknown =
         |what: &str, name: &str| failed!("sensor `{}` names the {what} `{name}`, which is not there", sensor.name);
-    let found = model.bodies.iter().enumerate().find_map(|(index, body)| {
-        let geom = body.geoms.iter().find(|own| own.name == geom)?;
-        Some((index, geom))
-    });
-    let (body, own) = found.ok_or_else(|| unknown("geom", geom))?;
+    let model = places.model;
+    let &(body, index) = places.geoms.get(geom).ok_or_else(|| unknown("geom", geom))?;
+    let own = &model.bodies[body].geoms[index];
     let vertices = model.meshes.get(mesh).ok_or_else(|| unknown("mesh", mesh))?;
     if own.shape != GeomShape::Mesh(mesh.to_owned()) {
         return Err(failed!(
@@ -193,36 +200,33 @@ fn on_vertices(model: &Model, sensor: &MjSensor, geom: &str, mesh: &str) -> Resu
 }
 
 /// A taxel for each bin of `grid`, where its middle leaves the shapes that move with the site's body.
-fn in_bins(model: &Model, sensor: &MjSensor, site: &str, grid: &TouchGrid) -> Result<PlacedTaxels> {
-    let found = model.bodies.iter().enumerate().find_map(|(index, body)| {
-        let site = body.sites.iter().find(|own| own.name == site)?;
-        Some((index, site))
-    });
-    let (body, own) =
-        found.ok_or_else(|| failed!("sensor `{}` names the site `{site}`, which is not there", sensor.name))?;
+fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchGrid) -> Result<PlacedTaxels> {
+    let model = places.model;
+    let &(body, index) = places
+        .sites
+        .get(site)
+        .ok_or_else(|| failed!("sensor `{}` names the site `{site}`, which is not there", sensor.name))?;
+    let own = &model.bodies[body].sites[index];
     let world_from_site = model.bodies[body].world_from_body * own.body_from_site;
-    let rigid = rigid_root(model, body);
-    let shapes: Vec<(usize, &Geom, DAffine3)> = model
-        .bodies
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| rigid_root(model, *index) == rigid)
-        .flat_map(|(index, body)| {
-            body.geoms.iter().map(move |geom| (index, geom, body.world_from_body * geom.body_from_geom))
-        })
-        .filter(|(_, geom, _)| geom.collides)
-        .collect();
+    let shapes = places.shapes.get(&places.rigid[body]).map_or(&[][..], Vec::as_slice);
+    let tests: usize = shapes.iter().map(|shape| shape.mesh.map_or(1, |mesh| mesh.triangles.len())).sum();
+    places.ray_tests = places.ray_tests.saturating_add(tests.saturating_mul(grid.taxels() as usize));
+    if places.ray_tests > MAX_RAY_TESTS {
+        return Err(failed!(
+            "the bins of `{}` are compared with {tests} triangles each, over {MAX_RAY_TESTS} with those before; give it fewer \
+             bins, or a coarser mesh to collide with",
+            sensor.name
+        ));
+    }
     let mut placed = Vec::new();
     for index in 0..grid.taxels() {
         let [[a0, a1], [e0, e1]] = grid.bin(index);
         let direction = TouchGrid::direction((a0 + a1) / 2.0, (e0 + e1) / 2.0);
         let along = world_from_site.transform_vector3(direction);
         let from = world_from_site.translation;
-        let exits = shapes.iter().filter_map(|(body, geom, world_from_geom)| {
-            let geom_from_world = world_from_geom.inverse();
-            let mesh = if let GeomShape::Mesh(mesh) = &geom.shape { model.meshes.get(mesh) } else { None };
+        let exits = shapes.iter().filter_map(|Shape { body, geom, mesh, world_from_geom, geom_from_world }| {
             let (origin, along) = (geom_from_world.transform_point3(from), geom_from_world.transform_vector3(along));
-            let exit = last_exit(&geom.shape, mesh, origin, along)?;
+            let exit = last_exit(&geom.shape, *mesh, origin, along)?;
             Some((*body, Exit { normal: world_from_geom.transform_vector3(exit.normal), ..exit }))
         });
         let Some((on, exit)) = exits.max_by(|(_, a), (_, b)| a.distance_m.total_cmp(&b.distance_m)) else { continue };
@@ -244,14 +248,6 @@ fn in_bins(model: &Model, sensor: &MjSensor, site: &str, grid: &TouchGrid) -> Re
         return Err(failed!("sensor `{}`: from its site no shape of its body is seen along −z", sensor.name));
     }
     Ok((grid.taxels(), placed))
-}
-
-/// The body with which `body` moves as one.
-fn rigid_root(model: &Model, mut body: usize) -> usize {
-    while let (Some(parent), false) = (model.bodies[body].parent, model.bodies[body].has_joint) {
-        body = parent;
-    }
-    body
 }
 
 /// What of `geoms` is shown, in their body's frame; all if its colliding shapes have taxels.
@@ -282,6 +278,7 @@ fn looks(model: &Model, geoms: &[Geom], geometry: Geometry, is_shaped: bool) -> 
             }
             GeomShape::Other => continue,
         };
+        whole.check_room_for(&mesh)?;
         mesh.transform(&geom.body_from_geom);
         whole.extend(&mesh);
     }

@@ -1,20 +1,22 @@
 //! Reads an MJCF: bodies with their geometry, and the sensors that are skin.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
-use roxmltree::Node;
+use roxmltree::{Document, Node};
 
-use super::document::{Defaults, at, attribute, included, line, numbers, parse};
+use super::document::{Defaults, at, attribute, included, numbers, parse};
 use super::mesh_asset;
 use super::model::{Geom, GeomShape, MjBody, MjSensor, Model, SensorKind, Site, TouchGrid};
 use super::pose::{Angles, between};
+use crate::author::mesh::triangles::Room;
+use crate::author::mesh::xml::Lines;
 use crate::error::{Error, Result, failed};
+use crate::limits::MAX_CELLS;
 
 /// The plugin whose sensors are skin.
 const TOUCH_GRID: &str = "mujoco.sensor.touch_grid";
-/// Most taxels of a grid along one side.
-const MAX_SIDE: u32 = 4096;
 
 /// The model in the file at `path`.
 ///
@@ -25,15 +27,23 @@ pub(super) fn read(path: &Path) -> Result<Model> {
     Reader::read(&text, path.parent().unwrap_or(Path::new(""))).map_err(|e| e.at(path.display()))
 }
 
-struct Reader {
+struct Reader<'a> {
     defaults: Defaults,
     angles: Angles,
+    lines: Lines,
+    /// Of plugins, by name.
+    instances: HashMap<&'a str, Node<'a, 'a>>,
+    room: Room,
     model: Model,
 }
 
-impl Reader {
+impl<'a> Reader<'a> {
     fn read(text: &str, folder: &Path) -> Result<Model> {
         let document = parse(text)?;
+        Reader::model(&document, folder)
+    }
+
+    fn model(document: &'a Document<'a>, folder: &Path) -> Result<Model> {
         let root = document.root_element();
         if root.tag_name().name() != "mujoco" {
             return Err(failed!("not an MJCF: its root is <{}>, not <mujoco>", root.tag_name().name()));
@@ -44,12 +54,18 @@ impl Reader {
             in_degrees: compiler("angle") != Some("radian"),
             eulerseq: compiler("eulerseq").unwrap_or("xyz").to_owned(),
         };
-        let mut reader = Self { defaults: Defaults::read(root), angles, model: Model::default() };
+        let mut instances = HashMap::new();
+        for node in root.descendants().filter(|node| node.has_tag_name("instance")) {
+            node.attribute("name").map(|name| instances.entry(name).or_insert(node));
+        }
+        let (defaults, lines) = (Defaults::read(root)?, Lines::of(document));
+        let mut reader = Self { defaults, angles, lines, instances, room: Room::default(), model: Model::default() };
         let mesh_folder: PathBuf = folder.join(compiler("meshdir").or(compiler("assetdir")).unwrap_or(""));
         let strips = compiler("strippath") == Some("true");
         for node in sections("asset").flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
             let (name, mesh) =
                 mesh_asset::read(node, &reader.defaults, &mesh_folder, strips).map_err(|e| at(node, e))?;
+            reader.room.take(&mesh).map_err(|e| at(node, e))?;
             reader.model.meshes.insert(name, mesh);
         }
         reader.model.bodies.push(MjBody {
@@ -66,7 +82,7 @@ impl Reader {
         }
         for sensors in sections("sensor") {
             for node in sensors.children().filter(Node::is_element) {
-                reader.sensor(root, node)?;
+                reader.sensor(node)?;
             }
         }
         Ok(reader.model)
@@ -159,7 +175,7 @@ impl Reader {
         Ok(Geom { name, body_from_geom: body_from_node * pose, shape, collides })
     }
 
-    fn sensor(&mut self, root: Node<'_, '_>, node: Node<'_, '_>) -> Result<()> {
+    fn sensor(&mut self, node: Node<'_, '_>) -> Result<()> {
         let number = self.model.sensors.len() + 1;
         let name = node.attribute("name").map_or_else(|| format!("skin_{number}"), str::to_owned);
         let kind = match node.tag_name().name() {
@@ -171,55 +187,54 @@ impl Reader {
                 self.model.scalar_touches += 1;
                 return Ok(());
             }
-            "plugin" => match touch_grid(root, node)? {
+            "plugin" => match self.touch_grid(node)? {
                 Some(grid) => SensorKind::TouchGrid { site: attribute(node, "objname")?.to_owned(), grid },
                 None => return Ok(()),
             },
             _ => return Ok(()),
         };
-        self.model.sensors.push(MjSensor { name, line: line(node), kind });
+        self.model.sensors.push(MjSensor { name, line: self.lines.line(node), kind });
         Ok(())
     }
-}
 
-/// The grid of the sensor plugin `node`; `None` if it is another plugin.
-fn touch_grid(root: Node<'_, '_>, node: Node<'_, '_>) -> Result<Option<TouchGrid>> {
-    // What is said in the sensor itself, or in the instance that it names.
-    let instance = node.attribute("instance").and_then(|wanted| {
-        let all = root.descendants().filter(|node| node.has_tag_name("instance"));
-        all.into_iter().find(|node| node.attribute("name") == Some(wanted))
-    });
-    let plugin = node.attribute("plugin").or_else(|| instance?.parent()?.attribute("plugin"));
-    if plugin != Some(TOUCH_GRID) {
-        return Ok(None);
-    }
-    let configs = instance.unwrap_or(node);
-    let config = |key: &str| {
-        let found = configs.children().find(|node| node.has_tag_name("config") && node.attribute("key") == Some(key));
-        found.and_then(|node| node.attribute("value"))
-    };
-    let pair = |key: &str| {
-        let text = config(key).ok_or_else(|| at(node, failed!("the touch grid has no <config key=\"{key}\">")))?;
-        match numbers(node, key, text)?[..] {
-            [a, b] if a > 0.0 && b > 0.0 => Ok([a, b]),
-            _ => Err(at(node, failed!("`{key}` is `{text}`; write two numbers over 0"))),
+    /// The grid of the sensor plugin `node`; `None` if it is another plugin.
+    fn touch_grid(&self, node: Node<'_, '_>) -> Result<Option<TouchGrid>> {
+        // What is said in the sensor itself, or in the instance that it names.
+        let instance = node.attribute("instance").and_then(|wanted| self.instances.get(wanted).copied());
+        let plugin = node.attribute("plugin").or_else(|| instance?.parent()?.attribute("plugin"));
+        if plugin != Some(TOUCH_GRID) {
+            return Ok(None);
         }
-    };
-    let size = pair("size")?.map(|side| side as u32);
-    if size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
-        return Err(at(
-            node,
-            failed!("a touch grid of {} × {} taxels; give it 1 to {MAX_SIDE} each way", size[0], size[1]),
-        ));
+        let configs = instance.unwrap_or(node);
+        let config = |key: &str| {
+            let found =
+                configs.children().find(|node| node.has_tag_name("config") && node.attribute("key") == Some(key));
+            found.and_then(|node| node.attribute("value"))
+        };
+        let pair = |key: &str| {
+            let text = config(key).ok_or_else(|| at(node, failed!("the touch grid has no <config key=\"{key}\">")))?;
+            match numbers(node, key, text)?[..] {
+                [a, b] if a > 0.0 && b > 0.0 => Ok([a, b]),
+                _ => Err(at(node, failed!("`{key}` is `{text}`; write two numbers over 0"))),
+            }
+        };
+        let sides = pair("size")?;
+        if sides.iter().any(|side| side.fract() != 0.0) || sides[0] * sides[1] > MAX_CELLS as f64 {
+            let [columns, rows] = sides;
+            let what =
+                failed!("a touch grid of {columns} × {rows} taxels; give it whole numbers, and at most {MAX_CELLS}");
+            return Err(at(node, what));
+        }
+        let size = sides.map(|side| side as u32);
+        let fov_deg = pair("fov")?;
+        if fov_deg[0] > 180.0 || fov_deg[1] > 90.0 {
+            return Err(at(
+                node,
+                failed!("a field of view of {} and {} degrees; at most 180 and 90", fov_deg[0], fov_deg[1]),
+            ));
+        }
+        let gamma = config("gamma").map_or(Ok(Vec::new()), |text| numbers(node, "gamma", text))?;
+        let gamma = gamma.first().copied().unwrap_or(0.0).clamp(0.0, 1.0);
+        Ok(Some(TouchGrid { size, fov_deg, gamma }))
     }
-    let fov_deg = pair("fov")?;
-    if fov_deg[0] > 180.0 || fov_deg[1] > 90.0 {
-        return Err(at(
-            node,
-            failed!("a field of view of {} and {} degrees; at most 180 and 90", fov_deg[0], fov_deg[1]),
-        ));
-    }
-    let gamma = config("gamma").map_or(Ok(Vec::new()), |text| numbers(node, "gamma", text))?;
-    let gamma = gamma.first().copied().unwrap_or(0.0).clamp(0.0, 1.0);
-    Ok(Some(TouchGrid { size, fov_deg, gamma }))
 }
