@@ -64,7 +64,7 @@ limits! {
     MAX_TAXEL_LINE_BYTES: u64 = 64 << 10;
 
     /// Elements of an XML file within each other
-    MAX_XML_DEPTH: usize = 256;
+    MAX_XML_DEPTH: usize = 500;
     /// Nodes of an XML file: elements, and texts between them
     MAX_XML_NODES: u32 = 20_000_000;
     /// Attributes of an XML element

@@ -393,6 +393,42 @@ fn the_icubs_files_are_a_body_without_a_mesh() {
     assert!(somatic::Engine::new(&made.body, somatic::Options::default()).is_ok());
 }
 
+#[test]
+fn what_is_deep_or_claims_a_lot_is_one_line_in_no_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let mjcf = |depth: usize| {
+        format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(depth), "</body>".repeat(depth))
+    };
+    let collada = |depth: usize| format!("<COLLADA>{}{}</COLLADA>", "<node>".repeat(depth), "</node>".repeat(depth));
+    let urdf = |depth: usize| format!("<robot>{}{}</robot>", "<link>".repeat(depth), "</link>".repeat(depth));
+    let skin = |path: &Path| author_mjcf_skin(path, &options()).unwrap_err().to_string();
+    // Also where there is little stack.
+    let small = std::thread::Builder::new().stack_size(512 << 10);
+    std::thread::scope(|scope| {
+        let work = || {
+            assert!(skin(&write("a.xml", &mjcf(490))).contains("neither <tactile> nor touch_grid"));
+            assert!(skin(&write("a.xml", &mjcf(100_000))).contains("nested over 500 deep"));
+            assert!(why(&write("a.dae", &collada(490)), &options()).contains("no <scene>"));
+            assert!(why(&write("a.dae", &collada(100_000)), &options()).contains("nested over 500 deep"));
+            assert!(why(&write("a.urdf", &urdf(490)), &options()).contains("no `name`"));
+            assert!(why(&write("a.urdf", &urdf(100_000)), &options()).contains("nested over 500 deep"));
+        };
+        small.spawn_scoped(scope, work).unwrap().join().unwrap();
+    });
+    let grid = "<mujoco><worldbody><body><geom size=\"1\"/><site name=\"s\"/></body></worldbody><sensor>\
+                <plugin plugin=\"mujoco.sensor.touch_grid\" objname=\"s\"><config key=\"size\" value=\"4000 4000\"/>\
+                <config key=\"fov\" value=\"45 45\"/></plugin></sensor></mujoco>";
+    assert!(skin(&write("a.xml", grid)).contains("a touch grid of 4000 × 4000 taxels"));
+    assert!(
+        skin(&write("a.xml", &grid.replace("4000 4000", "2.9 3"))).contains("2.9 × 3 taxels; give it whole numbers")
+    );
+}
+
 /// A model for MuJoCo without files of its own.
 fn mjcf() -> String {
     let text = include_str!("../mujoco/skin.xml");

@@ -78,7 +78,7 @@ impl<'a> Reader<'a> {
             sites: Vec::new(),
         });
         for world in sections("worldbody") {
-            reader.children(world, 0, DAffine3::IDENTITY)?;
+            reader.bodies(world)?;
         }
         for sensors in sections("sensor") {
             for node in sensors.children().filter(Node::is_element) {
@@ -88,14 +88,20 @@ impl<'a> Reader<'a> {
         Ok(reader.model)
     }
 
-    /// What stands in `node`, a body or a frame in the body `body`.
-    fn children(&mut self, node: Node<'_, '_>, body: usize, body_from_node: DAffine3) -> Result<()> {
-        for child in node.children().filter(Node::is_element) {
+    /// What stands in `world`, the body 0, in the order of the file. However deep bodies are, no stack grows.
+    fn bodies(&mut self, world: Node<'_, '_>) -> Result<()> {
+        let mut open = vec![(world.children(), 0, DAffine3::IDENTITY)];
+        while let Some((children, body, body_from_node)) = open.last_mut() {
+            let (body, body_from_node) = (*body, *body_from_node);
+            let Some(child) = children.next() else {
+                open.pop();
+                continue;
+            };
             match child.tag_name().name() {
-                "body" => self.body(child, body, body_from_node)?,
+                "body" => open.push((child.children(), self.body(child, body, body_from_node)?, DAffine3::IDENTITY)),
                 "frame" => {
                     let frame = self.defaults.pose(child, &self.angles)?;
-                    self.children(child, body, body_from_node * frame)?;
+                    open.push((child.children(), body, body_from_node * frame));
                 }
                 "geom" => {
                     let geom = self.geom(child, body_from_node)?;
@@ -120,7 +126,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn body(&mut self, node: Node<'_, '_>, parent: usize, parent_from_node: DAffine3) -> Result<()> {
+    /// Adds the body `node`, and gives its number.
+    fn body(&mut self, node: Node<'_, '_>, parent: usize, parent_from_node: DAffine3) -> Result<usize> {
         let parent_from_body = parent_from_node * self.defaults.pose(node, &self.angles)?;
         let number = self.model.bodies.len();
         self.model.bodies.push(MjBody {
@@ -132,7 +139,7 @@ impl<'a> Reader<'a> {
             geoms: Vec::new(),
             sites: Vec::new(),
         });
-        self.children(node, number, DAffine3::IDENTITY)
+        Ok(number)
     }
 
     /// The pose of a geom or site in what is around it, and half its length where it is between two ends.
