@@ -9,7 +9,9 @@ these are in both; the axes are those of the file and the unit is the metre.
 """
 
 import importlib.metadata
+import io
 import json
+import re
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -41,9 +43,10 @@ def theirs(path):
         import collada
         from trimesh.exchange.dae import load_collada
 
-        loaded = load_collada(file)
-        file.seek(0)
-        metres = collada.Collada(file, ignore=[collada.common.DaeError]).assetInfo.unitmeter
+        # pycollada leaves out what has a material whose texture is missing: materials are no shape.
+        text = re.sub(rb"<bind_material>.*?</bind_material>", b"", file.read(), flags=re.DOTALL)
+        loaded = load_collada(io.BytesIO(text))
+        metres = collada.Collada(io.BytesIO(text), ignore=[collada.common.DaeError]).assetInfo.unitmeter or 1.0
     found = [np.zeros((0, 3, 3))]
     for node in loaded["graph"]:
         mesh = loaded["geometry"][node["geometry"]]
