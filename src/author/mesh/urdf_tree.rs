@@ -47,7 +47,7 @@ pub(crate) fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint
         return Err(Error::failed("its joints go round in a ring; a link cannot be above itself"));
     }
     placed.sort_unstable();
-    followed(robot)?;
+    drivers(robot, false)?;
     Ok(placed.into_iter().map(|(_, index, _)| (&robot.links[index], above[index])).collect())
 }
 
@@ -71,6 +71,11 @@ impl RobotJoint {
 /// # Errors
 /// Two joints have one name, or one mimics itself, or what does not move.
 pub(crate) fn followed(robot: &Robot) -> Result<Vec<Driver>> {
+    drivers(robot, true)
+}
+
+/// The same; unless `all_move`, a joint that mimics what is not there stands for itself, as in authoring nothing moves.
+fn drivers(robot: &Robot, all_move: bool) -> Result<Vec<Driver>> {
     let at = |joint: &RobotJoint, what: String| Error::failed(what).at(format!("line {}", joint.line));
     let mut by_name = BTreeMap::new();
     for (index, joint) in robot.joints.iter().enumerate() {
@@ -88,19 +93,28 @@ pub(crate) fn followed(robot: &Robot) -> Result<Vec<Driver>> {
                 break known;
             }
             let joint = &robot.joints[index];
+            let own = Driver { joint: index, multiplier: 1.0, offset: 0.0 };
             let Some(mimic) = joint.mimic.as_ref().filter(|_| joint.is_driven()) else {
-                let own = Driver { joint: index, multiplier: 1.0, offset: 0.0 };
                 drivers[index] = Some(own);
                 break own;
             };
             if chain.len() > robot.joints.len() {
-                return Err(at(joint, format!("`{}` mimics itself", robot.joints[first].name)));
+                return Err(at(joint, format!("`{}` mimics itself", joint.name)));
             }
-            chain.push((index, mimic));
-            let other = by_name.get(mimic.joint.as_str()).filter(|&&other| robot.joints[other].is_driven());
-            index = *other.ok_or_else(|| {
-                at(joint, format!("`{}` mimics `{}`, which is no joint that moves", joint.name, mimic.joint))
-            })?;
+            match by_name.get(mimic.joint.as_str()).filter(|&&other| robot.joints[other].is_driven()) {
+                Some(&other) => {
+                    chain.push((index, mimic));
+                    index = other;
+                }
+                None if all_move => {
+                    let what = format!("`{}` mimics `{}`, which is no joint that moves", joint.name, mimic.joint);
+                    return Err(at(joint, what));
+                }
+                None => {
+                    drivers[index] = Some(own);
+                    break own;
+                }
+            }
         };
         for (index, mimic) in chain.into_iter().rev() {
             driver = Driver {
@@ -180,6 +194,9 @@ mod tests {
             let why = names(&robot(last)).unwrap_err().to_string();
             assert!(why.contains("line ") && why.ends_with("mimics itself"), "{why}");
         }
-        assert!(names(&robot("no")).unwrap_err().to_string().contains("mimics `no`, which is no joint that moves"));
+        let stray = robot("no");
+        assert_eq!(names(&stray).unwrap().len(), count + 1);
+        let why = followed(&Robot::joints_of(&stray).unwrap()).unwrap_err().to_string();
+        assert!(why.ends_with("mimics `no`, which is no joint that moves"), "{why}");
     }
 }
