@@ -176,11 +176,14 @@ impl Connection {
 
     /// The messages that have come, at most so many at once that others have their turn; whether there may be more.
     pub(super) fn receive(&mut self, mut each: impl FnMut(&mut Self, String)) -> bool {
+        if let State::Greeting(socket) | State::Viewing(socket, _) = &mut self.state {
+            socket.begin_turn();
+        }
         for _ in 0..MESSAGES_AT_ONCE {
             let (State::Greeting(socket) | State::Viewing(socket, _)) = &mut self.state else { return false };
             match socket.receive() {
                 Received::Text(text) => each(self, text),
-                Received::Nothing => return false,
+                Received::Nothing => return socket.has_more(),
                 Received::Wrong(reason, text) => self.close(reason, text),
                 Received::Gone => {
                     // What answers a close frame is sent.

@@ -29,6 +29,8 @@ const GONE_TIME: Duration = Duration::from_secs(120);
 const MAX_WAITING_BYTES: usize = 4 << 20;
 /// Events of a message at most.
 const EVENTS_AT_ONCE: usize = 256;
+/// Connections that are taken or refused before those that are there have their turn.
+const ACCEPTED_AT_ONCE: usize = 64;
 /// How often a connection that waits to be accepted is looked for.
 const ACCEPT_PERIOD: Duration = Duration::from_millis(50);
 
@@ -149,7 +151,7 @@ impl Serving {
     /// Takes new connections. Where there is no room, one that says nothing goes; where all are viewers, the new one.
     fn accept(&mut self, now: Instant) {
         self.is_full = false;
-        loop {
+        for _ in 0..ACCEPTED_AT_ONCE {
             if self.next.is_none() {
                 match self.listener.accept() {
                     Ok((stream, _)) => self.next = Some(stream),

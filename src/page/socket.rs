@@ -1,7 +1,7 @@
 //! A WebSocket that never blocks and holds little: large messages go out in pieces, each when the one before has gone.
 
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Read as _};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
 
 use tungstenite::error::{CapacityError, ProtocolError};
@@ -15,6 +15,10 @@ use super::message::MAX_MESSAGE_BYTES;
 
 /// The most bytes that are handed to the system at once.
 const PIECE_BYTES: usize = 64 << 10;
+
+/// The most bytes that one connection is read in its turn. What matters is bytes and not messages: whoever sends nothing but pings, or
+/// empty parts of a message that never ends, would otherwise keep the server to itself.
+const BYTES_AT_ONCE: usize = 16 << 10;
 
 /// Why the server ends a connection, as the protocol numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,11 +57,40 @@ pub(super) type SharedBytes = Bytes;
 /// A WebSocket and what waits to be sent.
 #[derive(Debug)]
 pub(super) struct Socket {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<InTurns>,
     waiting: VecDeque<Waiting>,
     waiting_bytes: usize,
     /// Whether the system takes nothing at present.
     is_blocked: bool,
+}
+
+/// A stream that is read up to [`BYTES_AT_ONCE`] in a turn; beyond, it seems to have nothing more.
+#[derive(Debug)]
+struct InTurns {
+    stream: TcpStream,
+    left: usize,
+}
+
+impl Read for InTurns {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let room = to.len().min(self.left);
+        if room == 0 {
+            return Err(ErrorKind::WouldBlock.into());
+        }
+        let count = self.stream.read(&mut to[..room])?;
+        self.left -= count;
+        Ok(count)
+    }
+}
+
+impl Write for InTurns {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
 }
 
 #[derive(Debug)]
@@ -81,6 +114,7 @@ impl Socket {
             .write_buffer_size(0)
             .max_message_size(Some(MAX_MESSAGE_BYTES))
             .max_frame_size(Some(MAX_MESSAGE_BYTES));
+        let stream = InTurns { stream, left: BYTES_AT_ONCE };
         Self {
             socket: WebSocket::from_partially_read(stream, received, Role::Server, Some(config)),
             waiting: VecDeque::new(),
@@ -90,7 +124,7 @@ impl Socket {
     }
 
     pub(super) fn stream(&self) -> &TcpStream {
-        self.socket.get_ref()
+        &self.socket.get_ref().stream
     }
 
     /// Whether everything has been handed to the system.
@@ -154,7 +188,17 @@ impl Socket {
         }
     }
 
-    /// The next message.
+    /// Begins its turn of being read.
+    pub(super) fn begin_turn(&mut self) {
+        self.socket.get_mut().left = BYTES_AT_ONCE;
+    }
+
+    /// Whether its turn ended before everything was read.
+    pub(super) fn has_more(&self) -> bool {
+        self.socket.get_ref().left == 0
+    }
+
+    /// The next message of this turn.
     pub(super) fn receive(&mut self) -> Received {
         loop {
             return match self.socket.read() {
@@ -193,7 +237,7 @@ impl Socket {
 
     /// Its connection, for its last moments.
     pub(super) fn into_stream(self) -> TcpStream {
-        self.socket.into_inner()
+        self.socket.into_inner().stream
     }
 }
 

@@ -3,6 +3,9 @@
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -423,4 +426,98 @@ fn an_address_for_others_needs_a_name() {
     let run = Run::start(&["--allow-host", "robot.lan"]);
     assert!(run.socket("robot.lan:1", Some("http://robot.lan:1")).is_ok());
     assert_eq!(run.socket("robot.lam:1", Some("http://robot.lam:1")).err(), Some(421));
+}
+
+/// A masked frame of a WebSocket, as clients send them; `mask` is zero.
+fn client_frame(first: u8, bytes: &[u8]) -> Vec<u8> {
+    assert!(bytes.len() < 126);
+    [&[first, 0x80 | bytes.len() as u8, 0, 0, 0, 0], bytes].concat()
+}
+
+/// Connections that want to keep the server to themselves: with pings, with a message that never ends, with half requests, and by
+/// never reading; until `stop`.
+fn attack(run: &Run, stop: &Arc<AtomicBool>) -> Vec<JoinHandle<()>> {
+    const PING: u8 = 0x89;
+    const TEXT_BEGINS: u8 = 0x01;
+    const GOES_ON: u8 = 0x00;
+    let floods = [
+        (Vec::new(), client_frame(PING, b"")),
+        (Vec::new(), client_frame(PING, &[b'x'; 100])),
+        (Vec::new(), client_frame(PING, b"")),
+        (client_frame(TEXT_BEGINS, b"{"), client_frame(GOES_ON, b"")),
+    ];
+    let mut threads = Vec::new();
+    let mut spawn = |attack: Box<dyn FnMut() + Send>| {
+        let stop = Arc::clone(stop);
+        let mut attack = attack;
+        threads.push(std::thread::spawn(move || {
+            while !stop.load(Ordering::Relaxed) {
+                attack();
+            }
+        }));
+    };
+    for (begin, again) in floods {
+        let (port, host) = (run.port, run.host());
+        spawn(Box::new(move || {
+            // As soon as it is shut out it comes again.
+            let Ok(mut stream) = TcpStream::connect(("127.0.0.1", port)) else { return };
+            stream.set_write_timeout(Some(Duration::from_millis(200))).unwrap();
+            let upgrade = format!(
+                "GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+                 Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+            );
+            let many = again.repeat(1000);
+            if stream.write_all(upgrade.as_bytes()).and_then(|()| stream.write_all(&begin)).is_ok() {
+                // It reads nothing of what answers it.
+                while stream.write_all(&many).is_ok() {}
+            }
+        }));
+    }
+    let port = run.port;
+    spawn(Box::new(move || {
+        let Ok(mut stream) = TcpStream::connect(("127.0.0.1", port)) else { return };
+        let _ = stream.write_all(b"GET / HTTP/1.1\r\nHo");
+        std::thread::sleep(Duration::from_millis(20));
+    }));
+    threads
+}
+
+#[test]
+fn a_run_and_a_view_end_when_told_whatever_viewers_do() {
+    let view = ["view", "--listen", "127.0.0.1:0", "--backend", "cpu", "--quiet"];
+    for mut run in [Run::start(&[]), Run::of(&view)] {
+        let stop = Arc::new(AtomicBool::new(false));
+        let attackers = attack(&run, &stop);
+        let deaf = run.viewer();
+        std::thread::sleep(Duration::from_millis(500));
+        // Who has the token is served meanwhile.
+        let begin = Instant::now();
+        let mut viewer = run.viewer();
+        viewer.binary();
+        viewer.frame();
+        let served = begin.elapsed();
+        let begin = Instant::now();
+        Command::new("kill").args(["-TERM", &run.child.id().to_string()]).status().unwrap();
+        assert_eq!(code_of(&mut run.child), Some(0));
+        let ended = begin.elapsed();
+        eprintln!("served after {} ms, ended after {} ms", served.as_millis(), ended.as_millis());
+        // Half of it on an idle machine.
+        assert!(served < Duration::from_secs(5) && ended < Duration::from_secs(2), "{served:?}, {ended:?}");
+        stop.store(true, Ordering::Relaxed);
+        attackers.into_iter().for_each(|thread| thread.join().unwrap());
+        drop((viewer, deaf));
+    }
+}
+
+#[test]
+fn pings_do_not_stand_in_for_a_hello() {
+    let run = Run::start(&[]);
+    let mut socket = run.own_socket();
+    let begin = Instant::now();
+    // It is shut out after two seconds, whatever it sends.
+    while socket.get_mut().write_all(&client_frame(0x89, b"")).is_ok() {
+        assert!(begin.elapsed() < Duration::from_secs(6), "it is still let in");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(begin.elapsed() > Duration::from_millis(1500), "{:?}", begin.elapsed());
 }

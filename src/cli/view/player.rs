@@ -15,6 +15,8 @@ use super::timeline::Timeline;
 
 /// The longest wait for a request, so that Ctrl-C is seen.
 const MAX_WAIT: Duration = Duration::from_millis(50);
+/// Requests that are answered before the next frame, and before a look at whether to end.
+const REQUESTS_AT_ONCE: usize = 256;
 
 /// A recording being played.
 pub(super) struct Player {
@@ -84,7 +86,7 @@ impl Player {
                 Ok((viewer, request)) => {
                     self.answer(viewer, request);
                     // A slider sends many: the last one counts.
-                    while let Ok((viewer, request)) = requests.try_recv() {
+                    for (viewer, request) in requests.try_iter().take(REQUESTS_AT_ONCE) {
                         self.answer(viewer, request);
                     }
                 }
