@@ -6,6 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* For sketches in C++, such as Arduino's: the functions are C. */
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Channels of a board; fewer need less memory. */
 #ifndef SOMATIC_CHANNELS
 #define SOMATIC_CHANNELS 256
@@ -65,5 +70,9 @@ struct somatic_ear {
 /* Takes one byte from the line; 1 when it ends a whole command, which is then in `command`. A command of a kind that
  * this version does not know is given, too, so that it can be answered. */
 int somatic_hear(struct somatic_ear *ear, uint8_t byte, struct somatic_command *command);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

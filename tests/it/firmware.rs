@@ -125,3 +125,38 @@ fn frames_from_c_are_what_rust_reads() {
         assert_eq!(decoded(&unhex(said)), std::slice::from_ref(packet));
     }
 }
+
+#[test]
+fn a_sketch_in_cpp_links_with_it() {
+    let Some(c) = compiler() else { return };
+    let runs = |name: &&str| Process::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
+    let Some(cpp) = ["g++", "c++", "clang++"].into_iter().find(runs) else {
+        return skip("COMPILER", "no C++ compiler: a sketch is not linked");
+    };
+    let (folder, firmware) = (tempfile::tempdir().unwrap(), root().join("examples/firmware"));
+    let sketch = r#"
+        #include "somatic_wire.h"
+        int main() {
+            uint8_t line[SOMATIC_LINE];
+            somatic_head head = {1, 1, 0, 0};
+            uint16_t values[4] = {1, 2, 3, 4};
+            somatic_ear ear = {};
+            somatic_command command;
+            return somatic_frame(line, &head, 10, values, 4) > 0 && somatic_hear(&ear, 0, &command) == 0 ? 0 : 1;
+        }"#;
+    std::fs::write(folder.path().join("sketch.cpp"), sketch).unwrap();
+    let compile = |with: &str, arguments: &[&str]| {
+        let output = Process::new(with)
+            .args(["-Wall", "-Wextra", "-Werror", "-I"])
+            .arg(&firmware)
+            .args(arguments)
+            .current_dir(folder.path())
+            .output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let source = firmware.join("somatic_wire.c");
+    compile(c, &["-std=c99", "-c", source.to_str().unwrap(), "-o", "wire.o"]);
+    compile(cpp, &["-std=c++11", "sketch.cpp", "wire.o", "-o", "sketch"]);
+    assert!(Process::new(folder.path().join("sketch")).status().unwrap().success());
+}
