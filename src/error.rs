@@ -58,6 +58,12 @@ impl Error {
         Self::new(Kind::NoAdapter, what.into())
     }
 
+    /// The same as a usage error: where a file says what is asked for, its mistakes are those of who asks.
+    #[must_use]
+    pub fn into_usage(self) -> Self {
+        Self { kind: Kind::Usage, ..self }
+    }
+
     /// An operation on the file at `path` failed in the operating system.
     #[must_use]
     pub fn io(path: impl AsRef<Path>, error: &io::Error) -> Self {

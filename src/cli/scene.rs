@@ -40,7 +40,7 @@ use super::ports::LineFlags;
 /// its name; paths in a file are relative to that file. Flags come before keys.
 #[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-#[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do; docs/scenes.md")]
+#[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do")]
 pub(super) struct RunOptions {
     /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
     /// hand].
@@ -131,8 +131,7 @@ pub(super) struct RunOptions {
     #[serde(rename = "in")]
     pub(super) in_link: Option<String>,
 
-    /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing;
-    /// docs/robots.md].
+    /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing].
     #[arg(long, help_heading = COMPUTED, value_name = "M")]
     #[serde(rename = "contact_tolerance_m")]
     pub(super) contact_tolerance: Option<f64>,
@@ -232,7 +231,7 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = LIVE)]
     pub(super) strict: bool,
 
-    /// Which taxel is on which channel of which board, a TOML file; docs/wire.md [default: the boards, one per port,
+    /// Which taxel is on which channel of which board, a TOML file as `somatic board --help` shows [default: the boards, one per port,
     /// share the taxels in ascending order of their ids].
     #[arg(long, help_heading = LIVE, value_name = "FILE")]
     pub(super) wiring: Option<PathBuf>,
@@ -327,7 +326,7 @@ impl RunOptions {
     /// What the scene file at `path` asks for, its paths made relative to where we are.
     fn load(path: &Path) -> Result<Self> {
         let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
-        let mut asked: Self = parse_toml(&text).map_err(|e| e.at(path.display()))?;
+        let mut asked: Self = parse_toml(&text).map_err(|e| e.into_usage().at(path.display()))?;
         asked.check_accuracy().map_err(|(key, e)| Accuracy::placed(&text, key, e).at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let there = |file: &Path| folder.join(file).display().to_string();

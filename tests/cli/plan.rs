@@ -50,12 +50,46 @@ fn what_a_scene_gets_wrong_is_one_line_with_line_and_column() {
         ("filter_window = \"5..2mm\"", "line 1, column 17", "lets nothing pass"),
         ("body = \"hand", "line 1", "basic string"),
     ] {
-        let line = fails(1, &["run", &scene(folder.path(), text)]);
+        let line = fails(2, &["run", &scene(folder.path(), text)]);
         assert!(line.contains(place) && line.contains(what) && line.lines().count() == 1, "{text}: {line}");
     }
     assert!(fails(2, &["run", &scene(folder.path(), "max_age_s = -1")]).contains("scene.toml"));
     assert!(fails(1, &["run", "no/such.toml"]).contains("no such file"));
     assert!(fails(2, &["run", &scene(folder.path(), "fields = \"hand/plam\"")]).contains("did you mean `hand/palm`"));
+}
+
+/// One mistake, by flag and by key, ends with one exit code.
+#[test]
+fn a_mistake_is_wrong_usage_whether_by_flag_or_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (flags, key) in [
+        ("--sorce -", "sorce = \"-\""),
+        ("--source seril:a", "source = \"seril:a\""),
+        ("--sink jsn:a", "sink = \"jsn:a\""),
+        ("--outputs centriod", "outputs = [\"centriod\"]"),
+        ("--fields hand/plam", "fields = \"hand/plam\""),
+        ("--backend cuda", "backend = \"cuda\""),
+        ("--batch 0", "batch = 0"),
+        ("--batch x", "batch = \"x\""),
+        ("--speed 0", "speed = 0"),
+        ("--speed x", "speed = \"x\""),
+        ("--max-age -1", "max_age_s = -1"),
+        ("--max-gap x", "max_gap_s = \"x\""),
+        ("--letters chnage", "letters = \"chnage\""),
+        ("--signal log", "signal = \"log\""),
+        ("--coordinates wrld", "coordinates = \"wrld\""),
+        ("--filter-window 5..2mm", "filter_window = \"5..2mm\""),
+        ("--filter-by x", "filter_by = \"x\""),
+        ("--record frmes", "record = \"frmes\""),
+        ("--in nowhere --outputs position", "in = \"nowhere\"\noutputs = \"position\""),
+        ("--arithmetic f16", "[accuracy]\narithmetic = \"f16\""),
+        ("--charts x", "[accuracy]\ncharts = \"x\""),
+    ] {
+        let words: Vec<&str> = flags.split(' ').collect();
+        fails(2, &[&["run"][..], &words].concat());
+        let said = fails(2, &["run", &scene(folder.path(), key)]);
+        assert_eq!(said.lines().count(), 1, "{key}: {said}");
+    }
 }
 
 #[test]

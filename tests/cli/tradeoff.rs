@@ -126,7 +126,7 @@ fn contradictions_are_found_where_they_stand() {
         ("[accuracy]\ncharts = \"geodesik\"", "line 2, column 10", "did you mean `geodesic`?"),
         ("[accuracy]\ncentriod = \"1 mm\"", "line 2, column 1", "did you mean `centroid`?"),
     ] {
-        let line = fails(1, &["run", &scene(folder.path(), text)]);
+        let line = fails(2, &["run", &scene(folder.path(), text)]);
         assert!(line.contains(place) && line.contains(what) && line.lines().count() == 1, "{text}: {line}");
     }
     assert!(fails(2, &["tradeoff", "--write", "--within", "1 mm"]).contains("name one"));

@@ -201,7 +201,7 @@ impl Accuracy {
         }
         let keys = toml::from_str(text).map_or_else(|_| BTreeMap::new(), |keys: Keys| keys.accuracy);
         match keys.keys().find(|known| known.get_ref() == key) {
-            Some(known) => Error::failed(error.to_string()).at(place_in(text, known.span().start)),
+            Some(known) => Error::usage(error.to_string()).at(place_in(text, known.span().start)),
             None => error,
         }
     }
