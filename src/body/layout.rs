@@ -109,8 +109,8 @@ impl FieldSpec {
         if let Some(version) = version.filter(|&v| v > u64::from(VERSION)) {
             return Err(bad(format!("layout version {version} is newer than this program; update it")));
         }
-        let json: FieldJson = serde_json::from_str(text)
-            .map_err(|e| bad(format!("its field JSON is not as docs/layout.md has it: {e}")))?;
+        let json: FieldJson =
+            serde_json::from_str(text).map_err(|e| bad(format!("its field JSON is not that of a field: {e}")))?;
         if json.name.is_empty() {
             return Err(bad("a field has an empty name; give it one".into()));
         }

@@ -131,7 +131,8 @@ fn field_text(index: usize, node: &json::Node) -> Result<Option<String>> {
         Some(serde_json::Value::String(text)) => Ok(Some(text.clone())),
         Some(_) => {
             let name = node.name.clone().unwrap_or_else(|| format!("node_{index}"));
-            Err(failed!("`{FIELD_KEY}` should be one string; docs/layout.md says what is in it")
+            let example = r#"{"version":1,"name":"palm","members":{"1":[1]}}"#;
+            Err(failed!("`{FIELD_KEY}` should be one string, a field as JSON, such as {example}")
                 .at(format!("field node `{name}`")))
         }
     }

@@ -285,7 +285,7 @@ fn read_taxels(
     let column = |name: &str| -> Result<Option<Vec<f32>>> {
         let Some(accessor) = custom(primitive, name) else { return Ok(None) };
         if !document.is_scalar_float(accessor) {
-            return Err(failed!("attribute _{name} is not SCALAR FLOAT; docs/layout.md says why it must be"));
+            return Err(failed!("attribute _{name} is not SCALAR FLOAT; other types are lost or changed by editors"));
         }
         let column: Vec<f32> = document.floats::<1>(accessor)?.into_iter().map(|[x]| x).collect();
         if column.len() != positions.len() {

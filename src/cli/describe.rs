@@ -13,8 +13,8 @@ pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) ->
             SinkSpec::Mcap(_) => {
                 "--describe is for csv: and parquet:; a recording has its schemas in itself: somatic info FILE"
             }
-            SinkSpec::Page(_) => "--describe is for csv: and parquet:; docs/page.md has the messages of a page",
-            _ => "--describe is for csv: and parquet:; README.md shows the keys of NDJSON",
+            SinkSpec::Page(_) => "--describe is for csv: and parquet:; a page has no columns",
+            _ => "--describe is for csv: and parquet:; NDJSON has the same names as keys",
         };
         return Err(Error::usage(what));
     }

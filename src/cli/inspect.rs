@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     strict: bool,
 
     /// How near taxels of two links must be to be told as near at rest, in metres [default: by the taxels' spacing, as for
-    /// contacts; docs/robots.md].
+    /// contacts].
     #[arg(long, value_name = "M")]
     contact_tolerance: Option<f64>,
 }

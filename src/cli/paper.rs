@@ -17,7 +17,8 @@ Examples:
   somatic paper --out paper --quick         the figures, and one speed and noise of the table
   jq '.over_all_angles[] | [.indenter, .signal, .centroid_mm]' paper/table.json
 
-docs/paper.md shows the results and says what they mean.";
+table.json and table.md have the errors of place and direction for each indenter, signal, speed and
+noise; the figures are drawn as the paper has them.";
 
 /// Do the paper's experiments in simulation: its Figs. 3, 6 and 7, and a table of errors against the truth.
 ///

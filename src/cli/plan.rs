@@ -32,7 +32,7 @@ taxel pressed. A stage's time is what a plan with it takes more than a plan with
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
+    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 

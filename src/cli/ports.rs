@@ -10,7 +10,7 @@ use somatic::{Calibration, Error, Result};
 /// How boards on serial lines are read.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct LineFlags {
-    /// Which taxel is on which channel of which board, a TOML file; docs/wire.md [default: the boards, one per port,
+    /// Which taxel is on which channel of which board, a TOML file as `somatic board --help` shows [default: the boards, one per port,
     /// share the taxels in ascending order of their ids].
     #[arg(long, value_name = "FILE")]
     pub(super) wiring: Option<PathBuf>,

@@ -143,7 +143,7 @@ impl Plan {
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
             return Err(Error::usage(format!(
-                "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; see docs/calibration.md"
+                "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; give it `sensor = \"fsr\"` under [all] or [taxel.ID]"
             )));
         }
         if let Some(name) = calibration.fields.keys().find(|name| !fields.fields.iter().any(|f| f.name == **name)) {

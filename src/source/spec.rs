@@ -221,7 +221,7 @@ impl SourceSpec {
             }
             Self::Ros2 { topic, .. } => {
                 let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \
-                            somatic --features ros2";
+                            --path . --features ros2";
                 Err(Error::failed(what).at(format!("source `ros2:{topic}`")))
             }
             #[cfg(feature = "serial")]
@@ -236,7 +236,7 @@ impl SourceSpec {
             }
             #[cfg(not(feature = "zenoh"))]
             Self::Zenoh(key) => {
-                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                let what = "built without the feature `zenoh`: cargo install --path . --features zenoh";
                 Err(Error::failed(what).at(format!("source `zenoh:{key}`")))
             }
             #[cfg(not(feature = "serial"))]

@@ -109,7 +109,9 @@ pub fn measure(
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
     }
     if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) && !has_skin(options) {
-        report.left_out.push("footprints: no calibration says what the layer is; see docs/footprint.md".to_owned());
+        report
+            .left_out
+            .push("footprints: no calibration says what the layer is; add [skin] with sigma_m to it".to_owned());
     }
     const PROGRESS_BUILT: f64 = 0.1;
     const PROGRESS_COMPARED: f64 = 0.3;

@@ -32,7 +32,18 @@ Examples:
 
 Faults, with commas between them: noise=P and drop=P, the chance of a byte; flip=P, of a bit;
 drift=50ppm; silence=2s@10s, for 2 s once after 10 s; unplug=1s/20s, for 1 s every 20 s;
-reset@30s. docs/wire.md describes the format, the wiring and the board.";
+reset@30s.
+
+A wiring says which taxel is on which channel of which board, in TOML:
+
+  [[board]]
+  id = 1
+  bits = 10
+  channels = 64
+  taxels = [
+    { channel = 0, first = 0, count = 9 },      # taxels 0 to 8 on channels 0 to 8
+    { channel = 25, ids = [25, 26] },           # one by one
+  ]";
 
 /// What a sensor that nobody touches reads.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -163,7 +163,7 @@ fn live(
 
 #[cfg(not(feature = "ros2"))]
 fn live(_: Box<dyn Source + Send>, topic: &str, _: Option<f64>, _: bool) -> Result<Box<dyn Source + Send>> {
-    let what = "built without the feature `ros2`: cargo install somatic --features ros2";
+    let what = "built without the feature `ros2`: cargo install --path . --features ros2";
     Err(Error::failed(what).at(format!("joint states `ros2:{topic}`")))
 }
 

@@ -87,7 +87,7 @@ pub(super) fn json(tuning: &Tuning, places: &[TunedChannel]) -> String {
 }
 
 pub(super) fn wiring(wiring: &Wiring) -> String {
-    format!("# With the taps that `somatic tune` found. docs/wire.md has the keys.\n{}", wiring.to_toml())
+    format!("# With the taps that `somatic tune` found.\n{}", wiring.to_toml())
 }
 
 /// A calibration for the paper's circuit.

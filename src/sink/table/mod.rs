@@ -168,7 +168,7 @@ pub fn percept_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let mut columns = keys(&session.names);
     columns.push(TableColumn::new("contact", "", TableType::Bool, "Whether the field is touched.", ValueOf::Contact));
     columns.extend(output_columns(session));
-    let help = "Why quantities are absent or in doubt; docs/tables.md.";
+    let help = "Why quantities are absent or in doubt, by name.";
     columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
     columns
 }
@@ -232,7 +232,7 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let footprint = session.outputs.of_each_touch();
     columns.extend(columns_of(footprint, session, ValueOf::TouchFootprint));
     if !footprint.is_empty() {
-        let help = "Why its footprint, or a part of it, is absent; docs/footprint.md.";
+        let help = "Why its footprint, or a part of it, is absent, by name.";
         columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
     }
     columns

@@ -11,7 +11,7 @@ const DEAD_BAND_SIGMAS: f64 = 6.0;
 impl Sensor {
     /// The calibration file for sensors of the taxels `ids` on the body called `body`.
     pub(super) fn calibration(&self, body: &str, ids: &[u32]) -> String {
-        let mut text = String::from("# The sensors of a simulation as they are; docs/simulation.md says more.\n\n");
+        let mut text = String::from("# The sensors of a simulation as they are.\n\n");
         let _ = writeln!(text, "body = {}\n\n[all]", toml::Value::from(body));
         let mut keys = self.keys();
         if let Some(noise) = self.noise() {
