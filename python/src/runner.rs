@@ -76,7 +76,8 @@ pub(crate) fn run<'py>(
         let text = calibration.map(|calibration| calibration.text.as_str());
         let about = Run::new(&engine, &body.inner, &body.bytes, &scene.text, text);
         let label = label.unwrap_or_else(|| file.display().to_string());
-        let session = about.session(&label, all_fields, true);
+        let mut session = about.session(&label, all_fields, true);
+        session.is_recorded = true;
         let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], TableWish::new(about.outputs, false))?;
         let mut sink = target.open(&session)?;
         let mut frames = vec![Frame::missing(0.0, source.taxels().len()); BATCH];

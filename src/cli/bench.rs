@@ -15,7 +15,7 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
 use super::files::FilesRead;
-use super::interrupt::stop_on_signal;
+use super::interrupt::stop_soon_on_signal;
 use super::scene::{one_of, output, outputs_help, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
@@ -27,7 +27,7 @@ Examples:
   somatic bench --outputs centroid,orientation --json         these alone, as JSON
   somatic bench --sensors 100000 --wide 100000 --dump arrays  a field over all; check it by a program
 
-docs/performance.md has figures and what they were compared with.";
+A rate counts each sensor of each field in each frame: memberships per second.";
 
 /// Nothing is measured before this long, and one call at least: memory is at hand then, and the clock has settled.
 const WARM_UP: Duration = Duration::from_millis(100);
@@ -110,7 +110,7 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
             Some(outputs_of.add_folder(folder, dump::files(&shape, outputs))?)
         }
     };
-    let stop = stop_on_signal()?;
+    let stop = stop_soon_on_signal()?;
     let body = shape.body();
     let mut frames = shape.frames();
     let mut engine = shape.engine(&body, arguments.backend, outputs)?;

@@ -16,7 +16,7 @@ use somatic::{Body, Calibration, Error, Result};
 use super::bodies::{in_body, load_body};
 use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
-use super::interrupt::stop_on_signal;
+use super::interrupt::{left_out, stop_on_signal};
 use super::plot_file::PlotFile;
 use super::ports::LineFlags;
 use super::stdio::{print, say, tell_losses};
@@ -34,7 +34,17 @@ Examples:
 First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one
 after the other or many at once, until the recording ends, --press seconds are over, or Ctrl-C.
 --skin needs no rest and no order: a finger that wanders over the skin for two minutes.
-docs/calibration.md describes the file.";
+
+The file is TOML; its keys may be edited:
+
+  [all]                         # what most sensors share; [taxel.ID] has what differs
+  baseline = 244                # raw value at rest
+  gain = 1                      # pressure per raw unit
+  unit = \"kPa\"                  # of the pressure; without it P is a count
+  invert = true                 # the raw value falls when the sensor is pressed
+  dead_band = 4                 # pressures up to this are 0
+  noise = 0.8                   # standard deviation of a raw value
+  mask = false                  # true leaves the sensor out";
 
 /// Find baselines, noise, direction and range of a robot's sensors, and write them down as its calibration.
 #[derive(Args)]
@@ -117,6 +127,8 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
         return Err(Error::usage("--rest and --press are times over 0, in seconds"));
     }
+    // What was found is printed there.
+    outputs.add_standard_output()?;
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let body = load_body(&arguments.body)?;
     if let Some(recording) = &arguments.skin {
@@ -140,12 +152,23 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         (Box::new(source), Some(lines))
     };
     let mut survey = Survey::new(&in_body(&body, &*source)?);
-    let gathered = gather(&mut survey, source, arguments, lines.as_ref());
+    let is_live = lines.is_some() || first_of(&arguments.sources)?.is_stdin();
+    let gathered = gather(&mut survey, source, arguments, lines.as_ref(), is_live);
     if let Some(lines) = &lines {
         lines.close();
         tell(lines);
     }
-    let lost = gathered?;
+    let Gathered { losses: lost, frames, last_s, is_whole } = gathered?;
+    // Of what is live, Ctrl-C ends the presses; of a recording it leaves out the rest.
+    if !is_live && !is_whole {
+        let name = arguments.sources.first().map_or("", String::as_str);
+        let absent: Vec<String> = [Some(output), arguments.plot.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(|path| path.display().to_string())
+            .collect();
+        return Ok(tell_losses(&[lost, vec![left_out(name, frames, last_s, None, &absent)]].concat()));
+    }
     let findings = survey.finish(Wishes {
         bits: arguments.bits,
         equalise: arguments.equalise,
@@ -181,14 +204,24 @@ pub(super) fn name_of(body: &Body) -> String {
     Path::new(&body.name).file_stem().map_or_else(|| body.name.clone(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// Takes rest and press from `source`; gives what of it was lost.
+/// What was taken of a source.
+struct Gathered {
+    losses: Vec<String>,
+    frames: u64,
+    /// The time of the last frame.
+    last_s: f64,
+    /// Whether all was taken that was asked for.
+    is_whole: bool,
+}
+
+/// Takes rest and press from `source`.
 fn gather(
     survey: &mut Survey,
     source: Box<dyn Source + Send>,
     arguments: &Arguments,
     lines: Option<&Lines>,
-) -> Result<Vec<String>> {
-    let is_live = lines.is_some() || first_of(&arguments.sources)?.is_stdin();
+    is_live: bool,
+) -> Result<Gathered> {
     let stop = stop_on_signal()?;
     let mut feed = match lines {
         Some(_) => Feed::start_live(source, 64),
@@ -200,15 +233,17 @@ fn gather(
         }
     };
     guide(&format!("leave the robot alone for {} s", arguments.rest));
-    let (mut begin, mut lost) = (None, Vec::new());
+    let mut begin = None;
+    let mut taken = Gathered { losses: Vec::new(), frames: 0, last_s: 0.0, is_whole: false };
     let mut is_pressing = false;
     while !stop.load(Ordering::Relaxed) {
         lines.into_iter().for_each(tell);
         match feed.next(Duration::from_millis(40)) {
             Some(Arrival::Frames(frames, told)) => {
                 told.notices.iter().for_each(|notice| say(notice));
-                lost = told.losses;
+                taken.losses = told.losses;
                 for frame in &frames {
+                    (taken.frames, taken.last_s) = (taken.frames + 1, frame.t_s);
                     let since_s = frame.t_s - *begin.get_or_insert(frame.t_s);
                     if since_s < arguments.rest {
                         survey.rest(&frame.values);
@@ -222,18 +257,18 @@ fn gather(
                         });
                     }
                     if arguments.press.is_some_and(|press| since_s >= arguments.rest + press) {
-                        return Ok(lost);
+                        return Ok(Gathered { is_whole: true, ..taken });
                     }
                     survey.press(&frame.values);
                 }
                 feed.give_back(frames);
             }
-            Some(Arrival::End(ending)) => return Ok(ending.losses),
+            Some(Arrival::End(ending)) => return Ok(Gathered { losses: ending.losses, is_whole: true, ..taken }),
             Some(Arrival::Failed(error)) => return Err(error),
             None | Some(Arrival::Woken) => {}
         }
     }
-    Ok(lost)
+    Ok(taken)
 }
 
 fn table_of(findings: &Findings) -> String {

@@ -17,14 +17,14 @@ use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::first_source::source_of;
-use super::interrupt::stop_on_signal;
+use super::interrupt::{left_out, stop_soon_on_signal};
 use super::stdio::{say, tell_losses};
 use super::words::count;
 
 const EXAMPLES: &str = "\
 Examples:
   somatic convert touch.csv touch.mcap --body robot.glb --calibration robot.toml
-  somatic convert touch.mcap touch.csv
+  somatic convert touch.mcap touch.csv        or csv:- for standard output
   somatic convert insoles.lst insoles.mcap    a pressure system's export, with its sensors and unit
   somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
   somatic convert skin.glb -o skin.csv        the taxels of a body as a table
@@ -105,26 +105,37 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         _ => (from.open(&[], &options)?, files(arguments, &from, None)?),
     };
     source.report_stale();
+    let place = output.name().display().to_string();
     let mut target = match &to {
         SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
             return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
         }
         SourceSpec::Csv(_) => Target::Csv(CsvFile::create(output, source.taxels())?),
         _ => {
-            let mut recorder = Recorder::create(output, source.taxels())?;
+            let mut recorder = Recorder::create_whole(output, source.taxels())?;
             for (name, media_type, bytes) in &attached {
                 recorder.attach(name, media_type, bytes)?;
             }
             Target::Mcap(Box::new(recorder))
         }
     };
-    let (frames, posed) = copy(&mut *source, &mut target)?;
+    let Copied { frames, posed, last_s, is_whole } = copy(&mut *source, &mut target)?;
     let is_csv = matches!(target, Target::Csv(_));
+    if !is_whole {
+        let absent = match target {
+            Target::Csv(file) => file.finish_early()?,
+            Target::Mcap(recorder) => recorder.finish_early()?,
+        };
+        let mut losses = source.losses();
+        let absent: Vec<String> = absent.into_iter().collect();
+        losses.push(left_out(&arguments.from, frames, last_s, source.progress(), &absent));
+        return Ok(tell_losses(&losses));
+    }
     match target {
         Target::Csv(file) => file.finish()?,
         Target::Mcap(recorder) => recorder.finish()?,
     }
-    say(&format!("{} in {}", count(frames, "frame"), to_path.display()));
+    say(&format!("{} in {place}", count(frames, "frame")));
     if is_csv && posed > 0 {
         say(&format!("a CSV has no place for poses: those of {} are left out", count(posed, "frame")));
     }
@@ -138,25 +149,38 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     Ok(tell_losses(&source.losses()))
 }
 
-/// Copies all frames; gives how many there were, and how many had poses.
-fn copy(source: &mut dyn Source, target: &mut Target) -> Result<(u64, u64)> {
-    let stop = stop_on_signal()?;
+/// What was copied.
+#[derive(Default)]
+struct Copied {
+    frames: u64,
+    /// Frames with poses.
+    posed: u64,
+    /// The time of the last frame.
+    last_s: f64,
+    /// Whether it was not interrupted.
+    is_whole: bool,
+}
+
+/// Copies all frames.
+fn copy(source: &mut dyn Source, target: &mut Target) -> Result<Copied> {
+    let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("converting");
     let mut frame = Frame::missing(0.0, source.taxels().len());
-    let (mut frames, mut posed) = (0, 0);
+    let mut copied = Copied::default();
     while source.next_frame(&mut frame)? {
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::failed("interrupted"));
+            return Ok(copied);
         }
         match target {
             Target::Csv(file) => file.frame(&frame)?,
             Target::Mcap(recorder) => recorder.frame(&frame)?,
         }
-        frames += 1;
-        posed += u64::from(!frame.pose.is_empty());
+        copied.frames += 1;
+        copied.posed += u64::from(!frame.pose.is_empty());
+        copied.last_s = frame.t_s;
         bar.show(source.progress().unwrap_or(0.0));
     }
-    Ok((frames, posed))
+    Ok(Copied { is_whole: true, ..copied })
 }
 
 /// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the

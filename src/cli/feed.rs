@@ -25,6 +25,8 @@ pub(super) struct Ending {
     pub(super) losses: Vec<String>,
     /// The last messages for the user.
     pub(super) notices: Vec<String>,
+    /// Whether a recording was left before its end.
+    pub(super) is_early: bool,
 }
 
 /// Information on frames.
@@ -157,7 +159,7 @@ fn read(
                     frames.push(frame);
                     info.read_at.extend(source.read_at());
                 }
-                Ok(false) => end = Some(Arrival::End(Ending { losses: source.losses(), notices: Vec::new() })),
+                Ok(false) => end = Some(Arrival::End(Ending { losses: source.losses(), ..Ending::default() })),
                 Err(e) => end = Some(Arrival::Failed(e)),
             }
         }

@@ -10,6 +10,7 @@ use somatic::{Body, Error, Result, bundled};
 use super::attached;
 use super::bodies::{check_body_name, load_body};
 use super::scene::RunOptions;
+use super::stdio::check_input;
 
 /// Frames a call for recordings, unless told otherwise.
 pub(super) const RECORDED_BATCH: usize = 256;
@@ -56,6 +57,9 @@ impl Input {
             };
         };
         let Some(spec) = asked.first_source()? else { unreachable!("a source is named") };
+        if matches!(spec, SourceSpec::Stdin | SourceSpec::CsvStdin) {
+            check_input()?;
+        }
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),

@@ -138,6 +138,8 @@ enum Command {
 
 /// Does what was asked for and gives the exit code.
 pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
+    stdio::refuse_closed_output();
+    interrupt::heed_signals()?;
     let Some(command) = &arguments.command else {
         print(GREETING)?;
         return Ok(DONE);

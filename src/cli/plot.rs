@@ -1,6 +1,6 @@
 //! `somatic plot`: a recording as a picture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
@@ -13,7 +13,7 @@ use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
-use super::interrupt::stop_on_signal;
+use super::interrupt::{left_out, stop_soon_on_signal};
 use super::plot_file::PlotFile;
 use super::scene::{RunOptions, output};
 use super::stdio::{DONE, say, tell_losses};
@@ -102,12 +102,15 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
     });
     let mut outputs = read.outputs(arguments.force);
     let file = PlotFile::at(&arguments.output, "-o", &mut outputs)?;
-    let stop = stop_on_signal()?;
+    let stop = stop_soon_on_signal()?;
     let (mut all, mut losses) = (Vec::new(), Vec::new());
     for asked in &runs {
-        let (gathered, lost) = gather(asked, wanted, &stop)?;
-        all.push(gathered);
+        let (gathered, lost) = gather(asked, wanted, &stop, &arguments.output)?;
         losses.extend(lost);
+        match gathered {
+            Some(gathered) => all.push(gathered),
+            None => return Ok(tell_losses(&losses)),
+        }
     }
     file.draw(|| svg(&all), || png(&all))?;
     say(&format!("{} is drawn", arguments.output.display()));
@@ -136,8 +139,14 @@ fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Run
     }
 }
 
-/// Runs a recording and keeps what is plotted of it; also gives what the source lost.
-fn gather(asked: &RunOptions, wanted: Outputs, stop: &AtomicBool) -> Result<(Gathered, Vec<String>)> {
+/// Runs a recording and keeps what is plotted of it, unless it was interrupted and the plot `to` is not drawn; also gives what of
+/// the source was never processed.
+fn gather(
+    asked: &RunOptions,
+    wanted: Outputs,
+    stop: &AtomicBool,
+    to: &Path,
+) -> Result<(Option<Gathered>, Vec<String>)> {
     let input = Input::named(asked)?;
     if !input.is_recording() {
         return Err(Error::usage("only recordings are plotted; record what is live with `somatic run`").at(&input.name));
@@ -153,6 +162,7 @@ fn gather(asked: &RunOptions, wanted: Outputs, stop: &AtomicBool) -> Result<(Gat
     let mut gatherer = gatherer.with_p_unit(p_unit);
     let mut bar = Bar::new("reading");
     let width = source.taxels().len();
+    let (mut seen, mut last_s) = (0, 0.0);
     let mut frames: Vec<Frame> = Vec::with_capacity(RECORDED_BATCH);
     loop {
         frames.clear();
@@ -167,11 +177,14 @@ fn gather(asked: &RunOptions, wanted: Outputs, stop: &AtomicBool) -> Result<(Gat
             break;
         }
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::failed("interrupted"));
+            let absent = [to.display().to_string()];
+            let left = left_out(&input.name, seen, last_s, source.progress(), &absent);
+            return Ok((None, [source.losses(), vec![left]].concat()));
         }
+        (seen, last_s) = (seen + frames.len() as u64, frames[frames.len() - 1].t_s);
         engine.process(&frames)?;
         gatherer.see(&engine, &frames);
         bar.show(source.progress().unwrap_or(0.0));
     }
-    Ok((gatherer.finish(), source.losses()))
+    Ok((Some(gatherer.finish()), source.losses()))
 }

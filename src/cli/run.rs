@@ -1,14 +1,17 @@
 //! `somatic run`: from a source through an engine to sinks.
 
+mod serve;
+
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use somatic::signal::Quantity;
-use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableWish};
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts, Precision, Result};
+use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableName, TableWish};
+use somatic::{Agreement, BackendKind, Engine, Error, Frame, Precision, Result};
 
+use self::serve::{give, give_lines, serve};
 use super::attachments::attachments;
 use super::describe::describe;
 use super::doubts::Doubts;
@@ -17,7 +20,7 @@ use super::explanation::LiveExplainer;
 use super::feed::{Arrival, Ending, Feed, ReadMode};
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
-use super::interrupt::stop_on_signal;
+use super::interrupt::{left_out, stop_on_signal};
 #[cfg(unix)]
 use super::keys::Keys;
 use super::lines::LineReport;
@@ -42,6 +45,7 @@ Examples:
   somatic run                                            the bundled touch on the bundled hand
   somatic run --source touch.csv --sink percepts.ndjson  a recording, as fast as possible
   somatic run --source touch.csv --sink percepts.csv     the same as a table; --wide for a row per frame
+  somatic run --source touch.csv --sink csv:- | head     the table on standard output
   somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
   somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
   somatic run --source touch.csv --letters sustained,change --outputs total
@@ -65,7 +69,7 @@ of JSON a frame.";
 #[derive(Args)]
 #[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
+    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
@@ -75,6 +79,11 @@ pub(super) struct Arguments {
     /// In csv: one row per frame, with columns of their own for each field, instead of a row per field in contact.
     #[arg(long, help_heading = "Output")]
     wide: bool,
+
+    /// The table that csv:- puts on standard output: fields, touches or contacts [default: touches if they are computed, else
+    /// fields].
+    #[arg(long, value_name = "TABLE", help_heading = "Output")]
+    table: Option<TableName>,
 
     /// Print the columns of csv: or parquet: with their units and types, and run nothing.
     #[arg(long, help_heading = "Output")]
@@ -93,7 +102,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
-    let table = TableWish::new(asked.outputs(), arguments.wide);
+    let table = TableWish::new(asked.outputs(), arguments.wide).on_stdout(arguments.table)?;
+    if arguments.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
+        return Err(Error::usage("--table is for a table on standard output; add --sink csv:-"));
+    }
+    if arguments.wide && !matches!(arguments.table, None | Some(TableName::Fields)) {
+        return Err(Error::usage("--wide is for the table of fields; leave --table out"));
+    }
     if arguments.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !arguments.describe {
         return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
     }
@@ -121,13 +136,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
     }
 
-    let view = View::choose(asked.quiet, sinks.contains(&SinkSpec::Stdout), input.is_recording());
+    let view = View::choose(asked.quiet, sinks.iter().any(SinkSpec::is_on_stdout), input.is_recording());
     let at_terminal = view.is_table();
     let has_page = sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_)));
     let is_watched =
         (input.is_bundled() && at_terminal) || (input.is_recording() && sinks.iter().any(SinkSpec::is_watched));
     let speed = asked.speed.or(is_watched.then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
+    // What is played until somebody ends it is never a part.
+    let ends = input.is_recording() && asked.repeat != Some(0);
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
     let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
@@ -185,6 +202,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         plan: Some(engine.plan()),
         source: &input.name,
         backend: [backend, &device, settled.why.as_deref().unwrap_or(why)],
+        is_recorded: ends,
         wiring: wiring.as_ref(),
         zenoh_config: asked.zenoh_config.as_deref(),
         ros_time: asked.ros_time.unwrap_or_default(),
@@ -223,6 +241,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         live,
         heeds_stale,
         doubts,
+        recording: ends.then(|| input.name.clone()),
+        progress: None,
+        frames: 0,
         #[cfg(feature = "page")]
         explainer,
     };
@@ -259,6 +280,12 @@ struct Pump {
     heeds_stale: bool,
     /// What is looked for in the first frames.
     doubts: Option<Doubts>,
+    /// The name of the source, if that is a recording and ends.
+    recording: Option<String>,
+    /// The share of it that has been read, if known.
+    progress: Option<f64>,
+    /// Frames that were processed.
+    frames: u64,
     /// With a page.
     #[cfg(feature = "page")]
     explainer: Option<LiveExplainer>,
@@ -299,6 +326,8 @@ impl Pump {
                         tell_doubts(&self.engine, &mut self.doubts);
                     }
                     self.view.see(self.engine.percepts(), told.progress);
+                    self.progress = told.progress;
+                    self.frames += frames.len() as u64;
                     self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
                     self.pass_on(&frames, call)?;
                     if self.sinks.is_empty() && !watched {
@@ -329,7 +358,9 @@ impl Pump {
             }
             self.view.draw();
         }
-        Ok(Ending { losses, notices: closing })
+        // Who has only looked at it has no part of anything.
+        let is_early = self.recording.is_some() && !self.sinks.is_empty() && is_ended();
+        Ok(Ending { losses, notices: closing, is_early })
     }
 
     /// Reports taxels that are left out, or used again, to sinks and, unless a table fills the terminal, to people.
@@ -375,14 +406,22 @@ impl Pump {
     }
 
     /// Makes all outputs whole, says what is to be said, and gives the exit code.
-    fn finish(mut self, Ending { mut losses, notices }: Ending) -> Result<u8> {
+    fn finish(mut self, Ending { mut losses, notices, is_early }: Ending) -> Result<u8> {
         self.view.finish();
         // Where nobody was heard, no file is left.
         if let Some(live) = self.live {
             losses = live.finish()?;
         }
+        let mut absent = Vec::new();
         for sink in self.sinks {
-            sink.finish()?;
+            match is_early {
+                true => absent.extend(sink.finish_early()?),
+                false => sink.finish()?,
+            }
+        }
+        if is_early {
+            let recording = self.recording.as_deref().unwrap_or_default();
+            losses.push(left_out(recording, self.frames, self.unfit.at_s, self.progress, &absent));
         }
         self.unfit.changes(&self.engine).iter().for_each(|message| say(message));
         self.unfit.print_repeats();
@@ -396,47 +435,6 @@ impl Pump {
             }
         }
         Ok(if self.failed { FAILED } else { code })
-    }
-}
-
-/// Does something with each sink that somebody reads. While somebody waits for every frame, a sink that fails is told and
-/// left out, and the others go on; the last one that fails is an error.
-fn serve(
-    sinks: &mut Vec<Box<dyn Sink + Send>>,
-    live: bool,
-    failed: &mut bool,
-    mut act: impl FnMut(&mut dyn Sink) -> Result<Flow>,
-) -> Result<()> {
-    let mut index = 0;
-    while index < sinks.len() {
-        match act(&mut *sinks[index]) {
-            Ok(Flow::Open) => index += 1,
-            Ok(Flow::Closed) => sinks.remove(index).finish()?,
-            Err(error) if live && sinks.len() > 1 => {
-                say(&format!("{error}; continuing without it"));
-                *failed = true;
-                drop(sinks.remove(index));
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
-}
-
-fn give(sink: &mut dyn Sink, input: &InputFrames<'_>, percepts: &Percepts, flush: bool) -> Result<Flow> {
-    for flow in [sink.write_input(input)?, sink.write(percepts)?] {
-        if flow == Flow::Closed {
-            return Ok(flow);
-        }
-    }
-    if flush { sink.flush() } else { Ok(Flow::Open) }
-}
-
-/// Gives a sink percepts that limbs have computed.
-fn give_lines(sink: &mut dyn Sink, lines: &[String]) -> Result<Flow> {
-    match sink.write_percepts_of_limbs(lines)? {
-        Flow::Open => sink.flush(),
-        Flow::Closed => Ok(Flow::Closed),
     }
 }
 

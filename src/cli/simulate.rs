@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::source::{SimulatedSource, write_recording};
+use somatic::source::{SimulatedSource, write_recording_with_progress};
 use somatic::{Error, Result};
 
+use super::bar::Bar;
 use super::files::FilesRead;
 use super::stdio::{DONE, say};
 
@@ -15,7 +16,27 @@ Examples:
   somatic run --source rod.csv --calibration rod.calibration.toml --sink ndjson:percepts.ndjson
   somatic run --source sim:examples/simulations/rod.toml        without a file in between
 
-docs/simulation.md describes the file, the model and the truth.";
+A simulation is TOML: the body, the rate, and touches, which move along paths in a field's chart.
+
+  body = \"hand\"
+  rate_hz = 50
+  duration_s = 4
+  [skin]                        # the layer over the sensors; without it they feel contacts as they are
+  thickness_m = 0.007
+  stiffness_pa = 400e3
+  [sensor]                      # ideal, linear or fsr; ideal ones give newton
+  kind = \"fsr\"
+  noise_sigma = 1.5
+  [[touch]]
+  on = \"hand/back\"
+  indenter = \"rod\"              # or ball, fingertip, flat, edge
+  radius_m = 0.0127
+  length_m = 0.05
+  path = [[0, 0.015], [0, -0.015]]
+  times_s = [0.5, 3.5]
+  force_newton = [[0.5, 0], [0.7, 32], [3.3, 34], [3.5, 0]]
+
+The truth has a row per frame and touch: its place, normal, angle, velocity, speed and force.";
 
 /// Write a simulated touch down as a recording, with what is true in it and its sensors' calibration beside it.
 #[derive(Args)]
@@ -25,7 +46,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "FILE.toml")]
     simulation: PathBuf,
 
-    /// The recording to write, CSV.
+    /// The recording to write, CSV, or - for standard output.
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
 
@@ -52,8 +73,13 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
     let truth_to = outputs.add(&truth)?;
     let calibration_to = calibration.as_ref().map(|path| outputs.add(path)).transpose()?;
     let mut simulation = SimulatedSource::open(&arguments.simulation)?;
-    let frames = write_recording(&mut simulation, frames_to, truth_to)?;
-    let mut told = format!("{frames} frames in {output}, the truth in {}", truth.display());
+    let place = frames_to.name().display().to_string();
+    let mut bar = Bar::new("simulating");
+    let frames = write_recording_with_progress(&mut simulation, frames_to, truth_to, &mut |share| {
+        bar.show_with_time_left(share);
+    })?;
+    drop(bar);
+    let mut told = format!("{frames} frames in {place}, the truth in {}", truth.display());
     if let Some(to) = calibration_to {
         told += &format!(", the calibration in {}", to.name().display());
         to.write(simulation.calibration().as_bytes())?;

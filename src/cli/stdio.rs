@@ -1,7 +1,9 @@
 //! Standard output, standard error and exit codes.
 
 use std::io::{self, Write as _};
+use std::sync::atomic::Ordering;
 
+use somatic::output::{OutputPaths, refuse_standard_output};
 use somatic::{Error, Result};
 
 /// Exit code: everything was done.
@@ -22,8 +24,52 @@ pub(super) fn tell_losses(losses: &[String]) -> u8 {
     if losses.is_empty() { DONE } else { LOST }
 }
 
+/// Refuses what goes to standard output if that was closed when the process started.
+pub(super) fn refuse_closed_output() {
+    if closed::OUTPUT.load(Ordering::Relaxed) {
+        refuse_standard_output();
+    }
+}
+
+/// Checks that there is a standard input.
+pub(super) fn check_input() -> Result<()> {
+    if closed::INPUT.load(Ordering::Relaxed) {
+        return Err(Error::failed("it is closed; lead frames into it, or name a file").at("standard input"));
+    }
+    Ok(())
+}
+
+/// Whether standard streams were closed when the process started. What runs before `main` looks, as the runtime puts `/dev/null`
+/// in the place of a stream that is closed: what is printed would be lost, and nobody would know.
+mod closed {
+    use std::sync::atomic::AtomicBool;
+
+    pub(super) static INPUT: AtomicBool = AtomicBool::new(false);
+    pub(super) static OUTPUT: AtomicBool = AtomicBool::new(false);
+
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    mod look {
+        #![expect(unsafe_code, reason = "nothing of the standard library is early enough")]
+
+        use std::sync::atomic::Ordering;
+
+        #[used]
+        #[cfg_attr(target_os = "linux", unsafe(link_section = ".init_array"))]
+        #[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]
+        static LOOK: extern "C" fn() = look;
+
+        extern "C" fn look() {
+            for (number, is_closed) in [(0, &super::INPUT), (1, &super::OUTPUT)] {
+                // SAFETY: it asks for the flags of a file that need not be there.
+                is_closed.store(unsafe { libc::fcntl(number, libc::F_GETFD) } == -1, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
 /// Writes `text` to standard output. A reader that has gone is a normal end.
 pub(super) fn print(text: &str) -> Result<()> {
+    OutputPaths::default().add_standard_output()?;
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {

@@ -19,7 +19,7 @@ use super::bar::Bar;
 use super::bodies::load_body;
 use super::files::FilesRead;
 use super::input::Input;
-use super::interrupt::stop_on_signal;
+use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
 use super::scene::{RunOptions, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
@@ -40,7 +40,7 @@ calibration names in [skin], or of the source where it is a simulation. The knob
 against the reference. Combinations take turns, so that a machine that slows down slows all of them.
 A front is what no other combination beats: none is as true and faster. What is measured is kept, and
 `somatic run` and `somatic plan` choose by it, on the same recording or live, where a scene leaves
-the backend or the knobs to be chosen. docs/tradeoff.md says what to conclude.";
+the backend or the knobs to be chosen.";
 
 /// Frames that are measured on, unless told otherwise.
 const FRAMES: usize = 512;
@@ -51,7 +51,7 @@ const VALUES: usize = 1 << 24;
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
 pub(super) struct Arguments {
-    /// A TOML file whose keys are the flags below; a flag takes the place of its key; docs/scenes.md.
+    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
@@ -113,7 +113,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let played = input.as_ref().map(|input| played(input, &asked, &body, most)).transpose()?;
     let tested = Tested::new(&body, &options, played, most)?;
     let measure_options = measure_options(&asked, &options, arguments.seconds)?;
-    let stop = stop_on_signal()?;
+    let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("measured");
     let report = tested.measure(&body, &measure_options, &mut |share| {
         bar.show_with_time_left(share);
@@ -132,6 +132,11 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         say(&format!("cannot save the measurements: {e}"));
     }
     let way = if asked.batch.is_some_and(|batch| batch > 1) { CallMode::Batch } else { CallMode::Live };
+    if stop.load(Ordering::Relaxed) {
+        print(&if arguments.json { json(&report, None)? } else { text(&report, arguments.all) })?;
+        say("interrupted: that is what was measured until then; nothing is picked, drawn or kept");
+        return Ok(FAILED);
+    }
     let pick = if target.is_empty() { None } else { target.pick(&report, way) };
     if let Some(plot) = plot {
         plot.draw(|| plot_svg(&report), || plot_png(&report))?;

@@ -31,7 +31,7 @@ First nothing touches the robot, for --rest seconds; then every sensor is presse
 ever will be. From that follows which tap lets it use most of the range and leaves a sixteenth;
 the taps are set, and the sensors pressed again to see it, until all fit, in at most five rounds.
 What stands in the file written by -o is set again by every command that has it as its --wiring,
-whenever a board starts. Ctrl-C puts all taps back. docs/live.md says more.";
+whenever a board starts. Ctrl-C puts all taps back.";
 
 /// Set the boards' potentiometers so that their sensors use the converters' range.
 #[derive(Args)]
@@ -82,6 +82,8 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let mut outputs = read.outputs(arguments.force);
     let mut add = |path: &Option<PathBuf>| path.as_ref().map(|path| outputs.add(path)).transpose();
     let (output, fsr_calibration) = (add(&arguments.output)?, add(&arguments.fsr_calibration)?);
+    // What was found is printed there.
+    outputs.add_standard_output()?;
     let spans = [Some(arguments.rest), arguments.press];
     let [rest, press] = spans.map(|s| s.map(|s| Duration::try_from_secs_f64(s).ok().filter(|span| !span.is_zero())));
     let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {

@@ -26,22 +26,24 @@ pub const FILES: [&str; 9] =
 /// Writes the paper's figures and the table into `folder`, which has [`FILES`], and returns the files. `quick` omits most of
 /// the table. `progress` gets the share that is done.
 pub fn write(mut folder: OutputFolder, quick: bool, progress: &(dyn Fn(f64) + Sync)) -> Result<Vec<PathBuf>> {
-    folder.make()?;
     let body = Body::from_bytes("hand", bundled::HAND)?;
-    let mut written = Vec::new();
-    let mut put = |name: &str, bytes: &[u8]| {
-        let output = folder.take(name);
-        written.push(output.name().to_owned());
-        output.write(bytes)
-    };
+    let mut made: Vec<(String, Vec<u8>)> = Vec::new();
     for figures::NamedFigure { name, figure } in figures::figures(&body)? {
-        put(&format!("{name}.svg"), figure.svg()?.as_bytes())?;
-        put(&format!("{name}.png"), &figure.png()?)?;
+        made.push((format!("{name}.svg"), figure.svg()?.into_bytes()));
+        made.push((format!("{name}.png"), figure.png()?));
     }
-    put("motion.md", motion::markdown(&body, quick, &|share| progress(0.5 * share))?.as_bytes())?;
+    let motion = motion::markdown(&body, quick, &|share| progress(0.5 * share))?;
+    made.push(("motion.md".to_owned(), motion.into_bytes()));
     let table = Table::new(&body, quick, &|share| progress(0.5 + 0.5 * share))?;
-    put("table.md", table.markdown().as_bytes())?;
+    made.push(("table.md".to_owned(), table.markdown().into_bytes()));
     let json = serde_json::to_string_pretty(&table).map_err(|e| Error::failed(e.to_string()))?;
-    put("table.json", (json + "\n").as_bytes())?;
-    Ok(written)
+    made.push(("table.json".to_owned(), (json + "\n").into_bytes()));
+    // All of them are of one run: nothing is written before all are there.
+    folder.make()?;
+    let write = |(name, bytes): (String, Vec<u8>)| {
+        let output = folder.take(&name);
+        let path = output.name().to_owned();
+        output.write(&bytes).map(|()| path)
+    };
+    made.into_iter().map(write).collect()
 }

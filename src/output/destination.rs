@@ -4,9 +4,24 @@ use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::{Error, Result};
 
 /// Maximum number of links to follow, as in Linux.
 const MAX_LINKS: usize = 40;
+
+/// What standard output is called where an output is named; a file of this name is `./-`.
+pub(crate) const STANDARD_OUTPUT: &str = "-";
+
+/// Whether standard output was closed when the process started: the runtime has put `/dev/null` there since.
+static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Makes standard output an error for every output of this process: it was closed when the process started, and what is written
+/// there would be lost.
+pub fn refuse_standard_output() {
+    IS_CLOSED.store(true, Ordering::Relaxed);
+}
 
 /// The destination of a path, with all links followed.
 #[derive(Debug)]
@@ -35,8 +50,11 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 }
 
 impl Destination {
-    /// The destination of `path`. Its folder must exist; the file or the target of a link need not.
+    /// The destination of `path`; `-` is standard output. Its folder must exist; the file or the target of a link need not.
     pub(super) fn of(path: &Path) -> io::Result<Self> {
+        if path.as_os_str() == STANDARD_OUTPUT {
+            return Ok(Self::Stream(Stream::Output));
+        }
         let mut at = path.to_owned();
         for _ in 0..MAX_LINKS {
             let ends_as_folder = at.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| byte == b'/');
@@ -115,13 +133,13 @@ impl Identity {
 
 /// Device and inode.
 #[cfg(unix)]
-type FileNumber = (u64, u64);
+pub(super) type FileNumber = (u64, u64);
 /// The canonical path, where inodes are not available.
 #[cfg(not(unix))]
-type FileNumber = PathBuf;
+pub(super) type FileNumber = PathBuf;
 
 #[cfg(unix)]
-fn file_number(_: &Path, there: &Metadata) -> Option<FileNumber> {
+pub(super) fn file_number(_: &Path, there: &Metadata) -> Option<FileNumber> {
     use std::os::unix::fs::MetadataExt as _;
     Some((there.dev(), there.ino()))
 }
@@ -152,6 +170,17 @@ impl Stream {
         };
         let own = [Path::new("/proc/self/fd"), Path::new("/dev/fd")];
         own.iter().any(|own| own.canonicalize().is_ok_and(|own| own == folder)).then_some(stream)
+    }
+
+    /// Checks that it can be written to.
+    ///
+    /// # Errors
+    /// It was closed when the process started.
+    pub(super) fn check(self) -> Result<()> {
+        if self == Self::Output && IS_CLOSED.load(Ordering::Relaxed) {
+            return Err(Error::failed("it is closed; lead it somewhere, or name a file").at("standard output"));
+        }
+        Ok(())
     }
 
     /// A file that writes to the stream.

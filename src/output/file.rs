@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
 use super::destination::{Destination, folder_of};
+#[cfg(unix)]
+use super::lock::{Holder, Lock, holder};
+use super::parts::{Listed, parts};
 use super::path::{OutputPath, already_exists};
 use crate::error::{Error, Result};
 
@@ -19,22 +22,32 @@ pub struct OutputFile {
 
 enum Target {
     /// A temporary file that will be moved to `target`.
-    Temporary { part: NamedTempFile, target: PathBuf, replaces: bool },
+    Temporary { part: Part, target: PathBuf, replaces: bool },
     /// Written directly.
     Device(File),
+}
+
+/// A temporary file in the folder of the file that it will be.
+struct Part {
+    file: NamedTempFile,
+    listed: Listed,
+    #[cfg(unix)]
+    _lock: Option<Lock>,
 }
 
 impl OutputPath {
     /// Starts to write it.
     ///
     /// # Errors
-    /// Its folder cannot be written to, or the device cannot be opened.
+    /// Its folder cannot be written to, the device cannot be opened, or another process is writing the same file.
     pub fn begin(self) -> Result<OutputFile> {
         let Self { name, destination, replaces } = self;
         let failed = |e: io::Error| Error::io(&name, &e);
         let to = match destination {
             Destination::Nothing(target) | Destination::File(target) => {
-                let part = temporary_file(&target).map_err(failed)?;
+                let part = Part::new(&target).map_err(failed)?;
+                #[cfg(unix)]
+                check_free(&target).map_err(|holder| held_by(&name, holder))?;
                 Target::Temporary { part, target, replaces }
             }
             Destination::Device(at) => Target::Device(File::options().write(true).open(at).map_err(failed)?),
@@ -44,43 +57,99 @@ impl OutputPath {
         Ok(OutputFile { name, to })
     }
 
-    /// Opens the file itself, for output that must survive a crash. An existing file is truncated.
+    /// Opens the file itself, for output that must survive a crash: what is written is there at once, and
+    /// [`OutputFile::finish`] adds nothing. An existing file is truncated.
     ///
     /// # Errors
-    /// It cannot be made or opened, or it exists and must not be replaced.
-    pub fn grow(self) -> Result<(File, GrowingFile)> {
+    /// It cannot be made or opened, it exists and must not be replaced, or another process is writing it.
+    pub fn grow(self) -> Result<(OutputFile, GrowingFile)> {
         let Self { name, destination, replaces } = self;
         let failed = |e: io::Error| match e.kind() {
             ErrorKind::AlreadyExists => already_exists(&name),
             _ => Error::io(&name, &e),
         };
-        let (file, made) = match destination {
+        let (file, growing) = match destination {
             Destination::Nothing(target) | Destination::File(target) => {
-                match File::options().write(true).create_new(true).open(&target) {
+                #[cfg(unix)]
+                check_free(&target).map_err(|holder| held_by(&name, holder))?;
+                let (file, is_new) = match File::options().write(true).create_new(true).open(&target) {
                     Err(e) if e.kind() == ErrorKind::AlreadyExists && replaces => {
-                        (File::options().write(true).truncate(true).open(target).map_err(failed)?, None)
+                        (File::options().write(true).open(&target).map_err(failed)?, false)
                     }
-                    made => (made.map_err(failed)?, Some(target)),
-                }
+                    made => (made.map_err(failed)?, true),
+                };
+                #[cfg(unix)]
+                let lock = Lock::take(&file, &target).map_err(|holder| held_by(&name, holder))?;
+                // Not before it is locked: it may be what another process is writing.
+                file.set_len(0).map_err(failed)?;
+                let growing = GrowingFile {
+                    made: is_new.then_some(target),
+                    #[cfg(unix)]
+                    _lock: Some(lock),
+                };
+                (file, growing)
             }
-            Destination::Device(at) => (File::options().write(true).open(at).map_err(failed)?, None),
-            Destination::Stream(stream) => (stream.duplicate().map_err(failed)?, None),
+            Destination::Device(at) => (File::options().write(true).open(at).map_err(failed)?, GrowingFile::default()),
+            Destination::Stream(stream) => (stream.duplicate().map_err(failed)?, GrowingFile::default()),
             Destination::Folder => return Err(failed(ErrorKind::IsADirectory.into())),
         };
-        Ok((file, GrowingFile { made }))
+        Ok((OutputFile { name, to: Target::Device(file) }, growing))
     }
 }
 
-/// A temporary file in the folder of `target`, named after it in case the process is killed.
-fn temporary_file(target: &Path) -> io::Result<NamedTempFile> {
+/// Checks that no other process writes `target`, or a part of it; nor this one, under its own name.
+#[cfg(unix)]
+fn check_free(target: &Path) -> Result<(), Holder> {
+    if let Some(holder) = holder(target) {
+        return Err(holder);
+    }
+    let start = part_name(target);
+    let is_part = |name: &std::ffi::OsStr| {
+        let (name, start) = (name.as_encoded_bytes(), start.as_encoded_bytes());
+        name.starts_with(start) && name.ends_with(PART.as_bytes())
+    };
+    let entries = fs::read_dir(folder_of(target)).into_iter().flatten().flatten();
+    let mut holders = entries.filter(|entry| is_part(&entry.file_name())).filter_map(|entry| holder(&entry.path()));
+    holders.find(|Holder(process)| *process != Some(std::process::id())).map_or(Ok(()), Err)
+}
+
+#[cfg(unix)]
+fn held_by(name: &Path, Holder(process): Holder) -> Error {
+    let who = process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
+    Error::failed(format!("{who} is writing it; wait for its end, or name another file")).at(name.display())
+}
+
+/// How the names of temporary files end.
+const PART: &str = ".part";
+
+/// How the name of a temporary file for `target` begins.
+fn part_name(target: &Path) -> std::ffi::OsString {
     let mut start = target.file_name().unwrap_or_default().to_owned();
     start.push(".");
-    let mut builder = Builder::new();
-    builder.prefix(&start).suffix(".part");
-    // Temporary files are private by default; this one gets the usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder_of(target))
+    start
+}
+
+impl Part {
+    /// In the folder of `target`, named after it in case the process is killed.
+    fn new(target: &Path) -> io::Result<Self> {
+        let start = part_name(target);
+        let mut builder = Builder::new();
+        builder.prefix(&start).suffix(PART);
+        // Temporary files are private by default; this one gets the usual permissions.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let file = builder.tempfile_in(folder_of(target))?;
+        let listed = Listed::new(file.path());
+        // Nobody else knows this file yet.
+        #[cfg(unix)]
+        let lock = Lock::take(file.as_file(), file.path()).ok();
+        Ok(Self {
+            file,
+            listed,
+            #[cfg(unix)]
+            _lock: lock,
+        })
+    }
 }
 
 impl OutputFile {
@@ -90,17 +159,18 @@ impl OutputFile {
         &self.name
     }
 
+    /// Whether it is a file that appears when it is finished, rather than a stream or a device.
+    #[must_use]
+    pub fn appears_when_finished(&self) -> bool {
+        matches!(self.to, Target::Temporary { .. })
+    }
+
     /// Moves the file into place.
     ///
     /// # Errors
     /// It cannot be moved, or another file has been created there and must not be replaced.
     pub fn finish(self) -> Result<()> {
-        let Self { name, to } = self;
-        let Target::Temporary { part, target, replaces } = to else { return Ok(()) };
-        put(part, &target, replaces).map_err(|e| match e.kind() {
-            ErrorKind::AlreadyExists => already_exists(&name),
-            _ => Error::io(&name, &e),
-        })
+        self.finish_with(Vec::new())
     }
 
     /// Moves this file and `others` into place: all, or none.
@@ -108,20 +178,40 @@ impl OutputFile {
     /// # Errors
     /// As [`OutputFile::finish`].
     pub fn finish_with(self, others: Vec<Self>) -> Result<()> {
-        let mut made = Vec::new();
-        for file in std::iter::once(self).chain(others) {
-            let target = match &file.to {
-                Target::Temporary { target, .. } => Some(target.clone()),
-                Target::Device(_) => None,
-            };
-            file.finish().inspect_err(|_| {
-                made.iter().for_each(|target| {
-                    let _ = fs::remove_file(target);
-                });
+        let mut files = std::iter::once(self).chain(others);
+        let (mut made, mut done) = (Vec::new(), Vec::new());
+        // An interruption waits until all are there.
+        let held = parts();
+        let moved = files.by_ref().try_for_each(|Self { name, to }| {
+            let Target::Temporary { part: Part { file, listed, .. }, target, replaces } = to else { return Ok(()) };
+            done.push(listed);
+            put(file, &target, replaces).map_err(|e| match e.kind() {
+                ErrorKind::AlreadyExists => already_exists(&name),
+                _ => Error::io(&name, &e),
             })?;
-            made.extend(target);
+            made.push(target);
+            Ok(())
+        });
+        if moved.is_err() {
+            made.iter().for_each(|target| {
+                let _ = fs::remove_file(target);
+            });
         }
-        Ok(())
+        // What has been listed, and what is left of the files, goes after this.
+        drop(held);
+        moved
+    }
+
+    /// Ends it early, as the beginning of a stream, which is of use as it stands: moves it into place unless that would
+    /// replace a file that is there. Gives whether it is there.
+    ///
+    /// # Errors
+    /// As [`OutputFile::finish`].
+    pub fn finish_early(self) -> Result<bool> {
+        match &self.to {
+            Target::Temporary { target, .. } if fs::symlink_metadata(target).is_ok() => Ok(false),
+            _ => self.finish().map(|()| true),
+        }
     }
 }
 
@@ -145,24 +235,26 @@ fn put(part: NamedTempFile, target: &Path, replaces: bool) -> io::Result<()> {
 impl Write for OutputFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.to {
-            Target::Temporary { part, .. } => part.write(bytes),
+            Target::Temporary { part, .. } => part.file.write(bytes),
             Target::Device(file) => file.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.to {
-            Target::Temporary { part, .. } => part.flush(),
+            Target::Temporary { part, .. } => part.file.flush(),
             Target::Device(file) => file.flush(),
         }
     }
 }
 
-/// A file that grows under its own name.
-#[derive(Debug)]
+/// A file that grows under its own name. Other processes cannot write it as long as this is there.
+#[derive(Debug, Default)]
 pub struct GrowingFile {
     /// Its path, if it was created.
     made: Option<PathBuf>,
+    #[cfg(unix)]
+    _lock: Option<Lock>,
 }
 
 impl GrowingFile {

@@ -5,7 +5,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::destination::Destination;
+use super::destination::{Destination, STANDARD_OUTPUT};
 use super::path::{OutputPath, OutputPaths};
 use crate::error::{Error, Result};
 
@@ -20,13 +20,16 @@ impl OutputPaths {
     /// The files called `names` in the folder at `path`, which need not exist.
     ///
     /// # Errors
-    /// It is a file; or as [`OutputPaths::add`], for each of them.
+    /// It is a file, or `-`; or as [`OutputPaths::add`], for each of them.
     pub fn add_folder(
         &mut self,
         path: impl AsRef<Path>,
         names: impl IntoIterator<Item = impl Into<String>>,
     ) -> Result<OutputFolder> {
         let path = path.as_ref().to_owned();
+        if path.as_os_str() == STANDARD_OUTPUT {
+            return Err(Error::usage("this is a folder, and no output for `-`; name one").at("-"));
+        }
         let is_there = match fs::metadata(&path) {
             Ok(there) if there.is_dir() => true,
             Ok(_) => return Err(Error::failed("there is a file of this name; name a folder").at(path.display())),

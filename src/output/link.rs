@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::Builder;
 
-use super::destination::{Identity, folder_of};
+use super::destination::{Identity, STANDARD_OUTPUT, folder_of};
 use super::path::OutputPaths;
 use crate::error::{Error, Result};
 
@@ -23,6 +23,9 @@ impl OutputPaths {
     /// A usage error if it is an input or a link to one; there is a file of this name, or a link to one.
     pub fn add_link(&mut self, path: impl AsRef<Path>) -> Result<OutputLink> {
         let path = path.as_ref().to_owned();
+        if path.as_os_str() == STANDARD_OUTPUT {
+            return Err(Error::usage("a link needs a name; give --link another").at("-"));
+        }
         if let Some(identity) = Identity::of_input(&path) {
             self.refuse_input(&path, &identity)?;
         }

@@ -2,7 +2,10 @@
 //!
 //! An output that is an input of the same command is an error, even with force; files are identified by inode, through
 //! links and other spellings. Two outputs that are one file are an error too. A regular file is replaced only with force.
-//! Pipes, terminals and devices are written directly.
+//! Pipes, terminals and devices are written directly; `-` is standard output, which has room for one output.
+//!
+//! Most files are written beside and appear when they are whole. Two processes never write one file: the second is refused with
+//! the first one's id.
 //!
 //! A command registers all of its outputs in one [`OutputPaths`] before it starts to work, which creates no file. Writers
 //! take an [`OutputPath`]:
@@ -25,14 +28,20 @@ mod file;
 mod folder;
 #[cfg(unix)]
 mod link;
+#[cfg(unix)]
+mod lock;
+mod parts;
 mod path;
 mod private;
 
 pub use self::private::PrivateFile;
+pub(crate) use destination::STANDARD_OUTPUT;
+pub use destination::refuse_standard_output;
 pub use file::{GrowingFile, OutputFile};
 pub use folder::OutputFolder;
 #[cfg(unix)]
 pub use link::OutputLink;
+pub use parts::abandon_outputs;
 pub use path::{OutputPath, OutputPaths};
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::destination::{Destination, Identity, Stream};
+use super::destination::{Destination, Identity, STANDARD_OUTPUT, Stream};
 use crate::error::{Error, Result};
 
 /// A checked output path: a file that may be created or replaced, or a pipe, a terminal or a device. Consumed by writing.
@@ -36,7 +36,7 @@ impl OutputPath {
         }
     }
 
-    /// As it was written.
+    /// As it was written, or `standard output`.
     #[must_use]
     pub fn name(&self) -> &Path {
         &self.name
@@ -66,6 +66,7 @@ pub struct OutputPaths {
     pub(super) force: bool,
     inputs: Vec<(PathBuf, Identity)>,
     outputs: Vec<(PathBuf, Identity)>,
+    has_standard_output: bool,
 }
 
 impl OutputPaths {
@@ -73,23 +74,32 @@ impl OutputPaths {
     pub fn new(force: bool, inputs: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
         let known = |path: &Path| Some((path.to_owned(), Identity::of_input(path)?));
         let inputs = inputs.into_iter().filter_map(|path| known(path.as_ref())).collect();
-        Self { force, inputs, outputs: Vec::new() }
+        Self { force, inputs, outputs: Vec::new(), has_standard_output: false }
     }
 
-    /// Adds an output at `path`.
+    /// Adds an output at `path`, or `-` for standard output.
     ///
     /// # Errors
-    /// A usage error if it is an input or another output; it exists, is a folder, or is in a folder that does not exist.
+    /// A usage error if it is an input or another output; it exists, is closed, is a folder, or is in a folder that does not exist.
     pub fn add(&mut self, path: impl AsRef<Path>) -> Result<OutputPath> {
         let name = path.as_ref().to_owned();
         let destination = Destination::of(&name).map_err(|e| Error::io(&name, &e))?;
+        if let Destination::Stream(stream) = &destination {
+            stream.check()?;
+        }
+        if name.as_os_str() == STANDARD_OUTPUT {
+            self.take_standard_output(&name)?;
+        }
         if let Some(identity) = destination.identity() {
             self.take(&name, identity, matches!(destination, Destination::Stream(_)))?;
         }
         match destination {
             Destination::Folder => Err(Error::io(&name, &std::io::ErrorKind::IsADirectory.into())),
             Destination::File(_) if !self.force => Err(already_exists(&name)),
-            destination => Ok(OutputPath { name, destination, replaces: self.force }),
+            destination => {
+                let name = if name.as_os_str() == STANDARD_OUTPUT { "standard output".into() } else { name };
+                Ok(OutputPath { name, destination, replaces: self.force })
+            }
         }
     }
 
@@ -98,8 +108,19 @@ impl OutputPaths {
     /// # Errors
     /// A usage error if that file is an input or another output.
     pub fn add_standard_output(&mut self) -> Result<()> {
+        Stream::Output.check()?;
+        self.take_standard_output(Path::new("standard output"))?;
         let identity = Destination::Stream(Stream::Output).identity();
         identity.map_or(Ok(()), |identity| self.take(Path::new("standard output"), identity, true))
+    }
+
+    /// Registers standard output, which has room for one output.
+    fn take_standard_output(&mut self, name: &Path) -> Result<()> {
+        if std::mem::replace(&mut self.has_standard_output, true) {
+            let what = "another output goes to standard output already; name a file for one of them";
+            return Err(Error::usage(what).at(name.display()));
+        }
+        Ok(())
     }
 
     /// Registers the file `identity` as an output, once unless it is a stream of this process.

@@ -5,11 +5,15 @@ use std::path::Path;
 
 use tempfile::NamedTempFile;
 
+use super::parts::Listed;
 use crate::error::{Error, Result};
 
 /// A temporary file that only its owner can read. It is removed when this is dropped.
 #[derive(Debug)]
-pub struct PrivateFile(NamedTempFile);
+pub struct PrivateFile {
+    file: NamedTempFile,
+    _listed: Listed,
+}
 
 impl PrivateFile {
     /// A file with `bytes`, whose name ends with `ending`.
@@ -21,7 +25,7 @@ impl PrivateFile {
         let written = made.and_then(|mut file| {
             file.write_all(bytes)?;
             file.flush()?;
-            Ok(Self(file))
+            Ok(Self { _listed: Listed::new(file.path()), file })
         });
         written.map_err(|e| Error::failed(format!("cannot write a temporary file: {e}")))
     }
@@ -29,7 +33,7 @@ impl PrivateFile {
     /// Where it is.
     #[must_use]
     pub fn path(&self) -> &Path {
-        self.0.path()
+        self.file.path()
     }
 }
 

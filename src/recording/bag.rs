@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::BufWriter;
 use std::time::{Duration, Instant};
 
 use mcap::McapError;
@@ -12,7 +11,7 @@ use mcap::write::NoSeek;
 
 use super::recorder::cannot_write;
 use crate::error::{Result, failed};
-use crate::output::{GrowingFile, OutputFolder, OutputPath};
+use crate::output::{GrowingFile, OutputFile, OutputFolder, OutputPath};
 
 /// The file in a bag's folder that says what is in it.
 pub(crate) const BAG_METADATA: &str = "metadata.yaml";
@@ -49,7 +48,8 @@ struct Topic {
 pub(crate) struct BagWriter {
     name: String,
     file_name: String,
-    file: GrowingFile,
+    /// If its file grows under its own name.
+    growing: Option<GrowingFile>,
     metadata: Option<OutputPath>,
     /// `None` once the end is written.
     writer: Option<Writer>,
@@ -58,18 +58,22 @@ pub(crate) struct BagWriter {
     flushed: Instant,
 }
 
-type Writer = mcap::Writer<NoSeek<BufWriter<File>>>;
+type Writer = mcap::Writer<NoSeek<BufWriter<OutputFile>>>;
 
 impl BagWriter {
-    /// Begins a bag in `folder`, whose MCAP is called `file_name`.
+    /// Begins a bag in `folder`, whose MCAP is called `file_name`; `whole`, that file appears when the bag is finished, and before
+    /// there is nothing.
     ///
     /// # Errors
     /// The folder or a file cannot be made.
-    pub(crate) fn create(mut folder: OutputFolder, file_name: &str) -> Result<Self> {
+    pub(crate) fn create(mut folder: OutputFolder, file_name: &str, whole: bool) -> Result<Self> {
         folder.make()?;
         let output = folder.take(file_name);
         let name = output.name().display().to_string();
-        let (to, file) = output.grow()?;
+        let (to, growing) = match whole {
+            true => (output.begin()?, None),
+            false => output.grow().map(|(to, growing)| (to, Some(growing)))?,
+        };
         let options = mcap::WriteOptions::new()
             .compression(None)
             .profile("ros2")
@@ -81,7 +85,7 @@ impl BagWriter {
         Ok(Self {
             name,
             file_name: file_name.to_owned(),
-            file,
+            growing,
             metadata: Some(folder.take(BAG_METADATA)),
             writer: Some(writer),
             topics: Vec::new(),
@@ -149,10 +153,22 @@ impl BagWriter {
     pub(crate) fn finish(mut self) -> Result<()> {
         self.with(|writer| writer.finish().map(drop))?;
         if let Some(writer) = self.writer.take() {
-            writer.into_inner().flush().map_err(|e| cannot_write(&self.name, e.into()))?;
+            let file = writer.into_inner().into_inner().into_inner();
+            file.map_err(|e| cannot_write(&self.name, e.into_error().into()))?.finish()?;
         }
         let text = self.metadata_text();
         self.metadata.take().map_or(Ok(()), |metadata| metadata.write(text.as_bytes()))
+    }
+
+    /// Ends it before all is there, as [`super::Recorder::finish_early`].
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub(crate) fn finish_early(self) -> Result<Option<String>> {
+        if self.growing.is_none() {
+            return Ok(Some(self.name.clone()));
+        }
+        self.finish().map(|()| None)
     }
 
     fn metadata_text(&self) -> String {
@@ -199,8 +215,11 @@ impl Drop for BagWriter {
     fn drop(&mut self) {
         // The writer ends the file on its own, as well as it still can.
         self.writer = None;
-        if self.span_ns.is_none() && self.metadata.is_some() {
-            self.file.remove();
+        if let Some(growing) = &self.growing
+            && self.span_ns.is_none()
+            && self.metadata.is_some()
+        {
+            growing.remove();
         }
     }
 }

@@ -1,8 +1,7 @@
 //! A recording being written.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::BufWriter;
 use std::time::{Duration, Instant};
 
 use mcap::McapError;
@@ -14,7 +13,7 @@ use super::{
     nanoseconds, schemas, words_of,
 };
 use crate::error::{Error, Result, failed};
-use crate::output::{GrowingFile, OutputPath};
+use crate::output::{GrowingFile, OutputFile, OutputPath};
 use crate::signal::Frame;
 
 /// The longest that anything is held back, so that a process that is killed loses less than a second.
@@ -25,10 +24,12 @@ const CHUNK: u64 = 1 << 20;
 /// The number of the channel that is added first.
 const FIRST_CHANNEL: u16 = 1;
 
-/// Writes frames, and messages about them, to a file that can be read however the writing ends.
+/// Writes frames, and messages about them: to a file that can be read however the writing ends, or to one that appears when it is
+/// whole.
 pub struct Recorder {
     name: String,
-    file: GrowingFile,
+    /// If the file grows under its own name.
+    growing: Option<GrowingFile>,
     /// `None` once the end is written.
     writer: Option<Writer>,
     /// By topic, in the order in which they came up.
@@ -44,7 +45,7 @@ pub struct Recorder {
     worth_keeping: bool,
 }
 
-type Writer = mcap::Writer<NoSeek<BufWriter<File>>>;
+type Writer = mcap::Writer<NoSeek<BufWriter<OutputFile>>>;
 
 impl Recorder {
     /// Begins a recording at `output` of the taxels `ids`, in the order of a frame's values. It grows there from the first
@@ -54,7 +55,21 @@ impl Recorder {
     /// The file cannot be made.
     pub fn create(output: OutputPath, ids: &[u32]) -> Result<Self> {
         let name = output.name().display().to_string();
-        let (to, file) = output.grow()?;
+        let (to, growing) = output.grow()?;
+        Self::begin(name, to, Some(growing), ids)
+    }
+
+    /// The same in a file that appears when the recording is finished; dropped before, it leaves nothing, and a file that is there
+    /// stays.
+    ///
+    /// # Errors
+    /// As [`Recorder::create`].
+    pub fn create_whole(output: OutputPath, ids: &[u32]) -> Result<Self> {
+        let name = output.name().display().to_string();
+        Self::begin(name, output.begin()?, None, ids)
+    }
+
+    fn begin(name: String, to: OutputFile, growing: Option<GrowingFile>, ids: &[u32]) -> Result<Self> {
         let options = mcap::WriteOptions::new()
             .compression(None)
             .library(concat!("somatic ", env!("CARGO_PKG_VERSION")))
@@ -67,7 +82,7 @@ impl Recorder {
         let writer = options.create(to).map_err(|e| cannot_write(&name, e))?;
         let mut recorder = Self {
             name,
-            file,
+            growing,
             writer: Some(writer),
             channels: Vec::new(),
             taxels: words_of(ids),
@@ -181,7 +196,20 @@ impl Recorder {
         self.worth_keeping = true;
         self.with(|writer| writer.finish().map(drop))?;
         let Some(writer) = self.writer.take() else { return Ok(()) };
-        writer.into_inner().flush().map_err(|e| cannot_write(&self.name, e.into()))
+        let file = writer.into_inner().into_inner().into_inner();
+        file.map_err(|e| cannot_write(&self.name, e.into_error().into()))?.finish()
+    }
+
+    /// Ends it before all is there: a file that grows under its own name gets its end, one that appears when it is whole does not
+    /// appear. Gives the name of a file that is not there for this reason.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish_early(self) -> Result<Option<String>> {
+        if self.growing.is_none() {
+            return Ok(Some(self.name.clone()));
+        }
+        self.finish().map(|()| None)
     }
 
     /// Does something with the writer.
@@ -195,8 +223,8 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         // The writer ends the file on its own, as well as it still can.
         self.writer = None;
-        if !self.worth_keeping {
-            self.file.remove();
+        if let Some(growing) = self.growing.as_ref().filter(|_| !self.worth_keeping) {
+            growing.remove();
         }
     }
 }

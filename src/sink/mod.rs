@@ -30,7 +30,7 @@ pub use recorded::RecordingSink;
 pub use ros2::Ros2Sink;
 #[cfg(feature = "mcap")]
 pub use ros2::{Ros2BagSink, RosTime};
-pub use spec::{SinkSpec, SinkTarget, TableWish};
+pub use spec::{SinkSpec, SinkTarget, TableName, TableWish};
 #[cfg(feature = "parquet")]
 pub use table::ParquetSink;
 #[cfg(feature = "arrow")]
@@ -97,6 +97,15 @@ pub trait Sink {
     /// # Errors
     /// As [`Sink::write`].
     fn finish(self: Box<Self>) -> Result<()>;
+
+    /// Ends the output before the recording has ended that it is made of. Streams keep what they have; files that appear when
+    /// they are whole do not appear. Gives the name of a file that is not there for this reason.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    fn finish_early(self: Box<Self>) -> Result<Option<String>> {
+        self.finish().map(|()| None)
+    }
 }
 
 /// Whether the output is still open.
@@ -216,6 +225,9 @@ pub struct Session<'a> {
     pub source: &'a str,
     /// The backend: its name, what it runs on, and why it was chosen.
     pub backend: [&'a str; 3],
+    /// Whether the frames are those of a recording, which ends: a recording or bag that is made of them appears when it is whole.
+    /// Else it grows under its own name, as what is live can be had only once.
+    pub is_recorded: bool,
     /// Which taxel is on which channel of which board.
     pub wiring: Option<&'a Wiring>,
     /// Zenoh's own configuration, a file; without one limbs send to this computer alone.

@@ -145,6 +145,15 @@ impl Sink for NdjsonSink {
             _ => Ok(()),
         }
     }
+
+    fn finish_early(mut self: Box<Self>) -> Result<Option<String>> {
+        let flow = self.flush()?;
+        // Every line is of use without those after it; but a file that is there is not given up for a part of a new one.
+        match self.writer.into_parts().0 {
+            Output::File(file) if flow == Flow::Open => Ok((!file.finish_early()?).then_some(self.name)),
+            _ => Ok(None),
+        }
+    }
 }
 
 #[cfg(test)]

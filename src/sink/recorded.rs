@@ -24,7 +24,8 @@ impl RecordingSink {
     /// # Errors
     /// It cannot be written.
     pub fn create(output: OutputPath, session: &Session<'_>) -> Result<Self> {
-        let mut recorder = Recorder::create(output, session.taxels)?;
+        let create = if session.is_recorded { Recorder::create_whole } else { Recorder::create };
+        let mut recorder = create(output, session.taxels)?;
         if let Some(plan) = session.plan {
             recorder.set_units(header::units(plan));
         }
@@ -78,5 +79,9 @@ impl Sink for RecordingSink {
 
     fn finish(self: Box<Self>) -> Result<()> {
         self.recorder.finish()
+    }
+
+    fn finish_early(self: Box<Self>) -> Result<Option<String>> {
+        self.recorder.finish_early()
     }
 }

@@ -7,10 +7,10 @@ use super::table::path_beside;
 use super::{CsvSink, NdjsonSink, Session, Sink, header};
 use crate::error::{Error, Result, nearest};
 use crate::limb::{LimbSends, checked_key};
-use crate::output::{OutputPath, OutputPaths};
+use crate::output::{OutputPath, OutputPaths, STANDARD_OUTPUT};
 use crate::percept::Outputs;
 
-const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], zenoh:KEY, zenoh-percepts:KEY, or - for NDJSON on standard output";
+const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:FOLDER, ros2[:/NAMESPACE], page[:HOST:PORT], zenoh:KEY, zenoh-percepts:KEY, or - for NDJSON on standard output (csv:- is a table there)";
 
 /// A sink as named on a command line or in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ const FORMS: &str = "ndjson:FILE, csv:FILE, parquet:FILE, mcap:FILE, ros2-mcap:F
 pub enum SinkSpec {
     /// `ndjson:FILE`, or a bare `FILE.ndjson`: a line of JSON a frame.
     Ndjson(PathBuf),
-    /// `csv:FILE`, or a bare `FILE.csv`: a table, a row per frame and field in contact.
+    /// `csv:FILE`, or a bare `FILE.csv`: a table, a row per frame and field in contact. `csv:-` is standard output.
     Csv(PathBuf),
     /// `parquet:FILE`, or a bare `FILE.parquet`: the same table in Parquet.
     Parquet(PathBuf),
@@ -58,6 +58,7 @@ impl FromStr for SinkSpec {
             "ndjson" | "csv" | "parquet" | "mcap" | "ros2-mcap" | "zenoh" | "zenoh-percepts" if rest.is_empty() => {
                 bad(format!("nothing follows `{kind}:`; {FORMS}"))
             }
+            "ndjson" if rest == STANDARD_OUTPUT => Ok(Self::Stdout),
             "ndjson" => Ok(Self::Ndjson(rest.into())),
             "csv" => Ok(Self::Csv(rest.into())),
             "parquet" => Ok(Self::Parquet(rest.into())),
@@ -87,6 +88,32 @@ impl FromStr for SinkSpec {
     }
 }
 
+/// The tables of percepts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TableName {
+    /// A row per frame and field in contact.
+    Fields,
+    /// A row per frame and separate touch.
+    Touches,
+    /// A row per frame and contact between links.
+    Contacts,
+}
+
+impl FromStr for TableName {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let all = [("fields", Self::Fields), ("touches", Self::Touches), ("contacts", Self::Contacts)];
+        if let Some((_, table)) = all.iter().find(|(known, _)| *known == name) {
+            return Ok(*table);
+        }
+        let near = nearest(name, all.map(|(name, _)| name)).map(|near| format!("; did you mean `{near}`?"));
+        let hint = near.unwrap_or_else(|| "; choose of fields, touches and contacts".to_owned());
+        Err(Error::usage(format!("there is no table `{name}`{hint}")))
+    }
+}
+
 /// What is asked of tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TableWish {
@@ -96,6 +123,8 @@ pub struct TableWish {
     pub touches: bool,
     /// Whether contacts are: they go into a third file, `percepts.contacts.csv`.
     pub contacts: bool,
+    /// The table that goes to standard output, which has room for one. `None`: touches if they are computed, else fields.
+    pub on_stdout: Option<TableName>,
 }
 
 impl TableWish {
@@ -103,7 +132,29 @@ impl TableWish {
     #[must_use]
     pub fn new(outputs: Outputs, wide: bool) -> Self {
         let outputs = outputs.with_needed();
-        Self { wide, touches: outputs.contains(Outputs::TOUCHES), contacts: outputs.contains(Outputs::CONTACTS) }
+        let (touches, contacts) = (outputs.contains(Outputs::TOUCHES), outputs.contains(Outputs::CONTACTS));
+        Self { wide, touches, contacts, on_stdout: None }
+    }
+
+    /// The same, with this table on standard output.
+    ///
+    /// # Errors
+    /// It is not computed.
+    pub fn on_stdout(self, table: Option<TableName>) -> Result<Self> {
+        let is_there = match table {
+            Some(TableName::Touches) => self.touches,
+            Some(TableName::Contacts) => self.contacts,
+            Some(TableName::Fields) | None => true,
+        };
+        let name = if table == Some(TableName::Touches) { "touches" } else { "contacts" };
+        if !is_there {
+            return Err(Error::usage(format!("{name} are not computed; ask for them with --outputs {name}")));
+        }
+        Ok(Self { on_stdout: table, ..self })
+    }
+
+    fn table_on_stdout(self) -> TableName {
+        self.on_stdout.unwrap_or(if self.touches && !self.wide { TableName::Touches } else { TableName::Fields })
     }
 }
 
@@ -112,6 +163,22 @@ impl SinkSpec {
     #[must_use]
     pub fn is_table(&self) -> bool {
         matches!(self, Self::Csv(_) | Self::Parquet(_))
+    }
+
+    /// Whether it is a table in CSV on standard output.
+    #[must_use]
+    pub fn is_table_on_stdout(&self) -> bool {
+        matches!(self, Self::Csv(path) if path.as_os_str() == STANDARD_OUTPUT)
+    }
+
+    /// Whether it goes to standard output.
+    #[must_use]
+    pub fn is_on_stdout(&self) -> bool {
+        match self {
+            Self::Stdout => true,
+            Self::Csv(path) | Self::Parquet(path) | Self::Mcap(path) => path.as_os_str() == STANDARD_OUTPUT,
+            _ => false,
+        }
     }
 
     /// Whether somebody watches it: a recording is then played as fast as it was.
@@ -136,15 +203,30 @@ impl SinkSpec {
             #[cfg(not(feature = "page"))]
             Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
+            Self::Csv(path) if self.is_table_on_stdout() => {
+                let (mut percepts, mut touches, mut contacts) = (None, None, None);
+                let place = match table.table_on_stdout() {
+                    TableName::Fields => &mut percepts,
+                    TableName::Touches => &mut touches,
+                    TableName::Contacts => &mut contacts,
+                };
+                *place = Some(outputs.add(path)?);
+                SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
+            }
             Self::Csv(path) => {
-                let percepts = outputs.add(path)?;
+                let percepts = Some(outputs.add(path)?);
                 let (touches, contacts) = beside(path, outputs)?;
                 SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
             }
             Self::Parquet(path) => {
                 if cfg!(not(feature = "parquet")) {
-                    let what = "built without the feature `parquet`: cargo install somatic --features parquet; or use csv:FILE";
+                    let what = "built without the feature `parquet`: cargo install --path . --features parquet; or use csv:FILE";
                     return Err(Error::failed(what).at(path.display()));
+                }
+                if self.is_on_stdout() && (table.touches || table.contacts) {
+                    let what =
+                        "standard output has room for one table; name a file, or choose one with csv:- and --table";
+                    return Err(Error::usage(what).at("sink `parquet:-`"));
                 }
                 let percepts = outputs.add(path)?;
                 let (touches, contacts) = beside(path, outputs)?;
@@ -166,11 +248,11 @@ impl SinkSpec {
             #[cfg(not(feature = "ros2"))]
             Self::Ros2(_) => {
                 let what =
-                    "built without the feature `ros2`: cargo install somatic --features ros2; or use ros2-mcap:FOLDER";
+                    "built without the feature `ros2`: cargo install --path . --features ros2; or use ros2-mcap:FOLDER";
                 return Err(Error::failed(what).at("sink `ros2`"));
             }
             Self::Zenoh { key, .. } if cfg!(not(feature = "zenoh")) => {
-                let what = "built without the feature `zenoh`: cargo install somatic --features zenoh";
+                let what = "built without the feature `zenoh`: cargo install --path . --features zenoh";
                 return Err(Error::failed(what).at(format!("sink `zenoh:{key}`")));
             }
             Self::Zenoh { key, sends } => SinkTarget::Zenoh { key: key.clone(), sends: *sends },
@@ -190,8 +272,8 @@ pub enum SinkTarget {
     Ndjson(OutputPath),
     /// A table in CSV.
     Csv {
-        /// The file.
-        percepts: OutputPath,
+        /// The file; `None` if standard output has another table.
+        percepts: Option<OutputPath>,
         /// That of separate touches.
         touches: Option<OutputPath>,
         /// That of contacts.
@@ -315,6 +397,10 @@ mod tests {
     fn a_sink_is_named_as_people_write_it() {
         let parsed = |text: &str| text.parse::<SinkSpec>().unwrap();
         assert_eq!(parsed("-"), SinkSpec::Stdout);
+        assert_eq!(parsed("ndjson:-"), SinkSpec::Stdout);
+        for (text, is_there) in [("-", true), ("csv:-", true), ("mcap:-", true), ("csv:./-", false), ("page", false)] {
+            assert_eq!(parsed(text).is_on_stdout(), is_there, "{text}");
+        }
         assert_eq!(parsed("page"), SinkSpec::Page(None));
         assert_eq!(parsed("page:127.0.0.1:0"), SinkSpec::Page(Some("127.0.0.1:0".into())));
         assert_eq!(parsed("ndjson:a/b"), SinkSpec::Ndjson("a/b".into()));

@@ -50,6 +50,16 @@ impl CsvFile {
         self.file.into_inner().map_err(|e| Error::io(name, e.error()))?.finish()
     }
 
+    /// Ends it before all is there: on standard output with what has been written, else without a file, whose name is given.
+    ///
+    /// # Errors
+    /// As [`CsvFile::finish`].
+    pub fn finish_early(self) -> Result<Option<String>> {
+        let name = self.file.get_ref().name().to_owned();
+        let file = self.file.into_inner().map_err(|e| Error::io(&name, e.error()))?;
+        Ok(file.appears_when_finished().then(|| name.display().to_string()))
+    }
+
     fn write_line(&mut self) -> Result<()> {
         self.line.push('\n');
         let written = self.file.write_all(self.line.as_bytes());

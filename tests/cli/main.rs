@@ -53,6 +53,8 @@ mod ros2_peer;
 mod run;
 #[cfg(unix)]
 mod serial;
+#[cfg(unix)]
+mod signals;
 mod simulate;
 mod skins;
 #[path = "../skips/mod.rs"]
@@ -168,6 +170,24 @@ fn help_teaches_and_names_everything() {
     let places: Vec<usize> = headings.iter().map(|heading| help.find(&format!("\n{heading}\n")).unwrap()).collect();
     assert!(places.is_sorted(), "{help}");
     assert_eq!(done(&["--version"]), format!("somatic {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn help_leads_to_no_page_that_is_not_installed() {
+    let help = done(&["--help"]);
+    let listed = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let commands: Vec<&str> = listed
+        .lines()
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(commands.len() > 12, "{commands:?}");
+    for command in commands {
+        for flag in ["-h", "--help"].into_iter().filter(|_| command != "help") {
+            let help = done(&[command, flag]);
+            assert!(!help.contains("docs/") && !help.contains(".md "), "{command} {flag}: {help}");
+        }
+    }
 }
 
 #[test]

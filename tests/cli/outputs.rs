@@ -525,6 +525,7 @@ const NO_FILES: &[&str] = &[
     "SHELL",
     "SIGNAL,...",
     "T",
+    "TABLE",
     "TAP",
     "TAPS",
     "TIME",

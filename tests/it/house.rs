@@ -196,7 +196,7 @@ fn each_heavy_dependency_has_one_door() {
         ("fearless_simd", "backend/cpu"),
         ("plotters", "ink.rs|figure.rs|picture|plot/draw.rs|tradeoff/plot.rs"),
         ("png", "ink.rs"),
-        ("rustix", "cli/board/pty.rs|cli/keys.rs|source/ports.rs|page/wake.rs"),
+        ("rustix", "cli/board/pty.rs|cli/keys.rs|source/ports.rs|page/wake.rs|output/lock.rs"),
         ("tungstenite", "page/socket.rs"),
         ("httparse", "page/http.rs"),
         ("getrandom", "page/token.rs"),
@@ -221,6 +221,18 @@ fn each_heavy_dependency_has_one_door() {
             seen |= uses;
         }
         assert!(seen, "{dependency} is used nowhere");
+    }
+}
+
+/// The documentation is not there after an installation: a message or a file says the thing itself.
+#[test]
+fn no_message_leads_to_a_page_that_is_not_installed() {
+    for (_, path, text) in sources() {
+        for line in text.lines().filter(|line| !line.trim_start().starts_with("//")) {
+            let cites =
+                line.split("docs/").skip(1).any(|rest| rest.split([' ', ')', ';']).next().unwrap().contains(".md"));
+            assert!(!cites, "{}: {line}", path.display());
+        }
     }
 }
 

@@ -12,8 +12,8 @@ use toml_edit::{DocumentMut, Item, Table, value};
 
 use crate::cli::bar::Bar;
 use crate::cli::bodies::in_body;
-use crate::cli::interrupt::stop_on_signal;
-use crate::cli::stdio::{DONE, print, say};
+use crate::cli::interrupt::{left_out, stop_soon_on_signal};
+use crate::cli::stdio::{print, say, tell_losses};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count};
 
@@ -49,11 +49,19 @@ pub(super) fn calibrate(
     let mut source = spec.open(&ids, &VendorOptions { rate_hz, ..VendorOptions::default() })?;
     let channels = in_body(body, &*source)?;
     let mut survey = SkinSurvey::new(body, calibration, &[], &channels)?;
-    let stop = stop_on_signal()?;
+    let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("read");
     let mut frames = Vec::with_capacity(BATCH);
     let mut frame = Frame::missing(0.0, channels.len());
-    while !stop.load(Ordering::Relaxed) && source.next_frame(&mut frame)? {
+    let (mut count, mut last_s) = (0, 0.0);
+    let absent = [to.name().display().to_string()];
+    while source.next_frame(&mut frame)? {
+        if stop.load(Ordering::Relaxed) {
+            drop(bar);
+            let left = left_out(recording, count, last_s, source.progress(), &absent);
+            return Ok(tell_losses(&[source.losses(), vec![left]].concat()));
+        }
+        (count, last_s) = (count + 1, frame.t_s);
         frames.push(frame.clone());
         if frames.len() == BATCH {
             survey.add(&frames)?;
@@ -71,6 +79,9 @@ pub(super) fn calibrate(
         })
         .map_err(|e| e.at(recording))?;
     drop(bar);
+    if stop.load(Ordering::Relaxed) {
+        return Err(Error::failed(format!("interrupted; {} is not written", absent[0])));
+    }
     if let Some(radius_m) = stamp_m {
         estimate.sigma_m = layer_under(radius_m, estimate.width_m)?;
     }
@@ -81,7 +92,7 @@ pub(super) fn calibrate(
     to.write(written.as_bytes())?;
     print(&if as_json { json_of(&ids, &estimate) } else { table_of(&ids, &estimate, path) })?;
     say(&format!("wrote {name}"));
-    Ok(DONE)
+    Ok(tell_losses(&source.losses()))
 }
 
 /// The layer's own σ where all touches were by the flat end of a stamp: an even disc has a variance of R²/4 each way.

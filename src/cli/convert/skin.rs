@@ -22,6 +22,7 @@ pub(super) fn convert(from: &str, to: &str, force: bool) -> Result<u8> {
     let path = Path::new(to.strip_prefix("csv:").unwrap_or(to));
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     let is_table = match ending.as_deref() {
+        _ if to == "csv:-" => true,
         Some("csv") => true,
         Some("urdf") => false,
         _ => return Err(Error::usage("the skin of a body becomes a .csv or a .urdf").at(format!("output `{to}`"))),
@@ -33,10 +34,11 @@ pub(super) fn convert(from: &str, to: &str, force: bool) -> Result<u8> {
         return Err(Error::failed(what).at(from));
     }
     let (text, notes) = if is_table { (taxel_table(&body), Vec::new()) } else { urdf_of_skin(&body) };
+    let name = output.name().display().to_string();
     output.write(text.as_bytes())?;
     let is_written = |taxel: &&Taxel| is_table || taxel.modality == Modality::Pressure;
     let written = body.taxels.iter().filter(is_written).count();
-    say(&format!("{} in {}", count(written as u64, "taxel"), path.display()));
+    say(&format!("{} in {name}", count(written as u64, "taxel")));
     notes.iter().for_each(|note| say(note));
     if !body.fields.is_empty() {
         let fields = count(body.fields.len() as u64, "field");

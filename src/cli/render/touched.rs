@@ -103,8 +103,10 @@ impl Flags {
         let mut engine = Engine::new(body, engine_options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
         let width = source.taxels().len();
+        let mut bar = Bar::new("reading");
         let frames = std::iter::from_fn(|| {
             let mut frame = Frame::missing(0.0, width);
+            bar.show(source.progress().unwrap_or(0.0));
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
         let moments = Moments::of(&mut engine, body, fields, times, &input.name, frames)?;

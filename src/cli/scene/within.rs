@@ -31,6 +31,7 @@ pub(super) fn source_within(folder: &Path, source: &str) -> Result<String> {
 /// The sink that a scene file in `folder` names.
 pub(super) fn sink_within(folder: &Path, sink: &str) -> Result<String> {
     Ok(match sink.parse()? {
+        spec if SinkSpec::is_on_stdout(&spec) => sink.to_owned(),
         SinkSpec::Ndjson(file) => format!("ndjson:{}", there(folder, &file)),
         SinkSpec::Csv(file) => format!("csv:{}", there(folder, &file)),
         SinkSpec::Parquet(file) => format!("parquet:{}", there(folder, &file)),

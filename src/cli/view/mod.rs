@@ -29,7 +29,7 @@ use self::shared::Shared;
 use self::subject::{Subject, subject};
 use super::browser;
 use super::input::Input;
-use super::interrupt::stop_on_signal;
+use super::interrupt::stop_soon_on_signal;
 use super::scene::{LIVE, RunOptions, grouped};
 use super::stdio::{DONE, LOST, say};
 use super::tradeoff::settled;
@@ -162,7 +162,7 @@ impl Opening<'_> {
                 recorded_max: None,
             },
         );
-        let stop = stop_on_signal()?;
+        let stop = stop_soon_on_signal()?;
         let mut opened = self.start(scene)?;
         // Without frames every taxel's value is missing, and so it is shown.
         let frame = engine.frame(0.0);
@@ -190,7 +190,7 @@ impl Opening<'_> {
             return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
         }
         let body = Arc::new(input.body(asked)?);
-        let stop = stop_on_signal()?;
+        let stop = stop_soon_on_signal()?;
         let source = input.open_posed(&body, asked)?;
         let Some(recording) = Recording::read(source, &stop, asked.quiet)? else { return Ok(DONE) };
         let recording = Arc::new(recording);

@@ -49,7 +49,7 @@ impl Ros2BagSink {
     pub fn create(folder: OutputFolder, file_name: &str, session: &Session<'_>) -> Result<Self> {
         let messages = Messages::new(session)?;
         let topics = vec![None; messages.topics().len()];
-        let mut topics = Topics { bag: BagWriter::create(folder, file_name)?, topics };
+        let mut topics = Topics { bag: BagWriter::create(folder, file_name, session.is_recorded)?, topics };
         for (index, kind) in messages.topics().iter().enumerate() {
             if !kind.is_optional {
                 topics.add(&messages, Topic(index))?;
@@ -101,5 +101,9 @@ impl Sink for Ros2BagSink {
 
     fn finish(self: Box<Self>) -> Result<()> {
         self.topics.bag.finish()
+    }
+
+    fn finish_early(self: Box<Self>) -> Result<Option<String>> {
+        self.topics.bag.finish_early()
     }
 }

@@ -21,7 +21,7 @@ const BETWEEN_WORDS: &str = ";";
 
 /// Writes percepts as CSV: a row per frame and field in contact, or one per frame.
 pub struct CsvSink {
-    percepts: CsvFile,
+    percepts: Option<CsvFile>,
     touches: Option<CsvFile>,
     contacts: Option<CsvFile>,
     rows: Rows,
@@ -46,13 +46,13 @@ struct CsvFile {
 }
 
 impl CsvSink {
-    /// Writes to `output`, where the file appears when the sink is finished, separate touches to `touches`, and contacts to
-    /// `contacts`. With `wide` there is one row per frame, and every field has columns of its own.
+    /// Writes percepts to `output`, where the file appears when the sink is finished, separate touches to `touches`, and contacts to
+    /// `contacts`; each if it is given. With `wide` there is one row per frame, and every field has columns of its own.
     ///
     /// # Errors
     /// A file cannot be made.
     pub fn create(
-        output: OutputPath,
+        output: Option<OutputPath>,
         touches: Option<OutputPath>,
         contacts: Option<OutputPath>,
         wide: bool,
@@ -61,7 +61,7 @@ impl CsvSink {
         let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
         let names = session.names.clone();
         let mut sink = Self {
-            percepts: CsvFile::begin(output, percept_columns(session))?,
+            percepts: output.map(|output| CsvFile::begin(output, percept_columns(session))).transpose()?,
             touches: touches.map(|output| CsvFile::begin(output, touch_columns(session))).transpose()?,
             contacts: contacts.map(|output| CsvFile::begin(output, contact_columns(session))).transpose()?,
             rows: Rows::PerField { all_fields: session.all_fields },
@@ -69,38 +69,44 @@ impl CsvSink {
             flags,
             closed: false,
         };
-        if wide {
+        let titles_of = |file: &CsvFile| file.columns.iter().map(TableColumn::title).collect::<Vec<_>>();
+        if let Some(percepts) = sink.percepts.as_mut().filter(|_| wide) {
             let columns = wide_columns(session);
-            let keys = sink.percepts.columns.drain(..2).collect();
-            sink.percepts.columns = keys;
-            let titles = sink.percepts.columns.iter().map(TableColumn::title);
+            let keys = percepts.columns.drain(..2).collect();
+            percepts.columns = keys;
+            let titles = percepts.columns.iter().map(TableColumn::title);
             let of_field = |name: &FieldNames| {
                 let head = head_of(name);
                 columns.iter().map(|column| format!("{head} {}", column.title())).collect::<Vec<_>>()
             };
             let titles: Vec<String> = titles.chain(sink.names.iter().flat_map(of_field)).collect();
             sink.rows = Rows::PerFrame(columns);
-            sink.percepts.record(titles)?;
-        } else {
-            let titles: Vec<String> = sink.percepts.columns.iter().map(TableColumn::title).collect();
-            sink.percepts.record(titles)?;
+            percepts.record(titles)?;
+        } else if let Some(percepts) = &mut sink.percepts {
+            percepts.record(titles_of(percepts))?;
         }
         for file in [&mut sink.touches, &mut sink.contacts].into_iter().flatten() {
-            let titles: Vec<String> = file.columns.iter().map(TableColumn::title).collect();
-            file.record(titles)?;
+            file.record(titles_of(file))?;
         }
         Ok(sink)
     }
 
-    fn flow(&mut self, written: Result<(), csv::Error>) -> Result<Flow> {
-        flow_of(written.map_err(io_error), &self.percepts.name).inspect(|flow| self.closed |= *flow == Flow::Closed)
+    /// All of its files, the one that names it first.
+    fn files(&mut self) -> impl Iterator<Item = &mut CsvFile> {
+        [&mut self.percepts, &mut self.touches, &mut self.contacts].into_iter().flatten()
+    }
+
+    fn flow(&mut self, written: io::Result<()>) -> Result<Flow> {
+        let name = self.files().next().map_or_else(String::new, |file| file.name.clone());
+        flow_of(written, &name).inspect(|flow| self.closed |= *flow == Flow::Closed)
     }
 
     fn write_all(&mut self, percepts: &Percepts) -> Result<(), csv::Error> {
         let Self { percepts: file, touches, contacts, rows: how, names, flags, .. } = self;
         for frame in 0..percepts.frames() {
-            match how {
-                Rows::PerField { all_fields } => {
+            match (how as &Rows, file.as_mut()) {
+                (_, None) => {}
+                (Rows::PerField { all_fields }, Some(file)) => {
                     for row in rows(percepts, frame, *all_fields) {
                         for column in 0..file.columns.len() {
                             file.field(&row, file.columns[column].kind, file.columns[column].value, names, flags)?;
@@ -108,13 +114,13 @@ impl CsvSink {
                         file.writer.write_record(None::<&[u8]>)?;
                     }
                 }
-                Rows::PerFrame(columns) => {
+                (Rows::PerFrame(columns), Some(file)) => {
                     let first = Row { percepts, frame, field: 0, touch: None, contact: None };
                     for column in 0..file.columns.len() {
                         file.field(&first, file.columns[column].kind, file.columns[column].value, names, flags)?;
                     }
                     for row in rows(percepts, frame, true) {
-                        for column in columns.iter() {
+                        for column in columns {
                             file.field(&row, column.kind, column.value, names, flags)?;
                         }
                     }
@@ -239,7 +245,7 @@ impl Sink for CsvSink {
         if self.closed {
             return Ok(Flow::Closed);
         }
-        let written = self.write_all(percepts);
+        let written = self.write_all(percepts).map_err(io_error);
         self.flow(written)
     }
 
@@ -247,12 +253,8 @@ impl Sink for CsvSink {
         if self.closed {
             return Ok(Flow::Closed);
         }
-        let flushed = self.percepts.writer.flush();
-        let mut beside = [&mut self.touches, &mut self.contacts].into_iter().flatten();
-        let flushed = flushed.and_then(|()| beside.try_for_each(|file| file.writer.flush()));
-        let flow = flow_of(flushed, &self.percepts.name)?;
-        self.closed |= flow == Flow::Closed;
-        Ok(flow)
+        let flushed = self.files().try_for_each(|file| file.writer.flush());
+        self.flow(flushed)
     }
 
     fn finish(mut self: Box<Self>) -> Result<()> {
@@ -260,8 +262,18 @@ impl Sink for CsvSink {
             // The rest has no reader.
             return Ok(());
         }
-        let percepts = self.percepts.finish()?;
-        let beside = [self.touches, self.contacts].into_iter().flatten();
-        percepts.finish_with(beside.map(CsvFile::finish).collect::<Result<_>>()?)
+        let files = [self.percepts, self.touches, self.contacts].into_iter().flatten();
+        let mut files = files.map(CsvFile::finish).collect::<Result<Vec<_>>>()?.into_iter();
+        files.next().map_or(Ok(()), |first| first.finish_with(files.collect()))
+    }
+
+    fn finish_early(mut self: Box<Self>) -> Result<Option<String>> {
+        if self.flush()? == Flow::Closed {
+            return Ok(None);
+        }
+        let Self { percepts, touches, contacts, .. } = *self;
+        let Some(first) = percepts.or(touches).or(contacts) else { return Ok(None) };
+        let name = first.name.clone();
+        Ok(first.finish()?.appears_when_finished().then_some(name))
     }
 }

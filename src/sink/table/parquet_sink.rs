@@ -126,4 +126,9 @@ impl Sink for ParquetSink {
         let beside = [self.touches, self.contacts].into_iter().flatten();
         percepts.finish_with(beside.map(ParquetFile::finish).collect::<Result<_>>()?)
     }
+    fn finish_early(self: Box<Self>) -> Result<Option<String>> {
+        let name = self.percepts.name.clone();
+        // Where it is a stream it gets an end, as it cannot be read without.
+        Ok(self.percepts.finish()?.appears_when_finished().then_some(name))
+    }
 }

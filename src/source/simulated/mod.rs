@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use record::write_recording;
+pub use record::{write_recording, write_recording_with_progress};
 pub use truth::Truth;
 
 use self::contact::{Footprint, Skin};

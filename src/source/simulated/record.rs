@@ -23,15 +23,33 @@ const COLUMNS: [&str; 22] = [
 /// # Errors
 /// A path leaves the surface, or a file cannot be written; the files are then not there.
 pub fn write_recording(simulation: &mut SimulatedSource, frames: OutputPath, truth: OutputPath) -> Result<u64> {
+    write_recording_with_progress(simulation, frames, truth, &mut |_| {})
+}
+
+/// The same, reporting after each frame the share that is done to `progress`.
+///
+/// # Errors
+/// As [`write_recording`].
+pub fn write_recording_with_progress(
+    simulation: &mut SimulatedSource,
+    frames: OutputPath,
+    truth: OutputPath,
+    progress: &mut dyn FnMut(f64),
+) -> Result<u64> {
     let (mut frames, mut truth) = (frames.begin()?, truth.begin()?);
     simulation.seek(0);
-    write(simulation, &mut frames, &mut truth)?;
+    write(simulation, &mut frames, &mut truth, progress)?;
 
     frames.finish_with(vec![truth])?;
     Ok(simulation.frames())
 }
 
-fn write(simulation: &mut SimulatedSource, frames_file: &mut OutputFile, truth_file: &mut OutputFile) -> Result<()> {
+fn write(
+    simulation: &mut SimulatedSource,
+    frames_file: &mut OutputFile,
+    truth_file: &mut OutputFile,
+    progress: &mut dyn FnMut(f64),
+) -> Result<()> {
     let paths = [frames_file.name().to_owned(), truth_file.name().to_owned()];
     let [frames_path, truth_path] = paths.each_ref().map(PathBuf::as_path);
     let writer = |file| csv::Writer::from_writer(std::io::BufWriter::with_capacity(1 << 16, file));
@@ -56,6 +74,7 @@ fn write(simulation: &mut SimulatedSource, frames_file: &mut OutputFile, truth_f
             truth.write_record(truth_row(frame.t_s, number, touch)).map_err(|e| failed(truth_path, e))?;
         }
         number += 1;
+        progress(number as f64 / simulation.frames() as f64);
     }
     frames.flush().map_err(|e| Error::io(frames_path, &e))?;
     truth.flush().map_err(|e| Error::io(truth_path, &e))
