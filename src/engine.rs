@@ -5,11 +5,14 @@ mod block;
 mod cadence;
 mod check;
 mod contacts;
+mod dominated;
 mod fit;
 mod ids;
 mod input;
+mod links;
 mod place;
 mod post;
+mod spread;
 mod state;
 mod upkeep_state;
 
@@ -18,7 +21,7 @@ use self::check::Check;
 use self::contacts::Contacts;
 use self::ids::ranges;
 use self::input::Input;
-use self::place::Links;
+use self::links::Links;
 use self::post::PostState;
 pub use self::state::EngineState;
 use self::upkeep_state::UpkeepState;
@@ -28,7 +31,7 @@ use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::Percepts;
-use crate::scene::{Cadence, Coordinates, Plan, Scene};
+use crate::scene::{Cadence, Plan, Scene};
 use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::calibrate;
 
@@ -156,7 +159,7 @@ impl Engine {
                 .with_letters(plan.letters().len())
                 .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
-            post: PostState::initial(plan.fields.len()),
+            post: PostState::initial(&plan),
             recalibrates: upkeep.is_some() || tare,
             upkeep,
             cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
@@ -172,17 +175,7 @@ impl Engine {
             channel_of_taxel: (0..body.taxels.len())
                 .map(|taxel| plan.body_taxels.binary_search(&taxel).ok().and_then(|channel| channel.try_into().ok()))
                 .collect(),
-            links: Links {
-                posed: scene.coordinates == Coordinates::World,
-                in_link: scene
-                    .in_link
-                    .as_deref()
-                    .and_then(|name| body.links.iter().position(|link| link.name == *name)),
-                index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
-                names: body.links.iter().map(|link| link.name.clone()).collect(),
-                parent: body.links.iter().map(|link| link.parent).collect(),
-                world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
-            },
+            links: Links::new(body, &scene),
             contacts: Contacts::new(body, &plan, &scene),
             kept_charts: recharted.kept,
             plan,
@@ -266,6 +259,23 @@ impl Engine {
     #[must_use]
     pub fn index_of_taxel(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
+    }
+
+    /// What is to be known before the first frame, a line each: taxels that no letter reads, and drift that no taxel can tell.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let drift = self.upkeep.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
+            "no taxel can tell the drift of a touched field: fewer than 3 are in other fields. While a touch lasts, baselines stay, \
+             and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [upkeep] out"
+                .to_owned()
+        });
+        self.plan.left_out.remark().into_iter().chain(drift).collect()
+    }
+
+    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`] had chosen was
+    /// lost, and the CPU goes on.
+    pub fn notice(&mut self) -> Option<String> {
+        self.backend.notice()
     }
 
     /// Turns `frames` into percepts, in order. However a recording is cut into calls, its percepts are the same bits.

@@ -37,6 +37,7 @@ enum Kind {
     Usage,
     NotFound,
     NoAdapter,
+    GpuLost,
 }
 
 impl Error {
@@ -62,6 +63,12 @@ impl Error {
     #[must_use]
     pub fn into_usage(self) -> Self {
         Self { kind: Kind::Usage, ..self }
+    }
+
+    /// The GPU that computed stopped answering.
+    #[must_use]
+    pub fn gpu_lost(what: impl Into<String>) -> Self {
+        Self::new(Kind::GpuLost, what.into())
     }
 
     /// An operation on the file at `path` failed in the operating system.
@@ -115,6 +122,13 @@ impl Error {
     #[must_use]
     pub fn is_no_adapter(&self) -> bool {
         self.kind == Kind::NoAdapter
+    }
+
+    /// True when the GPU that computed stopped answering: its driver was reset or replaced, or it was taken away. Another engine may
+    /// be made, and go on from the last [`crate::EngineState`].
+    #[must_use]
+    pub fn is_gpu_lost(&self) -> bool {
+        self.kind == Kind::GpuLost
     }
 
     /// The exit code that a command ends with on this error: 2 for usage, else 1.

@@ -69,8 +69,9 @@ pub struct Touch {
     pub active: u32,
     /// Its centroid (u, v), m; absent where the field has no chart.
     pub centroid: Option<[f64; 2]>,
-    /// The same point on the surface, as [`Percept::position`] and in the same frame, m.
-    pub position: [f64; 3],
+    /// The same point on the surface, as [`Percept::position`] and in the same frame, m; absent where that is a field over
+    /// several links, and the frame does not say where this touch's link is ([`Flags::NO_POSE`]).
+    pub position: Option<[f64; 3]>,
     /// What presses, where an output of the footprint was asked for and it has one.
     pub footprint: Option<Footprint>,
     /// Why the footprint, or a part of it, is absent.

@@ -54,7 +54,7 @@ pub(crate) fn raised(py: Python<'_>, error: &somatic::Error, file: Option<&Path>
     });
     let class = match () {
         () if error.is_usage() => &USAGE,
-        () if error.is_no_adapter() => &FAILED,
+        () if error.is_no_adapter() || error.is_gpu_lost() => &FAILED,
         () => &INPUT,
     };
     let raised = class.error(py, error.to_string(), file, place.map(str::to_owned));

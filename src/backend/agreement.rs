@@ -320,8 +320,8 @@ impl Cell<'_> {
             let place = limit.map(|limit| [limit.place; 2]);
             self.place(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
             let of = |touch: &Touch| touch.position;
-            let limit = far(limit.map(|limit| limit.position), right.map(of));
-            self.quantity(&format!("{touches}.position"), right.map(of), got.map(of), limit, apart_in_space);
+            let limit = far(limit.map(|limit| limit.position), right.and_then(of));
+            self.quantity(&format!("{touches}.position"), right.and_then(of), got.and_then(of), limit, apart_in_space);
         }
     }
 
@@ -490,7 +490,7 @@ mod tests {
             total: 10.0,
             active: 3,
             centroid: Some([0.1, 0.2]),
-            position: [0.0; 3],
+            position: Some([0.0; 3]),
             footprint: None,
             flags: Flags::empty(),
         };

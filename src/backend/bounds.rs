@@ -292,6 +292,9 @@ impl BoundedReference {
         let members = self.reference.plan.members_of(field).iter().enumerate();
         let (pulls, off): (Vec<f64>, Vec<f64>) =
             members.map(|(index, member)| pulls(index, member.slot, member.weight)).unzip();
+        if cell.step.restarts() {
+            doubt.release();
+        }
         let in_doubt = cell.advances && doubt.follow(&field.skin(), &pulls, off);
         bound.may_remember.touches = in_doubt;
         if in_doubt {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use super::fallback::Fallback;
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::{Backend, BackendKind, BackendState, RawBatch, Rows, Step, cpu, reference};
@@ -50,7 +51,7 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
                 on_cpu.as_secs_f64() * 1e6,
                 on_gpu.as_secs_f64() * 1e6
             );
-            chosen(if on_gpu < on_cpu { gpu } else { cpu }, why)
+            chosen(if on_gpu < on_cpu { Box::new(Fallback::new(gpu, plan)) } else { cpu }, why)
         }
     }
 }

@@ -4,6 +4,7 @@ pub(crate) mod agreement;
 pub(crate) mod bounds;
 mod choose;
 pub(crate) mod cpu;
+mod fallback;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod raw;
@@ -65,6 +66,11 @@ pub(crate) trait Backend: Send {
 
     /// What it runs on, for people.
     fn describe(&self) -> String;
+
+    /// What has changed about how it runs, to be said once.
+    fn notice(&mut self) -> Option<String> {
+        None
+    }
 
     /// What the next frame depends on.
     fn state(&mut self) -> Result<BackendState>;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::percept::Flags;
 use crate::signal::{Frame, RawValue};
+use crate::stage::motion::SHORTEST_STEP_S;
 
 /// A batch of raw values, frame by frame.
 #[derive(Clone, Copy)]
@@ -255,6 +256,13 @@ impl<'a> Rows<'a> {
             }
             Self::Picked { frames, picks } => Self::Picked { frames: frames.part(part), picks },
         }
+    }
+}
+
+impl Step {
+    /// Whether time starts again here: it goes back, or on by more than the scene's longest gap. Nothing is kept over that.
+    pub(crate) fn restarts(&self) -> bool {
+        self.flags.contains(Flags::BAD_DT) && self.dt_s.abs() > SHORTEST_STEP_S
     }
 }
 

@@ -320,6 +320,9 @@ impl Pump {
                     } else {
                         self.engine.process(&frames)?;
                     }
+                    if let Some(notice) = self.engine.notice() {
+                        say(&notice);
+                    }
                     let call = Call { arrived: told.read_at.last().copied(), took: begin.elapsed() };
                     let has_seen_enough = self.doubts.as_mut().is_some_and(|doubts| doubts.see(&frames));
                     if has_seen_enough && !self.view.is_table() {

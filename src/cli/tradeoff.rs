@@ -272,4 +272,5 @@ pub(super) fn say_kept(engine: &Engine) {
     for (name, why) in engine.kept_charts() {
         say(&format!("field `{name}` stays in the chart of the layout: {why}"));
     }
+    engine.remarks().iter().for_each(|remark| say(remark));
 }

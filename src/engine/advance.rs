@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::Engine;
 use super::cadence::step;
 use super::check::Check;
+use super::dominated::orient_again;
 use super::input::{GoOn, Input};
 use super::post::{Post, flag_stale, flag_stale_poses};
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
@@ -55,7 +56,7 @@ impl Engine {
         }
         for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
             flag_stale(&self.plan, self.intake.stale(), percepts);
-            flag_stale_poses(&self.links, frames, percepts);
+            flag_stale_poses(&self.plan, &self.links, frames, percepts);
         }
         self.frames_done += frames.len() as u64;
         Ok(true)
@@ -74,6 +75,9 @@ impl Engine {
                 let near = nearest(name, self.links.index_of.keys().map(String::as_str));
                 let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 return Err(at(Error::failed(format!("it poses link `{name}`, which the body does not have{hint}"))));
+            }
+            if let Some(why) = frame.pose.iter().find_map(|(name, pose)| pose.check(name).err()) {
+                return Err(at(Error::failed(why)));
             }
         }
         self.raw.clear();
@@ -118,8 +122,42 @@ impl Engine {
         Ok(true)
     }
 
-    /// Frames with the same calibration: through the backend, then through post-processing.
+    /// Frames with the same calibration. Where thresholds keep a contact, it ends where time starts again.
     fn segment(&mut self, input: Input<'_>, range: Range<usize>, mut check: Option<&mut Check>) -> Result<()> {
+        let (mut start, mut kept) = (range.start, None);
+        if self.plan.stages().hysteresis {
+            for index in range.clone() {
+                if self.steps[index].restarts() {
+                    self.stretch(input, start..index, kept, check.as_deref_mut())?;
+                    start = index;
+                    kept = Some(self.end_contacts(check.as_deref_mut())?);
+                }
+            }
+        }
+        self.stretch(input, start..range.end, kept, check)
+    }
+
+    /// Ends all contacts in the backend's state; which fields had one.
+    fn end_contacts(&mut self, check: Option<&mut Check>) -> Result<Vec<bool>> {
+        let mut state = self.backend.state()?;
+        let kept = state.fields.iter().map(|field| field.contact).collect();
+        state.fields.fill(FieldState::default());
+        self.backend.restore(&state)?;
+        if let Some(check) = check {
+            (0..state.fields.len()).for_each(|field| check.reference.restore_field(field, FieldState::default()));
+        }
+        Ok(kept)
+    }
+
+    /// Frames with the same calibration: through the backend, then through post-processing. `kept` are the fields in contact
+    /// before the first, if time starts again there.
+    fn stretch(
+        &mut self,
+        input: Input<'_>,
+        range: Range<usize>,
+        kept: Option<Vec<bool>>,
+        mut check: Option<&mut Check>,
+    ) -> Result<()> {
         if range.is_empty() {
             return Ok(());
         }
@@ -141,9 +179,12 @@ impl Engine {
             links: &self.links,
             contacts: self.contacts.as_ref(),
             cadence: self.cadence.as_ref(),
+            kept: kept.as_deref(),
         };
+        post.flag_restart(&raw, 0, &mut self.percepts);
+        orient_again(&self.plan, &raw, &mut self.percepts);
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());
-        post.place(frames, raw.first, &mut self.percepts);
+        post.place(frames, &raw, 0, &mut self.percepts, &self.post);
         for (offset, frame) in frames.iter().enumerate() {
             // As the backend left them: post-processing may put the last frame's percepts in their place.
             let left = check.is_some().then(|| FieldState::after(&self.plan, &self.percepts, raw.first + offset));

@@ -76,6 +76,10 @@ impl OnChange {
                     since
                 });
             };
+            // Nothing is kept over a restart of time.
+            if raw.steps[index].restarts() {
+                before.clear();
+            }
             if before.is_empty() {
                 (0..self.fields).for_each(&mut changed);
                 before.extend(raw.rows.row(index));

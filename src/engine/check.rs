@@ -71,8 +71,15 @@ impl Check {
     ) -> Result<()> {
         let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
         let mut bounds = self.reference.run(raw, offset, &mut self.right, advances);
+        post.flag_restart(raw, offset, &mut self.right);
         let before: Vec<world_motion::Memory> = self.post.fields.iter().map(|field| field.world_motion).collect();
-        post.place(std::slice::from_ref(frame), raw.first + offset, &mut self.right);
+        post.place(std::slice::from_ref(frame), raw, offset, &mut self.right, &self.post);
+        for (field, bound) in post.plan.fields.iter().zip(&mut bounds) {
+            // Such a position is made of the raw values alone, alike on both sides.
+            if !field.parts.is_empty() && post.links.may_pose(frame) && bound.limit(Outputs::POSITION) != Limit::TooClose {
+                bound.set([(Outputs::POSITION, Limit::Within(0.0))]);
+            }
+        }
         post.frame(offset, frame, raw, &mut self.right, &mut self.post);
         post.fit_now(raw, &mut self.right, &mut self.post, None)?;
         if post.plan.stages().world_motion {
@@ -258,9 +265,9 @@ mod tests {
             ),
             (
                 "touches.position",
-                |touch| Some(touch.position[0]),
+                |touch| Some(touch.position?[0]),
                 |bound, _| bound.position,
-                |touch, value| touch.position[0] = value,
+                |touch, value| touch.position.as_mut().unwrap()[0] = value,
             ),
         ];
         let mut backends = 0;

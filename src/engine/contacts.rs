@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::place::{self, Links};
+use super::links::Links;
+use super::place;
 use crate::body::Body;
 use crate::field::{ContactTolerance, rest_overlaps};
 use crate::percept::{Contact, ContactSide, Flags, Outputs, Percepts};
@@ -40,7 +41,7 @@ impl Contacts {
         &self,
         plan: &Plan,
         links: &Links,
-        frame: &Frame,
+        (frame, restarts): (&Frame, bool),
         index: usize,
         percepts: &mut Percepts,
         memory: &mut Memory,
@@ -52,25 +53,30 @@ impl Contacts {
                 continue;
             }
             let world = links.world_from_anchor(field, frame);
-            if world.is_none() {
+            let is_placed = if field.parts.is_empty() { world.is_some() } else { links.are_posed(frame) };
+            if !is_placed {
                 percepts.flags[index * plan.fields.len() + number] |= Flags::NO_POSE;
             }
             let Some(link) = self.links[number] else { continue };
             touched = true;
             let Some(world) = world else { continue };
             placed = true;
-            sides.extend(percepts.touches(index, number).iter().map(|touch| {
+            sides.extend(percepts.touches(index, number).iter().filter_map(|touch| {
+                let position = DVec3::from_array(touch.position?);
                 let normal = touch.centroid.map(|[u, v]| place::on_skin(field, DVec3::new(u, v, 0.0)).1);
-                Side {
+                Some(Side {
                     field: number,
                     touch: touch.id,
                     link,
                     letter: field.letter,
                     total: touch.total,
-                    position: DVec3::from_array(touch.position),
+                    position,
                     normal: normal.map(|normal| world.transform_vector3(normal)),
-                }
+                })
             }));
+        }
+        if restarts {
+            memory.restart();
         }
         memory.release(|field, id| percepts.touches(index, field).iter().any(|touch| touch.id == id));
         let found =

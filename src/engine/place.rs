@@ -1,9 +1,11 @@
 //! Centroids put on the skin, and into the world: [`crate::stage::position`] over a batch.
 
-use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::{DAffine3, DVec3};
 
+use super::links::Links;
+use super::spread::{Frames, Now};
 use crate::backend::cpu::{Level, with_widest};
 use crate::parallel;
 use crate::percept::{Flags, Percepts, PlaceCells};
@@ -18,40 +20,55 @@ const FRAMES_IN_TURN: usize = 16;
 /// Cells whose normals are brought to unit length together.
 const AT_ONCE: usize = 16;
 
-/// What poses are applied to: the body's links and how they hang together at rest.
-pub(super) struct Links {
-    /// Whether poses are heeded.
-    pub(super) posed: bool,
-    /// The link in whose frame everything is put instead of the world.
-    pub(super) in_link: Option<usize>,
-    pub(super) index_of: HashMap<String, usize>,
-    pub(super) names: Vec<String>,
-    pub(super) parent: Vec<Option<usize>>,
-    pub(super) world_from_link: Vec<DAffine3>,
-}
-
-/// Puts the centroids of `frames` on the skin, which stand in `percepts` from frame `first` on: positions, normals, and
-/// whether they are in the world.
-pub(super) fn all_frames(plan: &Plan, links: &Links, frames: &[Frame], first: usize, percepts: &mut Percepts) {
-    let fields = plan.fields.len();
-    let threads = parallel::threads().min((frames.len() * fields).div_ceil(CELLS_A_TASK));
-    let mut cells = percepts.place_cells(first, frames.len());
+/// Puts the centroids of `of.frames` on the skin: positions, normals, and whether they are in the world.
+pub(super) fn all_frames(of: Frames<'_>, percepts: &mut Percepts) {
+    let (fields, frames) = (of.plan.fields.len(), of.frames.len());
+    let threads = parallel::threads().min((frames * fields).div_ceil(CELLS_A_TASK));
+    let mut cells = percepts.place_cells(of.raw.first + of.offset, frames);
     if threads < 2 {
-        run_of_frames(plan, links, frames, &mut cells);
+        run_of_frames(of, 0..frames, &mut cells);
         return;
     }
-    let a_run = frames.len().div_ceil(4 * threads).max(CELLS_A_TASK.div_ceil(fields));
+    let a_run = frames.div_ceil(4 * threads).max(CELLS_A_TASK.div_ceil(fields));
     let mut runs = Vec::new();
-    for frames in frames.chunks(a_run) {
-        let (run, later) = cells.split_at(frames.len() * fields);
-        runs.push((frames, run));
+    for start in (0..frames).step_by(a_run) {
+        let range = start..frames.min(start + a_run);
+        let (run, later) = cells.split_at(range.len() * fields);
+        runs.push((range, run));
         cells = later;
     }
-    parallel::for_each(threads, runs, |(frames, mut cells)| run_of_frames(plan, links, frames, &mut cells));
+    parallel::for_each(threads, runs, |(range, mut cells)| run_of_frames(of, range, &mut cells));
 }
 
-fn run_of_frames(plan: &Plan, links: &Links, frames: &[Frame], cells: &mut PlaceCells<'_>) {
+fn run_of_frames(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>) {
+    let (plan, links, frames) = (of.plan, of.links, &of.frames[range.clone()]);
     with_widest!(Level::new(), simd => with_vectors_of(simd, plan, links, frames, cells));
+    if !plan.spread_slots.is_empty() {
+        link_by_link(of, range, cells);
+    }
+}
+
+/// Places the fields on several links once more, each member by its own link, in the frames that say where links are.
+fn link_by_link(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>) {
+    let fields = of.plan.fields.len();
+    let mut now = Now::default();
+    for (row, frame) in range.enumerate().filter(|&(_, frame)| of.links.may_pose(&of.frames[frame])) {
+        let in_world = of.links.are_posed(&of.frames[frame]);
+        for (index, field) in of.plan.fields.iter().enumerate() {
+            let cell = row * fields + index;
+            if field.parts.is_empty() || cells.flags[cell].contains(Flags::NO_CONTACT) {
+                continue;
+            }
+            match of.position(field, frame, &mut now) {
+                Ok(position) => cells.put(cell, position, DVec3::ZERO, in_world),
+                Err(why) => {
+                    // Of its touches some may be in the world all the same.
+                    cells.put(cell, DVec3::ZERO, DVec3::ZERO, in_world);
+                    cells.remove_position(cell, why);
+                }
+            }
+        }
+    }
 }
 
 /// The same; the compiler uses the vectors of whoever calls it.
@@ -143,35 +160,4 @@ pub(super) fn on_skin(field: &PlanField, place: DVec3) -> (DVec3, DVec3) {
 
 pub(super) fn in_world(world_from_anchor: &DAffine3, position: DVec3, normal: DVec3) -> (DVec3, DVec3) {
     (world_from_anchor.transform_point3(position), world_from_anchor.transform_vector3(normal))
-}
-
-impl Links {
-    /// world_from_anchor of `field` in `frame`, if that says where it is; the world is the scene's link, where it names one.
-    #[inline(always)]
-    pub(super) fn world_from_anchor(&self, field: &PlanField, frame: &Frame) -> Option<DAffine3> {
-        if frame.pose.is_empty() || !self.posed {
-            return None;
-        }
-        let world_from_anchor = self.world_from(field.anchor?, frame)?;
-        match self.in_link {
-            None => Some(world_from_anchor),
-            Some(link) => Some(self.world_from(link, frame)?.inverse() * world_from_anchor),
-        }
-    }
-
-    /// world_from_link of `link` in `frame`: its own pose, or that of its nearest ancestor that has one, at rest from
-    /// there on. `None` where the frame poses neither.
-    fn world_from(&self, link: usize, frame: &Frame) -> Option<DAffine3> {
-        let mut at = Some(link);
-        while let Some(ancestor) = at {
-            let posed = frame.pose.iter().find(|(name, _)| *name == self.names[ancestor]);
-            if let Some((_, pose)) = posed {
-                let world_from_ancestor = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
-                let ancestor_from_link = self.world_from_link[ancestor].inverse() * self.world_from_link[link];
-                return Some(world_from_ancestor * ancestor_from_link);
-            }
-            at = self.parent[ancestor];
-        }
-        None
-    }
 }

@@ -5,12 +5,14 @@ use glam::{DAffine3, DVec3};
 use super::cadence::{self, OnChange};
 use super::contacts::Contacts;
 use super::fit::{self, On};
-use super::place::{self, Links};
+use super::links::Links;
+use super::place;
+use super::spread::{self, Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::error::Result;
 use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
-use crate::signal::{Frame, Quantity, Receptor};
+use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
 use crate::stage::{contacts, difference, filter, force, motion, touches, world_motion};
 
@@ -22,6 +24,8 @@ pub(super) struct PostState {
     pub(super) last: Option<Percepts>,
     pub(super) fits: fit::FitState,
     pub(super) contacts: contacts::Memory,
+    /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
+    pub(super) raw_before: Vec<RawValue>,
 }
 
 /// The same of one field.
@@ -40,12 +44,14 @@ pub(super) struct PostFieldState {
 
 impl PostState {
     /// The state before the first frame.
-    pub(super) fn initial(fields: usize) -> Self {
+    pub(super) fn initial(plan: &Plan) -> Self {
+        let fields = plan.fields.len();
         Self {
             fields: vec![PostFieldState::default(); fields],
             last: None,
             fits: fit::FitState::initial(fields),
             contacts: contacts::Memory::default(),
+            raw_before: Vec::new(),
         }
     }
 }
@@ -57,6 +63,8 @@ pub(super) struct Post<'a> {
     pub(super) contacts: Option<&'a Contacts>,
     /// Which fields changed, where the others keep their percepts.
     pub(super) cadence: Option<&'a OnChange>,
+    /// By field, whether it was in contact before the batch, where time starts again with that.
+    pub(super) kept: Option<&'a [bool]>,
 }
 
 /// Flags every field that holds a taxel that is stale. `stale` has those of each frame, by their places in the body.
@@ -75,12 +83,16 @@ pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Perce
     }
 }
 
-/// Flags the touched fields of `frames` whose poses are missing because joints are late, where poses are heeded.
-pub(super) fn flag_stale_poses(links: &Links, frames: &[Frame], percepts: &mut Percepts) {
-    let fields = percepts.fields();
-    for (frame, _) in frames.iter().enumerate().filter(|(_, frame)| links.posed && frame.has_stale_pose) {
-        for flags in &mut percepts.flags[frame * fields..][..fields] {
-            if !flags.contains(Flags::NO_CONTACT) {
+/// Flags the touched fields of `frames` whose places in the world are not known because joints are late, where poses are heeded.
+pub(super) fn flag_stale_poses(plan: &Plan, links: &Links, frames: &[Frame], percepts: &mut Percepts) {
+    for (index, frame) in frames.iter().enumerate().filter(|(_, frame)| links.posed && frame.has_stale_pose) {
+        let cells = &mut percepts.flags[index * plan.fields.len()..];
+        for (flags, field) in cells.iter_mut().zip(plan.fields.iter()) {
+            let is_placed = match field.parts.is_empty() {
+                true => links.world_from_anchor(field, frame).is_some(),
+                false => !flags.contains(Flags::NO_POSE),
+            };
+            if !flags.contains(Flags::NO_CONTACT) && !is_placed {
                 *flags |= Flags::STALE_POSE;
             }
         }
@@ -88,11 +100,39 @@ pub(super) fn flag_stale_poses(links: &Links, frames: &[Frame], percepts: &mut P
 }
 
 impl Post<'_> {
-    /// Puts the centroids of `frames`, which stand in `percepts` from frame `first` on, on the skin, where that is wanted.
-    pub(super) fn place(&self, frames: &[Frame], first: usize, percepts: &mut Percepts) {
-        if self.plan.stages().position {
-            place::all_frames(self.plan, self.links, frames, first, percepts);
+    /// Says of frame `offset`, where time starts again with it, why a contact that was there before has no motion.
+    pub(super) fn flag_restart(&self, raw: &RawBatch<'_>, offset: usize, percepts: &mut Percepts) {
+        let Some(kept) = self.kept.filter(|_| offset == 0 && self.plan.stages().motion) else { return };
+        let cells = &mut percepts.flags[raw.first * kept.len()..][..kept.len()];
+        for (flags, _) in cells.iter_mut().zip(kept).filter(|(_, kept)| **kept) {
+            if flags.contains(Flags::NO_PREVIOUS) && !flags.contains(Flags::NO_CONTACT) {
+                *flags = (*flags - Flags::NO_PREVIOUS) | Flags::BAD_DT;
+            }
         }
+    }
+
+    /// Puts the centroids of `frames`, which begin at frame `offset` of `raw`, on the skin, where that is wanted.
+    pub(super) fn place(
+        &self,
+        frames: &[Frame],
+        raw: &RawBatch<'_>,
+        offset: usize,
+        percepts: &mut Percepts,
+        state: &PostState,
+    ) {
+        if self.plan.stages().position {
+            place::all_frames(self.of(frames, raw, offset, &state.raw_before), percepts);
+        }
+    }
+
+    fn of<'f>(
+        &'f self,
+        frames: &'f [Frame],
+        raw: &'f RawBatch<'f>,
+        offset: usize,
+        before: &'f [RawValue],
+    ) -> Frames<'f> {
+        Frames { plan: self.plan, links: self.links, frames, raw, offset, before }
     }
 
     /// Completes frame `offset` of `raw`, which is `frame`, but for positions and normals.
@@ -109,6 +149,7 @@ impl Post<'_> {
         if !(stages.pressures || stages.filter || stages.world_motion || stages.sigma || self.cadence.is_some()) {
             return;
         }
+        let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
             if let Some(cadence) = self.cadence {
@@ -133,9 +174,14 @@ impl Post<'_> {
                 continue;
             }
             before.contact = contact;
+            if step.restarts() {
+                before.touches.release();
+            }
             if stages.touches {
-                let world = self.links.world_from_anchor(field, frame);
-                let found = self.touches(field, world.as_ref(), index, cell, percepts, &mut before.touches);
+                let poses = (!field.parts.is_empty() && self.links.may_pose(frame))
+                    .then(|| self.of(alone, raw, offset, &state.raw_before).poses(0, &mut now));
+                let at = Touched { field, frame, poses };
+                let found = self.touches(at, index, cell, percepts, &mut before.touches);
                 match &field.layer {
                     _ if !stages.footprint || found.is_empty() => {}
                     Ok(_) => state.fits.waiting.push(fit::Waiting::new((number, cell, offset), found)),
@@ -149,14 +195,15 @@ impl Post<'_> {
                 self.filter(field, step, cell, percepts, before);
             }
             if stages.world_motion {
-                self.world_motion((field, frame), step, cell, percepts, &mut before.world_motion);
+                let of = self.of(alone, raw, offset, &state.raw_before);
+                self.world_motion(field, (of, &mut now), step, cell, percepts, &mut before.world_motion);
             }
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
             }
         }
         if let Some(contacts) = self.contacts {
-            contacts.find(self.plan, self.links, frame, index, percepts, &mut state.contacts);
+            contacts.find(self.plan, self.links, (frame, step.restarts()), index, percepts, &mut state.contacts);
         }
     }
 
@@ -180,6 +227,10 @@ impl Post<'_> {
         on: On<'_>,
     ) -> Result<()> {
         fit::all(self.plan, raw, &mut state.fits, percepts, on)?;
+        if let Some(last) = raw.frames.checked_sub(1).filter(|_| self.plan.has_spread_changes()) {
+            state.raw_before.clear();
+            state.raw_before.extend(raw.rows.row(last));
+        }
         if self.cadence.is_some() && raw.frames > 0 {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);
@@ -228,7 +279,8 @@ impl Post<'_> {
     /// Finds how fast a cell's position moves in the world.
     fn world_motion(
         &self,
-        (field, frame): (&PlanField, &Frame),
+        field: &PlanField,
+        (of, now): (Frames<'_>, &mut Now),
         step: &Step,
         cell: usize,
         percepts: &mut Percepts,
@@ -239,8 +291,14 @@ impl Post<'_> {
             return;
         }
         let position_in_anchor = || place::on_skin(field, centroid(percepts, cell)).0;
-        let world = self.links.world_from_anchor(field, frame);
-        let position_in_world = world.map(|world| world.transform_point3(position_in_anchor()));
+        let position_in_world = if field.parts.is_empty() {
+            let world = self.links.world_from_anchor(field, &of.frames[0]);
+            world.map(|world| world.transform_point3(position_in_anchor()))
+        } else if self.links.are_posed(&of.frames[0]) {
+            of.position(field, 0, now).ok()
+        } else {
+            None
+        };
         match memory.follow(step.dt_s, step.flags, position_in_world) {
             Ok(speed) => {
                 percepts.add_present(cell, Outputs::SPEED_IN_WORLD);
@@ -283,8 +341,7 @@ impl Post<'_> {
     /// Finds a cell's separate touches.
     fn touches<'m>(
         &self,
-        field: &PlanField,
-        world: Option<&DAffine3>,
+        Touched { field, frame: of, poses }: Touched<'_>,
         frame: usize,
         cell: usize,
         percepts: &mut Percepts,
@@ -306,9 +363,13 @@ impl Post<'_> {
         let unit_m = f64::from(field.unit_m);
         let found = memory.follow(&field.skin(), &pulls);
         let several = found.len() > 1;
-        let on_skin = |place: DVec3| {
-            let (position, normal) = place::on_skin(field, place);
-            world.map_or(position, |world| place::in_world(world, position, normal).0)
+        let world = self.links.world_from_anchor(field, of);
+        let on_skin = |touch: &touches::Found, place: DVec3| match poses {
+            Some(poses) => spread::of_touch(self.links, field, poses, touch, place),
+            None => {
+                let (position, normal) = place::on_skin(field, place);
+                Some(world.map_or(position, |world| place::in_world(&world, position, normal).0))
+            }
         };
         percepts.push_touches(found.iter().map(|touch| {
             let place = touch.place * unit_m;
@@ -317,7 +378,7 @@ impl Post<'_> {
                 total: touch.total,
                 active: touch.active,
                 centroid: field.charted.then(|| place.truncate().to_array()),
-                position: on_skin(place).to_array(),
+                position: on_skin(touch, place).map(|place| place.to_array()),
                 footprint: None,
                 flags: Flags::empty(),
             }
@@ -328,6 +389,15 @@ impl Post<'_> {
         }
         found
     }
+}
+
+/// A field whose touches are put into the world.
+#[derive(Clone, Copy)]
+struct Touched<'a> {
+    field: &'a PlanField,
+    frame: &'a Frame,
+    /// By link, world_from_link, where members lie on several links and the frame says where any is.
+    poses: Option<&'a [Option<DAffine3>]>,
 }
 
 /// A cell's centroid as the backend has it, m.

@@ -5,8 +5,11 @@ use std::collections::HashMap;
 use crate::body::Body;
 use crate::percept::Flags;
 use crate::scene::Plan;
-use crate::signal::{Kept, RawValue, Receptor, Upkeep, UpkeepKeys, Wiring};
+use crate::signal::{Kept, MIN_UNTOUCHED, RawValue, Receptor, Upkeep, UpkeepKeys, Wiring};
 use crate::stage::{calibrate, layout};
+
+/// Fields that are looked at to find one that leaves enough taxels untouched.
+const MOST_LOOKED_AT: usize = 16;
 
 /// Upkeep, and what it needs of the engine.
 #[derive(Clone, Debug)]
@@ -52,6 +55,26 @@ impl UpkeepState {
         let boards = (0..plan.channels()).map(|channel| board_of.get(&id_of(channel)).copied()).collect();
         self.groups.insert(0, boards);
         self.restart(plan);
+    }
+
+    /// Whether the drift of taxels is followed, and none can tell that of `plan` while it is touched anywhere: too few taxels
+    /// stay untouched then.
+    pub(super) fn cannot_tell_drift(&self, plan: &Plan) -> bool {
+        if self.upkeep.keys().time_constant_s.is_none() {
+            return false;
+        }
+        let mut touched = vec![false; plan.fields.len()];
+        let mut leaves_enough = |field: usize| {
+            touched[field] = true;
+            let channels = plan.touched_channels(&touched);
+            touched[field] = false;
+            let untouched = channels.iter().zip(&plan.calibrations).filter(|(touched, taxel)| !**touched && !taxel.mask);
+            untouched.count() >= MIN_UNTOUCHED
+        };
+        let lasting = |field: &usize| plan.letters()[plan.fields[*field].letter].receptor == Receptor::Sustained;
+        // A field whose parts are fields of their own is touched where one of these is.
+        let own = |field: &usize| lasting(field) && !plan.fields[*field].divided;
+        !(0..plan.fields.len()).filter(own).take(MOST_LOOKED_AT).any(|field| leaves_enough(field))
     }
 
     /// Notes which fields are in contact, by the flags of frames, cell by cell.

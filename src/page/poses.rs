@@ -60,7 +60,7 @@ impl Poses {
             let above = parent.filter(|&parent| self.posed[parent]);
             self.posed[index] = own.is_some() || above.is_some();
             self.world[index] = match (own, above) {
-                (Some((_, pose)), _) => DAffine3::from_rotation_translation(pose.rotation, pose.translation),
+                (Some((_, pose)), _) => pose.transform(),
                 (None, Some(parent)) => self.world[parent] * *parent_from_link,
                 (None, None) => *at_rest,
             };

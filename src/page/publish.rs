@@ -101,14 +101,18 @@ impl Publisher {
                 _ => own,
             };
         }
-        // While joints are late, the links stay where they were seen last.
-        if input.frame.has_stale_pose {
-            snapshot.poses.clone_from(&self.last_poses);
-            return;
-        }
         snapshot.poses.clear();
         let links = input.frame.pose.iter();
         snapshot.poses.extend(links.filter_map(|(name, pose)| Some((*self.index_of_link.get(name)?, *pose))));
+        // While joints are late, the links that they move stay where they were seen last.
+        if input.frame.has_stale_pose {
+            let known = snapshot.poses.len();
+            for last in &self.last_poses {
+                if snapshot.poses[..known].iter().all(|(link, _)| *link != last.0) {
+                    snapshot.poses.push(*last);
+                }
+            }
+        }
         self.last_poses.clone_from(&snapshot.poses);
     }
 

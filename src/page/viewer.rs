@@ -283,7 +283,8 @@ fn write_touches(to: &mut Writer, current: &Current) {
         to.f32(touch.total as f32);
         to.u32(touch.active);
         touch.centroid.map_or([f32::NAN; 2], |uv| uv.map(|x| x as f32)).into_iter().for_each(|x| to.f32(x));
-        (0..3).for_each(|i| to.f32((touch.position[i] - from[i]) as f32));
+        let position = touch.position.unwrap_or([f64::NAN; 3]);
+        (0..3).for_each(|i| to.f32((position[i] - from[i]) as f32));
     }
     to.pad();
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::batch::Values;
 use super::columns::{Component, Host};
-use super::{Flags, Percepts};
+use super::{Flags, Outputs, Percepts};
 
 /// A run of frames of single-precision percepts, to be written; columns that nobody asked for are empty.
 pub(crate) struct CellsMut<'a> {
@@ -93,7 +93,8 @@ fn take_mut<'a, T>(column: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 
 /// Cells whose centroids are put on the skin, with the columns that this fills; those that nobody asked for are empty.
 pub(crate) struct PlaceCells<'a> {
-    pub(crate) flags: &'a [Flags],
+    pub(crate) flags: &'a mut [Flags],
+    present: &'a mut [u32],
     centroids: Centroids<'a>,
     in_world: &'a mut [bool],
     position: &'a mut [[f64; 3]],
@@ -123,7 +124,8 @@ impl Percepts {
         let [position, normal, ..] = &mut self.host;
         debug_assert_eq!((Host::Position as usize, Host::Normal as usize), (0, 1));
         PlaceCells {
-            flags: &self.flags[cells.clone()],
+            flags: &mut self.flags[cells.clone()],
+            present: &mut self.present[cells.clone()],
             centroids,
             in_world: &mut self.in_world[cells.clone()],
             position: part(position.as_chunks_mut().0, cells.clone()),
@@ -139,7 +141,8 @@ impl PlaceCells<'_> {
             Centroids::F64(columns) => Centroids::F64(columns.each_mut().map(|column| take(column, cells))),
         };
         let first = Self {
-            flags: take(&mut self.flags, cells),
+            flags: take_mut(&mut self.flags, cells),
+            present: take_mut(&mut self.present, cells),
             centroids,
             in_world: take_mut(&mut self.in_world, cells),
             position: take_mut(&mut self.position, cells),
@@ -159,6 +162,12 @@ impl PlaceCells<'_> {
             Centroids::F32(columns) => of(columns, cell),
             Centroids::F64(columns) => of(columns, cell),
         }
+    }
+
+    /// Takes a cell's position away; `why` says it.
+    pub(crate) fn remove_position(&mut self, cell: usize, why: Flags) {
+        self.flags[cell] |= why;
+        self.present[cell] &= !(Outputs::POSITION.bits() as u32);
     }
 
     /// Puts a cell's position (m) and normal where they are wanted.

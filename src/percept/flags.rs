@@ -67,9 +67,11 @@ bitflags! {
         const NOISE_UNKNOWN = 1 << 25;
         /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.
         const UNSURE = 1 << 26;
-        /// The states of the joints that move the field are missing or too old: its position and normal are in the link.
+        /// The states of the joints that move the field are missing or too old: its position and normal are in the link, or it has
+        /// none as it lies over several.
         const STALE_POSE = 1 << 27;
-        /// Frames do not say where the field is in the world: it is in no contact with another link, and has no speed there.
+        /// Frames do not say where the field is in the world: it is in no contact with another link, and has no speed there. Of
+        /// a field over several links: where one is that is pressed; it has no position.
         const NO_POSE = 1 << 28;
     }
 }

@@ -30,6 +30,8 @@ pub struct JointOptions {
 const MOST_NAMED: usize = 8;
 /// Messages on late states are at least so far apart, s.
 const QUIET_S: f64 = 10.0;
+/// How long joints are waited for until those that are still without a state are named, s.
+const COMES_WITHIN_S: f64 = 1.0;
 /// The default of [`JointOptions::max_age_s`].
 const DEFAULT_MAX_AGE_S: f64 = 0.1;
 
@@ -43,8 +45,9 @@ impl JointOptions {
 
 /// Frames of another source, with poses of links from joint states.
 ///
-/// A frame's own pose of a link stands, and what hangs on that link goes from there: so a floating base is given. Where a
-/// joint that moves a link with taxels has no state, or an old one, the frame has no poses and [`Frame::has_stale_pose`].
+/// A frame's own pose of a link overrides the joints', and what hangs on that link goes from there: so a floating base is given. Where a
+/// joint that moves a link with taxels has no state, or an old one, the frame has [`Frame::has_stale_pose`], and poses of those
+/// links alone that such joints do not move.
 ///
 /// With [`JointOptions::states`], a frame with poses has the positions that these are of as [`Frame::joints`].
 pub struct JointedSource {
@@ -58,8 +61,14 @@ pub struct JointedSource {
     /// By joint, the last state that a frame has carried, with its time, s.
     carried: Vec<Option<(f64, f64)>>,
     positions: Vec<Option<JointPosition>>,
+    /// By joint that is needed, whether any frame had a state of it.
+    has_come: Vec<bool>,
     poses: Vec<Option<DAffine3>>,
     was_stale: bool,
+    /// Since when it is stale, s, until the joints that are late then are named.
+    stale_since_s: Option<f64>,
+    /// The joint that was named first.
+    named: Option<usize>,
     /// Whether the last time that it became stale was told, and when that was, s.
     is_stale_told: bool,
     told_s: f64,
@@ -114,6 +123,7 @@ impl JointedSource {
         Ok(Self {
             source,
             world_from_root: y_up_from(options.up),
+            has_come: vec![false; matches.needed.len()],
             matches,
             options,
             recorded,
@@ -121,6 +131,8 @@ impl JointedSource {
             positions: vec![None; joints],
             poses: Vec::new(),
             was_stale: false,
+            stale_since_s: None,
+            named: None,
             is_stale_told: false,
             told_s: f64::NEG_INFINITY,
             counts: PoseCounts::default(),
@@ -160,9 +172,13 @@ impl JointedSource {
         let PoseCounts { frames, without_pose, span_s } = self.counts;
         let [first_s, last_s] = span_s.filter(|_| without_pose > 0)?;
         let mut line = format!(
-            "{without_pose} of {frames} frames have no pose: states of joints were missing, or older than --joints-max-age {}",
+            "{without_pose} of {frames} frames lack poses of links: states of joints were missing, or older than --joints-max-age {}",
             self.options.max_age_s
         );
+        let silent: Vec<usize> = (0..self.matches.needed.len()).filter(|&at| !self.has_come[at]).collect();
+        if !silent.is_empty() {
+            line += &format!("; no frame has a state of {}", self.named_joints(&silent));
+        }
         if let Some([from_s, to_s]) = self.options.states.as_ref().and_then(JointStates::span_s) {
             let from_s = from_s - self.options.delay_s;
             let to_s = to_s - self.options.delay_s;
@@ -212,39 +228,12 @@ impl JointedSource {
         // Times are rounded: what is as old as the limit to a nanosecond is not older.
         let allowed_s = 0.0..=max_age_s + 1e-9;
         let known = |joint: usize| self.positions[joint].filter(|found| allowed_s.contains(&found.age_s));
-        let late = self.matches.needed.iter().find(|(joint, _)| known(*joint).is_none());
-        frame.has_stale_pose = late.is_some();
-        let is_stale = late.is_some();
-        if is_stale && !self.was_stale {
-            // States that keep coming too late are told of now and then, and counted at the end.
-            self.is_stale_told = frame.t_s - self.told_s >= QUIET_S;
-            self.told_s = if self.is_stale_told { frame.t_s } else { self.told_s };
-        }
-        if is_stale != self.was_stale && self.is_stale_told {
-            self.remarks.notices.push(match late {
-                Some((joint, link)) => {
-                    let name = self.robot.joint_names().nth(*joint).unwrap_or_default();
-                    let age = self.positions[*joint].map_or("no state so far".to_owned(), |found| {
-                        format!("its last state is {:.3} s old", found.age_s)
-                    });
-                    format!(
-                        "at {} s: joint `{name}`, which moves `{link}`: {age}; positions are in links from here on",
-                        frame.t_s
-                    )
-                }
-                None => format!("at {} s: every joint has a state; positions are in the world from here on", frame.t_s),
-            });
-        }
-        self.was_stale = is_stale;
-        let is_recorded = self.options.states.is_some();
-        if frame.has_stale_pose {
-            frame.pose.clear();
-            if is_recorded {
-                frame.joints.clear();
-            }
-            return;
-        }
-        if is_recorded {
+        let needed = self.matches.needed.iter();
+        let late: Vec<usize> =
+            needed.enumerate().filter(|(_, (joint, _))| known(*joint).is_none()).map(|(at, _)| at).collect();
+        self.has_come.iter_mut().enumerate().for_each(|(at, has_come)| *has_come |= !late.contains(&at));
+        frame.has_stale_pose = !late.is_empty();
+        if self.options.states.is_some() {
             self.put_joints(known, names, frame);
         }
         let links: Vec<&str> = self.robot.link_names().collect();
@@ -262,6 +251,64 @@ impl JointedSource {
                 frame.pose.push((name.clone(), Pose { translation: world_from_link.translation, rotation }));
             }
         }
+        if frame.has_stale_pose {
+            self.matches.put_carried(&mut frame.pose);
+        }
+        self.note_late(&late, frame.t_s);
+    }
+
+    /// Says which joints are late: the first of them at once, those that are still late a second later, and when none is.
+    fn note_late(&mut self, late: &[usize], t_s: f64) {
+        let is_stale = !late.is_empty();
+        if is_stale && !self.was_stale {
+            // States that keep coming too late are told of now and then, and counted at the end.
+            self.is_stale_told = t_s - self.told_s >= QUIET_S;
+            self.told_s = if self.is_stale_told { t_s } else { self.told_s };
+            self.stale_since_s = self.is_stale_told.then_some(t_s);
+            self.named = late.first().copied();
+        }
+        if is_stale != self.was_stale && self.is_stale_told {
+            self.remarks.notices.push(match late.first() {
+                Some(&first) => {
+                    let (joint, link) = &self.matches.needed[first];
+                    let name = self.robot.joint_names().nth(*joint).unwrap_or_default();
+                    let age = self.positions[*joint].map_or("no state so far".to_owned(), |found| {
+                        format!("its last state is {:.3} s old", found.age_s)
+                    });
+                    format!(
+                        "at {t_s} s: joint `{name}`, which moves `{link}`: {age}; positions on links that late joints move are in \
+                         those links from here on"
+                    )
+                }
+                None => format!("at {t_s} s: every joint has a state; positions are in the world from here on"),
+            });
+        }
+        self.was_stale = is_stale;
+        if !is_stale {
+            self.stale_since_s = None;
+        } else if self.stale_since_s.is_some_and(|since_s| t_s - since_s >= COMES_WITHIN_S) {
+            self.stale_since_s = None;
+            // Who is late alone has been named.
+            if late.len() > 1 || late.first() != self.named.as_ref() {
+                let joints = self.named_joints(late);
+                self.remarks.notices.push(format!(
+                    "at {t_s} s: still without a state, or with one that is too old: {joints}; links that these move have no pose"
+                ));
+            }
+        }
+    }
+
+    /// Joints among those that are needed, each with a link that it moves.
+    fn named_joints(&self, needed: &[usize]) -> String {
+        let name = |&at: &usize| {
+            let (joint, link) = &self.matches.needed[at];
+            format!("`{}`, which moves `{link}`", self.robot.joint_names().nth(*joint).unwrap_or_default())
+        };
+        let mut names = needed.iter().take(MOST_NAMED).map(name).collect::<Vec<_>>().join("; ");
+        if needed.len() > MOST_NAMED {
+            names += &format!("; and {} more", needed.len() - MOST_NAMED);
+        }
+        names
     }
 }
 

@@ -6,6 +6,7 @@ use super::kinematics::Kinematics;
 use crate::author::mesh::{Up, y_up_from};
 use crate::body::{Body, Taxel};
 use crate::error::{Error, Result, failed};
+use crate::signal::Pose;
 
 /// How far apart URDF and body may have a link at rest, m.
 pub const MAX_REST_DISTANCE_M: f64 = 1e-3;
@@ -19,6 +20,9 @@ pub struct LinkMatches {
     pub(super) matched: Vec<(usize, String)>,
     /// Links of the body that the URDF does not have.
     unmatched: Vec<String>,
+    /// The same with what carries them: each link of the body above, the nearest first, as far as one that the URDF has, with the
+    /// transform from there to the link at rest.
+    carried: Vec<(String, Vec<(String, DAffine3)>)>,
     /// The joints that move a link with taxels, each with such a link.
     pub(super) needed: Vec<(usize, String)>,
     /// How many links of the URDF the body does not have.
@@ -48,8 +52,9 @@ impl LinkMatches {
                 some.join(", ")
             ));
         }
-        let unmatched =
+        let unmatched: Vec<String> =
             body.links.iter().filter(|link| !is_matched(&link.name)).map(|link| link.name.clone()).collect();
+        let carried = unmatched.iter().map(|name| (name.clone(), carriers(body, name, is_matched))).collect();
         let mut needed: Vec<(usize, String)> = Vec::new();
         for taxel in &body.taxels {
             // A link that the URDF does not have moves with the nearest above it that it has.
@@ -76,7 +81,7 @@ impl LinkMatches {
             ));
         }
         let not_in_body = robot.link_names().len() - matched.len();
-        let matches = Self { matched, unmatched, needed, not_in_body };
+        let matches = Self { matched, unmatched, carried, needed, not_in_body };
         matches.check_rest(robot, body, up)?;
         Ok(matches)
     }
@@ -112,6 +117,21 @@ impl LinkMatches {
         })
     }
 
+    /// Adds the poses of links that the URDF does not have to `poses`, as far as what carries them is there.
+    pub(super) fn put_carried(&self, poses: &mut Vec<(String, Pose)>) {
+        for (name, above) in &self.carried {
+            let pose_of = |name: &str| poses.iter().find(|(posed, _)| posed == name).map(|(_, pose)| pose.transform());
+            if pose_of(name).is_some() {
+                continue;
+            }
+            let Some(world_from_link) = above.iter().find_map(|(above, rest)| Some(pose_of(above)? * *rest)) else {
+                continue;
+            };
+            let rotation = rotation(&world_from_link).normalize();
+            poses.push((name.clone(), Pose { translation: world_from_link.translation, rotation }));
+        }
+    }
+
     /// What is matched and what is not, in a line.
     #[must_use]
     pub fn summary(&self) -> String {
@@ -126,6 +146,20 @@ impl LinkMatches {
         }
         text
     }
+}
+
+/// The links above the link called `name`, the nearest first, as far as one that `is_matched`, each with its transform to that
+/// link at rest.
+fn carriers(body: &Body, name: &str, is_matched: impl Fn(&str) -> bool) -> Vec<(String, DAffine3)> {
+    let Some(link) = body.link_index(name) else { return Vec::new() };
+    let mut carriers = Vec::new();
+    let mut at = body.links[link].parent;
+    while let Some(above) = at {
+        let name = &body.links[above].name;
+        carriers.push((name.clone(), body.rest_transform(above, link)));
+        at = body.links[above].parent.filter(|_| !is_matched(name));
+    }
+    carriers
 }
 
 fn rotation(pose: &DAffine3) -> DQuat {

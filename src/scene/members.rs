@@ -1,5 +1,10 @@
 //! What a plan makes of a field: its members' weights and neighbours, its thresholds, its unit.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+
 use crate::body::{Body, Nearest};
 use crate::error::{Result, failed};
 use crate::field::{Field, Lift};
@@ -7,11 +12,31 @@ use crate::signal::{Calibration, ContactThresholds, Quantity, Receptor};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
 
+/// The members of a field that lie on one link.
+#[derive(Clone, Debug)]
+pub(crate) struct LinkPart {
+    /// The link's index in the body.
+    pub(crate) link: usize,
+    /// Members, ascending, each with its position in that link, m.
+    pub(crate) members: Vec<(u32, DVec3)>,
+}
+
 /// Per member of `field`, the members beside it; `around` has each taxel's neighbours.
 pub(super) fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let member_of = |taxel: u32| field.members.binary_search_by_key(&(taxel as usize), |member| member.taxel).ok();
     let beside = |taxel: usize| around[taxel].iter().filter_map(|&n| member_of(n)).map(|m| m as u32).collect();
     field.members.iter().map(|member| beside(member.taxel)).collect()
+}
+
+/// The members of `field` by their links; none where they all lie on one.
+pub(super) fn parts(body: &Body, field: &Field) -> Arc<[LinkPart]> {
+    let mut parts: BTreeMap<usize, Vec<_>> = BTreeMap::new();
+    for (index, member) in field.members.iter().enumerate() {
+        let taxel = &body.taxels[member.taxel];
+        parts.entry(taxel.link).or_default().push((index as u32, taxel.position_in_link));
+    }
+    let parts = if parts.len() > 1 { parts } else { BTreeMap::new() };
+    parts.into_iter().map(|(link, members)| LinkPart { link, members }).collect()
 }
 
 /// Per member of `field` its weight; empty where single precision holds each.

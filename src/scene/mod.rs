@@ -5,6 +5,7 @@ mod curves;
 mod explain;
 mod filter;
 mod knobs;
+mod left_out;
 mod members;
 mod onset;
 mod plan;
@@ -17,6 +18,7 @@ pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub use plan::Plan;
+pub(crate) use members::LinkPart;
 pub(crate) use plan::PlanField;
 pub(crate) use stages::Stages;
 

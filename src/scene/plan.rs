@@ -6,10 +6,11 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::curves::Curves;
-use super::members::{beside, quantity_of, surface, thresholds, unit_of, weights};
+use super::left_out::{LeftOut, is_pressure, pressed_members};
+use super::members::{LinkPart, beside, parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::onset::{SoftOnset, softened};
 use super::stages::Stages;
-use super::{Arithmetic, Knobs, Scene, choose_fields};
+use super::{Arithmetic, Coordinates, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
@@ -53,6 +54,10 @@ pub struct Plan {
     pub(crate) curves: Curves,
     /// Per slot, the P up to which its taxel reads 0, where contacts are fitted.
     pub(crate) feels_from: Vec<f64>,
+    /// The slots that fields on several links read, ascending, where positions in the world are wanted.
+    pub(crate) spread_slots: Vec<u32>,
+    /// Taxels of its fields that measure something else than pressure.
+    pub(crate) left_out: LeftOut,
     /// Shared by the engine and its backend: of a large skin these are most of what a plan takes.
     pub(crate) fields: Arc<[PlanField]>,
     /// All fields' members, one field after the other, each by ascending id.
@@ -79,6 +84,8 @@ pub(crate) struct PlanField {
     pub(crate) quantity: Quantity,
     /// Whether every member's weight is 1.
     pub(crate) unweighted: bool,
+    /// The largest weight of a member.
+    pub(crate) heaviest: f32,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
     /// When it counts as touched.
@@ -98,6 +105,8 @@ pub(crate) struct PlanField {
     pub(crate) places: Vec<DVec3>,
     /// Members' third coordinate in the unit.
     pub(crate) depths: Vec<f32>,
+    /// Members by their links, in the body's order, where they lie on several and positions in the world are wanted; else none.
+    pub(crate) parts: Arc<[LinkPart]>,
     pub(crate) origin_in_anchor: DVec3,
     pub(crate) chart: Option<Chart>,
     /// Why there is none.
@@ -156,8 +165,13 @@ impl Plan {
             .at(&body.name));
         }
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
-        let read: BTreeSet<usize> =
-            chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel)).collect();
+        let left_out = LeftOut::of(body, &chosen, fields);
+        let chosen = left_out.feeling(body, chosen, fields)?;
+        let read: BTreeSet<usize> = chosen
+            .iter()
+            .flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel))
+            .filter(|&taxel| is_pressure(body, taxel))
+            .collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs).with_needed();
@@ -178,6 +192,8 @@ impl Plan {
             taxels: Vec::new(),
             curves: Curves::default(),
             feels_from: Vec::new(),
+            spread_slots: Vec::new(),
+            left_out,
             fields: Arc::default(),
             members: Arc::default(),
             body_taxels: Vec::new(),
@@ -187,8 +203,10 @@ impl Plan {
         let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
-        let (mut plan_fields, mut members) = (Vec::<PlanField>::with_capacity(chosen.len()), Vec::new());
-        for (index, field) in chosen.into_iter().map(|index| (index, &fields.fields[index])) {
+        let (mut plan_fields, mut members) =
+            (Vec::<PlanField>::with_capacity(chosen.len()), Vec::<layout::Member>::new());
+        for (index, field) in chosen.into_iter().map(|index| (index, pressed_members(body, &fields.fields[index]))) {
+            let field = &*field;
             let (count, unit_m) = (field.members.len(), unit_of(field.radius_m()));
             let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
             let first = plan_fields.len();
@@ -206,10 +224,16 @@ impl Plan {
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 weights: weights(field),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
+                heaviest: field.members.iter().map(|member| member.weight as f32).fold(0.0, f32::max),
                 unit_m,
                 thresholds: Thresholds::default(),
                 still,
                 filter: scene.filter.settings(field.spacing_m(), still, f64::from(unit_m))?,
+                parts: if plan.stages().position && scene.coordinates == Coordinates::World {
+                    parts(body, field)
+                } else {
+                    Arc::default()
+                },
                 depths: places.iter().map(|place| place.z as f32).collect(),
                 origin_in_anchor: field.origin_in_anchor,
                 chart: field.chart.as_ref().ok().cloned(),
@@ -238,6 +262,9 @@ impl Plan {
                 }));
             }
         }
+        let spread = plan_fields.iter().filter(|field| !field.parts.is_empty());
+        let slots = spread.flat_map(|field| members[field.first..][..field.count].iter().map(|member| member.slot));
+        plan.spread_slots = slots.collect::<BTreeSet<u32>>().into_iter().collect();
         plan.body_taxels = body_taxels;
         plan.fields = plan_fields.into();
         plan.members = members.into();
@@ -247,6 +274,10 @@ impl Plan {
         }
         if plan.stages().position || plan.stages().filter {
             plan.columns |= Outputs::CENTROID;
+        }
+        if plan.stages().orientation {
+            // Whether one taxel is nearly all of a touch.
+            plan.columns |= Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
         }
         if plan.stages().motion || plan.stages().filter {
             plan.columns |= Outputs::ACTIVE;
@@ -338,6 +369,11 @@ impl Plan {
     /// How many of the slots, the first ones, are pressures calibrated from raw values; the others are their changes.
     pub(crate) fn calibrated(&self) -> usize {
         self.calibrated
+    }
+
+    /// Whether changes of values say where a field on several links is touched.
+    pub(crate) fn has_spread_changes(&self) -> bool {
+        self.spread_slots.last().is_some_and(|&slot| slot as usize >= self.calibrated())
     }
 
     pub(crate) fn has_changes(&self) -> bool {

@@ -1,7 +1,7 @@
 //! Frames: a time stamp and the raw values of some taxels.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use serde::{Serialize, Serializer};
 
 /// One taxel's raw value: a single-precision number, or missing, or faulty.
@@ -92,6 +92,41 @@ pub struct Pose {
     pub rotation: DQuat,
 }
 
+/// How far a pose may be from the world's origin, m, along each axis: beyond, double precision puts places off by over 0.1 µm.
+pub const FARTHEST_POSE_M: f64 = 1e9;
+/// Lengths that a quaternion may have to be taken for a rotation.
+const QUATERNION_LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// By how much the square of a unit quaternion's length may be off 1 for roundings.
+const UNIT: f64 = 1e-12;
+
+impl Pose {
+    /// Whether it can be computed with: finite numbers, at most [`FARTHEST_POSE_M`] away, and a quaternion that has a length;
+    /// else what is wrong with the pose of `link`.
+    pub(crate) fn check(&self, link: &str) -> Result<(), String> {
+        let Self { translation, rotation } = self;
+        if !translation.is_finite() || translation.abs().max_element() > FARTHEST_POSE_M {
+            let [x, y, z] = translation.to_array();
+            return Err(format!(
+                "the pose of `{link}` is at {x:e}, {y:e}, {z:e} m; poses may be {FARTHEST_POSE_M:e} m from the origin at most"
+            ));
+        }
+        if !QUATERNION_LENGTHS.contains(&rotation.length()) {
+            return Err(format!(
+                "the quaternion of `{link}` has length {:e}; give a unit quaternion qx,qy,qz,qw",
+                rotation.length()
+            ));
+        }
+        Ok(())
+    }
+
+    /// world_from_link; of a quaternion that is not unit the direction counts.
+    pub(crate) fn transform(&self) -> DAffine3 {
+        let is_unit = (self.rotation.length_squared() - 1.0).abs() <= UNIT;
+        let rotation = if is_unit { self.rotation } else { self.rotation.normalize() };
+        DAffine3::from_rotation_translation(rotation, self.translation)
+    }
+}
+
 /// `[x, y, z, qx, qy, qz, qw]`.
 impl Serialize for Pose {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -107,13 +142,15 @@ pub struct Frame {
     pub t_s: f64,
     /// One value per taxel, [`RawValue::MISSING`] where none arrived.
     pub values: Vec<RawValue>,
-    /// Poses of links by name, if the frame has them: world_from_link.
+    /// Poses of links by name, if the frame has them: world_from_link. A link without one is carried by the nearest above it
+    /// that has one, as at rest, unless [`Frame::has_stale_pose`].
     #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "as_map")]
     pub pose: Vec<(String, Pose)>,
     /// Positions of joints by name (rad, or m for prismatic ones), if the frame has them.
     #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "positions_as_map")]
     pub joints: Vec<(String, f64)>,
-    /// Whether poses are missing because the joints' states are missing or too old.
+    /// Whether poses are missing because the joints' states are missing or too old: links without a pose of their own are then
+    /// nowhere in the world.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub has_stale_pose: bool,
 }
@@ -153,6 +190,23 @@ mod tests {
         let frame = Frame { t_s: 0.5, values, pose: vec![("arm".to_owned(), pose)], ..Frame::default() };
         let expected = r#"{"t":0.5,"values":[0.1,null,"stale","faulty"],"pose":{"arm":[1.0,0.0,0.0,0.0,0.0,0.0,1.0]}}"#;
         assert_eq!(serde_json::to_string(&frame).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_pose_that_cannot_be_computed_with_is_refused() {
+        let check = |x: f64, rotation: DQuat| Pose { translation: DVec3::X * x, rotation }.check("arm");
+        assert_eq!(check(-FARTHEST_POSE_M, DQuat::IDENTITY * 2.0), Ok(()));
+        for x in [1.1e9, 1e160, -1e308, f64::NAN, f64::INFINITY] {
+            let why = check(x, DQuat::IDENTITY).unwrap_err();
+            assert!(why.starts_with("the pose of `arm` is at ") && why.ends_with("poses may be 1e9 m from the origin at most"));
+        }
+        for w in [0.0, 1e-4, 1e4, f64::NAN, f64::INFINITY] {
+            let why = check(0.0, DQuat::from_xyzw(0.0, 0.0, 0.0, w)).unwrap_err();
+            assert!(why.starts_with("the quaternion of `arm` has length ") && why.len() < 100, "{why}");
+        }
+        // What is off by more than rounding does not scale places.
+        let pose = Pose { translation: DVec3::X, rotation: DQuat::from_rotation_z(0.3) * 1.5 };
+        assert!((pose.transform().transform_point3(DVec3::Y) - DVec3::X).length() - 1.0 < 1e-12);
     }
 
     #[test]

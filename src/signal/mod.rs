@@ -20,12 +20,12 @@ pub use calibration::{
 };
 pub use curve::Curve;
 pub(crate) use curve::slope;
-pub use frame::{Frame, Pose, RawValue};
+pub use frame::{FARTHEST_POSE_M, Frame, Pose, RawValue};
 pub use fsr::FsrCircuit;
 pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub use response::{FsrResponse, FsrSignal, Response};
 pub use unit::{Quantity, UnitOfP};
-pub(crate) use upkeep::{Kept, Upkeep};
+pub(crate) use upkeep::{Kept, MIN_UNTOUCHED, Upkeep};
 pub use upkeep::{Unfit, UpkeepKeys};
 pub use wiring::{WiredBoard, Wiring};

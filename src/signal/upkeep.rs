@@ -30,6 +30,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use self::common_drift::MIN_UNTOUCHED;
 use self::common_drift::{CommonDrift, Drift};
 use self::press_evidence::{PressEvidence, TouchSense};
 use super::RawValue;

@@ -152,8 +152,10 @@ impl LineWriter {
                 key(line, "centroid");
                 print(line, &centroid);
             }
-            key(line, "position");
-            print(line, &touch.position);
+            if let Some(position) = touch.position {
+                key(line, "position");
+                print(line, &position);
+            }
             print_footprint(line, touch, footprint);
             if !footprint.is_empty() {
                 self.write_flags(touch.flags, line);

@@ -159,16 +159,20 @@ impl ViewWriter {
         Ok(())
     }
 
-    /// Updates the links' poses: those in `frame`, and their descendants; all others are at rest.
+    /// Updates the links' poses: those in `frame`, and their descendants; all others are at rest, or while joints are late where
+    /// they were last.
     fn pose(&mut self, frame: &Frame) {
         let mut posed = vec![false; self.links.len()];
         for (index, link) in self.links.iter().enumerate() {
+            let own = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&index));
+            if own.is_none() && frame.has_stale_pose {
+                continue;
+            }
             let above = link.parent.filter(|&parent| posed[parent]);
             self.world[index] = above.map_or(link.world_from_link, |parent| self.world[parent] * link.parent_from_link);
             posed[index] = above.is_some();
-            let own = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&index));
             if let Some((_, pose)) = own {
-                self.world[index] = DAffine3::from_rotation_translation(pose.rotation, pose.translation);
+                self.world[index] = pose.transform();
                 posed[index] = true;
             }
         }

@@ -20,9 +20,6 @@ use crate::signal::{Frame, Pose, RawValue};
 /// Longest accepted line, so that invalid input does not fill the memory.
 const MAX_LINE_BYTES: u64 = 64 << 20;
 
-/// Quaternions with lengths in this range are normalised; others are errors.
-const QUATERNION_LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
-
 /// Frames read from NDJSON.
 pub struct NdjsonSource {
     name: String,
@@ -421,15 +418,9 @@ impl<'de> Visitor<'de> for PoseVisitor<'_> {
             return Err(wrong(found));
         }
         let [x, y, z, qx, qy, qz, qw] = numbers;
-        let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
-        if !QUATERNION_LENGTHS.contains(&rotation.length()) {
-            return Err(A::Error::custom(format!(
-                "the quaternion of `{}` has length {:e}; give a unit quaternion qx,qy,qz,qw",
-                self.link,
-                rotation.length()
-            )));
-        }
-        Ok(Pose { translation: DVec3::new(x, y, z), rotation: rotation.normalize() })
+        let pose = Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw) };
+        pose.check(self.link).map_err(A::Error::custom)?;
+        Ok(Pose { rotation: pose.rotation.normalize(), ..pose })
     }
 }
 

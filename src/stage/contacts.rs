@@ -96,6 +96,11 @@ struct Known {
 }
 
 impl Memory {
+    /// Forgets all contacts; their identities are never used again.
+    pub(crate) fn restart(&mut self) {
+        self.known.clear();
+    }
+
     /// Forgets contacts of which a touch has ended: those for whose field and touch `lasts` does not hold.
     pub(crate) fn release(&mut self, lasts: impl Fn(usize, u64) -> bool) {
         self.known.retain(|known| known.sides.iter().all(|&(field, touch)| lasts(field, touch)));

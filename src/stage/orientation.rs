@@ -9,6 +9,8 @@
 //! * ‖e₁ − e₂‖ ≤ 2⁻¹⁴ R₁: absent, `coincident`.
 //! * A third point with R₂ − R₃ ≤ 2⁻¹⁴ R₁: given, with `tie`.
 //!
+//! Of a touch of which one taxel is nearly all, single precision does not do: the host computes it (`engine/dominated.rs`).
+//!
 //! **Bound.** A point's own error is ε = q(‖δc‖ + u‖x‖ + 9u‖x − c‖) plus 2⁻⁶², where its square underflows: the
 //! centroid's error, the coordinate's rounding, then 3u in q, u each in the difference and the product, and the sum of
 //! squares. Pressures that are off by ε more than 2u add q‖x − c‖(ε/P + ρ)/(1 − ρ) with ρ = Σ wε/S; from ρ = ½ on nothing

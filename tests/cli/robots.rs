@@ -66,6 +66,53 @@ fn a_joint_that_the_urdf_does_not_have_is_left_out_and_told_once() {
 }
 
 #[test]
+fn a_joint_that_never_comes_is_named_and_leaves_the_links_that_it_does_not_move_in_the_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let skin = "<sensor name=\"upper_skin\"><parent link=\"upper_arm\"/><origin xyz=\"0.05 -0.015 0.03\"/>\
+                <tactile><array rows=\"2\" cols=\"2\" size=\"0.008 0.008\" spacing=\"0.02 0.01\"/></tactile></sensor></robot>";
+    let urdf = folder.path().join("two.urdf");
+    std::fs::write(&urdf, std::fs::read_to_string(URDF).unwrap().replace("</robot>", skin)).unwrap();
+    let body = folder.path().join("two.glb");
+    done(&["author", "--urdf-skin", text_of(&urdf), "-o", text_of(&body)]);
+    let run = |joints: &str| {
+        let line = |index: u32| {
+            let t = f64::from(index) * 0.05;
+            format!("{{\"t\":{t},\"values\":{{\"11\":5,\"33\":7}},\"joints\":{{{joints}}}}}\n")
+        };
+        let lines: String = (0..30).map(line).collect();
+        run_lines(&body, &lines, &["--joints", text_of(&urdf), "--up", "z", "--outputs", "total,position"])
+    };
+    // By link of the layout, in the last frame: the link that the position is in, that position, and whether it is flagged.
+    let places = |frames: &[Value]| -> Vec<(f64, String, String, bool)> {
+        let fields = frames.last().unwrap()["fields"].as_array().unwrap().clone();
+        let of = |field: &Value| {
+            let is_stale = field["flags"].to_string().contains("stale_pose");
+            let [link, at] = ["link", "position"].map(|key| field[key].to_string());
+            (field["total"].as_f64().unwrap(), link, at, is_stale)
+        };
+        fields.iter().map(of).filter(|(total, ..)| *total < 12.0).collect()
+    };
+    let (all, said) = run("\"shoulder\":0.3,\"elbow\":-0.4");
+    assert!(!said.contains("lack poses"), "{said}");
+    let whole = places(&all);
+    assert!(whole.len() >= 2 && whole.iter().all(|place| place.1 == "\"world\"" && !place.3), "{whole:?}");
+    let (some, said) = run("\"shoulder\":0.3");
+    for (place, whole) in places(&some).iter().zip(&whole) {
+        // The shoulder alone moves the upper arm, which is pressed with 7.
+        let is_placed = place.0 == 7.0;
+        assert_eq!((place == whole, place.3), (is_placed, !is_placed), "{place:?} {whole:?}");
+        assert_eq!(place.1, if is_placed { "\"world\"" } else { "\"fore_arm\"" });
+    }
+    assert!(said.contains("at 0 s: joint `elbow`, which moves `fore_arm`: no state so far"), "{said}");
+    assert!(said.contains("30 of 30 frames lack poses of links"), "{said}");
+    assert!(said.contains("no frame has a state of `elbow`, which moves `fore_arm`"), "{said}");
+    let (none, said) = run("\"elbow\":-0.4");
+    assert!(places(&none).iter().all(|place| place.3), "{none:?}");
+    let later = "at 1 s: still without a state, or with one that is too old: `shoulder`, which moves `fore_arm`";
+    assert!(said.matches(later).count() == 1 && said.contains("no frame has a state of `shoulder`"), "{said}");
+}
+
+#[test]
 fn frames_without_a_pose_are_counted_where_a_run_is_stopped_too() {
     let (_folder, body) = arm();
     let (_other, states) = file("states.csv", "t,shoulder,elbow,grip\n100,0,0,0\n101,0,0,0\n");
@@ -74,7 +121,7 @@ fn frames_without_a_pose_are_counted_where_a_run_is_stopped_too() {
     let output = super::output(&[&run[..], &jointed, &["--speed", "0.5", "--for", "0.5s"]].concat());
     assert_eq!(output.status.code(), Some(0));
     let said = stderr(&output);
-    assert!(said.matches(" frames have no pose: ").count() == 1, "{said}");
+    assert!(said.matches(" frames lack poses of links: ").count() == 1, "{said}");
 }
 
 #[test]
@@ -178,7 +225,7 @@ fn joints_in_frames_put_percepts_into_the_world() {
     assert_eq!(found.len(), 6);
     assert!(said.contains("at 0.9 s: joint `elbow`") || said.contains("at 0.9 s: joint `shoulder`"), "{said}");
     assert!(said.contains("0.750 s old") && said.contains("at 1 s: every joint has a state"), "{said}");
-    assert!(said.contains("1 of 6 frames have no pose") && !said.contains("degrees"), "{said}");
+    assert!(said.contains("1 of 6 frames lack poses") && !said.contains("degrees"), "{said}");
     // Who asks for the anchor gets it, and no flag.
     let flags = ["--joints", URDF, "--up", "z", "--coordinates", "anchor"];
     let anchored = run_lines(&body, &lines.concat(), &flags).0;
@@ -305,7 +352,7 @@ fn states_that_cannot_be_meant_are_told_of() {
     assert!(told.contains("joint `shoulder` is at 28.6 rad"), "{told}");
     // In ms instead of s; the states come too late again and again.
     let (code, told) = said(URDF, "t,shoulder,elbow,grip\n0,0,0,0\n250,0,0,0\n500,0,0,0\n");
-    assert!(code == Some(0) && told.contains("89 of 100 frames have no pose"), "{told}");
+    assert!(code == Some(0) && told.contains("89 of 100 frames lack poses"), "{told}");
     assert!(told.contains("states are of 0 to 500 s on the frames' clock, frames of 0 to 0.99 s"), "{told}");
     let slow: String = (0..5).map(|state| format!("{},0,0,0\n", f64::from(state) * 0.25)).collect();
     let (_, told) = said(URDF, &format!("t,shoulder,elbow,grip\n{slow}"));
@@ -334,7 +381,7 @@ fn states_that_cannot_be_meant_are_told_of() {
     // Two clocks.
     let (_, told) = said(URDF, "t,shoulder,elbow,grip\n1700000000,0,0,0\n1700000001,0,0,0\n");
     assert!(
-        told.contains("100 of 100 frames have no pose") && told.contains("two clocks, give --joints-delay"),
+        told.contains("100 of 100 frames lack poses") && told.contains("two clocks, give --joints-delay"),
         "{told}"
     );
     // The base of another robot is called alike.

@@ -408,3 +408,139 @@ fn a_field_of_a_million_taxels_answers() {
         assert_eq!(percepts.get(0, 0).active, Some(values.iter().filter(|&&v| v > 0.0).count() as u32));
     }
 }
+
+#[test]
+fn a_line_between_faint_points_beside_a_strong_one_is_the_references() {
+    let uv: Vec<[f64; 2]> = (0..16).map(|i| [0.013 * f64::from(i % 4) + 0.001, 0.011 * f64::from(i / 4)]).collect();
+    let body = Flat::new(&uv).field("field", None, 0..16).surface(1.0).body();
+    let outputs = Outputs::ORIENTATION | Outputs::TOTAL;
+    let run = |backend: BackendKind, frames: &[Frame]| {
+        let options = Options::default().backend(backend).scene(Scene::default().outputs(outputs)).batch(64);
+        let mut engine = Engine::new(&body, options).unwrap();
+        engine.process(frames).unwrap().clone()
+    };
+    let mut random = 7_u32;
+    let mut next = move || {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        random >> 8
+    };
+    // One taxel at 10⁵, some at 10⁻⁶ or a little more.
+    let mut frame_at = |index: u32| {
+        let strong = next() % 16;
+        let value = |taxel: u32, chance: u32| match chance % 3 {
+            _ if taxel == strong => 1e5,
+            0 => 1e-6 * (1.0 + f64::from(chance % 1000) / 100.0),
+            _ => 0.0,
+        };
+        let values: Vec<f64> = (0..16).map(|taxel| value(taxel, next())).collect();
+        frame(0.01 * f64::from(index), &values)
+    };
+    let frames: Vec<Frame> = (0..200).map(&mut frame_at).collect();
+    let right = run(BackendKind::Reference, &frames);
+    for backend in backends() {
+        let found = run(backend, &frames);
+        let mut compared = 0;
+        for frame in 0..frames.len() {
+            let (found, right) = (found.get(frame, 0), right.get(frame, 0));
+            assert_eq!((found.flags, found.orientation.is_some()), (right.flags, right.orientation.is_some()), "{frame}");
+            if let (Some(found), Some(right)) = (found.orientation, right.orientation) {
+                let apart = (found - right).abs().min(PI - (found - right).abs());
+                assert!(apart < 1e-6, "{backend:?}, frame {frame}: {found}, not {right}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 150, "{compared}");
+    }
+}
+
+#[test]
+fn a_taxel_that_measures_something_else_is_left_out_and_named() {
+    let mut body = Flat::new(&SQUARE).field("field", None, 0..4).field("warm", None, 2..4).surface(1.0).body();
+    let plain = body.clone();
+    body.taxels[2].modality = Modality::Temperature;
+    body.taxels[3].modality = Modality::Proximity;
+    // What it measures is neither in sums nor in flags, not even where it is faulty.
+    let mut told = frame(0.0, &[3.0, 1.0, 37.0, 0.2]);
+    told.values[3] = RawValue::FAULTY;
+    let untold = frame(0.0, &[3.0, 1.0, 0.0, 0.0]);
+    for backend in backends() {
+        let scene = Scene::default().outputs(Outputs::USUAL | Outputs::TOUCHES);
+        let engine = |body: &Body| Engine::new(body, Options::default().backend(backend).scene(scene.clone())).unwrap();
+        let (mut mixed, mut pressures) = (engine(&body), engine(&plain));
+        assert_eq!(mixed.plan().fields().map(|(name, _)| name.to_owned()).collect::<Vec<_>>(), ["field"]);
+        let (percepts, agreement) = mixed.process_and_compare(std::slice::from_ref(&told)).unwrap();
+        assert!(agreement.holds(), "{agreement}");
+        let (found, right) = (percepts.get(0, 0), pressures.process_one(&untold).unwrap().get(0, 0));
+        let of = |p: &Percept| (p.total, p.peak, p.active, p.area, p.centroid, p.orientation, p.flags);
+        assert_eq!((of(&found), found.total), (of(&right), Some(4.0)));
+        let remark = &mixed.remarks()[..];
+        assert_eq!(remark.len(), 1);
+        assert!(remark[0].contains("taxel 3 measures proximity, taxel 2 measures temperature"), "{remark:?}");
+        assert!(remark[0].contains("field `warm` has no other"), "{remark:?}");
+        assert!(pressures.remarks().is_empty());
+    }
+    body.taxels.iter_mut().for_each(|taxel| taxel.modality = Modality::Temperature);
+    let why = Engine::new(&body, Options::default()).err().unwrap().to_string();
+    assert!(why.contains("no field has a taxel of pressure: 4 taxels measure temperature"), "{why}");
+}
+
+#[test]
+fn nothing_is_kept_over_a_restart_of_time() {
+    let body = field(&SQUARE);
+    let calibration = somatic::Calibration::parse("[contact]\non = 5\noff = 1\n", &[0, 1, 2, 3]).unwrap();
+    // Over the threshold, then under it but over that at which a touch ends.
+    let (hard, soft) = ([9.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0]);
+    let at = |times: &[(f64, [f64; 4])]| times.iter().map(|(t_s, values)| frame(*t_s, values)).collect::<Vec<_>>();
+    for backend in backends() {
+        for back_or_on in [-5.0, 20.0] {
+            let frames = at(&[
+                (0.0, hard),
+                (0.1, soft),
+                (back_or_on, soft),
+                (back_or_on + 0.1, hard),
+                (back_or_on + 0.2, soft),
+                (back_or_on + 0.2, hard),
+                (0.0 + back_or_on * 3.0, hard),
+            ]);
+            let scene = Scene::default().outputs(Outputs::USUAL | Outputs::TOUCHES);
+            let options = Options::default().backend(backend).scene(scene).calibration(calibration.clone());
+            let mut engine = Engine::new(&body, options.clone()).unwrap();
+            let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
+            assert!(agreement.holds(), "{agreement}");
+            let id = |index: usize| percepts.touches(index, 0).first().map(|touch| touch.id);
+            let ids: Vec<Option<u64>> = (0..7).map(id).collect();
+            // A stamp that repeats is no restart; identities are never used again.
+            assert_eq!(ids, [Some(1), Some(1), None, Some(2), Some(2), Some(2), Some(3)], "{backend:?}, {back_or_on}");
+            let flags = |index: usize| percepts.get(index, 0).flags & (Flags::BAD_DT | Flags::NO_PREVIOUS);
+            let expected = [Flags::NO_PREVIOUS, Flags::empty(), Flags::empty(), Flags::NO_PREVIOUS, Flags::empty()];
+            assert_eq!((0..5).map(flags).collect::<Vec<_>>(), expected);
+            assert_eq!([flags(5), flags(6)], [Flags::BAD_DT; 2]);
+            // The same however it is cut.
+            let whole = percepts.clone();
+            let mut alone = Engine::new(&body, options).unwrap();
+            for (index, frame) in frames.iter().enumerate() {
+                let one = alone.process_one(frame).unwrap();
+                assert_eq!((one.get(0, 0), one.touches(0, 0)), (whole.get(index, 0), whole.touches(index, 0)));
+            }
+        }
+    }
+}
+
+#[test]
+fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
+    let calibration = |keys: &str| somatic::Calibration::parse(keys, &[0, 1, 2, 3, 4, 5]).unwrap();
+    let uv = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.1, 0.1], [0.0, 0.2], [0.1, 0.2]];
+    let remarks = |fields: &[std::ops::Range<u32>], keys: &str| {
+        let flat = fields.iter().enumerate().fold(Flat::new(&uv).surface(1.0), |flat, (index, ids)| {
+            flat.field(&format!("f{index}"), None, ids.clone())
+        });
+        let options = Options::default().backend(BackendKind::Cpu).calibration(calibration(keys));
+        Engine::new(&flat.body(), options).unwrap().remarks()
+    };
+    let upkeep = "[upkeep]\ntime_constant_s = 2\n";
+    let told = remarks(&[0..6], upkeep);
+    assert!(told.len() == 1 && told[0].contains("no taxel can tell the drift"), "{told:?}");
+    // Three others can, two cannot.
+    assert!(remarks(&[0..2, 2..5], upkeep).is_empty() && remarks(&[0..6], "[upkeep]\nstuck_s = 4\n").is_empty());
+    assert!(remarks(&[0..2, 2..5], &format!("{upkeep}[taxel.4]\nmask = true\n")).len() == 1);
+}

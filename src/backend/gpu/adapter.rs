@@ -18,7 +18,7 @@ impl Device {
     pub(crate) fn lost(&self, why: &dyn std::fmt::Display) -> Error {
         let words = why.to_string();
         let words: Vec<&str> = words.split_whitespace().collect();
-        Error::failed(format!(
+        Error::gpu_lost(format!(
             "{} stopped answering: {}; start again, or use the cpu backend",
             self.info.name,
             words.join(" ")

@@ -197,6 +197,9 @@ impl Opening<'_> {
         let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;
         let mut engine = Engine::new(&body, settled.options.clone())?;
         engine.set_channels(&recording.taxels).map_err(|e| e.at("header").at(&input.name))?;
+        if !asked.quiet {
+            engine.remarks().iter().for_each(|remark| say(remark));
+        }
         let (name, what, why) = engine.backend();
         let scene = PageScene::new(
             &body,

@@ -5,7 +5,7 @@
 //! epochs is the group's drift. Steps of a median add up, so that rounding by the converter does not accumulate.
 
 /// Minimum number of untouched taxels for an estimate: the median of three tolerates one outlier.
-pub(super) const MIN_UNTOUCHED: usize = 3;
+pub(crate) const MIN_UNTOUCHED: usize = 3;
 
 /// A drift estimated from other taxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -106,7 +106,7 @@ impl Messages {
         let time_ns = moment.time_ns;
         // Where links are is not known while joints are late, and told now and then while nothing moves.
         let is_due = self.links_told_s.is_none_or(|told_s| !(0.0..LINKS_PERIOD_S).contains(&(moment.t_s - told_s)));
-        if !moment.has_stale_pose && (is_due || !moment.pose.is_empty()) {
+        if (is_due && !moment.has_stale_pose) || !moment.pose.is_empty() {
             self.links_told_s = Some(moment.t_s);
             send(LINKS, transforms(time_ns, &self.at_rest, &moment.pose).to_cdr())?;
         }

@@ -305,7 +305,7 @@ impl Row<'_> {
             }
             ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
             ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
-            ValueOf::TouchPosition(component) => self.touch.map(|touch| touch.position[component]),
+            ValueOf::TouchPosition(component) => self.touch?.position.map(|position| position[component]),
             ValueOf::TouchFootprint(column, component) => Some(self.touch?.value(column)?[component]),
             ValueOf::ContactPosition(component) => self.contact.map(|contact| contact.position[component]),
             ValueOf::ContactDistance => self.contact.map(|contact| contact.distance),

@@ -1,0 +1,85 @@
+//! Taxels that measure something else than pressure: no letter reads them, and they are never summed as if they felt a touch.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use crate::body::{Body, Modality};
+use crate::error::{Error, Result};
+use crate::field::{Field, FieldSet};
+
+/// What of a plan's fields is left out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LeftOut {
+    /// By the name of a modality, the ids of the taxels, ascending.
+    taxels: BTreeMap<String, Vec<u32>>,
+    /// Names of fields that have no taxel of pressure.
+    fields: Vec<String>,
+}
+
+impl LeftOut {
+    /// Of the fields `chosen` of `fields`.
+    pub(super) fn of(body: &Body, chosen: &[usize], fields: &FieldSet) -> Self {
+        let mut taxels: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+        let chosen = || chosen.iter().map(|&field| &fields.fields[field]);
+        for member in chosen().flat_map(|field| &field.members).filter(|member| !is_pressure(body, member.taxel)) {
+            let taxel = &body.taxels[member.taxel];
+            taxels.entry(taxel.modality.name()).or_default().push(taxel.id);
+        }
+        for ids in taxels.values_mut() {
+            ids.sort_unstable();
+            ids.dedup();
+        }
+        let feels_nothing = |field: &&Field| !field.members.iter().any(|member| is_pressure(body, member.taxel));
+        Self { taxels, fields: chosen().filter(feels_nothing).map(|field| field.name.clone()).collect() }
+    }
+
+    /// Those of `chosen` that have a taxel of pressure.
+    ///
+    /// # Errors
+    /// None has.
+    pub(super) fn feeling(&self, body: &Body, chosen: Vec<usize>, fields: &FieldSet) -> Result<Vec<usize>> {
+        let left: Vec<usize> =
+            chosen.into_iter().filter(|&field| !self.fields.contains(&fields.fields[field].name)).collect();
+        if left.is_empty() {
+            let what = format!("no field has a taxel of pressure: {}", self.remark().unwrap_or_default());
+            return Err(Error::failed(what).at(&body.name));
+        }
+        Ok(left)
+    }
+
+    /// What is left out, in a line; none where nothing is.
+    pub(crate) fn remark(&self) -> Option<String> {
+        if self.taxels.is_empty() {
+            return None;
+        }
+        let kind = |(name, ids): (&String, &Vec<u32>)| match ids[..] {
+            [id] => format!("taxel {id} measures {name}"),
+            [first, ..] => format!("{} taxels measure {name}, such as {first}", ids.len()),
+            [] => String::new(),
+        };
+        let mut line = format!(
+            "{}; percepts are of pressure: left out of every field",
+            self.taxels.iter().map(kind).collect::<Vec<_>>().join(", ")
+        );
+        match &self.fields[..] {
+            [] => {}
+            [only] => line += &format!("; field `{only}` has no other, and is left out"),
+            [first, ..] => line += &format!("; {} fields have no other, such as `{first}`, and are left out", self.fields.len()),
+        }
+        Some(line)
+    }
+}
+
+pub(super) fn is_pressure(body: &Body, taxel: usize) -> bool {
+    body.taxels[taxel].modality == Modality::Pressure
+}
+
+/// `field` with its members of pressure alone. Its chart is the layout's own.
+pub(super) fn pressed_members<'f>(body: &Body, field: &'f Field) -> Cow<'f, Field> {
+    if field.members.iter().all(|member| is_pressure(body, member.taxel)) {
+        return Cow::Borrowed(field);
+    }
+    let mut pressed = field.clone();
+    pressed.members.retain(|member| is_pressure(body, member.taxel));
+    Cow::Owned(pressed)
+}
