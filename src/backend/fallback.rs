@@ -163,10 +163,20 @@ mod tests {
         for (call, ((found, notice), (right, _))) in found.iter().zip(&right).enumerate() {
             assert!(found == right, "call {call}");
             let told = notice.as_deref().unwrap_or_default();
-            assert_eq!((call == 3, call == 3), (told.contains("stopped answering"), told.contains("goes on on the CPU")));
+            assert_eq!(
+                (call == 3, call == 3),
+                (told.contains("stopped answering"), told.contains("goes on on the CPU"))
+            );
         }
         // Asked for by name it is an error of its own kind.
-        assert!(lost(0).run(&RawBatch { first: 0, frames: 0, rows: Rows::Packed { values: &[], channels: 1 }, steps: &[] },
-            &mut Percepts::new(plan.outputs, 1, Precision::F32)).unwrap_err().is_gpu_lost());
+        assert!(
+            lost(0)
+                .run(
+                    &RawBatch { first: 0, frames: 0, rows: Rows::Packed { values: &[], channels: 1 }, steps: &[] },
+                    &mut Percepts::new(plan.outputs, 1, Precision::F32)
+                )
+                .unwrap_err()
+                .is_gpu_lost()
+        );
     }
 }

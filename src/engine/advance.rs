@@ -124,17 +124,17 @@ impl Engine {
 
     /// Frames with the same calibration. Where thresholds keep a contact, it ends where time starts again.
     fn segment(&mut self, input: Input<'_>, range: Range<usize>, mut check: Option<&mut Check>) -> Result<()> {
-        let (mut start, mut kept) = (range.start, None);
+        let (mut start, mut kept) = (range.start, None::<Vec<bool>>);
         if self.plan.stages().hysteresis {
             for index in range.clone() {
                 if self.steps[index].restarts() {
-                    self.stretch(input, start..index, kept, check.as_deref_mut())?;
+                    self.stretch(input, start..index, kept.as_deref(), check.as_deref_mut())?;
                     start = index;
                     kept = Some(self.end_contacts(check.as_deref_mut())?);
                 }
             }
         }
-        self.stretch(input, start..range.end, kept, check)
+        self.stretch(input, start..range.end, kept.as_deref(), check)
     }
 
     /// Ends all contacts in the backend's state; which fields had one.
@@ -155,7 +155,7 @@ impl Engine {
         &mut self,
         input: Input<'_>,
         range: Range<usize>,
-        kept: Option<Vec<bool>>,
+        kept: Option<&[bool]>,
         mut check: Option<&mut Check>,
     ) -> Result<()> {
         if range.is_empty() {
@@ -179,7 +179,7 @@ impl Engine {
             links: &self.links,
             contacts: self.contacts.as_ref(),
             cadence: self.cadence.as_ref(),
-            kept: kept.as_deref(),
+            kept,
         };
         post.flag_restart(&raw, 0, &mut self.percepts);
         orient_again(&self.plan, &raw, &mut self.percepts);

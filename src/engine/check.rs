@@ -76,7 +76,10 @@ impl Check {
         post.place(std::slice::from_ref(frame), raw, offset, &mut self.right, &self.post);
         for (field, bound) in post.plan.fields.iter().zip(&mut bounds) {
             // Such a position is made of the raw values alone, alike on both sides.
-            if !field.parts.is_empty() && post.links.may_pose(frame) && bound.limit(Outputs::POSITION) != Limit::TooClose {
+            if !field.parts.is_empty()
+                && post.links.may_pose(frame)
+                && bound.limit(Outputs::POSITION) != Limit::TooClose
+            {
                 bound.set([(Outputs::POSITION, Limit::Within(0.0))]);
             }
         }

@@ -26,8 +26,7 @@ pub(super) fn orient_again(plan: &Plan, raw: &RawBatch<'_>, percepts: &mut Perce
         let Values::F32(parts) = &percepts.values else { return };
         let row = (raw.first + frame) * fields..(raw.first + frame + 1) * fields;
         let [total, peak] = [Component::Total, Component::Peak].map(|part| &parts[part][row.clone()]);
-        let is_dominated =
-            |field: &PlanField, total: f32, peak: f32| total - field.heaviest * peak < SHARE * total;
+        let is_dominated = |field: &PlanField, total: f32, peak: f32| total - field.heaviest * peak < SHARE * total;
         let cells = plan.fields.iter().zip(total.iter().zip(peak));
         let found: Vec<usize> = cells
             .enumerate()

@@ -64,17 +64,18 @@ impl UpkeepState {
             return false;
         }
         let mut touched = vec![false; plan.fields.len()];
-        let mut leaves_enough = |field: usize| {
+        let leaves_enough = |field: usize| {
             touched[field] = true;
             let channels = plan.touched_channels(&touched);
             touched[field] = false;
-            let untouched = channels.iter().zip(&plan.calibrations).filter(|(touched, taxel)| !**touched && !taxel.mask);
+            let untouched =
+                channels.iter().zip(&plan.calibrations).filter(|(touched, taxel)| !**touched && !taxel.mask);
             untouched.count() >= MIN_UNTOUCHED
         };
         let lasting = |field: &usize| plan.letters()[plan.fields[*field].letter].receptor == Receptor::Sustained;
         // A field whose parts are fields of their own is touched where one of these is.
         let own = |field: &usize| lasting(field) && !plan.fields[*field].divided;
-        !(0..plan.fields.len()).filter(own).take(MOST_LOOKED_AT).any(|field| leaves_enough(field))
+        !(0..plan.fields.len()).filter(own).take(MOST_LOOKED_AT).any(leaves_enough)
     }
 
     /// Notes which fields are in contact, by the flags of frames, cell by cell.

@@ -64,7 +64,10 @@ impl LeftOut {
         match &self.fields[..] {
             [] => {}
             [only] => line += &format!("; field `{only}` has no other, and is left out"),
-            [first, ..] => line += &format!("; {} fields have no other, such as `{first}`, and are left out", self.fields.len()),
+            [first, ..] => {
+                let count = self.fields.len();
+                line += &format!("; {count} fields have no other, such as `{first}`, and are left out");
+            }
         }
         Some(line)
     }

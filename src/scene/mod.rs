@@ -17,8 +17,8 @@ pub use choose_fields::choose_fields;
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
-pub use plan::Plan;
 pub(crate) use members::LinkPart;
+pub use plan::Plan;
 pub(crate) use plan::PlanField;
 pub(crate) use stages::Stages;
 

@@ -198,7 +198,10 @@ mod tests {
         assert_eq!(check(-FARTHEST_POSE_M, DQuat::IDENTITY * 2.0), Ok(()));
         for x in [1.1e9, 1e160, -1e308, f64::NAN, f64::INFINITY] {
             let why = check(x, DQuat::IDENTITY).unwrap_err();
-            assert!(why.starts_with("the pose of `arm` is at ") && why.ends_with("poses may be 1e9 m from the origin at most"));
+            assert!(
+                why.starts_with("the pose of `arm` is at ")
+                    && why.ends_with("poses may be 1e9 m from the origin at most")
+            );
         }
         for w in [0.0, 1e-4, 1e4, f64::NAN, f64::INFINITY] {
             let why = check(0.0, DQuat::from_xyzw(0.0, 0.0, 0.0, w)).unwrap_err();

@@ -442,7 +442,11 @@ fn a_line_between_faint_points_beside_a_strong_one_is_the_references() {
         let mut compared = 0;
         for frame in 0..frames.len() {
             let (found, right) = (found.get(frame, 0), right.get(frame, 0));
-            assert_eq!((found.flags, found.orientation.is_some()), (right.flags, right.orientation.is_some()), "{frame}");
+            assert_eq!(
+                (found.flags, found.orientation.is_some()),
+                (right.flags, right.orientation.is_some()),
+                "{frame}"
+            );
             if let (Some(found), Some(right)) = (found.orientation, right.orientation) {
                 let apart = (found - right).abs().min(PI - (found - right).abs());
                 assert!(apart < 1e-6, "{backend:?}, frame {frame}: {found}, not {right}");

@@ -179,7 +179,7 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
             assert!(seen[3].is_empty());
             assert_eq!(told(&seen[4]), [(3, 6.0, 1, 3.0)]);
             assert_eq!(several, [true, true, false, false, false]);
-            assert_eq!(seen[0][1].position, [4.0, 0.0, 0.0]);
+            assert_eq!(seen[0][1].position, Some([4.0, 0.0, 0.0]));
         }
         let mut usual = Engine::new(&cross(), Options::default().backend(backend)).unwrap();
         let percepts = usual.process(&frames).unwrap();
