@@ -94,10 +94,10 @@ impl PyTouches {
         self.column(py, 2, |(_, _, touch), to| to.extend(touch.centroid.unwrap_or([f64::NAN; 2])))
     }
 
-    /// The same point on the surface, float64 [touches, 3], in metres.
+    /// The same point on the surface, float64 [touches, 3], in metres; NaN where the frame does not say where the touch's link is.
     #[getter]
     fn position(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.column(py, 3, |(_, _, touch), to| to.extend(touch.position))
+        self.column(py, 3, |(_, _, touch), to| to.extend(touch.position.unwrap_or([f64::NAN; 3])))
     }
 
     /// Why the footprint of each, or a part of it, is absent, uint32 [touches]; the bits are those of `Flags`.

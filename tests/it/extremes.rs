@@ -477,7 +477,7 @@ fn a_taxel_that_measures_something_else_is_left_out_and_named() {
         let (found, right) = (percepts.get(0, 0), pressures.process_one(&untold).unwrap().get(0, 0));
         let of = |p: &Percept| (p.total, p.peak, p.active, p.area, p.centroid, p.orientation, p.flags);
         assert_eq!((of(&found), found.total), (of(&right), Some(4.0)));
-        let remark = &mixed.remarks()[..];
+        let remark = mixed.remarks();
         assert_eq!(remark.len(), 1);
         assert!(remark[0].contains("taxel 3 measures proximity, taxel 2 measures temperature"), "{remark:?}");
         assert!(remark[0].contains("field `warm` has no other"), "{remark:?}");
@@ -504,7 +504,7 @@ fn nothing_is_kept_over_a_restart_of_time() {
                 (back_or_on + 0.1, hard),
                 (back_or_on + 0.2, soft),
                 (back_or_on + 0.2, hard),
-                (0.0 + back_or_on * 3.0, hard),
+                (3.0 * back_or_on, hard),
             ]);
             let scene = Scene::default().outputs(Outputs::USUAL | Outputs::TOUCHES);
             let options = Options::default().backend(backend).scene(scene).calibration(calibration.clone());
@@ -542,9 +542,9 @@ fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
         Engine::new(&flat.body(), options).unwrap().remarks()
     };
     let upkeep = "[upkeep]\ntime_constant_s = 2\n";
-    let told = remarks(&[0..6], upkeep);
+    let told = remarks(std::slice::from_ref(&(0..6)), upkeep);
     assert!(told.len() == 1 && told[0].contains("no taxel can tell the drift"), "{told:?}");
     // Three others can, two cannot.
-    assert!(remarks(&[0..2, 2..5], upkeep).is_empty() && remarks(&[0..6], "[upkeep]\nstuck_s = 4\n").is_empty());
+    assert!(remarks(&[0..2, 2..5], upkeep).is_empty() && remarks(std::slice::from_ref(&(0..6)), "[upkeep]\nstuck_s = 4\n").is_empty());
     assert!(remarks(&[0..2, 2..5], &format!("{upkeep}[taxel.4]\nmask = true\n")).len() == 1);
 }
