@@ -8,6 +8,7 @@ use serde_json::json;
 use somatic::page::{PageInput, Publisher, Request, ViewerId};
 use somatic::{Engine, Result};
 
+use super::super::stdio::say;
 use super::explain::Explainer;
 use super::recording::CHUNK;
 use super::shared::Shared;
@@ -216,6 +217,9 @@ impl Player {
 
     /// Hands over the last of `count` frames that the engine has processed since `started`.
     fn publish(&mut self, count: usize, started: Instant) {
+        if let Some(notice) = self.engine.notice() {
+            say(&notice);
+        }
         let frame = &self.shared.recording.frames[self.done - 1];
         let call_us = started.elapsed().as_secs_f32() * 1e6 / count as f32;
         self.publisher.read(&PageInput {
