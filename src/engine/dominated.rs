@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use crate::backend::RawBatch;
 use crate::percept::{Component, Flags, Outputs, Percepts, Values};
-use crate::scene::{Plan, PlanField};
+use crate::scene::Plan;
 use crate::signal::Receptor;
 use crate::stage::{Pressed, calibrate, centroid, orientation};
 
@@ -26,11 +26,15 @@ pub(super) fn orient_again(plan: &Plan, raw: &RawBatch<'_>, percepts: &mut Perce
         let Values::F32(parts) = &percepts.values else { return };
         let row = (raw.first + frame) * fields..(raw.first + frame + 1) * fields;
         let [total, peak] = [Component::Total, Component::Peak].map(|part| &parts[part][row.clone()]);
-        let is_dominated = |field: &PlanField, total: f32, peak: f32| total - field.heaviest * peak < SHARE * total;
-        let cells = plan.fields.iter().zip(total.iter().zip(peak));
-        let found: Vec<usize> = cells
+        let is_dominated = |heaviest: f32, total: f32, peak: f32| total - heaviest * peak < SHARE * total;
+        let cells = || plan.heaviest.iter().zip(total.iter().zip(peak));
+        // All of them without a branch, as there is nearly always none.
+        if !cells().fold(false, |any, (heaviest, (total, peak))| any | is_dominated(*heaviest, *total, *peak)) {
+            continue;
+        }
+        let found: Vec<usize> = cells()
             .enumerate()
-            .filter(|(_, (field, (total, peak)))| is_dominated(field, **total, **peak))
+            .filter(|(_, (heaviest, (total, peak)))| is_dominated(**heaviest, **total, **peak))
             .map(|(index, _)| index)
             .collect();
         for field in found {

@@ -56,6 +56,8 @@ pub struct Plan {
     pub(crate) feels_from: Vec<f64>,
     /// The slots that fields on several links read, ascending, where positions in the world are wanted.
     pub(crate) spread_slots: Vec<u32>,
+    /// By field, the largest weight of a member.
+    pub(crate) heaviest: Vec<f32>,
     /// Taxels of its fields that measure something else than pressure.
     pub(crate) left_out: LeftOut,
     /// Shared by the engine and its backend: of a large skin these are most of what a plan takes.
@@ -84,8 +86,6 @@ pub(crate) struct PlanField {
     pub(crate) quantity: Quantity,
     /// Whether every member's weight is 1.
     pub(crate) unweighted: bool,
-    /// The largest weight of a member.
-    pub(crate) heaviest: f32,
     /// The power of two, at least the field's radius, that coordinates are counted in, m.
     pub(crate) unit_m: f32,
     /// When it counts as touched.
@@ -193,6 +193,7 @@ impl Plan {
             curves: Curves::default(),
             feels_from: Vec::new(),
             spread_slots: Vec::new(),
+            heaviest: Vec::new(),
             left_out,
             fields: Arc::default(),
             members: Arc::default(),
@@ -224,7 +225,6 @@ impl Plan {
                 area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
                 weights: weights(field),
                 unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
-                heaviest: field.members.iter().map(|member| member.weight as f32).fold(0.0, f32::max),
                 unit_m,
                 thresholds: Thresholds::default(),
                 still,
@@ -262,6 +262,8 @@ impl Plan {
                 }));
             }
         }
+        let weights = |field: &PlanField| members[field.first..][..field.count].iter().map(|member| member.weight);
+        plan.heaviest = plan_fields.iter().map(|field| weights(field).fold(0.0, f32::max)).collect();
         let spread = plan_fields.iter().filter(|field| !field.parts.is_empty());
         let slots = spread.flat_map(|field| members[field.first..][..field.count].iter().map(|member| member.slot));
         plan.spread_slots = slots.collect::<BTreeSet<u32>>().into_iter().collect();

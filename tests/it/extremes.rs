@@ -545,6 +545,9 @@ fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
     let told = remarks(std::slice::from_ref(&(0..6)), upkeep);
     assert!(told.len() == 1 && told[0].contains("no taxel can tell the drift"), "{told:?}");
     // Three others can, two cannot.
-    assert!(remarks(&[0..2, 2..5], upkeep).is_empty() && remarks(std::slice::from_ref(&(0..6)), "[upkeep]\nstuck_s = 4\n").is_empty());
+    assert!(
+        remarks(&[0..2, 2..5], upkeep).is_empty()
+            && remarks(std::slice::from_ref(&(0..6)), "[upkeep]\nstuck_s = 4\n").is_empty()
+    );
     assert!(remarks(&[0..2, 2..5], &format!("{upkeep}[taxel.4]\nmask = true\n")).len() == 1);
 }
