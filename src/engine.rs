@@ -32,7 +32,7 @@ use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::Percepts;
 use crate::scene::{Cadence, Plan, Scene};
-use crate::signal::{Calibration, Frame, Intake, RawValue, Receptor, Unfit, Wiring};
+use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::calibrate;
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
@@ -88,7 +88,7 @@ pub struct Engine {
     /// Where frames have the plan's values, if those pass as they are; `raw` stays empty then.
     picks: Option<Picks>,
     steps: Vec<Step>,
-    last_t_s: Option<f64>,
+    last_time: Option<FrameTime>,
     max_gap_s: f64,
     percepts: Percepts,
     /// The reference's side of the last comparison, if no frame was processed without one since.
@@ -152,7 +152,7 @@ impl Engine {
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         let mut engine = Self {
             steps: Vec::new(),
-            last_t_s: None,
+            last_time: None,
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures())

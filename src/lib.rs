@@ -114,4 +114,4 @@ pub use percept::{
     Precision, Touch,
 };
 pub use scene::{Plan, Scene};
-pub use signal::{Calibration, Frame, Letter, Pose, RawValue, Receptor};
+pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};

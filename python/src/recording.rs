@@ -210,11 +210,10 @@ type NamedBytes = (String, Vec<u8>);
 /// The body in the recording at `path`, and the text of its calibration.
 fn attached(path: &Path) -> somatic::Result<(Option<NamedBytes>, Option<String>)> {
     let mut reader = Reader::open(path)?;
-    let body = reader.attached().iter().find(|attached| attached.media_type == BODY).cloned();
-    let calibration = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
-    let body = body.map(|attached| Ok((attached.name.clone(), reader.bytes_of(&attached)?))).transpose()?;
-    let calibration = calibration.map(|attached| reader.bytes_of(&attached)).transpose()?;
-    let text = calibration.map(String::from_utf8).transpose();
+    let body = reader.find_attached(|attached| attached.media_type == BODY)?;
+    let body = body.map(|(attached, bytes)| (attached.name, bytes));
+    let calibration = reader.find_attached(|attached| attached.name == CALIBRATION)?;
+    let text = calibration.map(|(_, bytes)| String::from_utf8(bytes)).transpose();
     Ok((body, text.map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?))
 }
 

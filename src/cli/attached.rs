@@ -10,16 +10,15 @@ use somatic::{Error, Result, bundled};
 /// The body in the recording at `path`: its name, and its bytes as `.glb`.
 pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
     let mut reader = Reader::open(path)?;
-    let found = reader.attached().iter().find(|attached| attached.media_type == BODY).cloned();
-    found.map(|attached| Ok((attached.name.clone(), reader.bytes_of(&attached)?))).transpose()
+    let found = reader.find_attached(|attached| attached.media_type == BODY)?;
+    Ok(found.map(|(attached, bytes)| (attached.name, bytes)))
 }
 
 /// The text of the calibration in the recording at `path`.
 pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
     let mut reader = Reader::open(path)?;
-    let found = reader.attached().iter().find(|attached| attached.name == CALIBRATION).cloned();
-    let Some(attached) = found else { return Ok(None) };
-    let text = String::from_utf8(reader.bytes_of(&attached)?);
+    let Some((_, bytes)) = reader.find_attached(|attached| attached.name == CALIBRATION)? else { return Ok(None) };
+    let text = String::from_utf8(bytes);
     text.map(Some).map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))
 }
 

@@ -219,6 +219,10 @@ fn files(
     }
     if let SourceSpec::Mcap(path) = from {
         let mut reader = Reader::open(path)?;
+        if arguments.body.is_none() || arguments.calibration.is_none() {
+            // Refuses what is too damaged to tell.
+            reader.find_attached(|_| false)?;
+        }
         for attached in reader.attached().to_vec() {
             let given = match attached.media_type.as_str() {
                 BODY => arguments.body.is_some(),

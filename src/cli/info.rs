@@ -17,7 +17,7 @@ use super::exports::ExportFlags;
 use super::first_source::source_of;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
-use super::words::{number, size_words, span};
+use super::words::{between_s, number, size_words, span};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -69,15 +69,21 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
             }
             let mut reader = Reader::open(&path)?;
             let survey = Survey::of(&mut reader, |share| bar.show(share))?;
+            let mut losses = reader.losses();
+            // What is attached may be damaged, and the rest is described all the same.
+            let contacts = recorded(&path).unwrap_or_else(|e| {
+                losses.push(e.to_string());
+                None
+            });
             Known {
                 kind: "MCAP",
                 bytes: size(&path),
                 taxels: reader.taxels().len(),
                 attached: reader.attached().to_vec(),
                 has_end: reader.has_end(),
-                losses: reader.losses(),
+                losses,
                 layout: None,
-                contacts: recorded(&path)?,
+                contacts,
                 survey,
             }
         }
@@ -182,7 +188,7 @@ fn size(path: &std::path::Path) -> u64 {
 }
 
 fn duration_s(rhythm: &Rhythm) -> Option<f64> {
-    rhythm.span_s.map(|[first, last]| last - first)
+    rhythm.span_s.map(|[first, last]| between_s(first, last))
 }
 
 fn as_json(known: &Known) -> Value {
@@ -198,7 +204,9 @@ fn as_json(known: &Known) -> Value {
     json!({
         "kind": kind, "bytes": bytes, "taxels": taxels, "frames": rhythm.frames,
         "start": rhythm.span_s.map(|span| span[0]), "duration": duration_s(rhythm), "rate_hz": rhythm.rate_hz(),
-        "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({"seconds": gap[0], "after": gap[1]})),
+        "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({
+            "seconds": between_s(gap[1], gap[1] + gap[0]), "after": gap[1],
+        })),
         "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
         "ended": has_end, "losses": losses,
         "fields": contacts.as_ref().map(Contacts::as_json),

@@ -48,11 +48,23 @@ pub(super) fn size_words(bytes: u64) -> String {
 /// A time span as short as it can be understood.
 pub(super) fn span(seconds: f64) -> String {
     match seconds {
+        0.0 => "0 s".to_owned(),
+        s if s < 1e-3 => format!("{:.0} µs", s * 1e6),
+        s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
         s if s < 10.0 => format!("{s:.1} s"),
         s if s < 120.0 => format!("{s:.0} s"),
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.1} h", s / 3600.0),
     }
+}
+
+/// The time from `first` to `last`, s, without digits that come from rounding these: the nearest number with as many decimals
+/// as both have.
+pub(super) fn between_s(first: f64, last: f64) -> f64 {
+    let step = f64::EPSILON * first.abs().max(last.abs());
+    let decimals = if step > 0.0 { (-step.log10()).floor().clamp(0.0, 12.0) as usize } else { 12 };
+    let apart = last - first;
+    format!("{apart:.decimals$}").parse().unwrap_or(apart)
 }
 
 /// `2s`, `500ms`, `10min`, as `--for` has them.
@@ -116,6 +128,21 @@ mod tests {
     }
 
     #[test]
+    fn a_difference_has_the_digits_of_its_ends() {
+        for (first, last, apart) in [
+            (0.01, 6.538, 6.528),
+            (0.1, 0.3, 0.2),
+            (0.0, 0.026, 0.026),
+            (1_700_000_000.25, 1_700_000_001.35, 1.1),
+            (-0.3, 0.1, 0.4),
+            (0.0, 0.0, 0.0),
+            (2.0, 1.9, -0.1),
+        ] {
+            assert_eq!(between_s(first, last), apart);
+        }
+    }
+
+    #[test]
     fn text_is_fitted_by_what_a_terminal_shows() {
         assert_eq!(fitted("palm", 6, false), "palm  ");
         assert_eq!(fitted("12", 4, true), "  12");
@@ -128,7 +155,10 @@ mod tests {
 
     #[test]
     fn spans_and_counts_read_well() {
-        assert_eq!([0.04, 59.6, 130.0, 9000.0].map(span), ["0.0 s", "60 s", "2 min", "2.5 h"]);
+        assert_eq!(
+            [0.0, 0.000_05, 0.026, 0.9999, 59.6, 130.0, 9000.0].map(span),
+            ["0 s", "50 µs", "26 ms", "1.0 s", "60 s", "2 min", "2.5 h"]
+        );
         assert_eq!((count(1, "frame"), count(0, "frame")), ("1 frame".into(), "0 frames".into()));
     }
 }

@@ -89,8 +89,8 @@ impl Engine {
         }
         self.steps.clear();
         for frame in frames {
-            self.steps.push(step(self.last_t_s, frame.t_s, self.max_gap_s));
-            self.last_t_s = Some(frame.t_s);
+            self.steps.push(step(self.last_time, frame.time(), self.max_gap_s));
+            self.last_time = Some(frame.time());
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::backend::bounds::CellBound;
 use crate::backend::{RawBatch, Step};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::Plan;
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Frame, FrameTime, RawValue};
 use crate::stage::motion::SHORTEST_STEP_S;
 
 /// Which fields' values changed in each frame.
@@ -29,7 +29,7 @@ pub(super) struct ChangeState {
     /// The frame before, by channel; empty where there is none that counts.
     before: Vec<RawValue>,
     /// Per field, when it last changed.
-    changed_at_s: Vec<Option<f64>>,
+    changed_at: Vec<Option<FrameTime>>,
 }
 
 impl OnChange {
@@ -53,7 +53,7 @@ impl OnChange {
             starts,
             readers: of_channel.concat(),
             max_gap_s,
-            state: ChangeState { before: Vec::new(), changed_at_s: vec![None; plan.fields.len()] },
+            state: ChangeState { before: Vec::new(), changed_at: vec![None; plan.fields.len()] },
             cells: Vec::new(),
         }
     }
@@ -64,15 +64,15 @@ impl OnChange {
     }
 
     pub(super) fn look(&mut self, raw: &RawBatch<'_>, frames: &[Frame]) {
-        let ChangeState { before, changed_at_s } = &mut self.state;
+        let ChangeState { before, changed_at } = &mut self.state;
         self.cells.clear();
         self.cells.resize(raw.frames * self.fields, None);
         for (index, frame) in frames.iter().enumerate() {
             let cells = &mut self.cells[index * self.fields..][..self.fields];
             let mut changed = |field: usize| {
                 cells[field].get_or_insert_with(|| {
-                    let since = step(changed_at_s[field], frame.t_s, self.max_gap_s);
-                    changed_at_s[field] = Some(frame.t_s);
+                    let since = step(changed_at[field], frame.time(), self.max_gap_s);
+                    changed_at[field] = Some(frame.time());
                     since
                 });
             };
@@ -138,10 +138,10 @@ pub(super) fn rates(percepts: &mut Percepts, cell: usize, step: &Step, since: &S
     }
 }
 
-/// The time from the frame at `last_t_s` to the one at `t_s`, and whether motion can be measured over it.
-pub(super) fn step(last_t_s: Option<f64>, t_s: f64, max_gap_s: f64) -> Step {
-    let Some(last_t_s) = last_t_s else { return Step { dt_s: 0.0, flags: Flags::NO_PREVIOUS } };
-    let dt_s = t_s - last_t_s;
+/// The time from the frame at `last` to the one at `now`, and whether motion can be measured over it.
+pub(super) fn step(last: Option<FrameTime>, now: FrameTime, max_gap_s: f64) -> Step {
+    let Some(last) = last else { return Step { dt_s: 0.0, flags: Flags::NO_PREVIOUS } };
+    let dt_s = now.since(last);
     // A step too short for single precision is none.
     let usable = dt_s > SHORTEST_STEP_S && dt_s <= max_gap_s;
     Step { dt_s, flags: if usable { Flags::empty() } else { Flags::BAD_DT } }

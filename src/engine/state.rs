@@ -6,7 +6,7 @@ use super::post::PostState;
 use super::upkeep_state::UpkeepState;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
-use crate::signal::{IntakeState, TaxelCalibration};
+use crate::signal::{FrameTime, IntakeState, TaxelCalibration};
 use crate::stage::layout;
 
 /// Everything that the next percepts depend on beside the next frames.
@@ -33,7 +33,7 @@ use crate::stage::layout;
 #[derive(Clone, Debug)]
 pub struct EngineState {
     frames_done: u64,
-    last_t_s: Option<f64>,
+    last_time: Option<FrameTime>,
     tare: bool,
     /// By channel and by slot, if the calibration may change.
     calibration: Option<(Vec<TaxelCalibration>, Vec<layout::Taxel>)>,
@@ -61,7 +61,7 @@ impl Engine {
     pub fn state(&mut self) -> Result<EngineState> {
         Ok(EngineState {
             frames_done: self.frames_done,
-            last_t_s: self.last_t_s,
+            last_time: self.last_time,
             tare: self.tare,
             calibration: self.recalibrates.then(|| (self.plan.calibrations.clone(), self.plan.taxels.clone())),
             intake: self.intake.state().clone(),
@@ -102,7 +102,7 @@ impl Engine {
         if let (Some(cadence), Some(state)) = (&mut self.cadence, &state.cadence) {
             cadence.state.clone_from(state);
         }
-        (self.frames_done, self.last_t_s, self.tare) = (state.frames_done, state.last_t_s, state.tare);
+        (self.frames_done, self.last_time, self.tare) = (state.frames_done, state.last_time, state.tare);
         self.check = None;
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! What of a file was whole, and what was not.
 
+use super::summary::{Summary, Trust};
+
 /// Counts what is whole in a file, and tells what is not.
 pub(super) struct Account {
     /// What people call the file.
@@ -12,14 +14,40 @@ pub(super) struct Account {
     /// Places that are damaged, and bytes that were not read there.
     places: u64,
     bytes: u64,
+    /// Where the last of them ends.
+    damaged_to: Option<u64>,
     /// The times before and after the first of them, s.
     after_s: Option<f64>,
     before_s: Option<f64>,
-    losses: Vec<String>,
+    cut: Option<Cut>,
+    summary: SummaryState,
+    /// How many the file says that it has, and how many were read, once everything was.
+    counts: Option<[u64; 2]>,
+    /// Records of other programs, if nothing says that these hold no messages.
+    strange: u64,
+}
+
+/// How a file ends before its end.
+struct Cut {
+    /// Bytes that are no whole chunk.
+    bytes: u64,
+    /// Whether its data are over.
+    is_in_summary: bool,
+}
+
+/// What of a [`Summary`] is told.
+struct SummaryState {
+    trust: Trust,
+    shift: i64,
+    gone: usize,
+    gone_ns: Option<[u64; 2]>,
+    listed: usize,
 }
 
 impl Account {
-    pub(super) fn new(name: &str, thing: &'static str) -> Self {
+    /// Of the file called `name` with `summary`, of which `thing` is read.
+    pub(super) fn new(name: &str, thing: &'static str, summary: &Summary) -> Self {
+        let Summary { trust, shift, gone, gone_ns, .. } = *summary;
         Self {
             name: name.to_owned(),
             thing,
@@ -27,10 +55,19 @@ impl Account {
             last_s: None,
             places: 0,
             bytes: 0,
+            damaged_to: None,
             after_s: None,
             before_s: None,
-            losses: Vec::new(),
+            cut: None,
+            summary: SummaryState { trust, shift, gone, gone_ns, listed: summary.chunks.len() + gone },
+            counts: None,
+            strange: 0,
         }
+    }
+
+    /// What is read, such as `frame`.
+    pub(super) fn thing(&self) -> &'static str {
+        self.thing
     }
 
     /// Notes that what is at `t_s` was whole.
@@ -49,41 +86,123 @@ impl Account {
         }
         self.places += 1;
         self.bytes += bytes;
+        self.damaged_to = None;
     }
 
-    /// Tells that the file ends before its end, in `bytes` that are no whole chunk.
-    pub(super) fn tell_cut(&mut self, bytes: u64) {
-        let what = if bytes > 0 { format!("; {bytes} bytes of an incomplete chunk") } else { String::new() };
+    /// Notes that the file was not read from `from` to `to`; one place with what was not read before it.
+    pub(super) fn damaged_from(&mut self, from: u64, to: u64) {
+        if self.damaged_to == Some(from) {
+            self.bytes += to - from;
+        } else {
+            self.damaged(to - from);
+        }
+        self.damaged_to = Some(to);
+    }
+
+    /// Notes that the file ends before its end, in `bytes` that are no whole chunk; or, if `is_in_summary`, after its data.
+    pub(super) fn cut(&mut self, bytes: u64, is_in_summary: bool) {
+        self.cut.get_or_insert(Cut { bytes, is_in_summary });
+    }
+
+    /// Notes that everything has been read: how many the file says that it has, and how many were read, where it says so; and
+    /// how many records of other programs may hold more.
+    pub(super) fn end(&mut self, counts: Option<[u64; 2]>, strange: u64) {
+        (self.counts, self.strange) = (counts, strange);
+    }
+
+    /// What is lost, in a line each.
+    pub(super) fn losses(&self) -> Vec<String> {
+        let told = [self.cut_words(), self.damage_words()];
+        let told = told.into_iter().flatten().chain(self.summary_words());
+        told.map(|line| format!("{}: {line}", self.name)).collect()
+    }
+
+    fn cut_words(&self) -> Option<String> {
+        let cut = self.cut.as_ref()?;
+        if cut.is_in_summary {
+            return Some(format!("it is cut off after its data: its summary is not whole, {}", self.intact()));
+        }
+        let what = if cut.bytes > 0 { format!("; {} bytes of an incomplete chunk", cut.bytes) } else { String::new() };
         let missing = match self.last_s {
             Some(t_s) => format!("what came after t = {t_s} s is missing"),
             None => format!("it has no complete {}", self.thing),
         };
-        self.losses.push(format!("{}: it is cut off: {missing}{what}", self.name));
+        Some(format!("it is cut off: {missing}{what}"))
     }
 
-    /// Tells of the damage, when nothing more comes; call it once.
-    pub(super) fn end(&mut self) {
-        let Self { name, thing, places, bytes, .. } = self;
-        if *places == 0 {
-            return;
-        }
-        let places = if *places == 1 { "one place".to_owned() } else { format!("{places} places, the first") };
+    fn damage_words(&self) -> Option<String> {
+        let Self { thing, places, bytes, .. } = self;
+        let places = match places {
+            0 => return None,
+            1 => "one place".to_owned(),
+            places => format!("{places} places, the first"),
+        };
         let when = match (self.after_s, self.before_s) {
             (Some(after), Some(before)) => format!("between t = {after} s and t = {before} s"),
             (Some(after), None) => format!("after t = {after} s"),
             (None, Some(before)) => format!("before t = {before} s"),
             (None, None) => format!("before any {thing}"),
         };
-        let intact = match self.whole {
+        let missing = self.missing().map_or(String::new(), |words| format!("; {words}"));
+        Some(format!("damaged in {places} {when}: {bytes} bytes not read, {}{missing}", self.intact()))
+    }
+
+    fn intact(&self) -> String {
+        let Self { thing, whole, .. } = self;
+        match whole {
             0 => format!("no {thing} is whole"),
             1 => format!("1 {thing} is whole"),
             whole => format!("{whole} {thing}s are intact"),
-        };
-        self.losses.push(format!("{name}: damaged in {places} {when}: {bytes} bytes not read, {intact}"));
+        }
     }
 
-    /// What was told, in a line each.
-    pub(super) fn losses(&self) -> &[String] {
-        &self.losses
+    /// How many are missing, if the file says how many it has.
+    fn missing(&self) -> Option<String> {
+        let [counted, read] = self.counts?;
+        Some(match counted.saturating_sub(read) {
+            0 => format!("none of its {counted} {}s is missing", self.thing),
+            missing => format!("{missing} of its {counted} {}s are missing", self.thing),
+        })
+    }
+
+    fn summary_words(&self) -> Vec<String> {
+        let Self { thing, summary, strange, .. } = self;
+        let mut told = Vec::new();
+        if summary.trust == Trust::Damaged {
+            told.push(format!(
+                "its summary is damaged, so nothing says whether {thing}s are missing; {}",
+                self.intact()
+            ));
+        }
+        match summary.shift {
+            0 => {}
+            shift if shift < 0 => told.push(format!("{} bytes were cut out of it", shift.unsigned_abs())),
+            shift => told.push(format!("{shift} bytes were put into it")),
+        }
+        if summary.gone > 0 {
+            let when = summary.gone_ns.map_or(String::new(), |[first, last]| {
+                format!(", messages from {} s to {} s", first as f64 / 1e9, last as f64 / 1e9)
+            });
+            told.push(format!(
+                "{} of the {} chunks that its summary lists are not there{when}",
+                summary.gone, summary.listed
+            ));
+        }
+        match self.counts {
+            Some([counted, read]) if counted < read => told
+                .push(format!("{read} {thing}s were read, and its summary counts {counted}: some may be there twice")),
+            // Said with the damage.
+            Some([counted, read]) if counted > read && self.places == 0 => {
+                told.extend(self.missing().map(|words| format!("{words}, {}", self.intact())));
+            }
+            _ => {}
+        }
+        if *strange > 0 {
+            told.push(format!(
+                "{} records of other programs were passed over, and no summary says whether they hold {thing}s",
+                strange
+            ));
+        }
+        told
     }
 }

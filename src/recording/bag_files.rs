@@ -5,11 +5,28 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::bag::BAG_METADATA;
+use super::yaml_list::{listed, value};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_METADATA_BYTES};
 
 /// What a bag is made of MCAP by.
 const CONVERTED: &str = "convert it: rosbags-convert --src BAG --dst OUT --dst-storage mcap";
+/// What writes the metadata of a bag anew.
+const REINDEXED: &str = "write it anew: ros2 bag reindex BAG";
+
+/// What to say of a file that begins with `first`, which is not as MCAP does.
+pub(super) fn not_mcap(first: &[u8]) -> String {
+    if first.starts_with(b"SQLite format 3\0") {
+        return format!("its storage is sqlite3, and MCAP is read here; {}", CONVERTED.replace("BAG", "FOLDER"));
+    }
+    if first.starts_with(b"#ROSBAG V") {
+        return format!("it is a bag of ROS 1, and MCAP is read here; {CONVERTED}");
+    }
+    if first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD]) {
+        return "it is compressed as a whole; unpack it: unzstd FILE".to_owned();
+    }
+    "this is not an MCAP file: its first bytes differ".to_owned()
+}
 
 /// The MCAP files of the bag at `path`: itself, or those of a folder in the order of its metadata, or, where a recorder was killed
 /// before it wrote these, of their numbers.
@@ -24,8 +41,7 @@ pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
     match limits::read_to_string(&metadata, MAX_METADATA_BYTES) {
         Ok(text) => {
             let names = names_in(&text).map_err(|e| e.at(metadata.display()))?;
-            // Older recorders put the folder before the name.
-            Ok(names.iter().filter_map(|name| Path::new(name).file_name()).map(|name| path.join(name)).collect())
+            Ok(names.iter().map(|name| path.join(name)).collect())
         }
         Err(e) if e.kind() == ErrorKind::NotFound => unlisted(path),
         Err(e) => Err(Error::io(&metadata, &e)),
@@ -55,49 +71,41 @@ fn unlisted(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The names of files in a bag's metadata, as recorders write these: the YAML of one key to a line.
+/// The names of files in a bag's metadata.
 fn names_in(text: &str) -> Result<Vec<String>> {
-    let value = |key: &str| {
-        let mut values = text.lines().filter_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
-        values.next().map(|value| unquoted(value.trim()))
-    };
-    let storage = value("storage_identifier").unwrap_or_default();
+    let storage = value(text, "storage_identifier")?.unwrap_or_default();
     if !["mcap", ""].contains(&storage.as_str()) {
         return Err(failed!("its storage is {storage}, and MCAP is read here; {CONVERTED}"));
     }
-    let mode = value("compression_mode").unwrap_or_default();
+    let mode = value(text, "compression_mode")?.unwrap_or_default();
     if ["file", "message"].iter().any(|other| mode.eq_ignore_ascii_case(other)) {
         return Err(failed!(
             "each {} is compressed by itself, and chunks of MCAP are read here; {CONVERTED}",
             mode.to_lowercase()
         ));
     }
-    let list = value("relative_file_paths").unwrap_or_default();
-    let names: Vec<String> = match list.strip_prefix('[').and_then(|list| list.strip_suffix(']')) {
-        Some(list) => list.split(',').map(|name| unquoted(name.trim())).collect(),
-        None => {
-            let lines = text.lines().map(str::trim);
-            let after = lines.skip_while(|line| !line.starts_with("relative_file_paths:")).skip(1);
-            after.map_while(|line| line.strip_prefix("- ")).map(|name| unquoted(name.trim())).collect()
+    let list = listed(text, "relative_file_paths").map_err(|e| failed!("{e}; {REINDEXED}"))?;
+    let mut names: Vec<String> = Vec::new();
+    for path in list {
+        // Older recorders put the folder before the name.
+        let name = Path::new(&path).file_name().and_then(|name| name.to_str());
+        let Some(name) = name else {
+            return Err(failed!("`{path}` under relative_file_paths names no file; {REINDEXED}"));
+        };
+        if names.iter().any(|known| known == name) {
+            return Err(failed!("it lists {name} twice under relative_file_paths; {REINDEXED}"));
         }
-    };
-    if names.iter().all(String::is_empty) {
-        return Err(Error::failed("it lists no files under relative_file_paths; write it anew: ros2 bag reindex BAG"));
+        names.push(name.to_owned());
+    }
+    if names.is_empty() {
+        return Err(failed!("it lists no files under relative_file_paths; {REINDEXED}"));
     }
     Ok(names)
 }
 
-/// A text of YAML without its quotes.
-fn unquoted(text: &str) -> String {
-    match text.strip_prefix('\'').and_then(|text| text.strip_suffix('\'')) {
-        Some(inner) => inner.replace("''", "'"),
-        // A string of JSON is one of YAML.
-        None => serde_json::from_str(text).unwrap_or_else(|_| text.to_owned()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::reader::Reader;
     use super::*;
 
     #[test]
@@ -117,6 +125,8 @@ mod tests {
             ("\n    - b_10.mcap\n    - \"b 1.mcap\"\n  duration:\n    - c", inside(&["b_10.mcap", "b 1.mcap"])),
             ("\n  - 'it''s.mcap'\n  - old/b.mcap\n", inside(&["it's.mcap", "b.mcap"])),
             (" [\"x.mcap\", y.mcap]\n", inside(&["x.mcap", "y.mcap"])),
+            (" [ # both\n    'x, y.mcap',\n\n    y.mcap ] # of two\n", inside(&["x, y.mcap", "y.mcap"])),
+            ("  # in order\n\n    # first\n    - x.mcap # here\n", inside(&["x.mcap"])),
         ] {
             let text =
                 format!("bag:\n  storage_identifier: mcap\n  compression_mode: \"\"\n  relative_file_paths:{list}");
@@ -137,5 +147,58 @@ mod tests {
         );
         assert!(why("  storage_identifier: mcap\n  relative_file_paths: []\n").contains("ros2 bag reindex"));
         assert!(why("").contains("relative_file_paths"));
+        // What is not read is refused, and nothing is left out.
+        for list in [
+            " [..]",
+            " [/]",
+            " [a.mcap, ..]",
+            " [a.mcap",
+            " [a.mcap] b",
+            " [[a.mcap]]",
+            " [{a: b}]",
+            " *files",
+            " |\n    a.mcap",
+            " a.mcap",
+            "\n    - &x a.mcap",
+            "\n    - [a.mcap]",
+            "\n    -\n      a.mcap",
+            "\n    - a: b",
+            " ['a.mcap]",
+            " [\"\\x\"]",
+            " []\n  relative_file_paths: [a.mcap]",
+            " [a.mcap, a.mcap]",
+            "\n    - a.mcap\n    - b/a.mcap",
+            " [a.mcap,, b.mcap]",
+            " [~]",
+            "\n    - a.mcap\n      b.mcap",
+            " {}",
+        ] {
+            let why = why(&format!("  storage_identifier: mcap\n  relative_file_paths:{list}\n  ros_distro: x\n"));
+            assert!(why.contains("relative_file_paths") && why.ends_with("ros2 bag reindex BAG"), "{list}: {why}");
+        }
+        let flow = "{rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [a.mcap]}}";
+        assert!(why(flow).contains("ros2 bag reindex"), "{}", why(flow));
+    }
+
+    #[test]
+    fn bags_of_other_kinds_say_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, bytes, expected) in [
+            (
+                "a.db3",
+                &b"SQLite format 3\0\x10\0\x01\x01"[..],
+                "its storage is sqlite3, and MCAP is read here; convert it",
+            ),
+            ("a.bag", b"#ROSBAG V2.0\nE\0\0\0", "it is a bag of ROS 1, and MCAP is read here; convert it"),
+            ("a.mcap.zstd", b"\x28\xB5\x2F\xFD\0", "it is compressed as a whole; unpack it"),
+            ("a.mcap", b"mine", "this is not an MCAP file"),
+        ] {
+            let path = folder.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            for why in [Reader::open(&path).err(), Reader::open_any(&path).err()] {
+                let why = why.unwrap().to_string();
+                assert!(why.contains(&format!("{name}: {expected}")), "{why}");
+            }
+        }
     }
 }

@@ -147,9 +147,11 @@ impl BagReader {
         ((done + own) / self.lengths.iter().sum::<u64>().max(1) as f64).min(1.0)
     }
 
-    /// What of the bag was not read, in a line each; complete once the last message is.
-    pub(crate) fn losses(&self) -> &[String] {
-        &self.losses
+    /// What of the bag was not read so far, in a line each; complete once the last message is.
+    pub(crate) fn losses(&self) -> Vec<String> {
+        let mut losses = self.losses.clone();
+        losses.extend(self.reader.iter().flat_map(Reader::losses));
+        losses
     }
 }
 

@@ -34,16 +34,17 @@ pub struct SurveyedTopic {
     pub messages: u64,
     /// Their bytes.
     pub bytes: u64,
-    /// When the first and the last message came, by the recorder's clock, s.
-    pub span_s: Option<[f64; 2]>,
+    /// When the first and the last message came, by the recorder's clock, ns.
+    pub span_ns: Option<[u64; 2]>,
 }
 
 impl SurveyedTopic {
     /// Messages a second, where there are two at least.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
-        let [first_s, last_s] = self.span_s?;
-        (self.messages > 1 && last_s > first_s).then(|| (self.messages - 1) as f64 / (last_s - first_s))
+        let [first_ns, last_ns] = self.span_ns?;
+        (self.messages > 1 && last_ns > first_ns)
+            .then(|| (self.messages - 1) as f64 / ((last_ns - first_ns) as f64 / 1e9))
     }
 }
 
@@ -71,10 +72,10 @@ impl BagSurvey {
                 topic.encoding.clone_from(&channel.encoding);
                 topic.messages += 1;
                 topic.bytes += bytes;
-                let log_s = message.log_time as f64 / 1e9;
-                let [first_s, last_s] = topic.span_s.unwrap_or([log_s; 2]);
-                topic.span_s = Some([first_s.min(log_s), last_s.max(log_s)]);
-                reader.saw(log_s);
+                let log_ns = message.log_time;
+                let [first_ns, last_ns] = topic.span_ns.unwrap_or([log_ns; 2]);
+                topic.span_ns = Some([first_ns.min(log_ns), last_ns.max(log_ns)]);
+                reader.saw(log_ns as f64 / 1e9);
                 count += 1;
                 if count.is_multiple_of(1024) {
                     progress((index as f64 + reader.progress()) / files.len() as f64);

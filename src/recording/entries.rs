@@ -1,7 +1,7 @@
 //! What single records say: taxels, attachments, channels, schemas.
 
 use super::records::{Parts, Record, op};
-use super::{FRAMES_CHANNEL, TAXEL_IDS, ids_of};
+use super::{FRAMES, FRAMES_CHANNEL, TAXEL_IDS, ids_of};
 
 /// A file that lies beside the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,6 +22,15 @@ pub(super) struct Channel {
     pub(super) schema: u16,
     pub(super) topic: String,
     pub(super) encoding: String,
+    /// The ids of a frame's values, in their order, if this is the channel of frames.
+    pub(super) taxels: Option<Vec<u32>>,
+}
+
+impl Channel {
+    /// That of frames.
+    pub(super) fn of_frames() -> Self {
+        Self { schema: 0, topic: FRAMES.to_owned(), encoding: "protobuf".to_owned(), taxels: None }
+    }
 }
 
 /// What stands before all else in a recording.
@@ -61,7 +70,14 @@ pub(super) fn data_of(body: &[u8]) -> Option<&[u8]> {
 
 pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
     let (id, schema) = (parts.u16()?, parts.u16()?);
-    Some((id, Channel { schema, topic: parts.text()?.to_owned(), encoding: parts.text()?.to_owned() }))
+    let (topic, encoding) = (parts.text()?.to_owned(), parts.text()?.to_owned());
+    let mut metadata = parts.map()?;
+    let mut taxels = None;
+    while topic == FRAMES && !metadata.0.is_empty() {
+        let (key, value) = (metadata.text()?, metadata.text()?);
+        taxels = taxels.or(ids_of(value).filter(|_| key == TAXEL_IDS));
+    }
+    Some((id, Channel { schema, topic, encoding, taxels }))
 }
 
 /// The id of a schema, and its name.

@@ -28,6 +28,8 @@ pub(super) struct FrameMessage {
     joints: Vec<JointPosition>,
     #[prost(bool, tag = "8")]
     has_stale_pose: bool,
+    #[prost(int64, tag = "9")]
+    t_rest: i64,
 }
 
 /// `somatic.JointPosition`.
@@ -66,8 +68,15 @@ pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
     let joint = |(joint, position): &(String, f64)| JointPosition { joint: joint.clone(), position: *position };
     let joints = frame.joints.iter().map(joint).collect();
     let has_stale_pose = frame.has_stale_pose;
-    let mut message =
-        FrameMessage { t: Some(frame.t_s), poses, stale, joints, has_stale_pose, ..FrameMessage::default() };
+    let mut message = FrameMessage {
+        t: Some(frame.t_s),
+        t_rest: frame.t_rest_ns,
+        poses,
+        stale,
+        joints,
+        has_stale_pose,
+        ..FrameMessage::default()
+    };
     let bytes = if 2 * missing.len() > values.len() {
         message.present = indices(false);
         let present = values.iter().filter(|value| !value.is_missing());
@@ -97,24 +106,14 @@ impl FrameMessage {
         Self::decode(bytes).ok().filter(|message| message.t.is_some_and(f64::is_finite))
     }
 
-    /// The time of the frame, s.
-    pub(super) fn t_s(&self) -> f64 {
-        self.t.unwrap_or_default()
-    }
-
     /// Whether any of its values is stale.
     pub(super) fn has_stale(&self) -> bool {
         !self.stale.is_empty()
     }
 
-    /// Whether it poses links.
-    pub(super) fn is_posed(&self) -> bool {
-        !self.poses.is_empty()
-    }
-
     /// Puts it into `frame`, which has `width` values, with `stale` for those that are. `None` where it is no such frame.
     pub(super) fn put_into(&self, frame: &mut Frame, width: usize, stale: RawValue) -> Option<()> {
-        frame.t_s = self.t_s();
+        (frame.t_s, frame.t_rest_ns) = (self.t.unwrap_or_default(), self.t_rest);
         let (words, rest) = self.values.as_deref().unwrap_or_default().as_chunks::<4>();
         if !rest.is_empty() {
             return None;
@@ -161,6 +160,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::signal::FrameTime;
 
     fn value() -> impl Strategy<Value = RawValue> {
         prop_oneof![
@@ -180,8 +180,17 @@ mod tests {
             (link, Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(a, b, c, d) })
         });
         let joints = prop::collection::vec(("[a-z]{0,9}", -9.0..9.0_f64), 0..3);
-        (-1e12..1e12_f64, values, prop::collection::vec(pose, 0..3), joints, any::<bool>())
-            .prop_map(|(t_s, values, pose, joints, has_stale_pose)| Frame { t_s, values, pose, joints, has_stale_pose })
+        let times = prop_oneof![
+            (-1e12..1e12_f64).prop_map(FrameTime::from),
+            (1_700_000_000_000_000_000..1_800_000_000_000_000_000_i64).prop_map(FrameTime::from_ns)
+        ];
+        (times, values, prop::collection::vec(pose, 0..3), joints, any::<bool>()).prop_map(
+            |(time, values, pose, joints, has_stale_pose)| {
+                let mut frame = Frame { values, pose, joints, has_stale_pose, ..Frame::default() };
+                frame.set_time(time);
+                frame
+            },
+        )
     }
 
     proptest! {

@@ -8,17 +8,23 @@ mod bag;
 mod bag_files;
 mod bag_reader;
 mod bag_survey;
+mod chunks;
 mod entries;
 mod frames;
+#[cfg(test)]
+mod harm;
+mod head;
 mod percepts;
 mod proto;
 mod reader;
 mod recorder;
 mod records;
 mod schemas;
+mod summary;
 mod survey;
 mod unpack;
 mod view;
+mod yaml_list;
 
 pub(crate) use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
 pub(crate) use self::bag_reader::{BagMessage, BagReader, WantedTopics};

@@ -188,6 +188,12 @@ impl Recorder {
         flushed
     }
 
+    /// Closes the chunk, for tests of small files.
+    #[cfg(test)]
+    pub(super) fn end_chunk(&mut self) {
+        self.with(mcap::Writer::flush).unwrap();
+    }
+
     /// Writes the end: indexes that let readers jump.
     ///
     /// # Errors

@@ -5,15 +5,19 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 pub(super) use mcap::records::op;
 
+use super::unpack;
+
 /// What begins and ends a file.
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// A record's kind and length.
-const HEAD: u64 = 9;
-/// Magic, and the footer's record.
-const END: u64 = HEAD + 20 + 8;
+pub(super) const HEAD: u64 = 9;
+/// The footer's record, and magic.
+const END: u64 = HEAD + FOOTER + 8;
+/// The footer's body.
+const FOOTER: u64 = 20;
 
-/// Bytes of a record that says a word or two; a longer one is damaged.
-pub(super) const MAX_RECORD_BYTES: u64 = 1 << 16;
+/// Bytes of a record that tell whether it is what its kind says; names are shorter.
+const TOLD: u64 = 4096;
 
 /// A record whose body is still to be read, or passed over.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +26,13 @@ pub(super) struct Record {
     /// Where its body begins, and how long that is.
     pub(super) at: u64,
     pub(super) length: u64,
+}
+
+impl Record {
+    /// Where the next record begins.
+    pub(super) fn end(&self) -> u64 {
+        self.at + self.length
+    }
 }
 
 /// What comes next.
@@ -33,6 +44,25 @@ pub(super) enum Next {
     Damaged,
 }
 
+/// The end of a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Footer {
+    /// Where its record begins.
+    pub(super) at: u64,
+    /// Where the summary begins, and its offsets; 0 where there are none.
+    pub(super) summary: u64,
+    pub(super) offsets: u64,
+    /// The checksum of the summary and of the footer up to here; 0 where there is none.
+    pub(super) crc: u32,
+}
+
+impl Footer {
+    /// Where the bytes end that its checksum is of.
+    pub(super) fn checked_end(&self) -> u64 {
+        self.at + HEAD + 16
+    }
+}
+
 pub(super) struct Records<R> {
     file: BufReader<R>,
     pub(super) length: u64,
@@ -41,22 +71,24 @@ pub(super) struct Records<R> {
 }
 
 impl Records<File> {
-    /// The file's records; `None` where it does not begin as MCAP does.
-    pub(super) fn of(file: File) -> io::Result<Option<Self>> {
+    /// The file's records; what it begins with where that is not as MCAP does.
+    pub(super) fn of(file: File) -> io::Result<Result<Self, Vec<u8>>> {
         let length = file.metadata()?.len();
         Self::new(file, length)
     }
 }
 
 impl<R: Read + Seek> Records<R> {
-    pub(super) fn new(file: R, length: u64) -> io::Result<Option<Self>> {
+    pub(super) fn new(file: R, length: u64) -> io::Result<Result<Self, Vec<u8>>> {
         let mut file = BufReader::with_capacity(1 << 16, file);
-        let mut magic = [0; 8];
-        if length < 8 {
-            return Ok(None);
+        let mut first = Vec::new();
+        (&mut file).take(16).read_to_end(&mut first)?;
+        if !first.starts_with(&MAGIC) {
+            return Ok(Err(first));
         }
-        file.read_exact(&mut magic)?;
-        Ok((magic == MAGIC).then_some(Self { file, length, at: 8 }))
+        let mut records = Self { file, length, at: 8 };
+        records.go_to(8)?;
+        Ok(Ok(records))
     }
 
     pub(super) fn next(&mut self) -> io::Result<Next> {
@@ -66,17 +98,13 @@ impl<R: Read + Seek> Records<R> {
         }
         let mut head = [0; HEAD as usize];
         self.file.read_exact(&mut head)?;
-        let kind = head[0];
         let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
-        if !matches!(kind, 0x01..=0x0F | 0x80..) {
-            return Ok(Next::Damaged);
-        }
         if length > left - HEAD {
             // Damage makes lengths of any size; what was cut has the length of a record.
             return Ok(if length < 1 << 32 { Next::Cut } else { Next::Damaged });
         }
-        let record = Record { kind, at: self.at + HEAD, length };
-        self.at = record.at + length;
+        let record = Record { kind: head[0], at: self.at + HEAD, length };
+        self.at = record.end();
         Ok(Next::Record(record))
     }
 
@@ -89,6 +117,13 @@ impl<R: Read + Seek> Records<R> {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         self.skip(record.length - wanted)
+    }
+
+    /// Passes over the body of `record`, which was next. `false` where it is not what its kind says.
+    pub(super) fn pass(&mut self, record: Record) -> io::Result<bool> {
+        let mut told = Vec::new();
+        self.body(record, TOLD, &mut told)?;
+        Ok(is_plausible(record, &told))
     }
 
     /// Passes over `count` bytes.
@@ -108,67 +143,80 @@ impl<R: Read + Seek> Records<R> {
         Ok(())
     }
 
-    /// Whether the file has its end.
-    pub(super) fn has_end(&mut self) -> io::Result<bool> {
-        self.summary_start().map(|start| start.is_some())
-    }
-
-    /// Where the summary begins, which is 0 where there is none; `None` where the file has no end.
-    fn summary_start(&mut self) -> io::Result<Option<u64>> {
-        let Some(end) = self.length.checked_sub(END).filter(|&end| end >= 8) else { return Ok(None) };
+    /// The bytes from `from` up to `to`, as many of them as there are; then goes on where it was.
+    pub(super) fn bytes(&mut self, from: u64, to: u64) -> io::Result<Vec<u8>> {
         let back = self.at;
-        let mut bytes = [0; END as usize];
-        self.file.seek(SeekFrom::Start(end))?;
-        self.file.read_exact(&mut bytes)?;
+        let mut bytes = Vec::new();
+        self.go_to(from)?;
+        (&mut self.file).take(to.saturating_sub(from)).read_to_end(&mut bytes)?;
         self.go_to(back)?;
-        let start = u64::from_le_bytes(bytes[9..17].try_into().expect("eight bytes"));
-        Ok((bytes[0] == op::FOOTER && bytes[END as usize - 8..] == MAGIC).then_some(start))
+        Ok(bytes)
     }
 
-    /// The summary's records of these kinds: the kind of each, and its body.
-    pub(super) fn in_summary(&mut self, kinds: &[u8]) -> io::Result<Vec<(u8, Vec<u8>)>> {
-        let back = self.at;
-        let mut bodies = Vec::new();
-        if let Some(start) = self.summary_start()?.filter(|&start| start > 0 && start < self.length) {
-            self.go_to(start)?;
-            while let Next::Record(record) = self.next()? {
-                if kinds.contains(&record.kind) {
-                    let mut body = Vec::new();
-                    self.body(record, MAX_RECORD_BYTES, &mut body)?;
-                    bodies.push((record.kind, body));
-                } else {
-                    self.skip(record.length)?;
-                }
-            }
-        }
-        self.go_to(back)?;
-        Ok(bodies)
+    /// Whether a chunk's record begins at `at` that has `length` bytes with its head.
+    pub(super) fn has_chunk(&mut self, at: u64, length: u64) -> io::Result<bool> {
+        let bytes = self.bytes(at, at.saturating_add(HEAD))?;
+        let Some((&kind, told)) = bytes.split_first() else { return Ok(false) };
+        let told = told.try_into().map(u64::from_le_bytes);
+        Ok(kind == op::CHUNK && length >= HEAD && told.is_ok_and(|told| told == length - HEAD))
     }
 
-    /// Goes to the first chunk after `at` that the file's own index knows; `false` where there is none.
-    pub(super) fn resume_after(&mut self, at: u64) -> io::Result<bool> {
-        let Some(start) = self.summary_start()?.filter(|&start| start > at && start < self.length) else {
-            return Ok(false);
-        };
-        self.go_to(start)?;
-        let mut found: Option<u64> = None;
-        let mut body = Vec::new();
-        while let Next::Record(record) = self.next()? {
-            if record.kind == op::CHUNK_INDEX {
-                self.body(record, 24, &mut body)?;
-                let chunk = body.get(16..24).map(|bytes| u64::from_le_bytes(bytes.try_into().expect("eight bytes")));
-                if let Some(chunk) = chunk.filter(|&chunk| chunk > at && chunk < start) {
-                    found = Some(found.map_or(chunk, |known| known.min(chunk)));
-                }
-            } else {
-                self.skip(record.length)?;
-            }
-        }
-        if let Some(chunk) = found {
-            self.go_to(chunk)?;
-        }
-        Ok(found.is_some())
+    /// The end of the file; `None` where it has none.
+    pub(super) fn footer(&mut self) -> io::Result<Option<Footer>> {
+        let Some(at) = self.length.checked_sub(END).filter(|&at| at >= 8) else { return Ok(None) };
+        let bytes = self.bytes(at, self.length)?;
+        let mut parts = Parts(&bytes);
+        let read = (|| {
+            let (kind, length) = (parts.bytes(1)?[0], parts.u64()?);
+            let footer = Footer { at, summary: parts.u64()?, offsets: parts.u64()?, crc: parts.u32()? };
+            (kind == op::FOOTER && length == FOOTER && parts.0 == MAGIC).then_some(footer)
+        })();
+        Ok(read)
     }
+}
+
+/// Whether what `record` begins with, `told`, has the parts that its kind says, and these its length.
+fn is_plausible(record: Record, told: &[u8]) -> bool {
+    let mut parts = Parts(told);
+    let rest = |parts: &Parts<'_>| record.length - (told.len() - parts.0.len()) as u64;
+    let fits = (|| {
+        Some(match record.kind {
+            op::HEADER => {
+                let _names = (parts.text()?, parts.text()?);
+                rest(&parts) == 0
+            }
+            op::SCHEMA => {
+                let _names = (parts.u16()?, parts.text()?, parts.text()?);
+                u64::from(parts.u32()?) == rest(&parts)
+            }
+            op::CHANNEL => {
+                let _names = (parts.u16()?, parts.u16()?, parts.text()?, parts.text()?);
+                u64::from(parts.u32()?) == rest(&parts)
+            }
+            op::MESSAGE => record.length >= 22,
+            op::CHUNK => {
+                let _sizes = (parts.u64()?, parts.u64()?, parts.u64()?, parts.u32()?);
+                unpack::KNOWN.contains(&parts.text()?) && parts.u64()? == rest(&parts)
+            }
+            op::MESSAGE_INDEX => {
+                let (_, bytes) = (parts.u16()?, parts.u32()?);
+                bytes.is_multiple_of(16) && u64::from(bytes) == rest(&parts)
+            }
+            op::ATTACHMENT => {
+                let _names = (parts.u64()?, parts.u64()?, parts.text()?, parts.text()?);
+                parts.u64()?.checked_add(4) == Some(rest(&parts))
+            }
+            op::METADATA => {
+                parts.text()?;
+                u64::from(parts.u32()?) == rest(&parts)
+            }
+            op::DATA_END => record.length == 4,
+            // One of another program, if it is no chunk whose kind is damaged.
+            0x80.. => !is_plausible(Record { kind: op::CHUNK, ..record }, told),
+            _ => false,
+        })
+    })();
+    fits.unwrap_or(false)
 }
 
 /// Takes bytes off the front of a record's body.
@@ -196,6 +244,12 @@ impl<'a> Parts<'a> {
     pub(super) fn text(&mut self) -> Option<&'a str> {
         let count = self.u32()?;
         std::str::from_utf8(self.bytes(count.into())?).ok()
+    }
+
+    /// A map of as many bytes as come first.
+    pub(super) fn map(&mut self) -> Option<Parts<'a>> {
+        let count = self.u32()?;
+        Some(Parts(self.bytes(count.into())?))
     }
 
     /// A record within a chunk: its kind and its body.

@@ -83,7 +83,7 @@ const SOMATIC: [Message; 4] = [
     (
         "Frame",
         "double t 1; repeated float values 2; repeated uint32 missing 3; repeated uint32 present 4; repeated LinkPose poses 5; \
-         repeated uint32 stale 6; repeated JointPosition joints 7; bool has_stale_pose 8",
+         repeated uint32 stale 6; repeated JointPosition joints 7; bool has_stale_pose 8; int64 t_rest 9",
     ),
     ("LinkPose", "string link 1; repeated double pose 2"),
     ("JointPosition", "string joint 1; double position 2"),

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::FRAMES;
-use super::frames::FrameMessage;
 use super::reader::Reader;
 use crate::error::Result;
+use crate::signal::Frame;
 
 /// Steps after which it is known how far frames usually lie apart.
 const FIRST_STEPS: usize = 1000;
@@ -120,17 +119,14 @@ impl Survey {
     pub fn of(reader: &mut Reader, mut progress: impl FnMut(f64)) -> Result<Self> {
         let mut survey = Self::default();
         let mut counts: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
+        let mut frame = Frame::default();
         while let Some(message) = reader.next_message()? {
-            let data = reader.data(&message);
             let (messages, bytes) = counts.entry(message.channel).or_default();
             *messages += 1;
-            *bytes += data.len() as u64;
-            if reader.channels.get(&message.channel).is_some_and(|channel| channel.topic == FRAMES) {
-                let frame = FrameMessage::read(data);
-                let t_s = frame.as_ref().map_or(message.log_time as f64 / 1e9, FrameMessage::t_s);
-                survey.rhythm.see(t_s);
-                survey.posed += u64::from(frame.is_some_and(|frame| frame.is_posed()));
-                reader.saw(t_s);
+            *bytes += reader.data(&message).len() as u64;
+            if reader.frame_of(&message, &mut frame) == Some(true) {
+                survey.rhythm.see(frame.t_s);
+                survey.posed += u64::from(!frame.pose.is_empty());
                 if survey.rhythm.frames.is_multiple_of(64) {
                     progress(reader.progress());
                 }

@@ -6,8 +6,13 @@ use super::places::{FRAME_TYPES, Places, not_read};
 use crate::body::Body;
 use crate::error::{Error, Result, failed};
 use crate::recording::{BagMessage, BagReader, WantedTopics};
-use crate::signal::Frame;
+use crate::signal::{Frame, FrameTime};
 use crate::source::{BagName, Source};
+
+/// The time `log_ns` by a recorder's clock.
+pub(super) fn time_of(log_ns: u64) -> FrameTime {
+    FrameTime::from_ns(i64::try_from(log_ns).unwrap_or(i64::MAX))
+}
 
 /// What is read of a bag, where frames are.
 pub(super) fn frames_of(bag: &BagName) -> Result<BagReader> {
@@ -94,27 +99,27 @@ impl Kind {
         topics: &[String],
         frame: &mut Frame,
     ) -> Option<Result<f64>> {
-        let log_s = message.log_ns as f64 / 1e9;
-        let time_s = |cloud: &PointCloud2| match cloud.header.stamp.nanoseconds() {
-            0 => log_s,
-            _ => cloud.header.stamp.seconds(),
+        let log = time_of(message.log_ns);
+        let time_of = |cloud: &PointCloud2| match cloud.header.stamp.nanoseconds() {
+            0 => log,
+            _ => cloud.header.stamp.frame_time(),
         };
         Some(match self {
             Self::Array => {
                 let array = Float32MultiArray::from_cdr(message.data)?;
-                places.array(&array, log_s, frame).map(|()| log_s)
+                places.array(&array, log, frame).map(|()| log.s)
             }
             Self::Cloud => {
                 let cloud = PointCloud2::from_cdr(message.data)?;
-                places.cloud(&cloud, time_s(&cloud), frame).map(|()| frame.t_s)
+                places.cloud(&cloud, time_of(&cloud), frame).map(|()| frame.t_s)
             }
             Self::Clouds(merge) => {
                 let cloud = PointCloud2::from_cdr(message.data)?;
-                let t_s = time_s(&cloud);
+                let time = time_of(&cloud);
                 let mut values = Vec::new();
                 places.points(&cloud, |index, value| values.push((index, value))).and_then(|()| {
-                    let cloud = TopicCloud { topic: message.topic, t_s, log_s, values };
-                    merge.push(cloud).map(|()| t_s).map_err(|(index, other)| {
+                    let cloud = TopicCloud { topic: message.topic, time, log_s: log.s, values };
+                    merge.push(cloud).map(|()| time.s).map_err(|(index, other)| {
                         let (taxel, other) = (places.ids()[index], &topics[other]);
                         failed!("taxel {taxel} is in clouds of {other}, too; record each taxel on one topic")
                     })
@@ -145,7 +150,7 @@ impl Source for BagSource {
                 merge.end();
                 continue;
             };
-            let (topic, bytes, log_s) = (message.topic, message.data.len(), message.log_ns as f64 / 1e9);
+            let (topic, bytes, log_s) = (message.topic, message.data.len(), time_of(message.log_ns).s);
             match self.kind.read(&message, &mut self.places, &self.topics, frame) {
                 Some(Ok(t_s)) => self.bag.saw(t_s),
                 Some(Err(e)) => return Err(self.placed(e, topic, log_s)),
@@ -182,6 +187,76 @@ impl Source for BagSource {
     }
 
     fn losses(&self) -> Vec<String> {
-        self.bag.losses().to_vec()
+        self.bag.losses()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::messages::{Header, JointState, Time};
+    use super::*;
+    use crate::bundled;
+    use crate::output::OutputPaths;
+    use crate::recording::{BAG_METADATA, BagType, BagWriter};
+    use crate::source::JointStates;
+
+    #[test]
+    fn stamps_since_1970_keep_every_nanosecond() {
+        const FIRST_NS: u64 = 1_700_000_000_000_000_000;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bag");
+        let none: [&str; 0] = [];
+        let output = OutputPaths::new(false, none).add_folder(&path, ["a.mcap", BAG_METADATA]).unwrap();
+        let mut bag = BagWriter::create(output, "a.mcap").unwrap();
+        let of = |name, hash, definition| BagType { name, hash, definition };
+        let clouds = of(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition());
+        let arrays = of(Float32MultiArray::TYPE, Float32MultiArray::HASH, Float32MultiArray::definition());
+        let states = of(JointState::TYPE, JointState::HASH, JointState::definition());
+        let [clouds, arrays, states] = [("/clouds", clouds), ("/arrays", arrays), ("/joints", states)]
+            .map(|(name, kind)| bag.topic(name, &kind).unwrap());
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        // Steps that a double of seconds since 1970 does not have.
+        let stamps: Vec<u64> = (0..20).map(|index| FIRST_NS + index * 10_000_077).collect();
+        for (index, &ns) in stamps.iter().enumerate() {
+            let header = Header { stamp: Time::from_ns(ns), frame_id: String::new() };
+            let field =
+                crate::robot::messages::PointField { name: "value".to_owned(), offset: 0, datatype: 7, count: 1 };
+            let count = body.taxels.len() as u32;
+            let cloud = PointCloud2 {
+                header: header.clone(),
+                height: 1,
+                width: count,
+                fields: vec![field],
+                point_step: 4,
+                row_step: 4 * count,
+                data: vec![0; 4 * count as usize],
+                ..PointCloud2::default()
+            };
+            bag.write(clouds, ns, &cloud.to_cdr()).unwrap();
+            let array = Float32MultiArray { data: vec![0.0; count as usize], ..Float32MultiArray::default() };
+            bag.write(arrays, ns, &array.to_cdr()).unwrap();
+            let (name, position) = (vec!["wrist".to_owned()], vec![index as f64]);
+            let state = JointState { header, name, position, ..JointState::default() };
+            bag.write(states, ns, &state.to_cdr()).unwrap();
+        }
+        bag.finish().unwrap();
+        for topic in ["/clouds", "/arrays"] {
+            let mut source =
+                BagSource::open(&BagName { topics: vec![topic.into()], ..BagName::new(&path) }, &body).unwrap();
+            let mut frame = Frame::default();
+            let mut times = Vec::new();
+            while source.next_frame(&mut frame).unwrap() {
+                times.push(frame.time());
+            }
+            let ns: Vec<u64> = times.iter().map(|time| time.ns() as u64).collect();
+            assert_eq!(ns, stamps, "{topic}");
+            assert!(times.windows(2).all(|pair| pair[1].since(pair[0]) == 0.010_000_077), "{topic}");
+            // In a double alone they are not.
+            assert!(times.windows(2).any(|pair| (pair[1].s - pair[0].s - 0.010_000_077).abs() > 1e-7), "{topic}");
+        }
+        let states = JointStates::open_bag(&BagName::new(&path)).unwrap();
+        let at = FrameTime::from_ns((FIRST_NS + 10_000_077 + 100) as i64);
+        let found = states.at(0, at, false).unwrap();
+        assert_eq!((found.age_s, found.position), (1e-7, 1.0 + 1e-7 / 0.010_000_077));
     }
 }

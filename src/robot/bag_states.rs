@@ -1,5 +1,6 @@
 //! Joint states from a bag of ROS 2.
 
+use super::bag_source::time_of;
 use super::messages::{JointState, Message as _};
 use super::told_positions::told_positions;
 use crate::error::{Error, Result, failed};
@@ -32,24 +33,25 @@ impl JointStates {
         let mut odd: Option<(u64, String)> = None;
         while let Some(message) = reader.next()? {
             let bytes = message.data.len();
-            let log_s = message.log_ns as f64 / 1e9;
+            let log_ns = message.log_ns;
             let Some(state) = JointState::from_cdr(message.data) else {
                 reader.damaged(bytes);
                 continue;
             };
             let stamp = &state.header.stamp;
-            let t_s = if stamp.nanoseconds() == 0 { log_s } else { stamp.seconds() };
+            let time = if stamp.nanoseconds() == 0 { time_of(log_ns) } else { stamp.frame_time() };
+            let t_s = time.s;
             reader.saw(t_s);
             for (joint, position) in told_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
                 if position.is_finite() {
-                    states.add(joint, t_s, position);
+                    states.add(joint, time, position);
                 } else {
                     let first = || (0, format!("the first of joint `{joint}` at {t_s} s: {position}"));
                     odd.get_or_insert_with(first).0 += 1;
                 }
             }
         }
-        let mut losses = reader.losses().to_vec();
+        let mut losses = reader.losses();
         losses.extend(
             odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")),
         );

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Frame, FrameTime, RawValue};
 use crate::source::send_rate::{DEFAULT_PERIOD_S, max_age_s, takes_over, updated_period_s, wait_s};
 
 /// How far a recorder may take clouds out of the order of their stamps, s.
@@ -17,8 +17,8 @@ const MAX_WAITING: usize = 1024;
 /// What a message tells of the taxels of a body.
 pub(super) struct TopicCloud {
     pub(super) topic: usize,
-    /// The time of its values, s.
-    pub(super) t_s: f64,
+    /// The time of its values.
+    pub(super) time: FrameTime,
     /// When it came, by the recorder's clock, s.
     pub(super) log_s: f64,
     /// Indices in a frame, and the values there.
@@ -31,9 +31,9 @@ struct Topic {
     waiting: VecDeque<(u64, TopicCloud)>,
     /// The taxels of all its clouds.
     taxels: Vec<usize>,
-    /// The newest cloud, and its time, s.
+    /// The newest cloud, and its time.
     values: Vec<(usize, RawValue)>,
-    stamp_s: Option<f64>,
+    stamp: Option<FrameTime>,
     period_s: f64,
     /// Whether the newest cloud is in no frame yet.
     is_new: bool,
@@ -53,21 +53,21 @@ struct TopicAccount {
 }
 
 impl Topic {
-    fn is_sending(&self, now_s: f64) -> bool {
-        self.stamp_s.is_some_and(|stamp_s| now_s - stamp_s <= max_age_s(self.period_s, None))
+    fn is_sending(&self, now: FrameTime) -> bool {
+        self.stamp.is_some_and(|stamp| now.since(stamp) <= max_age_s(self.period_s, None))
     }
 
     /// Takes over `cloud` as its newest.
     fn take(&mut self, cloud: TopicCloud) {
-        if let Some(before_s) = self.stamp_s {
-            self.period_s = updated_period_s(self.period_s, cloud.t_s - before_s);
+        if let Some(before) = self.stamp {
+            self.period_s = updated_period_s(self.period_s, cloud.time.since(before));
         }
-        self.stamp_s = Some(cloud.t_s);
+        self.stamp = Some(cloud.time);
         self.values = cloud.values;
         self.account.clouds += 1;
         self.account.replaced += usize::from(std::mem::replace(&mut self.is_new, true));
-        let [first_s, _] = self.account.span_s.unwrap_or([cloud.t_s; 2]);
-        self.account.span_s = Some([first_s, cloud.t_s]);
+        let [first_s, _] = self.account.span_s.unwrap_or([cloud.time.s; 2]);
+        self.account.span_s = Some([first_s, cloud.time.s]);
     }
 }
 
@@ -83,8 +83,8 @@ pub(super) struct CloudMerge {
     has_ended: bool,
     /// The topic that sets the pace.
     leader: Option<usize>,
-    /// The time of the frame that is being made, s.
-    due_s: Option<f64>,
+    /// The time of the frame that is being made.
+    due: Option<FrameTime>,
     /// What is given for values that are too old, and whether any was so far.
     stale: RawValue,
     has_stale: bool,
@@ -105,7 +105,7 @@ impl CloudMerge {
             newest_log_s: f64::NEG_INFINITY,
             has_ended: false,
             leader: None,
-            due_s: None,
+            due: None,
             stale: RawValue::MISSING,
             has_stale: false,
             frames: 0,
@@ -157,15 +157,15 @@ impl CloudMerge {
     pub(super) fn next_frame(&mut self, frame: &mut Frame) -> bool {
         loop {
             let head = self.head();
-            let Some(due_s) = self.due_s.take_if(|due_s| match head {
-                Some(topic) => Self::ends_frame(&self.topics, self.leader, *due_s, topic),
+            let Some(due) = self.due.take_if(|due| match head {
+                Some(topic) => Self::ends_frame(&self.topics, self.leader, *due, topic),
                 None => self.has_ended,
             }) else {
                 let Some(topic) = head else { return false };
                 self.take(topic);
                 continue;
             };
-            self.fill(due_s, frame);
+            self.fill(due, frame);
             return true;
         }
     }
@@ -178,7 +178,7 @@ impl CloudMerge {
 
     /// The topic whose cloud is next by its stamp, if no earlier one is to come.
     fn head(&self) -> Option<usize> {
-        let (least, ..) = self.heads().min_by(|a, b| a.2.t_s.total_cmp(&b.2.t_s).then(a.1.cmp(&b.1)))?;
+        let (least, ..) = self.heads().min_by(|a, b| a.2.time.total_cmp(&b.2.time).then(a.1.cmp(&b.1)))?;
         let (oldest, _, cloud) = self.heads().min_by_key(|(_, came, _)| *came)?;
         let waited_s = self.newest_log_s - cloud.log_s;
         // Stamps of two clocks never come into order.
@@ -189,45 +189,42 @@ impl CloudMerge {
         is_sure.then_some(least)
     }
 
-    /// Whether the next cloud of `topic` is not for the frame at `due_s`.
-    fn ends_frame(topics: &[Topic], leader: Option<usize>, due_s: f64, topic: usize) -> bool {
+    /// Whether the next cloud of `topic` is not for the frame at `due`.
+    fn ends_frame(topics: &[Topic], leader: Option<usize>, due: FrameTime, topic: usize) -> bool {
         let wait_s = leader.map_or(0.0, |leader| wait_s(topics[leader].period_s));
         let own = &topics[topic];
-        let is_late = own.waiting.front().is_none_or(|(_, cloud)| cloud.t_s > due_s + wait_s);
+        let is_late = own.waiting.front().is_none_or(|(_, cloud)| cloud.time.since(due) > wait_s);
         // One that came since is not replaced.
-        let is_second = own.is_new && own.stamp_s.is_some_and(|stamp_s| stamp_s >= due_s);
+        let is_second = own.is_new && own.stamp.is_some_and(|stamp| stamp.since(due) >= 0.0);
         is_late || leader == Some(topic) || is_second
     }
 
     fn take(&mut self, topic: usize) {
         let Some((_, cloud)) = self.topics[topic].waiting.pop_front() else { return };
         self.waiting -= 1;
-        let t_s = cloud.t_s;
+        let time = cloud.time;
         self.topics[topic].take(cloud);
-        let leads = match self.leader.map(|leader| (leader, &self.topics[leader])) {
-            Some((leader, own)) if own.is_sending(t_s) => {
-                if takes_over(self.topics[topic].period_s, own.period_s) {
-                    topic
-                } else {
-                    leader
+        let leads =
+            match self.leader.map(|leader| (leader, &self.topics[leader])) {
+                Some((leader, own)) if own.is_sending(time) => {
+                    if takes_over(self.topics[topic].period_s, own.period_s) { topic } else { leader }
                 }
-            }
-            _ => topic,
-        };
+                _ => topic,
+            };
         self.leader = Some(leads);
         if leads == topic {
-            self.due_s.get_or_insert(t_s);
+            self.due.get_or_insert(time);
         }
     }
 
-    /// Fills `frame` with the values valid at `at_s`.
-    fn fill(&mut self, at_s: f64, frame: &mut Frame) {
+    /// Fills `frame` with the values valid at `at`.
+    fn fill(&mut self, at: FrameTime, frame: &mut Frame) {
         frame.values.resize(self.topic_of_taxel.len(), RawValue::MISSING);
         frame.clear();
-        frame.t_s = at_s;
-        let until_s = at_s + self.leader.map_or(0.0, |leader| wait_s(self.topics[leader].period_s));
+        frame.set_time(at);
+        let wait_s = self.leader.map_or(0.0, |leader| wait_s(self.topics[leader].period_s));
         for topic in &mut self.topics {
-            let is_valid = topic.is_sending(at_s) && topic.stamp_s.is_some_and(|stamp_s| stamp_s <= until_s);
+            let is_valid = topic.is_sending(at) && topic.stamp.is_some_and(|stamp| stamp.since(at) <= wait_s);
             let is_new = std::mem::take(&mut topic.is_new);
             if is_valid {
                 topic.values.iter().for_each(|&(taxel, value)| frame.values[taxel] = value);
@@ -239,8 +236,8 @@ impl CloudMerge {
             self.has_stale |= !topic.taxels.is_empty();
         }
         self.frames += 1;
-        let [first_s, _] = self.span_s.unwrap_or([at_s; 2]);
-        self.span_s = Some([first_s, at_s]);
+        let [first_s, _] = self.span_s.unwrap_or([at.s; 2]);
+        self.span_s = Some([first_s, at.s]);
     }
 
     /// Topics whose clouds are not all in frames, or that not all frames have, with that in words; nothing the next time.
@@ -288,7 +285,9 @@ mod tests {
         };
         for &(topic, ms, value) in clouds {
             let t_s = f64::from(ms) * 1e-3;
-            merge.push(TopicCloud { topic, t_s, log_s: t_s, values: vec![(topic, RawValue::new(value))] }).unwrap();
+            merge
+                .push(TopicCloud { topic, time: t_s.into(), log_s: t_s, values: vec![(topic, RawValue::new(value))] })
+                .unwrap();
             take(&mut merge);
         }
         merge.end();
@@ -384,7 +383,9 @@ mod tests {
         for (topic, ms, value) in late {
             let t_s = f64::from(ms) * 1e-3;
             let log_s = t_s + 0.08 * topic as f64;
-            merge.push(TopicCloud { topic, t_s, log_s, values: vec![(topic, RawValue::new(value))] }).unwrap();
+            merge
+                .push(TopicCloud { topic, time: t_s.into(), log_s, values: vec![(topic, RawValue::new(value))] })
+                .unwrap();
             while merge.next_frame(&mut frame) {
                 found.push((ms, frame.values.iter().map(|value| value.number()).collect::<Vec<_>>()));
             }
@@ -400,7 +401,9 @@ mod tests {
         for at in 0..10_000_u32 {
             let (topic, log_s) = ((at % 2) as usize, f64::from(at) * 0.005);
             let t_s = log_s + 1e9 * topic as f64;
-            merge.push(TopicCloud { topic, t_s, log_s, values: vec![(topic, RawValue::new(1.0))] }).unwrap();
+            merge
+                .push(TopicCloud { topic, time: t_s.into(), log_s, values: vec![(topic, RawValue::new(1.0))] })
+                .unwrap();
             while merge.next_frame(&mut frame) {
                 made += 1;
                 assert!(frame.values[0].is_missing() || frame.values[1].is_missing());
@@ -415,7 +418,7 @@ mod tests {
         let mut merge = CloudMerge::new(2, 3);
         let cloud = |topic, taxels: &[usize]| TopicCloud {
             topic,
-            t_s: 0.0,
+            time: FrameTime::default(),
             log_s: 0.0,
             values: taxels.iter().map(|&taxel| (taxel, RawValue::new(1.0))).collect(),
         };

@@ -10,7 +10,7 @@ use super::matching::LinkMatches;
 use crate::author::mesh::{Up, y_up_from};
 use crate::body::Body;
 use crate::error::{Result, failed};
-use crate::signal::{Frame, Pose};
+use crate::signal::{Frame, FrameTime, Pose};
 use crate::source::{JointPosition, JointStates, Source};
 
 /// How joint states are used.
@@ -58,8 +58,8 @@ pub struct JointedSource {
     options: JointOptions,
     /// By joint, its index in the recording of states.
     recorded: Vec<Option<usize>>,
-    /// By joint, the last state that a frame has carried, with its time, s.
-    carried: Vec<Option<(f64, f64)>>,
+    /// By joint, the last state that a frame has carried, with its time.
+    carried: Vec<Option<(FrameTime, f64)>>,
     positions: Vec<Option<JointPosition>>,
     /// By joint that is needed, whether any frame had a state of it.
     has_come: Vec<bool>,
@@ -151,7 +151,7 @@ impl JointedSource {
     fn find_positions(&mut self, frame: &Frame) {
         for (name, position) in &frame.joints {
             match self.robot.joint_names().position(|known| known == name) {
-                Some(joint) => self.carried[joint] = Some((frame.t_s, *position)),
+                Some(joint) => self.carried[joint] = Some((frame.time(), *position)),
                 // One that mimics another, or is fixed, adds nothing.
                 None if self.robot.has_joint(name) => {}
                 None => self.remarks.strange_joint(&self.robot, name, frame.t_s),
@@ -160,9 +160,10 @@ impl JointedSource {
         for joint in 0..self.positions.len() {
             self.positions[joint] = match &self.options.states {
                 Some(states) => self.recorded[joint].and_then(|recorded| {
-                    states.at(recorded, frame.t_s + self.options.delay_s, self.robot.is_continuous(joint))
+                    states.at(recorded, frame.time().plus(self.options.delay_s), self.robot.is_continuous(joint))
                 }),
-                None => self.carried[joint].map(|(t_s, position)| JointPosition { position, age_s: frame.t_s - t_s }),
+                None => self.carried[joint]
+                    .map(|(time, position)| JointPosition { position, age_s: frame.time().since(time) }),
             };
         }
     }
@@ -180,8 +181,10 @@ impl JointedSource {
             line += &format!("; no frame has a state of {}", self.named_joints(&silent));
         }
         if let Some([from_s, to_s]) = self.options.states.as_ref().and_then(JointStates::span_s) {
-            let from_s = from_s - self.options.delay_s;
-            let to_s = to_s - self.options.delay_s;
+            // In whole nanoseconds: a difference of doubles has digits that mean nothing.
+            let delay_ns = (self.options.delay_s * 1e9).round() as i64;
+            let [from_s, to_s] =
+                [from_s, to_s].map(|s| FrameTime::from_ns(FrameTime::from(s).ns().saturating_sub(delay_ns)).s);
             line += &format!(
                 "; states are of {from_s} to {to_s} s on the frames' clock, frames of {first_s} to {last_s} s"
             );

@@ -81,10 +81,10 @@ impl LiveJoints {
 
     fn read_states(&mut self) -> Result<()> {
         while let Some(state) = self.states.take()? {
-            let stamp_s = state.header.stamp.seconds();
+            let stamp = state.header.stamp.frame_time();
             take_state(&state, |joint, position| {
                 if self.time != StatesTime::Arrival {
-                    self.stamped.add(joint, stamp_s, position);
+                    self.stamped.add(joint, stamp, position);
                 }
                 self.arrived.insert(joint.to_owned(), position);
             })?;
@@ -95,7 +95,7 @@ impl LiveJoints {
 
     /// Finds out whether the stamps are of the clock of `frame`, once there are any.
     fn compare_clocks(&mut self, frame: &Frame) {
-        let Some(apart_s) = self.stamped.newest_s().map(|newest_s| newest_s - frame.t_s) else { return };
+        let Some(apart_s) = self.stamped.newest().map(|newest| newest.since(frame.time())) else { return };
         if apart_s.abs() <= ONE_CLOCK_S {
             self.time = StatesTime::Stamp { delay_s: 0.0 };
             return;
@@ -155,7 +155,8 @@ impl Source for LiveJoints {
         frame.joints.clear();
         if let StatesTime::Stamp { delay_s } = self.time {
             self.arrived.clear();
-            self.stamped.at(frame.t_s + delay_s, |joint, position| frame.joints.push((joint.to_owned(), position)));
+            self.stamped
+                .at(frame.time().plus(delay_s), |joint, position| frame.joints.push((joint.to_owned(), position)));
         } else {
             frame.joints.extend(std::mem::take(&mut self.arrived));
         }

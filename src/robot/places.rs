@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::messages::{Float32MultiArray, Message as _, PointCloud2, PointField};
 use crate::body::Body;
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Frame, FrameTime, RawValue};
 
 /// The types of messages that frames are read from.
 pub(super) const FRAME_TYPES: [&str; 2] = [PointCloud2::TYPE, Float32MultiArray::TYPE];
@@ -56,13 +56,13 @@ impl Places {
         frame.values.resize(self.ids.len(), RawValue::MISSING);
     }
 
-    /// Puts the values of a cloud into `frame`, in place of what that holds, with the time `t_s` (s).
+    /// Puts the values of a cloud into `frame`, in place of what that holds, with the time `time`.
     ///
     /// # Errors
     /// As [`Places::points`].
-    pub(super) fn cloud(&mut self, cloud: &PointCloud2, t_s: f64, frame: &mut Frame) -> Result<()> {
+    pub(super) fn cloud(&mut self, cloud: &PointCloud2, time: FrameTime, frame: &mut Frame) -> Result<()> {
         self.empty(frame);
-        frame.t_s = t_s;
+        frame.set_time(time);
         self.points(cloud, |index, value| frame.values[index] = value)
     }
 
@@ -129,13 +129,13 @@ impl Places {
         }
     }
 
-    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `t_s` (s) at which it came.
+    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `time` at which it came.
     ///
     /// # Errors
     /// It has not one number for each taxel.
-    pub(super) fn array(&self, array: &Float32MultiArray, t_s: f64, frame: &mut Frame) -> Result<()> {
+    pub(super) fn array(&self, array: &Float32MultiArray, time: FrameTime, frame: &mut Frame) -> Result<()> {
         self.empty(frame);
-        frame.t_s = t_s;
+        frame.set_time(time);
         let values = array.data.get(array.layout.data_offset as usize..).unwrap_or_default();
         if values.len() != self.ids.len() {
             return Err(failed!(
@@ -258,7 +258,7 @@ mod tests {
 
     fn read(places: &mut Places, cloud: &PointCloud2) -> Result<Frame> {
         let mut frame = Frame::missing(0.0, places.ids.len());
-        places.cloud(cloud, cloud.header.stamp.seconds(), &mut frame).map(|()| frame)
+        places.cloud(cloud, cloud.header.stamp.frame_time(), &mut frame).map(|()| frame)
     }
 
     #[test]
@@ -327,15 +327,15 @@ mod tests {
         let (places, _) = places();
         let mut frame = Frame::missing(0.0, places.ids.len());
         let mut array = Float32MultiArray { data: vec![1.5; places.ids.len() + 1], ..Float32MultiArray::default() };
-        let why = places.array(&array, 7.5, &mut frame).unwrap_err().to_string();
+        let why = places.array(&array, 7.5.into(), &mut frame).unwrap_err().to_string();
         assert!(
             why.contains(&format!("has {} numbers, and the body {}", places.ids.len() + 1, places.ids.len())),
             "{why}"
         );
         array.layout.data_offset = 1;
-        places.array(&array, 7.5, &mut frame).unwrap();
+        places.array(&array, 7.5.into(), &mut frame).unwrap();
         assert!(frame.values.iter().all(|value| value.number() == Some(1.5)) && frame.t_s == 7.5);
         array.layout.data_offset = u32::MAX;
-        assert!(places.array(&array, 7.5, &mut frame).is_err());
+        assert!(places.array(&array, 7.5.into(), &mut frame).is_err());
     }
 }

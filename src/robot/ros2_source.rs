@@ -7,7 +7,7 @@ use super::places::{Places, not_read};
 use crate::body::Body;
 use crate::dds::{Delivery, Node, Reader};
 use crate::error::{Error, Result, failed};
-use crate::signal::Frame;
+use crate::signal::{Frame, FrameTime};
 use crate::source::Source;
 
 /// How long a topic whose type is not named is looked for.
@@ -94,12 +94,16 @@ impl Source for Ros2Source {
         loop {
             let read = match &mut self.topic {
                 Topic::Clouds(reader) => {
-                    reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, cloud.header.stamp.seconds(), frame))
+                    reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, cloud.header.stamp.frame_time(), frame))
                 }
                 Topic::Arrays(reader) => reader.next(WAIT)?.map(|array| {
                     // It has no stamp: its time is when it came.
                     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-                    self.places.array(&array, now.as_secs_f64(), frame)
+                    self.places.array(
+                        &array,
+                        FrameTime::from_ns(i64::try_from(now.as_nanos()).unwrap_or(i64::MAX)),
+                        frame,
+                    )
                 }),
             };
             if let Some(read) = read {

@@ -4,6 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DQuat, DVec3};
 use serde::{Serialize, Serializer};
 
+use super::frame_time::FrameTime;
+
 /// One taxel's raw value: a single-precision number, or missing, or faulty.
 ///
 /// Stored as bits, because shader compilers may assume that NaN never occurs; backends compare them as integers.
@@ -140,6 +142,9 @@ pub struct Frame {
     /// Time, s.
     #[serde(rename = "t")]
     pub t_s: f64,
+    /// What is left of the time, ns, where its clock is finer than `t_s`; see [`FrameTime`].
+    #[serde(skip)]
+    pub t_rest_ns: i64,
     /// One value per taxel, [`RawValue::MISSING`] where none arrived.
     pub values: Vec<RawValue>,
     /// Poses of links by name, if the frame has them: world_from_link. A link without one is carried by the nearest above it
@@ -170,8 +175,20 @@ impl Frame {
         Self { t_s, values: vec![RawValue::MISSING; taxels], ..Self::default() }
     }
 
+    /// The time.
+    #[must_use]
+    pub fn time(&self) -> FrameTime {
+        FrameTime { s: self.t_s, rest_ns: self.t_rest_ns }
+    }
+
+    /// Gives it the time `time`.
+    pub fn set_time(&mut self, time: FrameTime) {
+        (self.t_s, self.t_rest_ns) = (time.s, time.rest_ns);
+    }
+
     /// Makes every value missing and drops poses and joints, keeping the allocations.
     pub fn clear(&mut self) {
+        self.t_rest_ns = 0;
         self.values.fill(RawValue::MISSING);
         self.pose.clear();
         self.joints.clear();

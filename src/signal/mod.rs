@@ -5,6 +5,7 @@ mod board_health;
 mod calibration;
 mod curve;
 mod frame;
+mod frame_time;
 mod fsr;
 mod intake;
 mod letter;
@@ -21,6 +22,7 @@ pub use calibration::{
 pub use curve::Curve;
 pub(crate) use curve::slope;
 pub use frame::{FARTHEST_POSE_M, Frame, Pose, RawValue};
+pub use frame_time::FrameTime;
 pub use fsr::FsrCircuit;
 pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};

@@ -187,6 +187,12 @@ impl SinkSpec {
         matches!(self, Self::Page(_) | Self::Ros2(_))
     }
 
+    /// Whether it has frames as well as percepts, and so nothing to write of percepts alone.
+    #[must_use]
+    pub fn needs_frames(&self) -> bool {
+        matches!(self, Self::Ros2Mcap(_) | Self::Ros2(_) | Self::Page(_) | Self::Zenoh { sends: LimbSends::Frames, .. })
+    }
+
     /// Reserves its files or standard output among a command's `outputs`. A page is also for the host names `allow_hosts`.
     ///
     /// # Errors

@@ -30,10 +30,12 @@ impl BagName {
         path.join("metadata.yaml").is_file()
     }
 
-    /// Whether `path` is a bag rather than another file: a folder, or a file with the ending of MCAP.
+    /// Whether `path` is a bag rather than another file: a folder, or a file with the ending of one, also of those that are
+    /// not read.
     #[must_use]
     pub fn is_bag(path: &Path) -> bool {
-        path.is_dir() || path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+        let has = |wanted: &str| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted));
+        path.is_dir() || ["mcap", "db3", "bag"].into_iter().any(has)
     }
 }
 
@@ -109,6 +111,6 @@ mod tests {
         assert_eq!(short.kind.as_deref(), Some(cloud));
         assert!("".parse::<BagName>().is_err());
         assert!(BagName::is_bag(Path::new("a.MCAP")) && BagName::is_bag(Path::new(".")));
-        assert!(!BagName::is_bag(Path::new("a.csv")));
+        assert!(BagName::is_bag(Path::new("a.db3")) && !BagName::is_bag(Path::new("a.csv")));
     }
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::error::{Error, Result, failed};
+use crate::signal::FrameTime;
 
 /// Joint states over time.
 #[derive(Clone, Debug, Default)]
@@ -17,8 +18,8 @@ pub struct JointStates {
     name: String,
     names: Vec<String>,
     index_of: HashMap<String, usize>,
-    /// By joint, times (s) and positions; times do not fall.
-    tracks: Vec<Vec<(f64, f64)>>,
+    /// By joint, times and positions; times do not fall.
+    tracks: Vec<Vec<(FrameTime, f64)>>,
     losses: Vec<String>,
 }
 
@@ -135,10 +136,10 @@ impl JointStates {
             return Err(failed!("joint `{name}` is at {position} at {t_s} s; write finite numbers"));
         }
         let track = &mut self.tracks[joint];
-        if let Some((last_s, _)) = track.last().filter(|(last_s, _)| t_s < *last_s) {
-            return Err(failed!("time goes back from {last_s} s to {t_s} s; sort the states by time"));
+        if let Some((last, _)) = track.last().filter(|(last, _)| t_s < last.s) {
+            return Err(failed!("time goes back from {} s to {t_s} s; sort the states by time", last.s));
         }
-        track.push((t_s, position));
+        track.push((t_s.into(), position));
         Ok(())
     }
 
@@ -148,19 +149,19 @@ impl JointStates {
         Self { name, ..Self::default() }
     }
 
-    /// Adds that the joint called `name` is at `position` (rad or m) at `t_s`, which may be before what is there;
+    /// Adds that the joint called `name` is at `position` (rad or m) at `time`, which may be before what is there;
     /// [`JointStates::sort`] comes last.
     #[cfg(feature = "mcap")]
-    pub(crate) fn add(&mut self, name: &str, t_s: f64, position: f64) {
+    pub(crate) fn add(&mut self, name: &str, time: FrameTime, position: f64) {
         let joint = self.joint_index(name).unwrap_or_else(|| self.joint(name.to_owned()));
-        self.tracks[joint].push((t_s, position));
+        self.tracks[joint].push((time, position));
     }
 
     /// Puts the states of each joint into the order of their times, and keeps what of them was not read.
     #[cfg(feature = "mcap")]
     pub(crate) fn sort(&mut self, losses: Vec<String>) {
         for track in &mut self.tracks {
-            track.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
+            track.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         }
         self.losses = losses;
     }
@@ -180,7 +181,7 @@ impl JointStates {
     /// The times of the first and the last state, s; `None` without states.
     #[must_use]
     pub fn span_s(&self) -> Option<[f64; 2]> {
-        let ends = self.tracks.iter().filter_map(|track| Some([track.first()?.0, track.last()?.0]));
+        let ends = self.tracks.iter().filter_map(|track| Some([track.first()?.0.s, track.last()?.0.s]));
         ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
@@ -196,34 +197,34 @@ impl JointStates {
         self.index_of.get(name).copied()
     }
 
-    /// The position of `joint` at `t_s`, linear between two states; of a joint that `is_continuous`, the shorter way around.
+    /// The position of `joint` at `time`, in seconds or a [`FrameTime`], linear between two states; of a joint that `is_continuous`, the shorter way around.
     /// After the last state, its position; `None` before the first.
     #[must_use]
-    pub fn at(&self, joint: usize, t_s: f64, is_continuous: bool) -> Option<JointPosition> {
-        let track = &self.tracks[joint];
-        let next = track.partition_point(|(state_s, _)| *state_s <= t_s);
-        let (before_s, before) = *track.get(next.checked_sub(1)?)?;
-        let age_s = t_s - before_s;
-        let Some((after_s, after)) = track.get(next).copied() else {
-            return Some(JointPosition { position: before, age_s });
+    pub fn at(&self, joint: usize, time: impl Into<FrameTime>, is_continuous: bool) -> Option<JointPosition> {
+        let (track, time) = (&self.tracks[joint], time.into());
+        let next = track.partition_point(|(state, _)| state.since(time) <= 0.0);
+        let before = *track.get(next.checked_sub(1)?)?;
+        let age_s = time.since(before.0);
+        let Some(after) = track.get(next).copied() else {
+            return Some(JointPosition { position: before.1, age_s });
         };
-        let position = position_between((before_s, before), (after_s, after), t_s, is_continuous);
+        let position = position_between(before, after, time, is_continuous);
         Some(JointPosition { position, age_s })
     }
 }
 
-/// The position at `t_s` between two states, each a time (s) and a position; the shorter way around if asked.
+/// The position at `time` between two states, each a time and a position; the shorter way around if asked.
 pub(crate) fn position_between(
-    (before_s, before): (f64, f64),
-    (after_s, after): (f64, f64),
-    t_s: f64,
+    (before_at, before): (FrameTime, f64),
+    (after_at, after): (FrameTime, f64),
+    time: FrameTime,
     shorter_way: bool,
 ) -> f64 {
     let mut way = after - before;
     if shorter_way {
         way -= (way / std::f64::consts::TAU).round() * std::f64::consts::TAU;
     }
-    before + way * ((t_s - before_s) / (after_s - before_s))
+    before + way * (time.since(before_at) / after_at.since(before_at))
 }
 
 #[cfg(test)]

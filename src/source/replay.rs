@@ -80,11 +80,7 @@ impl Replay {
 
     /// Starts the next repetition, if any is left.
     fn next_repetition(&mut self) -> Result<bool> {
-        for loss in self.source.losses() {
-            if !self.losses.contains(&loss) {
-                self.losses.push(loss);
-            }
-        }
+        self.losses = self.losses();
         self.played += 1;
         if self.played == self.cut.times || !self.has_delivered {
             return Ok(false);
@@ -176,7 +172,9 @@ impl Source for Replay {
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        let mut losses = self.losses.clone();
+        losses.extend(self.source.losses().into_iter().filter(|loss| !self.losses.contains(loss)));
+        losses
     }
 }
 

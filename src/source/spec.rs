@@ -101,6 +101,8 @@ impl SourceSpec {
             _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
+            // Not read either; but the file says what to do.
+            _ if ending("db3") || ending("bag") => ("ros2-mcap", text),
             _ if EXPORTS.iter().any(|wanted| ending(wanted)) => ("export", text),
             Some((kind, _)) => {
                 return match nearest(kind, kinds.iter().copied().filter(|kind| !kind.ends_with('-'))) {

@@ -384,6 +384,33 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     assert!(why.contains("none.mcap: no such file"), "{why}");
     std::fs::write(at("text.mcap"), "t,elbow\n").unwrap();
     assert!(refused(1, &with(&run(text_of(&at("text.mcap"))), &[])).contains("not an MCAP file"));
+    let hint = "and MCAP is read here; convert it: rosbags-convert --src";
+    for (name, first, kind) in [
+        ("skin.db3", &b"SQLite format 3\0"[..], "its storage is sqlite3"),
+        ("skin.bag", b"#ROSBAG V2.0\n", "it is a bag of ROS 1"),
+    ] {
+        std::fs::write(at(name), first).unwrap();
+        let path = at(name);
+        let bag = format!("ros2-mcap:{}", text_of(&path));
+        for arguments in [
+            &["info", text_of(&path)][..],
+            &["info", &bag],
+            &["run", "--source", text_of(&path)],
+            &["run", "--source", &format!("mcap:{}", text_of(&path))],
+        ] {
+            let why = fails(1, arguments);
+            assert!(why.contains(&format!("{name}: {kind}, {hint}")), "{arguments:?}: {why}");
+        }
+        let why = refused(1, &with(&run(text_of(&path)), &[]));
+        assert!(why.contains(&format!("{name}: {kind}, {hint}")), "{why}");
+    }
+    // A list that names no file is no empty bag.
+    std::fs::create_dir(at("odd")).unwrap();
+    std::fs::write(at("odd/metadata.yaml"), "a:\n  storage_identifier: mcap\n  relative_file_paths: [..]\n").unwrap();
+    let why = fails(1, &["info", &format!("ros2-mcap:{}", text_of(&at("odd")))]);
+    assert!(
+        why.contains("metadata.yaml: `..` under relative_file_paths names no file; write it anew: ros2 bag reindex")
+    );
     let mut short = messages.clone();
     let What::Joints(_, position) = &mut short.iter_mut().rfind(|one| one.topic != "/skin").unwrap().what else {
         panic!()

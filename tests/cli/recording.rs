@@ -446,6 +446,52 @@ fn damage_is_placed_in_time_whoever_reads() {
 }
 
 #[test]
+fn every_command_tells_what_a_damaged_recording_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let path = place("a.mcap");
+    let all = recorded(&path, 30_000, true).len();
+    let whole = std::fs::read(&path).unwrap();
+    let chunk = records_of(&whole, 0x06)[1].clone();
+    let mut flipped = whole.clone();
+    flipped[chunk.start - 9] ^= 0x80;
+    let cut_out = [&whole[..chunk.start - 9], &whole[chunk.end..]].concat();
+    let left = {
+        std::fs::write(&path, &cut_out).unwrap();
+        count_of(&path).0
+    };
+    assert!(all / 3 < left && left < all, "{left} of {all}");
+    let lacks = format!("{} of its {all} frames are missing", all - left);
+    for (bytes, kept, why) in [(flipped, all, format!("none of its {all} frames is missing")), (cut_out, left, lacks)] {
+        std::fs::write(&path, &bytes).unwrap();
+        let (copy, source) = (place("copy.mcap"), source(&path));
+        for arguments in [
+            &["info", text_of(&path)][..],
+            &["convert", text_of(&path), text_of(&copy), "--force"],
+            &[
+                "run",
+                "--source",
+                &source,
+                "--outputs",
+                "total",
+                "--backend",
+                "cpu",
+                "--sink",
+                "ndjson:/dev/null",
+                "--force",
+            ],
+        ] {
+            let said = fails(3, arguments);
+            assert!(said.contains(&why), "{arguments:?}: {said}");
+        }
+        assert_eq!(count_of(&copy), (kept, Vec::new()));
+        // A part of it that ends before the end tells what it came by.
+        let part = output(&["run", "--source", &source, "--to", "580", "--outputs", "total", "--backend", "cpu"]);
+        assert_eq!(part.status.code(), Some(3), "{}", stderr(&part));
+    }
+}
+
+#[test]
 fn messages_without_chunks_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");

@@ -103,6 +103,14 @@ def test_a_file_is_written_as_it_is_computed(touch: st.Recording, tmp_path: path
         st.write([1], tmp_path / "none.csv")
 
 
+def test_sinks_that_need_frames_are_refused(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    p = touch.engine({"outputs": ["total"]}, backend="cpu").process(touch.t, touch.values)
+    for sink in [f"ros2-mcap:{tmp_path / 'bag'}", "zenoh:skin", "ros2:/skin"]:
+        with pytest.raises(st.UsageError, match="has frames too, and percepts alone are written here"):
+            st.write(p, sink)
+    assert not (tmp_path / "bag").exists()
+
+
 @pytest.mark.once
 def test_recordings(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
     path = tmp_path / "touch.mcap"

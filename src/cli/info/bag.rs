@@ -2,6 +2,7 @@
 
 use console::style;
 use serde_json::{Value, json};
+use somatic::FrameTime;
 use somatic::recording::{BagSurvey, SurveyedTopic};
 use somatic::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
 
@@ -17,19 +18,24 @@ fn read_as(kind: &str) -> Option<&'static str> {
     }
 }
 
+/// `ns` nanoseconds in seconds.
+fn seconds_of(ns: u64) -> f64 {
+    FrameTime::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)).s
+}
+
 pub(super) fn text(name: &str, survey: &BagSurvey) -> String {
-    let spans: Vec<[f64; 2]> = survey.topics.iter().filter_map(|topic| topic.span_s).collect();
-    let first_s = spans.iter().map(|span| span[0]).fold(f64::INFINITY, f64::min);
-    let last_s = spans.iter().map(|span| span[1]).fold(f64::NEG_INFINITY, f64::max);
+    let spans = survey.topics.iter().filter_map(|topic| topic.span_ns);
+    let whole = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let mut text = format!("{}\n", style(name).bold());
     let files = count(survey.files as u64, "file");
     text += &format!("  {:<12}bag of ROS 2, {files}, {}\n", "kind", size_words(survey.bytes));
-    if !spans.is_empty() {
-        let duration_s = last_s - first_s;
+    if let Some([first_ns, last_ns]) = whole {
+        let duration_s = (last_ns - first_ns) as f64 / 1e9;
         text += &format!(
-            "  {:<12}{} ({duration_s} s from {first_s} s, by when messages came)\n",
+            "  {:<12}{} ({duration_s} s from {} s, by when messages came)\n",
             "duration",
-            span(duration_s)
+            span(duration_s),
+            seconds_of(first_ns)
         );
     }
     let mut table = plain(["topic", "type", "messages", "Hz", "read as"], 2..4);
@@ -52,7 +58,8 @@ pub(super) fn as_json(survey: &BagSurvey) -> Value {
     let topic = |topic: &SurveyedTopic| {
         json!({
             "topic": topic.name, "type": topic.kind, "encoding": topic.encoding, "messages": topic.messages,
-            "bytes": topic.bytes, "start": topic.span_s.map(|span| span[0]), "end": topic.span_s.map(|span| span[1]),
+            "bytes": topic.bytes, "start": topic.span_ns.map(|span| seconds_of(span[0])),
+            "end": topic.span_ns.map(|span| seconds_of(span[1])),
             "rate_hz": topic.rate_hz(), "read_as": read_as(&topic.kind),
         })
     };

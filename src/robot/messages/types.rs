@@ -2,6 +2,7 @@
 
 use super::Message;
 use super::cdr::{Byte, Cdr, CdrReader, CdrWriter};
+use crate::signal::FrameTime;
 
 macro_rules! messages {
     ($($(#[$about:meta])* $name:ident = $ros:literal { $($field:ident: $type:ty),+ $(,)? })+) => {
@@ -124,10 +125,10 @@ topics! {
 }
 
 impl Time {
-    /// The time after ROS's zero, s.
+    /// The time after ROS's zero.
     #[must_use]
-    pub fn seconds(&self) -> f64 {
-        self.nanoseconds() as f64 / 1e9
+    pub fn frame_time(&self) -> FrameTime {
+        FrameTime::from_ns(self.nanoseconds())
     }
 
     /// The time after ROS's zero, ns.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::clock::RosClock;
 use super::messages::{BOARDS, Messages, Topic, of_boards};
-use super::moment::Moment;
+use super::moment::{Moment, without_frames};
 use crate::error::Result;
 use crate::output::OutputFolder;
 use crate::percept::Percepts;
@@ -63,7 +63,7 @@ impl Sink for Ros2BagSink {
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         for frame in input.frames {
             let mut moment = Moment::default();
-            moment.read(self.clock.time_ns(frame.t_s), frame, input.pressures);
+            moment.read(self.clock.time_ns(frame.time()), frame, input.pressures);
             self.waiting.push_back(moment);
         }
         Ok(Flow::Open)
@@ -72,7 +72,7 @@ impl Sink for Ros2BagSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
         let mut made = Vec::new();
         for frame in 0..percepts.frames() {
-            let Some(mut moment) = self.waiting.pop_front() else { break };
+            let Some(mut moment) = self.waiting.pop_front() else { return Err(without_frames()) };
             moment.feel(percepts, frame);
             self.messages.tell(&moment, &mut |topic, message| {
                 made.push((topic, message));

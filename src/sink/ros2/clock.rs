@@ -2,7 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use crate::recording::nanoseconds;
+use crate::signal::FrameTime;
 
 words! {"time of ROS messages",
     /// Which times messages of ROS have.
@@ -29,9 +29,9 @@ impl RosClock {
         Self { which, shift_ns: None, last_ns: 0 }
     }
 
-    /// The time of a frame at `t_s`, ns; the last frame's where the source's time goes back.
-    pub(super) fn time_ns(&mut self, t_s: f64) -> u64 {
-        let own_ns = nanoseconds(t_s);
+    /// The time of a frame at `time`, ns; the last frame's where the source's time goes back.
+    pub(super) fn time_ns(&mut self, time: impl Into<FrameTime>) -> u64 {
+        let own_ns = u64::try_from(time.into().ns()).unwrap_or(0);
         let shift_ns = *self.shift_ns.get_or_insert_with(|| match self.which {
             RosTime::Recording => 0,
             RosTime::Wall => {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::RosClock;
 use super::messages::{BOARDS, Messages, Topic, of_boards};
-use super::moment::Moment;
+use super::moment::{Moment, without_frames};
 use crate::dds::{Delivery, Node, Writer};
 use crate::error::Result;
 use crate::percept::Percepts;
@@ -128,7 +128,7 @@ impl Sink for Ros2Sink {
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         self.moments.resize_with(self.moments.len().max(input.frames.len()), Moment::default);
         for (moment, frame) in self.moments.iter_mut().zip(input.frames) {
-            moment.read(self.clock.time_ns(frame.t_s), frame, input.pressures);
+            moment.read(self.clock.time_ns(frame.time()), frame, input.pressures);
         }
         self.read = input.frames.len();
         Ok(Flow::Open)
@@ -136,6 +136,9 @@ impl Sink for Ros2Sink {
 
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
         let read = std::mem::take(&mut self.read);
+        if read < percepts.frames() {
+            return Err(without_frames());
+        }
         for (frame, moment) in self.moments[..read.min(percepts.frames())].iter_mut().enumerate() {
             moment.feel(percepts, frame);
             self.handover.hand_over(|item| {

@@ -1,5 +1,6 @@
 //! What a frame gives, kept until its messages are made.
 
+use crate::error::Error;
 use crate::percept::{Column, Percepts};
 use crate::signal::{Frame, Pose};
 use crate::sink::Pressures;
@@ -42,6 +43,11 @@ impl TouchedField {
             area_m2: value(&Column::AREA).map(|[area_m2, ..]| area_m2),
         }
     }
+}
+
+/// Why percepts alone are refused.
+pub(super) fn without_frames() -> Error {
+    Error::failed("these percepts come without their frames, which messages of ROS 2 hold too")
 }
 
 impl Moment {

@@ -1,0 +1,3 @@
+//! Recordings and bags that are damaged.
+
+pub(crate) mod tests;
