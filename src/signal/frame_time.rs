@@ -1,6 +1,7 @@
 //! Times of frames, to the nanosecond also where they are counted since 1970.
 
 use std::cmp::Ordering;
+use std::fmt;
 
 /// From here on a double does not hold every nanosecond, s: 97 days.
 const COARSE_S: f64 = (1_u64 << 23) as f64;
@@ -57,6 +58,18 @@ impl FrameTime {
     pub fn total_cmp(&self, other: &Self) -> Ordering {
         let by_rest = || self.rest_ns.cmp(&other.rest_ns);
         self.s.total_cmp(&other.s).then_with(by_rest)
+    }
+}
+
+/// Seconds: to the nanosecond where something is left, else as the double is.
+impl fmt::Display for FrameTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.rest_ns == 0 {
+            return write!(f, "{}", self.s);
+        }
+        let ns = self.ns().unsigned_abs();
+        let sign = if self.ns() < 0 { "-" } else { "" };
+        write!(f, "{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
     }
 }
 

@@ -33,7 +33,7 @@ impl CsvFile {
     /// # Errors
     /// It cannot be written.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
-        let _ = write!(self.line, "{}", frame.t_s);
+        let _ = write!(self.line, "{}", frame.time());
         for &value in &frame.values {
             self.line.push(',');
             put_value(value, &mut self.line);
@@ -82,6 +82,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::signal::FrameTime;
     use crate::source::{CsvSource, Source as _};
 
     proptest! {
@@ -100,6 +101,16 @@ mod tests {
             prop_assert!(CsvSource::open(&path, None).unwrap().next_frame(&mut back).unwrap());
             prop_assert_eq!(back.t_s.to_bits(), t_s.to_bits());
             prop_assert_eq!(back.values, frame.values);
+        }
+
+        #[test]
+        fn a_time_to_the_nanosecond_reads_back_as_the_double_next_to_it(ns in -9_000_000_000_000_000_000..9_000_000_000_000_000_000_i64) {
+            let time = FrameTime::from_ns(ns);
+            let text = time.to_string();
+            prop_assert!((text.parse::<f64>().unwrap() - time.s).abs() <= f64::EPSILON * time.s.abs(), "{}", text);
+            if time.rest_ns != 0 {
+                prop_assert_eq!(text.replace('.', "").parse::<i64>().unwrap(), ns);
+            }
         }
     }
 }
