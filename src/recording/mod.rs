@@ -12,7 +12,7 @@ mod chunks;
 mod entries;
 mod frames;
 #[cfg(test)]
-mod harm;
+pub(crate) mod harm;
 mod head;
 mod percepts;
 mod proto;

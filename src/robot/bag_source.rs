@@ -193,43 +193,42 @@ impl Source for BagSource {
 
 #[cfg(test)]
 mod tests {
-    use super::super::messages::{Header, JointState, Time};
+    use std::path::Path;
+
+    use super::super::messages::{Header, JointState, PointField, Time};
     use super::*;
     use crate::bundled;
     use crate::output::OutputPaths;
+    use crate::recording::harm::tests::{damage, numbers};
     use crate::recording::{BAG_METADATA, BagType, BagWriter};
     use crate::source::JointStates;
 
-    #[test]
-    fn stamps_since_1970_keep_every_nanosecond() {
-        const FIRST_NS: u64 = 1_700_000_000_000_000_000;
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("bag");
+    const FIRST_NS: u64 = 1_700_000_000_000_000_000;
+    const NAME: &str = "a.mcap";
+
+    /// Writes a bag at `path` with a cloud, an array and a state at each of `stamps`, ns.
+    fn write(path: &Path, body: &Body, stamps: &[u64]) {
         let none: [&str; 0] = [];
-        let output = OutputPaths::new(false, none).add_folder(&path, ["a.mcap", BAG_METADATA]).unwrap();
-        let mut bag = BagWriter::create(output, "a.mcap").unwrap();
+        let output = OutputPaths::new(false, none).add_folder(path, [NAME, BAG_METADATA]).unwrap();
+        let mut bag = BagWriter::create(output, NAME).unwrap();
         let of = |name, hash, definition| BagType { name, hash, definition };
-        let clouds = of(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition());
-        let arrays = of(Float32MultiArray::TYPE, Float32MultiArray::HASH, Float32MultiArray::definition());
-        let states = of(JointState::TYPE, JointState::HASH, JointState::definition());
-        let [clouds, arrays, states] = [("/clouds", clouds), ("/arrays", arrays), ("/joints", states)]
-            .map(|(name, kind)| bag.topic(name, &kind).unwrap());
-        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        // Steps that a double of seconds since 1970 does not have.
-        let stamps: Vec<u64> = (0..20).map(|index| FIRST_NS + index * 10_000_077).collect();
+        let [clouds, arrays, states] = [
+            ("/clouds", of(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition())),
+            ("/arrays", of(Float32MultiArray::TYPE, Float32MultiArray::HASH, Float32MultiArray::definition())),
+            ("/joints", of(JointState::TYPE, JointState::HASH, JointState::definition())),
+        ]
+        .map(|(name, kind)| bag.topic(name, &kind).unwrap());
+        let count = body.taxels.len() as u32;
         for (index, &ns) in stamps.iter().enumerate() {
             let header = Header { stamp: Time::from_ns(ns), frame_id: String::new() };
-            let field =
-                crate::robot::messages::PointField { name: "value".to_owned(), offset: 0, datatype: 7, count: 1 };
-            let count = body.taxels.len() as u32;
             let cloud = PointCloud2 {
                 header: header.clone(),
                 height: 1,
                 width: count,
-                fields: vec![field],
+                fields: vec![PointField { name: "value".to_owned(), offset: 0, datatype: 7, count: 1 }],
                 point_step: 4,
                 row_step: 4 * count,
-                data: vec![0; 4 * count as usize],
+                data: (0..count).flat_map(|at| ((at + index as u32) as f32).to_le_bytes()).collect(),
                 ..PointCloud2::default()
             };
             bag.write(clouds, ns, &cloud.to_cdr()).unwrap();
@@ -240,14 +239,29 @@ mod tests {
             bag.write(states, ns, &state.to_cdr()).unwrap();
         }
         bag.finish().unwrap();
+    }
+
+    /// The frames of `topic` in the bag at `path`, and what is lost.
+    fn read(path: &Path, topic: &str, body: &Body) -> Result<(Vec<Frame>, Vec<String>)> {
+        let mut source = BagSource::open(&BagName { topics: vec![topic.into()], ..BagName::new(path) }, body)?;
+        let mut frame = Frame::default();
+        let mut frames = Vec::new();
+        while source.next_frame(&mut frame)? {
+            frames.push(frame.clone());
+        }
+        Ok((frames, source.losses()))
+    }
+
+    #[test]
+    fn stamps_since_1970_keep_every_nanosecond() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bag");
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        // Steps that a double of seconds since 1970 does not have.
+        let stamps: Vec<u64> = (0..20).map(|index| FIRST_NS + index * 10_000_077).collect();
+        write(&path, &body, &stamps);
         for topic in ["/clouds", "/arrays"] {
-            let mut source =
-                BagSource::open(&BagName { topics: vec![topic.into()], ..BagName::new(&path) }, &body).unwrap();
-            let mut frame = Frame::default();
-            let mut times = Vec::new();
-            while source.next_frame(&mut frame).unwrap() {
-                times.push(frame.time());
-            }
+            let times: Vec<FrameTime> = read(&path, topic, &body).unwrap().0.iter().map(Frame::time).collect();
             let ns: Vec<u64> = times.iter().map(|time| time.ns() as u64).collect();
             assert_eq!(ns, stamps, "{topic}");
             assert!(times.windows(2).all(|pair| pair[1].since(pair[0]) == 0.010_000_077), "{topic}");
@@ -258,5 +272,51 @@ mod tests {
         let at = FrameTime::from_ns((FIRST_NS + 10_000_077 + 100) as i64);
         let found = states.at(0, at, false).unwrap();
         assert_eq!((found.age_s, found.position), (1e-7, 1.0 + 1e-7 / 0.010_000_077));
+    }
+
+    /// Reads damaged bags for `seconds`, or `rounds` times; for harnesses.
+    pub(super) fn fuzz(seed: u64, rounds: u64, seconds: u64) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bag");
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        write(&path, &body, &(0..20).map(|index| FIRST_NS + index * 10_000_077).collect::<Vec<u64>>());
+        let (whole, _) = read(&path, "/clouds", &body).unwrap();
+        let originals = [NAME, BAG_METADATA].map(|name| std::fs::read(path.join(name)).unwrap());
+        let (mut chance, start) = (numbers(seed), std::time::Instant::now());
+        let mut told = 0;
+        for round in 0..rounds {
+            if start.elapsed().as_secs() >= seconds {
+                break;
+            }
+            // The metadata now and then.
+            let which = usize::from(chance() % 8 == 0);
+            for (index, (name, bytes)) in [NAME, BAG_METADATA].iter().zip(&originals).enumerate() {
+                let mut bytes = bytes.clone();
+                if index == which {
+                    damage(&mut bytes, &mut chance);
+                }
+                std::fs::write(path.join(name), bytes).unwrap();
+            }
+            let began = std::time::Instant::now();
+            match read(&path, "/clouds", &body) {
+                Ok((frames, losses)) => {
+                    let what = format!("round {round} of seed {seed}: {} frames", frames.len());
+                    assert!(frames == whole || !losses.is_empty(), "{what}, and not a word");
+                    assert!(losses.iter().all(|loss| loss.lines().count() == 1), "{what}: {losses:?}");
+                    told += u64::from(!losses.is_empty());
+                }
+                Err(e) => assert_eq!(e.to_string().lines().count(), 1, "{e}"),
+            }
+            if let Err(e) = JointStates::open_bag(&BagName::new(&path)) {
+                assert_eq!(e.to_string().lines().count(), 1, "{e}");
+            }
+            assert!(began.elapsed().as_secs() < 5, "round {round} of seed {seed} took {:?}", began.elapsed());
+        }
+        assert!(told > 0, "nothing was damaged");
+    }
+
+    #[test]
+    fn a_damaged_bag_is_read_as_it_was_or_told() {
+        fuzz(1, 400, 60);
     }
 }

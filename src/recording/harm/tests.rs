@@ -285,7 +285,7 @@ fn many_damaged_entries_of_an_index_take_as_long_as_the_file_is() {
 }
 
 /// Damages `bytes` in one to four places, by numbers from `chance`.
-fn damage(bytes: &mut Vec<u8>, chance: &mut impl FnMut() -> u64) {
+pub(crate) fn damage(bytes: &mut Vec<u8>, chance: &mut impl FnMut() -> u64) {
     for _ in 0..=chance() % 4 {
         if bytes.is_empty() {
             return;
@@ -306,18 +306,23 @@ fn damage(bytes: &mut Vec<u8>, chance: &mut impl FnMut() -> u64) {
     }
 }
 
-/// Reads damaged recordings and bags for `seconds`, or `rounds` times; for harnesses.
-pub(crate) fn fuzz(seed: u64, rounds: u64, seconds: u64) {
-    let mut harm = Harm::new();
-    let start = std::time::Instant::now();
+/// Random numbers of 53 bits.
+pub(crate) fn numbers(seed: u64) -> impl FnMut() -> u64 {
     let mut state = seed | 1;
-    let mut chance = || {
+    move || {
         // xorshift64*
         state ^= state >> 12;
         state ^= state << 25;
         state ^= state >> 27;
         state.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11
-    };
+    }
+}
+
+/// Reads damaged recordings and bags for `seconds`, or `rounds` times; for harnesses.
+pub(crate) fn fuzz(seed: u64, rounds: u64, seconds: u64) {
+    let mut harm = Harm::new();
+    let start = std::time::Instant::now();
+    let mut chance = numbers(seed);
     for round in 0..rounds {
         if start.elapsed().as_secs() >= seconds {
             break;
