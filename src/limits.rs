@@ -54,6 +54,8 @@ limits! {
     MAX_TABLE_BYTES: u64 = 256 << 20;
     /// Size of what a recorder writes beside a bag, `metadata.yaml`
     MAX_METADATA_BYTES: u64 = 16 << 20;
+    /// Size of a chunk of an MCAP when it is unpacked, or of its summary
+    MAX_CHUNK_BYTES: u64 = 256 << 20;
     /// Size of what is kept between runs, or read of the operating system
     MAX_SYSTEM_BYTES: u64 = 16 << 20;
     /// What is read of a device, such as `/dev/stdin` at a terminal, in place of a file

@@ -6,9 +6,8 @@ use std::io::{self, Read, Seek};
 use super::entries::{Attached, Channel, channel, schema};
 use super::records::{Footer, HEAD, Parts, Records, op};
 use super::unpack;
+use crate::limits::MAX_CHUNK_BYTES;
 
-/// Bytes of a summary; a longer one is not read.
-const MAX_BYTES: u64 = 1 << 28;
 /// Bytes of a record that says where a group of the summary begins, and how many groups there are at most.
 const OFFSET_BYTES: u64 = HEAD + 17;
 const MAX_GROUPS: u64 = 16;
@@ -150,7 +149,7 @@ fn find<R: Read + Seek>(records: &mut Records<R>, footer: &Footer) -> io::Result
         footer.at.checked_sub(groups * OFFSET_BYTES).and_then(|offsets| offsets.checked_sub(before_offsets?))
     });
     for start in [footer.summary].into_iter().chain(moved) {
-        if start < 8 || start > footer.at || footer.at - start > MAX_BYTES {
+        if start < 8 || start > footer.at || footer.at - start > MAX_CHUNK_BYTES {
             continue;
         }
         let mut bytes = records.bytes(start, footer.checked_end())?;

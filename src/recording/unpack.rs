@@ -2,8 +2,7 @@
 
 use std::io::Read;
 
-/// Maximum size of a chunk, bytes; more is damage or an attack.
-const MAX_CHUNK_BYTES: u64 = 1 << 28;
+use crate::limits::MAX_CHUNK_BYTES;
 
 /// Supported compressions.
 pub(super) const KNOWN: [&str; 3] = ["", "lz4", "zstd"];
