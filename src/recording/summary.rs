@@ -187,7 +187,8 @@ impl Listed {
                 op::CHUNK_INDEX => listed.chunks.push(chunk_index(&mut parts)?),
                 op::STATISTICS => listed.statistics = Some(statistics(&mut parts)?),
                 op::ATTACHMENT_INDEX => attached.push(attachment_index(&mut parts)?),
-                op::METADATA_INDEX | op::SUMMARY_OFFSET | 0x80.. => {}
+                // Kinds that are not known yet among them.
+                op::METADATA_INDEX | op::SUMMARY_OFFSET | 0x10.. => {}
                 _ => return None,
             }
         }
