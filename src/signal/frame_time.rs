@@ -22,8 +22,12 @@ impl FrameTime {
     /// The time `ns` nanoseconds after 0.
     #[must_use]
     pub fn from_ns(ns: i64) -> Self {
-        // Seconds and the rest by themselves: their sum is rounded once.
-        let s = ns.div_euclid(1_000_000_000) as f64 + ns.rem_euclid(1_000_000_000) as f64 / 1e9;
+        let s = if ns.unsigned_abs() < 1 << 53 {
+            ns as f64 / 1e9
+        } else {
+            // Seconds and the rest by themselves: a double does not hold both before they are divided.
+            ns.div_euclid(1_000_000_000) as f64 + ns.rem_euclid(1_000_000_000) as f64 / 1e9
+        };
         Self { s, rest_ns: ns - whole_ns(s) }
     }
 
@@ -102,9 +106,12 @@ mod tests {
         }
 
         #[test]
-        fn a_short_time_is_the_double_alone(ns in 0..8_000_000_000_000_000_i64) {
+        fn a_short_time_is_the_double_alone(ns in 0..8_000_000_000_000_000_i64, digits in 0..15_u32) {
+            // Of any size, and as a table has it.
+            let ns = ns / 10_i64.pow(digits);
             let time = FrameTime::from_ns(ns);
-            prop_assert_eq!((time.s, time.rest_ns), (ns as f64 / 1e9, 0));
+            let written = format!("{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000);
+            prop_assert_eq!((time.s, time.rest_ns), (written.parse().unwrap(), 0), "{}", written);
         }
     }
 
