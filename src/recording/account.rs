@@ -199,8 +199,7 @@ impl Account {
         }
         if *strange > 0 {
             told.push(format!(
-                "{} records of other programs were passed over, and no summary says whether they hold {thing}s",
-                strange
+                "{strange} records of other programs were passed over, and no summary says whether they hold {thing}s"
             ));
         }
         told

@@ -149,7 +149,7 @@ fn find<R: Read + Seek>(records: &mut Records<R>, footer: &Footer) -> io::Result
         footer.at.checked_sub(groups * OFFSET_BYTES).and_then(|offsets| offsets.checked_sub(before_offsets?))
     });
     for start in [footer.summary].into_iter().chain(moved) {
-        if start < 8 || start > footer.at || footer.at - start > MAX_CHUNK_BYTES {
+        if !(8..=footer.at).contains(&start) || footer.at - start > MAX_CHUNK_BYTES {
             continue;
         }
         let mut bytes = records.bytes(start, footer.checked_end())?;

@@ -31,10 +31,10 @@ fn after<'a>(text: &'a str, key: &str) -> Result<Option<(&'a str, &'a str)>> {
     while !rest.is_empty() {
         let (line, next) = rest.split_once('\n').unwrap_or((rest, ""));
         let line = line.strip_suffix('\r').unwrap_or(line);
-        if let Some(value) = line.trim_start().strip_prefix(key).and_then(|value| value.strip_prefix(':')) {
-            if found.replace((value, next)).is_some() {
-                return Err(failed!("it has {key} twice"));
-            }
+        if let Some(value) = line.trim_start().strip_prefix(key).and_then(|value| value.strip_prefix(':'))
+            && found.replace((value, next)).is_some()
+        {
+            return Err(failed!("it has {key} twice"));
         }
         rest = next;
     }

@@ -289,7 +289,7 @@ mod tests {
                 break;
             }
             // The metadata now and then.
-            let which = usize::from(chance() % 8 == 0);
+            let which = usize::from(chance().is_multiple_of(8));
             for (index, (name, bytes)) in [NAME, BAG_METADATA].iter().zip(&originals).enumerate() {
                 let mut bytes = bytes.clone();
                 if index == which {
