@@ -210,7 +210,7 @@ mod tests {
     fn write(path: &Path, body: &Body, stamps: &[u64]) {
         let none: [&str; 0] = [];
         let output = OutputPaths::new(false, none).add_folder(path, [NAME, BAG_METADATA]).unwrap();
-        let mut bag = BagWriter::create(output, NAME).unwrap();
+        let mut bag = BagWriter::create(output, NAME, true).unwrap();
         let of = |name, hash, definition| BagType { name, hash, definition };
         let [clouds, arrays, states] = [
             ("/clouds", of(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition())),
