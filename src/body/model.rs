@@ -67,6 +67,14 @@ impl Surface {
         }
     }
 
+    /// Whether `link` moves it, alone or as a joint.
+    pub(crate) fn is_carried_by(&self, link: usize) -> bool {
+        match &self.home {
+            Home::Rigid { link: carrier, .. } => *carrier == link,
+            Home::Skinned { joints, .. } => joints.iter().any(|(joint, _)| *joint == link),
+        }
+    }
+
     /// The corners of its triangles, transformed by `way`, counter-clockwise seen from outside.
     pub(crate) fn corners_through(&self, way: DAffine3) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let mirrored = way.matrix3.determinant() < 0.0;

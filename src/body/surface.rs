@@ -53,6 +53,8 @@ pub(crate) struct Nearest<'a> {
     body: &'a Body,
     /// Per surface its longest edge, in mesh coordinates.
     longest: Vec<f64>,
+    /// Per surface its lowest and highest coordinates, in its mesh.
+    bounds: Vec<[DVec3; 2]>,
 }
 
 impl<'a> Nearest<'a> {
@@ -63,18 +65,41 @@ impl<'a> Nearest<'a> {
             let lengths = surface.triangles.iter().flat_map(edges).map(|(a, b)| at(a).distance_squared(at(b)));
             lengths.fold(0.0, f64::max).sqrt()
         });
-        Self { body, longest: longest.collect() }
+        let bounds = body.surfaces.iter().map(|surface| {
+            let ends = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+            surface.positions.iter().fold(ends, |[low, high], &p| [low.min(p), high.max(p)])
+        });
+        Self { body, longest: longest.collect(), bounds: bounds.collect() }
     }
 
     pub(crate) fn body(&self) -> &'a Body {
         self.body
     }
 
+    /// A lower bound of the distance from `p` to surface `surface`, m.
+    fn bound(&self, surface: usize, link_from_mesh: &DAffine3, p: DVec3) -> f64 {
+        let [low, high] = self.bounds[surface];
+        if !(low.cmple(high).all() && low.is_finite() && high.is_finite()) {
+            return 0.0;
+        }
+        let corner = |k: u32| {
+            let side = |axis: u32, low: f64, high: f64| if k >> axis & 1 == 0 { low } else { high };
+            let corner = DVec3::new(side(0, low.x, high.x), side(1, low.y, high.y), side(2, low.z, high.z));
+            link_from_mesh.transform_point3(corner)
+        };
+        let ends = (0..8).map(corner).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        // Less what rounding may add.
+        p.distance(p.clamp(ends.0, ends.1)) * (1.0 - 1e-9) - 1e-9 * (p.abs() + ends.0.abs() + ends.1.abs()).max_element()
+    }
+
     /// The surface within about `radius` of `centre`, m, in the frame of `link`.
     pub(crate) fn around(&self, link: usize, centre: DVec3, radius: f64) -> SurfaceIndex {
         let mut near = Vec::new();
-        for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
+        for (index, (surface, longest)) in self.body.surfaces.iter().zip(&self.longest).enumerate() {
             let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
+            if self.bound(index, &link_from_mesh, centre) > radius {
+                continue;
+            }
             // One corner excludes most triangles.
             let within = (radius + slack(&link_from_mesh, *longest)).powi(2);
             let close = surface.corners_through(link_from_mesh);
@@ -87,8 +112,16 @@ impl<'a> Nearest<'a> {
     /// The surface point nearest to `p`, in the frame of `link`.
     pub(crate) fn in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
         let (mut nearest, mut least) = (None, f64::INFINITY);
-        for (surface, longest) in self.body.surfaces.iter().zip(&self.longest) {
-            let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
+        let placed = self.body.surfaces.iter().enumerate();
+        let placed = placed.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(self.body, link)?)));
+        let mut placed: Vec<_> = placed.map(|(i, surface, way)| (self.bound(i, &way, p), i, surface, way)).collect();
+        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut of_surface = 0;
+        for (bound, index, surface, link_from_mesh) in placed {
+            if bound > 0.0 && bound * bound > least {
+                break;
+            }
+            let longest = &self.longest[index];
             let slack = slack(&link_from_mesh, *longest);
             let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
             let mut within: f64 = (least.sqrt() + slack).powi(2);
@@ -101,8 +134,9 @@ impl<'a> Nearest<'a> {
                 if triangle.unit_normal().is_some() {
                     let point = triangle.nearest(p);
                     let distance = p.distance_squared(point);
-                    if distance < least {
-                        (nearest, least) = (Some(point), distance);
+                    // Of equals that of the first surface.
+                    if distance < least || (distance == least && index < of_surface) {
+                        (nearest, least, of_surface) = (Some(point), distance, index);
                         within = (least.sqrt() + slack).powi(2);
                     }
                 }

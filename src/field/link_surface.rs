@@ -6,7 +6,10 @@ use std::rc::Rc;
 use glam::DVec3;
 
 use super::geodesic::SurfacePlace;
-use crate::body::{Body, SurfaceIndex, Topology};
+use crate::body::{Body, Surface, SurfaceIndex, Topology};
+
+/// A taxel nearer to a surface than this is on it, m.
+const ON_SURFACE_M: f64 = 1e-4;
 
 /// A body's surface in the frames of its links, computed on demand.
 pub(crate) struct Surfaces<'a> {
@@ -19,9 +22,17 @@ impl<'a> Surfaces<'a> {
         Self { body, in_links: BTreeMap::new() }
     }
 
-    /// All of the body's surface in the frame of `link`, at rest.
+    /// The surface of `link` in its frame, at rest: of the meshes that it carries alone or with others, if all of its taxels
+    /// are on these, else of all. What other links carry moves on its own, and a robot has many links.
     pub(crate) fn in_link(&mut self, link: usize) -> Rc<LinkSurface> {
-        self.in_links.entry(link).or_insert_with(|| Rc::new(LinkSurface::new(self.body, link))).clone()
+        let body = self.body;
+        let own = || {
+            let carries = |surface: &Surface| surface.is_carried_by(link);
+            let own = LinkSurface::new(body, link, &carries);
+            own.holds(body, link).then_some(own)
+        };
+        let made = || Rc::new(own().unwrap_or_else(|| LinkSurface::new(body, link, &|_| true)));
+        self.in_links.entry(link).or_insert_with(made).clone()
     }
 }
 
@@ -34,14 +45,16 @@ pub(crate) struct LinkSurface {
 }
 
 impl LinkSurface {
-    fn new(body: &Body, link: usize) -> Self {
-        let corners: Vec<DVec3> = body.triangles_in_link(link).flatten().collect();
+    /// The surfaces of `body` that are `chosen`, in the frame of `link`.
+    fn new(body: &Body, link: usize, chosen: &dyn Fn(&Surface) -> bool) -> Self {
+        let seen = body.surfaces.iter().enumerate().filter(|(_, surface)| chosen(surface));
+        let seen = seen.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(body, link)?)));
+        let corners = seen.clone().flat_map(|(_, surface, link_from_mesh)| surface.corners_through(link_from_mesh));
+        let corners: Vec<DVec3> = corners.flatten().collect();
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         let topology = Topology::new(&corners, &triangles);
         let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
         let mut before = 0;
-        let seen = body.surfaces.iter().enumerate();
-        let seen = seen.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(body, link)?)));
         let parts = seen.map(|(i, surface, link_from_mesh)| {
             let first = before;
             before += surface.triangles.len();
@@ -49,6 +62,12 @@ impl LinkSurface {
         });
         let parts = parts.collect();
         Self { topology, index, parts }
+    }
+
+    /// Whether all taxels of `link` are on this surface.
+    fn holds(&self, body: &Body, link: usize) -> bool {
+        let is_near = |p: DVec3| self.index.nearest(p).is_some_and(|hit| hit.position.distance(p) <= ON_SURFACE_M);
+        body.taxels.iter().filter(|taxel| taxel.link == link).all(|taxel| is_near(taxel.position_in_link))
     }
 
     /// The place of the point `p` with the outward `normal`: the nearest one, or one about as near with a similar normal, as

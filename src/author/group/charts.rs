@@ -41,7 +41,11 @@ impl Grouper<'_> {
     pub fn finish(mut self) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
-        let mut bare = Body { fields: Vec::new(), ..self.body.clone() };
+        // Without a surface: only the origin of a plane chart depends on it, which is not stored.
+        let Body { name, links, taxels, .. } = self.body;
+        let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
+        let mut bare =
+            Body { name, links, taxels, surfaces: Vec::new(), fields: Vec::new(), findings: Vec::new() };
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
@@ -181,16 +185,23 @@ impl Grouper<'_> {
                 return Some(parts);
             }
         }
+        // Halves are smaller than what they are of, so this ends; each becomes a part or more, so it ends after twice `most`
+        // halves at the latest.
         let halves = self.patches(taxels, 2, SPLIT_ROUNDS);
+        if halves.len() < 2 || halves.len() > most {
+            return None;
+        }
         let mut parts = Vec::new();
-        for half in &halves {
+        for (half, after) in halves.iter().zip((0..halves.len()).rev()) {
             match self.part(made, whole, bare, half) {
                 Some(part) => parts.push(part),
-                None if halves.len() < 2 || parts.len() >= most => return None,
-                None => parts.extend(self.parts(made, whole, bare, half, most - parts.len())?),
+                None => {
+                    let room = most.checked_sub(parts.len() + after).filter(|&room| room > 1)?;
+                    parts.extend(self.parts(made, whole, bare, half, room)?);
+                }
             }
         }
-        (parts.len() <= most).then_some(parts)
+        Some(parts)
     }
 
     /// The child of `whole` with `taxels`, if it has its chart.

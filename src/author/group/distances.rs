@@ -62,7 +62,7 @@ impl LinkDistances {
     pub(super) fn near_taxel(&mut self, from: usize, limit_m: f64) -> Vec<TaxelDistance> {
         let mut reached = match self.places.get(from).copied() {
             Some(place) => self.near_place(&place, from, limit_m),
-            None => self.along_net(from, limit_m),
+            None => self.along_net(from, limit_m, None),
         };
         reached[from] = TaxelDistance { distance_m: 0.0, uv: Some(DVec2::ZERO) };
         reached
@@ -101,16 +101,17 @@ impl LinkDistances {
                 Err(_) => self.too_long_m = Some(limit_m),
             }
         }
-        self.along_net(nearest, limit_m)
+        self.along_net(nearest, limit_m, None)
     }
 
-    /// Distances from taxel `from` along the net, m: longer than along the surface, by up to a third, but soon known.
-    pub(super) fn along_net_from(&mut self, from: usize) -> Vec<f64> {
-        self.along_net(from, f64::INFINITY).into_iter().map(|way| way.distance_m).collect()
+    /// Distances from taxel `from` along the net to the taxels `wanted`, or to all, m: longer than along the surface, by up to
+    /// a third, but soon known. Those to other taxels may be too long.
+    pub(super) fn along_net_from(&mut self, from: usize, wanted: Option<&[usize]>) -> Vec<f64> {
+        self.along_net(from, f64::INFINITY, wanted).into_iter().map(|way| way.distance_m).collect()
     }
 
-    /// Distances along the net (Dijkstra).
-    fn along_net(&mut self, from: usize, limit_m: f64) -> Vec<TaxelDistance> {
+    /// Distances along the net (Dijkstra), final for the taxels `wanted`; for the others, they may be too long.
+    fn along_net(&mut self, from: usize, limit_m: f64, wanted: Option<&[usize]>) -> Vec<TaxelDistance> {
         let first_taxel = if self.places.is_empty() { 0 } else { self.surface.topology.positions.len() };
         let net = match self.net.take() {
             Some(net) => net,
@@ -121,10 +122,22 @@ impl LinkDistances {
         // Non-negative floats sort like their bits.
         let mut open = BinaryHeap::from([(Reverse(0_u64), (first_taxel + from) as u32)]);
         lengths[first_taxel + from] = 0.0;
+        let mut is_wanted = vec![false; if wanted.is_some() { self.len() } else { 0 }];
+        wanted.iter().copied().flatten().for_each(|&taxel| is_wanted[taxel] = true);
+        let mut missing = wanted.map_or(usize::MAX, <[usize]>::len);
+        // Each entry is a shorter length of a node than before, or is skipped.
         while let Some((Reverse(bits), node)) = open.pop() {
             let length = f64::from_bits(bits);
             if length > lengths[node as usize] {
                 continue;
+            }
+            if let Some(wanted) = (node as usize).checked_sub(first_taxel).and_then(|i| is_wanted.get_mut(i))
+                && std::mem::replace(wanted, false)
+            {
+                missing -= 1;
+                if missing == 0 {
+                    break;
+                }
             }
             for &(next, step) in &net[node as usize] {
                 let through = length + step;

@@ -20,7 +20,7 @@ pub(super) fn even_patches(distances: &mut LinkDistances, of: usize) -> Vec<Vec<
     let mut patches = Vec::new();
     let mut rest: Vec<usize> = (0..distances.len()).collect();
     while let Some(&first) = rest.first() {
-        let reached_m = distances.along_net_from(first);
+        let reached_m = distances.along_net_from(first, None);
         let (part, others) = rest.into_iter().partition(|&i| reached_m[i] < f64::INFINITY);
         rest = others;
         let part: Vec<usize> = part;
@@ -73,9 +73,10 @@ impl Halving<'_> {
 
     /// `taxels` sorted from one end of their longest distance to the other.
     fn by_distance(&mut self, taxels: &[usize]) -> Vec<usize> {
-        let from_any = self.distances.along_net_from(taxels[0]);
-        let from_one = self.distances.along_net_from(farthest(taxels, &from_any));
-        let from_other = self.distances.along_net_from(farthest(taxels, &from_one));
+        let mut from = |taxel: usize| self.distances.along_net_from(taxel, Some(taxels));
+        let from_any = from(taxels[0]);
+        let from_one = from(farthest(taxels, &from_any));
+        let from_other = from(farthest(taxels, &from_one));
         let key = |i: usize| from_one[i] - from_other[i];
         let mut sorted = taxels.to_vec();
         sorted.sort_by(|&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));

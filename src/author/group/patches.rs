@@ -25,12 +25,16 @@ impl Seeding {
     }
 
     /// Adds the farthest taxel as a seed; on a surface part without seeds, one at its rim.
+    ///
+    /// The seed is a taxel whose distance is over 0, if any is, and becomes 0: so many taxels, so many seeds at most.
     fn add(&mut self, distances: &mut LinkDistances) {
         let (mut seed, limit_m) = self.farthest();
         let is_first = limit_m == f64::INFINITY;
         if is_first {
             let from_here = distances.all_from_taxel(seed);
-            let reached = from_here.iter().map(|way| way.distance_m).enumerate().filter(|way| way.1 < f64::INFINITY);
+            let reached = from_here.iter().map(|way| way.distance_m).enumerate();
+            // Only taxels that no seed reaches: where a way does not lead back, the rim has a seed already.
+            let reached = reached.filter(|&(i, m)| m < f64::INFINITY && self.nearest_m[i] == f64::INFINITY);
             seed = reached.reduce(|best, next| if next.1 > best.1 { next } else { best }).map_or(seed, |(i, _)| i);
         }
         let reached = if is_first { distances.all_from_taxel(seed) } else { distances.near_taxel(seed, limit_m) };
@@ -54,7 +58,7 @@ pub(super) fn patches(links: &mut [LinkDistances], count: usize, most_rounds: us
         let Some((link, distance)) = farthest.reduce(|best, next| if next.1 > best.1 { next } else { best }) else {
             break;
         };
-        // If all taxels are at seeds, further seeds would have no taxels.
+        // If all taxels are at seeds, further seeds would have no taxels. Before that, each one is another taxel.
         if distance <= 0.0 || (taken >= count && distance < f64::INFINITY) {
             break;
         }
@@ -154,7 +158,8 @@ fn middle(distances: &LinkDistances, patch: &[usize], map: &[TaxelDistance], see
 /// that to each other.
 pub(super) fn spread(distances: &mut LinkDistances, apart_m: f64) -> Vec<usize> {
     let mut seeding = Seeding::new(distances);
-    while seeding.farthest().1 >= apart_m {
+    // Each seed is another taxel: see `Seeding::add`.
+    while seeding.seeds.len() < distances.len() && seeding.farthest().1 >= apart_m {
         seeding.add(distances);
     }
     seeding.seeds

@@ -138,6 +138,8 @@ pub struct LogMap<'a> {
     topology: &'a Topology,
     start: Start,
     limit_m: f64,
+    /// The part of the surface that the start is on.
+    part: u32,
     sources: Vec<Source>,
     arrivals: Vec<Arrival>,
     windows: Vec<Window>,
@@ -164,6 +166,7 @@ impl<'a> LogMap<'a> {
             topology,
             start: Start::new(topology, place, u),
             limit_m,
+            part: topology.part[place.triangle as usize],
             sources: vec![source],
             arrivals: vec![UNKNOWN; topology.positions.len()],
             windows: Vec::new(),
@@ -203,6 +206,10 @@ impl<'a> LogMap<'a> {
     /// The shortest path to `place`; `None` beyond the limit, and on another part of the surface.
     #[must_use]
     pub fn reach(&self, place: &SurfacePlace) -> Option<Reached> {
+        // Parts may share a vertex. A path through it would lead to the triangles around it alone, and not back.
+        if self.topology.part[place.triangle as usize] != self.part {
+            return None;
+        }
         let mut ways: Vec<Way> = Vec::new();
         for wedge in self.start.wedges.iter().filter(|wedge| wedge.triangle == place.triangle) {
             let at = mix(wedge.corners, place.barycentric);
