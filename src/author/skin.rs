@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::group::{FilePaint, Grouper, Grouping, group as group_by};
+use super::group::{FilePaint, Grouper, Grouping, group_while};
 use super::lattice::Lattice;
 use super::origin::Origin;
 use super::place::{evenly_apart, nearest_on_its_side, place_apart, place_by_density, place_evenly};
@@ -18,9 +18,10 @@ use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinnin
 use crate::error::{Error, Result, failed};
 use crate::field::unions;
 
-/// Progress before and after placing taxels.
+/// Progress before and after placing taxels, and when they are in fields.
 const PROGRESS_OPENED: f64 = 0.05;
-const PROGRESS_PLACED: f64 = 0.85;
+const PROGRESS_PLACED: f64 = 0.5;
+const PROGRESS_GROUPED: f64 = 0.95;
 
 /// A file with taxels and fields, and a report.
 #[derive(Debug)]
@@ -150,11 +151,12 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     drop(regions);
     file.add(&addition);
     let (body, details) = file.read()?;
-    let Grouping { fields, notes: more } = group(&body, &details, recipe)?;
+    let tick = &mut |done: f64| go_on(PROGRESS_PLACED + (PROGRESS_GROUPED - PROGRESS_PLACED) * done);
+    let Grouping { fields, notes: more } = group(&body, &details, recipe, tick)?;
     notes.extend(more);
     notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
-    report_progress(&mut go_on, 0.95)?;
+    report_progress(&mut go_on, PROGRESS_GROUPED)?;
     let (body, _) = file.read()?;
     Ok(Authored { file, body, places: reports, notes })
 }
@@ -357,16 +359,16 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
 }
 
 /// The fields of `recipe` over the taxels of `body`, with notes.
-fn group(body: &Body, details: &Details, recipe: &Recipe) -> Result<Grouping> {
+fn group(body: &Body, details: &Details, recipe: &Recipe, progress: Progress<'_>) -> Result<Grouping> {
     let painted = FilePaint { body, details };
     if recipe.fields.is_empty() {
-        return group_by(body, &painted, &[]);
+        return group_while(body, &painted, &[], progress);
     }
     let mut grower = Grouper::new(body, &painted);
     for (rule, at) in &recipe.fields {
         grower.apply(rule).map_err(|e| at.put(e))?;
     }
-    grower.finish().map_err(|(rule, e)| recipe.fields[rule].1.put(e))
+    grower.finish_while(progress).map_err(|(rule, e)| recipe.fields[rule].1.put(e))
 }
 
 /// Adds `fields` as empty nodes, each below its anchor and in the middle of its taxels.

@@ -89,7 +89,8 @@ impl<'a> Nearest<'a> {
         };
         let ends = (0..8).map(corner).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         // Less what rounding may add.
-        p.distance(p.clamp(ends.0, ends.1)) * (1.0 - 1e-9) - 1e-9 * (p.abs() + ends.0.abs() + ends.1.abs()).max_element()
+        p.distance(p.clamp(ends.0, ends.1)) * (1.0 - 1e-9)
+            - 1e-9 * (p.abs() + ends.0.abs() + ends.1.abs()).max_element()
     }
 
     /// The surface within about `radius` of `centre`, m, in the frame of `link`.

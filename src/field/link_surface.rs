@@ -98,3 +98,37 @@ impl LinkSurface {
         (surface, given - first, if mirrored { [a, c, b] } else { [a, b, c] })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Glb, MeshData, Modality, Taxel};
+
+    /// Two links with a triangle each, and a taxel below the first at the height `y`.
+    fn two_links(y: f64) -> Body {
+        let mut glb = Glb::new();
+        let positions = vec![[0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [0.1, 0.0, 0.0]];
+        let mesh =
+            MeshData { positions, normals: vec![[0.0, 1.0, 0.0]; 3], triangles: vec![[0, 1, 2]], skinning: None };
+        let links = [("lower", 0.0), ("upper", 1.0)].map(|(name, y)| glb.node(name, None, DVec3::Y * y));
+        links.iter().for_each(|&link| {
+            glb.mesh(link, "plate", &mesh, None, None);
+        });
+        let position_in_link = DVec3::new(0.02, y, 0.02);
+        let (normal_in_link, modality) = (DVec3::Y, Modality::Pressure);
+        let taxel = Taxel { id: 0, link: 0, position_in_link, normal_in_link, area: 1e-5, modality };
+        glb.taxels("taxels", Some(links[0]), &[taxel], None);
+        Body::from_bytes("two", &glb.to_bytes().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_link_is_measured_on_its_own_meshes_unless_its_taxels_are_on_others() {
+        for (y, triangles) in [(0.0, 1), (1.0, 2)] {
+            let body = two_links(y);
+            let surface = Surfaces::new(&body).in_link(body.taxels[0].link);
+            assert_eq!(surface.topology.triangles.len(), triangles);
+            let place = surface.locate(body.taxels[0].position_in_link, DVec3::Y).unwrap();
+            assert_eq!(surface.origin_of(&place).0, triangles - 1);
+        }
+    }
+}

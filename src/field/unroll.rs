@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::chart::{NoChart, frame};
 use super::distortion::Distortion;
-use super::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
+use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 use super::link_surface::Surfaces;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector};
 
@@ -26,13 +26,21 @@ const EDGE_MARGIN: f64 = 1e-6;
 pub struct Unroller<'a> {
     body: &'a Body,
     surfaces: Surfaces<'a>,
+    /// How many windows charts may still take; without it each map has a limit of its own.
+    windows_left: Option<usize>,
 }
 
 impl<'a> Unroller<'a> {
     /// For `body`; surfaces are computed on demand.
     #[must_use]
     pub fn new(body: &'a Body) -> Self {
-        Self { body, surfaces: Surfaces::new(body) }
+        Self { body, surfaces: Surfaces::new(body), windows_left: None }
+    }
+
+    /// How many windows charts may take from now on, to bound the time on meshes that are fine or have very thin triangles;
+    /// `None` for as many as each needs.
+    pub(crate) fn windows_left(&mut self) -> &mut Option<usize> {
+        &mut self.windows_left
     }
 
     pub(crate) fn surfaces(&mut self) -> &mut Surfaces<'a> {
@@ -68,10 +76,11 @@ impl<'a> Unroller<'a> {
         let patch = Patch { topology, members, places, ids, u: asked(|chart| chart.u_in_anchor) };
         let origin = asked(|chart| chart.origin_in_anchor);
         let nearest = surface.nearest(origin.unwrap_or(mean)).ok_or(NoChart::NoSurface)?;
-        match patch.chart_around(spec, off_edges(nearest)) {
+        let left = &mut self.windows_left;
+        match patch.chart_around(spec, off_edges(nearest), left) {
             // The mean of a bent field is off the surface, and the nearest point may be on another part.
             Err(why) if origin.is_none() => {
-                patch.chart_around(spec, off_edges(patch.middle(mean))).map_err(|other| match why {
+                patch.chart_around(spec, off_edges(patch.middle(mean)), left).map_err(|other| match why {
                     NoChart::Unreachable(..) => other,
                     why => why,
                 })
@@ -110,7 +119,12 @@ impl Patch<'_> {
     }
 
     /// `spec` with a geodesic chart around `origin`.
-    fn chart_around(&self, spec: &FieldSpec, origin: SurfacePlace) -> Result<FieldSpec, NoChart> {
+    fn chart_around(
+        &self,
+        spec: &FieldSpec,
+        origin: SurfacePlace,
+        left: &mut Option<usize>,
+    ) -> Result<FieldSpec, NoChart> {
         let Self { topology, members, places, ids, u } = self;
         let normal = area_vector(topology.corners(origin.triangle)).normalize_or(DVec3::Z);
         let [u, ..] = frame(normal, *u);
@@ -125,7 +139,9 @@ impl Patch<'_> {
         let mut limit = farthest * FIRST_LIMIT;
         let mut doublings = 0;
         let (map, reached) = loop {
-            let map = LogMap::new(topology, origin, u, limit).map_err(|why| NoChart::TooRough(why.to_string()))?;
+            let mut own = MAX_WINDOWS;
+            let map = LogMap::with_windows(topology, origin, u, limit, left.as_mut().unwrap_or(&mut own));
+            let map = map.map_err(|why| NoChart::TooRough(why.to_string()))?;
             let reached: Vec<_> = places.iter().map(|place| map.reach(place)).collect();
             // A path beyond the limit may not be the shortest.
             let out: Vec<usize> =

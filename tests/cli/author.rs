@@ -2,9 +2,15 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+#[cfg(unix)]
+use std::process::{Command, Stdio};
+#[cfg(unix)]
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+#[cfg(unix)]
+use crate::{code_of, somatic};
 use crate::{done, fails, file, files_in, frames, text_of};
 
 /// A folder, and in it the humanoid with 300 taxels.
@@ -18,7 +24,13 @@ fn skin(more: &[&str]) -> (tempfile::TempDir, std::path::PathBuf, String) {
 #[test]
 fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
     let (folder, path, text) = skin(&["--taxels", "300", "--seed", "1"]);
-    assert!(text.contains("300 taxels in ") && text.contains("0–299") && text.contains("least mm"), "{text}");
+    assert!(
+        text.contains("300 taxels in ")
+            && text.contains(" fields, on ")
+            && text.contains("0–299")
+            && text.contains("least mm"),
+        "{text}"
+    );
     let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
     let fields = told["fields"].as_array().unwrap();
     let charted = fields.iter().filter(|field| !field["chart"].is_null()).count();
@@ -239,4 +251,20 @@ fn a_layout_that_stays_is_brought_up_to_date() {
     let text = done(&["author", "hand", "--recipe", text_of(&recipe), "-o", text_of(&out), "--force"]);
     assert!(text.contains("40 taxels in 1 field"), "{text}");
     assert_eq!(seen(&out)["taxels"], before["taxels"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_it_within_a_second_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("skin.glb");
+    let arguments = ["author", "humanoid", "--taxels", "1000000", "-o", text_of(&path)];
+    let mut child = somatic(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let begun = Instant::now();
+    let _ = code_of(&mut child);
+    assert!(begun.elapsed() < Duration::from_secs(1), "{:?}", begun.elapsed());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -1,12 +1,15 @@
 //! Skins put on meshes: where taxels come to lie, what stays of the file, and what is refused in one line.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
+use somatic::author::mesh::{self, MeshOptions};
 use somatic::author::{Authored, Recipe, author};
-use somatic::body::{Body, MeshData, Original};
+use somatic::body::{Body, Glb, MeshData, Original};
 use somatic::field::FieldSet;
 use somatic::{Result, bundled};
 
@@ -632,4 +635,105 @@ fn a_region_keeps_its_taxels_on_its_own_links() {
         assert_eq!(links.values().sum::<usize>() as u64, count);
         lies_on_its_surface(&made.body);
     }
+}
+
+/// Unit boxes at whole steps, so that some share a corner, an edge or a face, in one mesh; one triangle in twelve looks inward.
+fn touching_boxes(seed: u64) -> Original {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut below = |end: u64| {
+        // xorshift64.
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state % end
+    };
+    let mut mesh = MeshData::default();
+    for _ in 0..2 + below(4) {
+        let at = [below(3), below(3), below(3)].map(|steps| 0.1 * steps as f32);
+        for axis in 0..3 {
+            for side in 0..2 {
+                let first = mesh.positions.len() as u32;
+                let mut normal = [0.0; 3];
+                normal[axis] = if side == 0 { -1.0 } else { 1.0 };
+                for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                    let mut p = at;
+                    let steps = [(axis, side), ((axis + 1) % 3, u), ((axis + 2) % 3, v)];
+                    steps.iter().for_each(|&(axis, steps)| p[axis] += 0.1 * steps as f32);
+                    mesh.positions.push(p);
+                    mesh.normals.push(normal);
+                }
+                for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+                    let looks_inward = (side == 0) != (below(12) == 0);
+                    let [b, c] = if looks_inward { [c, b] } else { [b, c] };
+                    mesh.triangles.push([first + a, first + b, first + c]);
+                }
+            }
+        }
+    }
+    let mut glb = Glb::new();
+    let link = glb.node("boxes", None, DVec3::ZERO);
+    glb.mesh(link, "boxes", &mesh, None, None);
+    Original::from_bytes("boxes", &glb.to_bytes().unwrap(), None).unwrap()
+}
+
+/// Authors `count` taxels on `file` and says how long that took; a panic if it has not ended in a minute.
+fn time_of_author(file: Original, count: u64, what: &str) -> Duration {
+    let (sender, receiver) = mpsc::channel();
+    let begun = Instant::now();
+    std::thread::spawn(move || {
+        let made = author(file, &Recipe::simple(Some(count), None, &[]).unwrap(), |_| {});
+        let _ = sender.send(made.map(|made| (made.body.taxels.len(), made.body.fields)));
+    });
+    let made = receiver.recv_timeout(Duration::from_secs(60)).unwrap_or_else(|e| panic!("{what}: {count} taxels: {e}"));
+    let (taxels, fields) = made.unwrap();
+    assert_eq!(taxels as u64, count, "{what}");
+    // No taxel is lost where a field is split.
+    let held: BTreeSet<u32> = fields.iter().flat_map(|field| field.members.keys().copied()).collect();
+    assert_eq!(held.len() as u64, count, "{what}");
+    begun.elapsed()
+}
+
+#[test]
+fn parts_that_touch_do_not_hang() {
+    for seed in 0..12 {
+        for count in [2, 4, 12, 40] {
+            time_of_author(touching_boxes(seed), count, &format!("boxes {seed}"));
+        }
+    }
+    for (name, count) in [("face.obj", 20), ("edge.obj", 20), ("cubes.obj", 12), ("two_triangles_hang.stl", 4)] {
+        let Some(path) = data(&format!("failing/{name}")) else { return };
+        time_of_author(mesh::open(&path, &MeshOptions::default()).unwrap(), count, name);
+    }
+}
+
+#[test]
+#[ignore = "10,000 bodies; cargo test --release --test it five_hundred -- --ignored"]
+fn five_hundred_soups_of_touching_boxes_end_in_two_seconds_each() {
+    for seed in 0..500 {
+        for count in [1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20, 25, 30, 40, 50, 70, 100, 150, 200] {
+            let took = time_of_author(touching_boxes(seed), count, &format!("boxes {seed}"));
+            assert!(took < Duration::from_secs(2), "boxes {seed}, {count} taxels: {took:?}");
+        }
+    }
+}
+
+#[test]
+fn charts_on_a_mesh_of_very_thin_triangles_take_bounded_time() {
+    // A disc of 1500 triangles that meet in its middle, folded up and down: each path bends or splits at every one.
+    let (mut mesh, around) = (MeshData::default(), 1500_u32);
+    mesh.positions.push([0.0; 3]);
+    mesh.normals.push([0.0, 1.0, 0.0]);
+    for step in 0..around {
+        let (sin, cos) = (f64::from(step) / f64::from(around) * std::f64::consts::TAU).sin_cos();
+        let bent = if step % 2 == 0 { 0.002 } else { -0.002 };
+        mesh.positions.push([0.1 * sin, bent, 0.1 * cos].map(|x| x as f32));
+        mesh.normals.push([0.0, 1.0, 0.0]);
+        mesh.triangles.push([0, 1 + step, 1 + (step + 1) % around]);
+    }
+    let mut glb = Glb::new();
+    let link = glb.node("disc", None, DVec3::ZERO);
+    glb.mesh(link, "disc", &mesh, None, None);
+    let file = Original::from_bytes("disc", &glb.to_bytes().unwrap(), None).unwrap();
+    let took = time_of_author(file, 60, "disc");
+    assert!(took < Duration::from_secs(40), "{took:?}");
 }

@@ -7,8 +7,10 @@ use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
 use super::divide::numbered;
 use super::grouper::{FieldDraft, Grouper, Grouping};
 use super::rule::{ChartWish, Wrap};
+use crate::author::placed::{Progress, report_progress};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
+use crate::field::geodesic::MAX_WINDOWS;
 use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
 
 /// Maximum [`crate::field::Distortion`] at which `auto` takes a plane chart: neighbours 5 mm apart are at most 0.25 mm
@@ -30,6 +32,9 @@ const SPLIT_ROUNDS: usize = 4;
 /// Maximum number of parts of a split that is only proposed in an error.
 const MAX_PROPOSED_PARTS: usize = 12;
 
+/// Windows that the search for the chart of a field and its parts may take: about 0.1 s. What is left goes to the next ones.
+const WINDOWS_OF_FIELD: usize = 150_000;
+
 type Fitted = std::result::Result<FieldSpec, NoChart>;
 
 impl Grouper<'_> {
@@ -38,14 +43,18 @@ impl Grouper<'_> {
     /// # Errors
     /// A field cannot have its chart and its rule says to refuse it; the message says which split would work. With it comes
     /// the index of the rule that made the field.
-    pub fn finish(mut self) -> Result<Grouping, (usize, Error)> {
+    pub fn finish(self) -> Result<Grouping, (usize, Error)> {
+        self.finish_while(&mut |_| true)
+    }
+
+    /// The same until `progress`, which gets the share of the fields that are done, says to stop.
+    pub(in crate::author) fn finish_while(mut self, progress: Progress<'_>) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
         // Without a surface: only the origin of a plane chart depends on it, which is not stored.
         let Body { name, links, taxels, .. } = self.body;
         let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
-        let mut bare =
-            Body { name, links, taxels, surfaces: Vec::new(), fields: Vec::new(), findings: Vec::new() };
+        let mut bare = Body { name, links, taxels, surfaces: Vec::new(), fields: Vec::new(), findings: Vec::new() };
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
@@ -53,8 +62,18 @@ impl Grouper<'_> {
         let mut fields = Vec::with_capacity(specs.len());
         let mut notes = ChartNotes::default();
         let made = std::mem::take(&mut self.made);
-        for ((made, plane), ids) in made.into_iter().zip(planes).zip(members) {
+        let count = made.len();
+        let (mut pool, mut bounded) = (MAX_WINDOWS - 1, 0);
+        for (index, ((made, plane), ids)) in made.into_iter().zip(planes).zip(members).enumerate() {
+            report_progress(progress, index as f64 / count as f64).map_err(|e| (made.rule, e))?;
             let name = made.spec.name.clone();
+            // What a field leaves, the next ones may use.
+            if let Some(left) = *self.unroller.windows_left() {
+                bounded += usize::from(left == 0);
+                pool = left;
+            }
+            pool = (pool + WINDOWS_OF_FIELD).min(MAX_WINDOWS - 1);
+            *self.unroller.windows_left() = (made.chart != ChartWish::Geodesic).then_some(pool);
             let whole = made.spec.clone().with_members(ids);
             let why = match self.fit(&made, &whole, plane.clone()) {
                 Ok(spec) => {
@@ -100,6 +119,14 @@ impl Grouper<'_> {
                     fields.push(uncharted);
                 }
             }
+        }
+        bounded += usize::from(*self.unroller.windows_left() == Some(0));
+        if bounded > 0 {
+            self.notes.push(format!(
+                "{} in smaller parts, or without a chart, as their surface is too fine, or its triangles too thin, to measure \
+                 all ways on it; simplify the mesh, or for a robot try --geometry collision",
+                if bounded == 1 { "1 field is".to_owned() } else { format!("{bounded} fields are") }
+            ));
         }
         notes.poor = std::mem::take(&mut self.poor);
         self.notes.extend(notes.lines());

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use glam::{DVec2, DVec3};
 
 use crate::field::LinkSurface;
-use crate::field::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
+use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 
 /// Taxels without a surface are neighbours up to this many median distances to the nearest.
 const NEIGHBOUR_DISTANCE: f64 = 2.0;
@@ -41,13 +41,15 @@ pub(super) struct LinkDistances {
     /// The limit from which exact distances have failed, m.
     too_long_m: Option<f64>,
     net: Option<Vec<Vec<(u32, f64)>>>,
+    /// How many windows may still be used; then distances are those in space. Without it, each map has a limit of its own.
+    pub(super) windows_left: Option<usize>,
 }
 
 impl LinkDistances {
     /// Distances on `surface` between `taxels` at `points` (position, normal).
     pub(super) fn new(surface: Rc<LinkSurface>, taxels: Vec<usize>, points: Vec<(DVec3, DVec3)>) -> Self {
         let places: Vec<SurfacePlace> = points.iter().filter_map(|&(p, normal)| surface.locate(p, normal)).collect();
-        Self { taxels, points, surface, places, too_long_m: None, net: None }
+        Self { taxels, points, surface, places, too_long_m: None, net: None, windows_left: None }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -88,7 +90,9 @@ impl LinkDistances {
     /// Distances from `place`, or in a net from taxel `nearest`, up to `limit_m`.
     pub(super) fn near_place(&mut self, place: &SurfacePlace, nearest: usize, limit_m: f64) -> Vec<TaxelDistance> {
         if self.too_long_m.is_none_or(|too_long_m| limit_m < too_long_m) {
-            match LogMap::new(&self.surface.topology, *place, DVec3::X, limit_m) {
+            let mut own = MAX_WINDOWS;
+            let left = self.windows_left.as_mut().unwrap_or(&mut own);
+            match LogMap::with_windows(&self.surface.topology, *place, DVec3::X, limit_m, left) {
                 Ok(map) => {
                     let reach = |to: &SurfacePlace| match map.reach(to) {
                         Some(way) if way.distance_m <= limit_m => {
@@ -101,7 +105,21 @@ impl LinkDistances {
                 Err(_) => self.too_long_m = Some(limit_m),
             }
         }
-        self.along_net(nearest, limit_m, None)
+        match self.windows_left {
+            Some(_) => self.in_space(place, limit_m),
+            None => self.along_net(nearest, limit_m, None),
+        }
+    }
+
+    /// Distances from `place` in space, to taxels on its part of the surface.
+    fn in_space(&self, place: &SurfacePlace, limit_m: f64) -> Vec<TaxelDistance> {
+        let topology = &self.surface.topology;
+        let (part, from) = (|place: &SurfacePlace| topology.part[place.triangle as usize], place.position(topology));
+        let reach = |to: &SurfacePlace| match to.position(topology).distance(from) {
+            distance_m if distance_m <= limit_m && part(to) == part(place) => TaxelDistance { distance_m, uv: None },
+            _ => UNREACHED,
+        };
+        self.places.iter().map(reach).collect()
     }
 
     /// Distances from taxel `from` along the net to the taxels `wanted`, or to all, m: longer than along the surface, by up to

@@ -95,7 +95,12 @@ impl Grouper<'_> {
     /// `chosen` in `count` patches, or more if they are on more links or surface parts, ordered by lowest id.
     pub(super) fn patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
         let mut links = self.distances(chosen);
+        let bounded = *self.unroller.windows_left();
+        links.iter_mut().for_each(|distances| distances.windows_left = bounded);
         let patches = patches(&mut links, count, most_rounds);
+        if let Some(left) = self.unroller.windows_left() {
+            *left = links.iter().filter_map(|distances| distances.windows_left).min().unwrap_or(*left);
+        }
         self.note_approximate(&links);
         let taxels = |(link, patch): (usize, Vec<usize>)| patch.into_iter().map(|i| links[link].taxels[i]).collect();
         sorted(patches.into_iter().map(taxels).collect())

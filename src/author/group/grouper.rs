@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::painted::Painted;
 use super::rule::{ChartWish, FieldRule, Wrap};
+use crate::author::placed::Progress;
 use crate::body::{Body, FieldSpec, MemberSpec};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::{Unroller, unions};
@@ -34,6 +35,16 @@ pub struct Grouping {
 /// A rule is inconsistent, names something that does not exist, or refuses a field that cannot have its chart. The message
 /// begins with the number of the rule, from 1.
 pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<Grouping> {
+    group_while(body, painted, rules, &mut |_| true)
+}
+
+/// The same until `progress`, which gets the share that is done, says to stop.
+pub(in crate::author) fn group_while(
+    body: &Body,
+    painted: &dyn Painted,
+    rules: &[FieldRule],
+    progress: Progress<'_>,
+) -> Result<Grouping> {
     let mut grower = Grouper::new(body, painted);
     for (rule, number) in rules.iter().zip(1..) {
         grower.apply(rule).map_err(|e| e.at(format!("field rule {number}")))?;
@@ -41,7 +52,7 @@ pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<
     if rules.is_empty() {
         grower.apply_usual()?;
     }
-    grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
+    grower.finish_while(progress).map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
 
 /// A field before its chart is computed.

@@ -17,6 +17,7 @@ mod rule;
 mod usual;
 
 pub use charts::MAX_PLANE_DISTORTION;
+pub(super) use grouper::group_while;
 pub use grouper::{Grouper, Grouping, group};
 pub(super) use painted::FilePaint;
 pub use painted::Painted;

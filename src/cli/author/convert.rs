@@ -103,6 +103,12 @@ impl MeshFile {
         mesh::files(&self.path, &self.options)
     }
 
+    /// Whether it is a URDF with its visual geometry.
+    pub(super) fn is_visual_robot(&self) -> bool {
+        let is_urdf = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("urdf"));
+        is_urdf && self.options.geometry == Geometry::Visual
+    }
+
     pub(super) fn open(&self) -> Result<Original> {
         mesh::open(&self.path, &self.options)
     }

@@ -135,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     authored.file.save(output)?;
     print(&match arguments.json {
         true => format!("{}\n", summary(&arguments.output, &authored)),
-        false => text(&arguments.output, &authored),
+        false => text(&arguments.output, &authored, foreign.as_ref().is_some_and(MeshFile::is_visual_robot)),
     })?;
     Ok(DONE)
 }

@@ -6,6 +6,7 @@ use comfy_table::Cell;
 use console::style;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport};
+use somatic::body::Body;
 use somatic::field::FieldSet;
 
 use crate::cli::table::{plain, shown};
@@ -28,11 +29,23 @@ fn runs(ids: &[u32]) -> Vec<(u32, u32)> {
     runs
 }
 
-pub(super) fn text(output: &Path, authored: &Authored) -> String {
+/// A robot of more triangles gets the hint that its collision geometry is coarser.
+const MANY_TRIANGLES: usize = 200_000;
+
+fn triangles(authored: &Authored) -> usize {
+    authored.body.surfaces.iter().map(|surface| surface.triangles.len()).sum()
+}
+
+/// The report for a person; `robot` says whether the mesh is a URDF with its visual geometry.
+pub(super) fn text(output: &Path, authored: &Authored, robot: bool) -> String {
     let body = &authored.body;
     let taxels = count(body.taxels.len() as u64, "taxel");
     let fields = count(body.fields.len() as u64, "field");
-    let mut text = format!("{}: {taxels} in {fields}\n", style(output.display()).bold());
+    let surface = match triangles(authored) {
+        0 => String::new(),
+        triangles => format!(", on {}", count(triangles as u64, "triangle")),
+    };
+    let mut text = format!("{}: {taxels} in {fields}{surface}\n", style(output.display()).bold());
     if authored.places.is_empty() {
         text += &format!(
             "  its taxels are those it had{}\n",
@@ -48,12 +61,19 @@ pub(super) fn text(output: &Path, authored: &Authored) -> String {
     for note in &authored.notes {
         text += &bullet(note);
     }
+    if robot && triangles(authored) > MANY_TRIANGLES {
+        text += &bullet("the robot's surface is fine; a coarser one is faster to work with: --geometry collision");
+    }
     text
 }
 
 /// How many fields have a chart, in which a centroid is measured.
 fn with_centroids(authored: &Authored) -> usize {
-    FieldSet::new(&authored.body).map_or(0, |set| set.fields.iter().filter(|field| field.chart.is_ok()).count())
+    // Whether a field has a chart does not depend on the surface, in which a search takes time.
+    let Body { name, links, taxels, fields, .. } = &authored.body;
+    let (name, links, taxels, fields) = (name.clone(), links.clone(), taxels.clone(), fields.clone());
+    let bare = Body { name, links, taxels, fields, surfaces: Vec::new(), findings: Vec::new() };
+    FieldSet::new(&bare).map_or(0, |set| set.fields.iter().filter(|field| field.chart.is_ok()).count())
 }
 
 /// The last line of the table.
@@ -133,6 +153,7 @@ pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
     json!({
         "output": output.display().to_string(),
         "taxels": authored.body.taxels.len(),
+        "triangles": triangles(authored),
         "fields": authored.body.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>(),
         "places": authored.places.iter().map(place).collect::<Vec<_>>(),
         "with_centroids": with_centroids(authored),

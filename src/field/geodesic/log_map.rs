@@ -15,7 +15,10 @@ use crate::error::{Error, Result, failed};
 pub(crate) const FIRST_LIMIT: f64 = 1.1 * std::f64::consts::FRAC_PI_2;
 
 /// Number of windows at which a surface counts as too rough.
-const MAX_WINDOWS: usize = 2_000_000;
+pub(crate) const MAX_WINDOWS: usize = 2_000_000;
+
+/// Vertices and triangles whose preparation takes as long as a window.
+const PREPARED_PER_WINDOW: usize = 50;
 
 /// Relative tolerance in comparing lengths: rounding over a sequence of unfolded triangles.
 const ROUNDING: f64 = 1e-12;
@@ -144,6 +147,8 @@ pub struct LogMap<'a> {
     arrivals: Vec<Arrival>,
     windows: Vec<Window>,
     followed: usize,
+    /// The largest number of windows to follow.
+    most: usize,
     /// Per triangle the last window that enters it.
     entering: Vec<u32>,
     queue: BinaryHeap<QueueEntry>,
@@ -157,6 +162,28 @@ impl<'a> LogMap<'a> {
     /// # Errors
     /// `place` is on no triangle, or the surface is too rough, with too many windows.
     pub fn new(topology: &'a Topology, place: SurfacePlace, u: DVec3, limit_m: f64) -> Result<Self> {
+        Self::with_windows(topology, place, u, limit_m, &mut { MAX_WINDOWS })
+    }
+
+    /// The same with at most `left` windows, from which those that it takes are subtracted.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn with_windows(
+        topology: &'a Topology,
+        place: SurfacePlace,
+        u: DVec3,
+        limit_m: f64,
+        left: &mut usize,
+    ) -> Result<Self> {
+        let prepared = (topology.positions.len() + topology.triangles.len()) / PREPARED_PER_WINDOW;
+        // Without a limit of its own, preparing it costs nothing.
+        if *left < MAX_WINDOWS {
+            *left = left.saturating_sub(prepared);
+            if *left == 0 {
+                return Err(too_rough(limit_m));
+            }
+        }
         if place.triangle as usize >= topology.triangles.len() {
             return Err(Error::failed("the chart's origin is on no triangle of the surface"));
         }
@@ -171,6 +198,7 @@ impl<'a> LogMap<'a> {
             arrivals: vec![UNKNOWN; topology.positions.len()],
             windows: Vec::new(),
             followed: 0,
+            most: *left,
             entering: vec![NONE; topology.triangles.len()],
             queue: BinaryHeap::new(),
             turn: 0,
@@ -181,13 +209,18 @@ impl<'a> LogMap<'a> {
         for wedge in map.start.wedges.clone() {
             map.start_windows(&wedge, 0);
         }
+        let mut done = Ok(());
         while let Some(waiting) = map.queue.pop() {
             match waiting.what & VERTEX_FLAG {
-                0 => map.follow(waiting.what)?,
+                0 => done = map.follow(waiting.what),
                 _ => map.start_at_vertex(waiting.what & !VERTEX_FLAG, waiting.distance_m),
             }
+            if done.is_err() {
+                break;
+            }
         }
-        Ok(map)
+        *left -= map.followed;
+        done.map(|()| map)
     }
 
     /// The start, and its tangent frame: (origin, u, v, normal).
@@ -346,11 +379,8 @@ impl<'a> LogMap<'a> {
         {
             return Ok(());
         }
-        if self.followed == MAX_WINDOWS {
-            return Err(failed!(
-                "the surface within {:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it",
-                self.limit_m
-            ));
+        if self.followed == self.most {
+            return Err(too_rough(self.limit_m));
         }
         let list = &mut self.entering[window.edge as usize / 3];
         self.windows[index as usize].before = std::mem::replace(list, index);
@@ -429,6 +459,12 @@ impl<'a> LogMap<'a> {
             self.start_windows(&Wedge { base_rad: turned(from), ..*wedge }, source);
         }
     }
+}
+
+fn too_rough(limit_m: f64) -> Error {
+    failed!(
+        "the surface within {limit_m:.3} m of the chart's origin is too rough to measure ways on; simplify or smooth it"
+    )
 }
 
 fn mix([a, b, c]: [DVec2; 3], weights: [f64; 3]) -> DVec2 {

@@ -9,7 +9,7 @@ mod log_map;
 mod place;
 mod source;
 
-pub(crate) use log_map::FIRST_LIMIT;
+pub(crate) use log_map::{FIRST_LIMIT, MAX_WINDOWS};
 pub use log_map::{LogMap, Reached, Rival};
 pub use place::SurfacePlace;
 pub(crate) use place::barycentric;

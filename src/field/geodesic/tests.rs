@@ -255,3 +255,33 @@ fn what_is_out_of_reach_is_told_apart() {
     let nowhere = SurfacePlace { triangle: 900, barycentric: [1.0, 0.0, 0.0] };
     assert!(LogMap::new(&topology, nowhere, DVec3::X, 1.0).is_err());
 }
+
+#[test]
+fn a_map_stops_when_its_windows_are_used_up_and_counts_them() {
+    let topology = sphere(4);
+    let place = find(&topology, DVec3::new(0.6, 0.0, 0.8));
+    let whole = LogMap::new(&topology, place, DVec3::X, 1.0).unwrap();
+    let (mut few, mut many) = (100, 1_000_000);
+    assert!(LogMap::with_windows(&topology, place, DVec3::X, 1.0, &mut few).is_err());
+    assert_eq!(few, 0);
+    let bounded = LogMap::with_windows(&topology, place, DVec3::X, 1.0, &mut many).unwrap();
+    // Besides its windows, preparing the map takes some.
+    assert!(many < 1_000_000 - whole.windows() && many > 1_000_000 - 2 * whole.windows(), "{many}");
+    for place in places(&topology) {
+        assert_eq!(bounded.reach(&place), whole.reach(&place));
+    }
+}
+
+#[test]
+fn a_vertex_that_two_parts_share_leads_to_no_way_between_them() {
+    // Two triangles that meet in the origin alone.
+    let positions = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0)];
+    let positions = positions.map(|(x, y)| DVec3::new(x, y, 0.0));
+    let topology = Topology::new(&positions, &[[0, 1, 2], [0, 3, 4]]);
+    assert_eq!(topology.parts(), 2);
+    let place = |triangle| SurfacePlace { triangle, barycentric: [0.2, 0.4, 0.4] };
+    for (from, to) in [(0, 1), (1, 0)] {
+        let map = LogMap::new(&topology, place(from), DVec3::X, 9.0).unwrap();
+        assert!(map.reach(&place(from)).is_some() && map.reach(&place(to)).is_none());
+    }
+}
