@@ -370,7 +370,7 @@ fn a_grid_round_a_tube_meets_itself_with_room() {
             }
         }
     }
-    let mut glb = somatic::body::Glb::new();
+    let mut glb = Glb::new();
     let node = glb.node("tube", None, DVec3::ZERO);
     glb.mesh(node, "tube", &mesh, None, None);
     let file = Original::from_bytes("tube", &glb.to_bytes().unwrap(), None).unwrap();
