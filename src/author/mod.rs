@@ -47,7 +47,9 @@ mod voronoi;
 
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use icub_body::author_icub;
-pub use lint::{Finding, FindingKind, lint};
+#[cfg(feature = "meshes")]
+pub(crate) use lint::drawn_position;
+pub use lint::{DrawnPoses, Finding, FindingKind, LinkShare, lint, lint_in_poses};
 pub use place::{place_apart, place_by_density, place_evenly, widest_radius};
 pub use placed::{Placed, Progress, SurfacePoint};
 pub use recipe::Recipe;

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DVec3};
 use serde_json::{Map, Value, json};
 
+use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
 use super::model::Taxel;
 use crate::error::{Error, Result};
@@ -169,6 +170,12 @@ impl Glb {
             own["rotation"] = json!(rotation.as_quat().to_array());
         }
         index
+    }
+
+    /// Keeps `joint`, which moves the added link `node` against its parent.
+    pub fn joint(&mut self, node: usize, joint: &LinkJoint) {
+        let own = self.element("nodes", node).expect("only nodes that were added get joints");
+        own["extras"] = json!({JOINT_KEY: joint.to_json()});
     }
 
     /// Adds a plain material and returns its index.

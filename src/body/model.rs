@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::joint::LinkJoint;
 use super::layout::FieldSpec;
 
 /// Largest taxel id: integers up to this one are exact as f32.
@@ -18,6 +19,8 @@ pub struct Link {
     pub world_from_link: DAffine3,
     /// The node's scale and shear: link_from_node.
     pub link_from_node: DAffine3,
+    /// How it moves against its parent, if the file has that and it moves.
+    pub joint: Option<LinkJoint>,
 }
 
 /// The triangles of one mesh, in the mesh's own coordinates.

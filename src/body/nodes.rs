@@ -6,6 +6,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json;
 
 use super::document::Document;
+use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::FIELD_KEY;
 use super::model::{Link, rigid_part};
 use super::primitives::is_taxels;
@@ -23,6 +24,7 @@ pub(super) struct Nodes<'a> {
     /// The link that a node is; `None` for nodes that hold taxels or a field.
     pub(super) link: Vec<Option<usize>>,
     pub(super) field: Vec<Option<String>>,
+    joint: Vec<Option<LinkJoint>>,
 }
 
 impl<'a> Nodes<'a> {
@@ -61,7 +63,9 @@ impl<'a> Nodes<'a> {
                 ));
             }
         }
-        let field = raw.iter().enumerate().map(|(index, node)| field_text(index, node)).collect::<Result<Vec<_>>>()?;
+        let all = || raw.iter().enumerate();
+        let field = all().map(|(index, node)| text_under(FIELD_KEY, index, node)).collect::<Result<Vec<_>>>()?;
+        let joint = all().map(|(index, node)| joint_of(index, node)).collect::<Result<Vec<_>>>()?;
         let mut link = vec![None; raw.len()];
         let mut links = 0;
         for &node in &in_order {
@@ -72,7 +76,7 @@ impl<'a> Nodes<'a> {
                 links += 1;
             }
         }
-        Ok(Self { raw, parent, in_order, world_from_node, link, field })
+        Ok(Self { raw, parent, in_order, world_from_node, link, field, joint })
     }
 
     pub(super) fn links(&self) -> Vec<Link> {
@@ -94,6 +98,7 @@ impl<'a> Nodes<'a> {
                 parent: self.parent[node].and_then(|up| self.link_above(up)),
                 world_from_link,
                 link_from_node: world_from_link.inverse() * self.world_from_node[node],
+                joint: self.joint[node].clone(),
             });
         }
         links
@@ -122,20 +127,32 @@ pub(super) fn is_in_range(transform: &DAffine3) -> bool {
     transform.to_cols_array().iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
 
-/// The field's JSON in a node's extras, if it carries one.
-fn field_text(index: usize, node: &json::Node) -> Result<Option<String>> {
+/// The string under `key` in a node's extras, if it has one.
+fn text_under(key: &str, index: usize, node: &json::Node) -> Result<Option<String>> {
     let Some(extras) = &node.extras else { return Ok(None) };
     let Ok(extras) = serde_json::from_str::<serde_json::Value>(extras.get()) else { return Ok(None) };
-    match extras.get(FIELD_KEY) {
+    match extras.get(key) {
         None => Ok(None),
         Some(serde_json::Value::String(text)) => Ok(Some(text.clone())),
         Some(_) => {
-            let name = node.name.clone().unwrap_or_else(|| format!("node_{index}"));
-            let example = r#"{"version":1,"name":"palm","members":{"1":[1]}}"#;
-            Err(failed!("`{FIELD_KEY}` should be one string, a field as JSON, such as {example}")
-                .at(format!("field node `{name}`")))
+            let example = match key {
+                FIELD_KEY => r#"a field as JSON, such as {"version":1,"name":"palm","members":{"1":[1]}}"#,
+                _ => r#"a joint as JSON, such as {"version":1,"type":"revolute","axis":[0,0,1]}"#,
+            };
+            Err(failed!("`{key}` should be one string, {example}").at(place(key, index, node)))
         }
     }
+}
+
+/// The joint in a node's extras, if it has one.
+fn joint_of(index: usize, node: &json::Node) -> Result<Option<LinkJoint>> {
+    let text = text_under(JOINT_KEY, index, node)?;
+    text.map(|text| LinkJoint::from_json(&text).map_err(|e| e.at(place(JOINT_KEY, index, node)))).transpose()
+}
+
+fn place(key: &str, index: usize, node: &json::Node) -> String {
+    let kind = if key == FIELD_KEY { "field" } else { "joint" };
+    format!("{kind} node `{}`", node.name.clone().unwrap_or_else(|| format!("node_{index}")))
 }
 
 fn holds_taxels(document: &Document, node: &json::Node) -> bool {

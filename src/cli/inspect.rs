@@ -4,10 +4,14 @@ mod inspection;
 mod json;
 mod report;
 
+use std::path::PathBuf;
+
 use clap::Args;
-use somatic::author::{coverage, lint};
+use somatic::author::mesh::Up;
+use somatic::author::{coverage, lint, lint_in_poses};
 use somatic::error::{Error, Result};
 use somatic::field::{ContactTolerance, FieldSet, rest_overlaps};
+use somatic::robot::{Kinematics, drawn_poses};
 
 use self::inspection::Inspection;
 use super::bodies::load_body;
@@ -17,6 +21,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic inspect robot.glb
   somatic inspect humanoid --json | jq '.fields[].name'
+  somatic inspect arm.glb --joints arm.urdf
   somatic inspect robot.glb --strict > /dev/null || echo 'look at the findings'";
 
 /// Say what links, taxels and fields a body has, and what is odd about it.
@@ -38,6 +43,15 @@ pub(super) struct Arguments {
     /// contacts].
     #[arg(long, value_name = "M")]
     contact_tolerance: Option<f64>,
+
+    /// Joints of the robot: a URDF. Taxels that are covered at rest are then looked for in other poses, too. A body that was
+    /// made from a URDF keeps its joints and needs none.
+    #[arg(long, value_name = "URDF")]
+    joints: Option<PathBuf>,
+
+    /// Axis that points up in the URDF of --joints [default: z].
+    #[arg(long, requires = "joints")]
+    up: Option<Up>,
 }
 
 pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
@@ -53,7 +67,15 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
             Vec::new()
         }
     };
-    let odd = lint(&body, &fields);
+    let odd = match &arguments.joints {
+        None => lint(&body, &fields),
+        Some(urdf) => {
+            let poses = Kinematics::load(urdf).and_then(|robot| {
+                drawn_poses(&robot, &body, arguments.up.unwrap_or(Up::Z)).map_err(|e| e.at(urdf.display()))
+            })?;
+            lint_in_poses(&body, &fields, Some(&poses))
+        }
+    };
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);
     let overlaps = rest_overlaps(&body, &ContactTolerance::new(&body, arguments.contact_tolerance));

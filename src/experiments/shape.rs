@@ -150,6 +150,7 @@ impl Shape {
                 parent: None,
                 world_from_link: DAffine3::IDENTITY,
                 link_from_node: DAffine3::IDENTITY,
+                joint: None,
             }],
             surfaces: Vec::new(),
             taxels,

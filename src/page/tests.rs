@@ -31,7 +31,7 @@ use somatic::{BackendKind, Engine, Letter, Options, Outputs, Scene};
 fn body() -> Body {
     let link = |name: &str, parent, x: f64| {
         let world_from_link = DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
-        Link { name: name.to_owned(), parent, world_from_link, link_from_node: DAffine3::IDENTITY }
+        Link { name: name.to_owned(), parent, world_from_link, link_from_node: DAffine3::IDENTITY, joint: None }
     };
     let surface = |link: usize| Surface {
         name: format!("surface {link}"),

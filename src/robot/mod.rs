@@ -22,6 +22,8 @@ mod bag_states;
 #[cfg(feature = "mcap")]
 mod cloud_merge;
 #[cfg(feature = "meshes")]
+mod drawn;
+#[cfg(feature = "meshes")]
 mod joint_remarks;
 #[cfg(feature = "meshes")]
 mod jointed_source;
@@ -45,6 +47,8 @@ mod told_positions;
 
 #[cfg(feature = "mcap")]
 pub use bag_source::BagSource;
+#[cfg(feature = "meshes")]
+pub use drawn::drawn_poses;
 #[cfg(feature = "meshes")]
 pub use jointed_source::{JointOptions, JointedSource};
 #[cfg(feature = "mcap")]

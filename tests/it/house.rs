@@ -22,7 +22,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("signal", vec!["error", "keys"]),
         ("body", vec!["error", "output"]),
         ("field", vec!["error", "body"]),
-        ("author", vec!["error", "keys", "length", "body", "field"]),
+        ("author", vec!["error", "keys", "length", "body", "field", "parallel"]),
         ("stage", vec!["percept", "signal", "field"]),
         ("scene", vec!["error", "length", "percept", "signal", "body", "field", "stage"]),
         ("backend", [&below_backend[..], &["parallel"]].concat()),

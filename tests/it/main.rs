@@ -21,6 +21,7 @@ mod gains;
 mod gate;
 mod geodesic;
 mod grouping;
+mod hidden;
 mod house;
 mod icub;
 mod imported;

@@ -6,7 +6,9 @@ use glam::DVec3;
 
 use super::super::placed::COINCIDENT_M;
 use super::super::surface_search::SurfaceSearch;
+use super::drawn_poses::DrawnPoses;
 use super::finding::{Finding, FindingKind};
+use super::hidden_findings;
 use super::large::large;
 use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed, point_tree};
 use crate::field::{Field, Unroller};
@@ -28,8 +30,16 @@ const UV_TOLERANCE_SHARE: f64 = 1e-5;
 ///
 /// A taxel is compared with the body's surface at rest, a skinned one with the mesh at bind. It is on the surface within
 /// 1 µm, beside rounding to single precision; its normal is current within 10⁻⁵ rad of a triangle's there.
+///
+/// Taxels that nothing can touch are looked for in the poses of the joints that the body keeps, if it keeps any.
 #[must_use]
 pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
+    lint_in_poses(body, fields, DrawnPoses::of_own_joints(body).as_ref())
+}
+
+/// As [`lint`]; taxels that nothing can touch are looked for in `poses`, at rest alone without them.
+#[must_use]
+pub fn lint_in_poses(body: &Body, fields: &[Field], poses: Option<&DrawnPoses>) -> Vec<Finding> {
     let mut findings = Vec::new();
     findings.extend(empty(body));
     findings.extend(small(fields));
@@ -38,6 +48,7 @@ pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
     findings.extend(against_surface(body));
     findings.extend(stale_charts(body));
     findings.extend(large(body));
+    findings.extend(hidden_findings::hidden(body, poses));
     findings
 }
 

@@ -31,6 +31,14 @@ pub enum FindingKind {
     StaleChart,
     /// A link is so large that its numbers are probably millimetres.
     LargeLink,
+    /// Nothing can touch a taxel.
+    HiddenTaxel,
+    /// Nothing can touch a taxel at rest, and the body has no joints that could uncover it.
+    CoveredAtRest,
+    /// Taxels lie on faces that point into their own link.
+    InwardFaces,
+    /// Links are inside each other at rest.
+    RestRunsIntoItself,
 }
 
 impl FindingKind {
@@ -40,9 +48,21 @@ impl FindingKind {
         match self {
             Self::OffSurface | Self::IsolatedTaxel | Self::StaleChart | Self::LargeLink => Some("m"),
             Self::InwardNormal | Self::StaleNormal => Some("rad"),
+            Self::HiddenTaxel | Self::CoveredAtRest | Self::InwardFaces => Some("1"),
             _ => None,
         }
     }
+}
+
+/// Taxels of a link that share a problem.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkShare {
+    /// The link's name.
+    pub link: String,
+    /// Their ids, ascending.
+    pub taxels: Vec<u32>,
+    /// Number of the link's taxels that were checked.
+    pub of: usize,
 }
 
 /// One kind of problem, with all its places.
@@ -54,10 +74,12 @@ pub struct Finding {
     pub taxels: Vec<u32>,
     /// Names of the fields concerned.
     pub fields: Vec<String>,
-    /// The worst value, in [`FindingKind::unit`].
+    /// The worst value, in [`FindingKind::unit`]; for hidden taxels their share of the skin's area.
     pub worst: Option<f64>,
-    /// The place of the worst value: a taxel and its link, a link, or a field.
+    /// The place of the worst value: a taxel and its link, a link, a field, or the link with most of the taxels.
     pub place: Option<String>,
+    /// The taxels by link, for findings that count them so; the link with most first.
+    pub links: Vec<LinkShare>,
     pub(super) what: String,
 }
 
@@ -75,15 +97,19 @@ impl Finding {
             FindingKind::StaleNormal | FindingKind::StaleChart => "recompute it with `somatic author BODY -o OUT`",
             FindingKind::IsolatedTaxel => "check its place",
             FindingKind::LargeLink => "author it again in its unit: `--unit mm`, or a `scale` in the URDF",
+            FindingKind::HiddenTaxel => "remove them, or move them to the outside",
+            FindingKind::CoveredAtRest => "give the robot's joints: somatic inspect BODY --joints robot.urdf",
+            FindingKind::InwardFaces => "flip these faces: until then their taxels count as inside",
+            FindingKind::RestRunsIntoItself => "give the body a rest pose that the robot can take",
         }
     }
 
     pub(super) fn of_taxels(kind: FindingKind, taxels: Vec<u32>, what: String) -> Self {
-        Self { kind, taxels, fields: Vec::new(), worst: None, place: None, what }
+        Self { kind, taxels, fields: Vec::new(), worst: None, place: None, links: Vec::new(), what }
     }
 
     pub(super) fn of_fields(kind: FindingKind, fields: Vec<String>, what: String) -> Self {
-        Self { kind, taxels: Vec::new(), fields, worst: None, place: None, what }
+        Self { kind, taxels: Vec::new(), fields, worst: None, place: None, links: Vec::new(), what }
     }
 }
 

@@ -1,11 +1,19 @@
 //! Finds problems of a valid layout, each with its place and remedy.
 
 mod checks;
+mod drawn_poses;
 mod finding;
+mod hidden;
+mod hidden_findings;
 mod large;
+mod posed_surface;
+mod shells;
 
-pub use checks::lint;
 pub(super) use checks::{SurfaceFit, drift};
-pub use finding::{Finding, FindingKind};
+pub use checks::{lint, lint_in_poses};
+pub use drawn_poses::DrawnPoses;
+#[cfg(feature = "meshes")]
+pub(crate) use drawn_poses::drawn_position;
+pub use finding::{Finding, FindingKind, LinkShare};
 #[cfg(feature = "meshes")]
 pub(crate) use large::MAX_LIKELY_LINK_M;

@@ -7,11 +7,11 @@ use glam::DAffine3;
 
 use super::options::{MeshOptions, Up, doubt, y_up_from};
 use super::triangles::Triangles;
-use super::urdf_file::{Robot, RobotLink, ShapeKind};
+use super::urdf_file::{JointMotion, Robot, RobotJoint, RobotLink, ShapeKind};
 use super::urdf_tree::order;
 use super::{formats, shapes};
 use crate::author::lint::MAX_LIKELY_LINK_M;
-use crate::body::Glb;
+use crate::body::{Glb, LinkJoint, LinkMimic, LinkMotion};
 use crate::error::{Error, Result};
 
 /// A robot of over this size was probably not meant in metres, m.
@@ -63,6 +63,9 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
             None => (None, y_up_from(up), y_up_from(up)),
         };
         let node = glb.placed_node(&link.name, parent, parent_from_link);
+        if let Some(joint) = joint.and_then(kept) {
+            glb.joint(node, &joint);
+        }
         nodes.insert(&link.name, (node, world_from_link));
         let mesh = geometry(link, &mut known)?;
         if mesh.triangles.is_empty() {
@@ -80,6 +83,24 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
     let what_to_do = "write metres into the URDF, or a `scale` of its meshes";
     let notes = doubts.into_iter().map(|doubt| format!("{doubt}, {what_to_do}")).collect();
     Ok(Linked { glb, nodes, notes, has_triangles: !whole.triangles.is_empty() })
+}
+
+/// What a body keeps of `joint`, if that moves by one number.
+fn kept(joint: &RobotJoint) -> Option<LinkJoint> {
+    let motion = match joint.motion {
+        JointMotion::Fixed | JointMotion::Free => return None,
+        JointMotion::Revolute { axis, is_continuous: true } => LinkMotion::Continuous(axis),
+        JointMotion::Revolute { axis, is_continuous: false } => LinkMotion::Revolute(axis),
+        JointMotion::Prismatic { axis } => LinkMotion::Prismatic(axis),
+    };
+    let is_finite = |limits: &[f64; 2]| limits.iter().all(|limit| limit.is_finite());
+    let limits = joint.limits.filter(is_finite).filter(|_| !matches!(motion, LinkMotion::Continuous(_)));
+    let mimic = joint.mimic.as_ref().map(|mimic| LinkMimic {
+        joint: mimic.joint.clone(),
+        multiplier: mimic.multiplier,
+        offset: mimic.offset,
+    });
+    Some(LinkJoint { name: joint.name.clone(), motion, limits, mimic })
 }
 
 /// The geometry of a link in its frame. Meshes that are used again are read once.

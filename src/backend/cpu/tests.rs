@@ -156,6 +156,7 @@ fn sheet(taxels: u32) -> Body {
         parent: None,
         world_from_link: DAffine3::IDENTITY,
         link_from_node: DAffine3::IDENTITY,
+        joint: None,
     };
     Body {
         name: "sheet".to_owned(),

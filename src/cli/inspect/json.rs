@@ -86,6 +86,7 @@ fn finding(finding: &Finding) -> Value {
         "worst": finding.worst,
         "unit": finding.kind.unit(),
         "place": finding.place,
+        "links": finding.links.iter().map(|of| json!({"link": of.link, "taxels": of.taxels, "of": of.of})).collect::<Vec<_>>(),
         "what": finding.to_string(),
     })
 }
