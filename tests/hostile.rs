@@ -5,6 +5,12 @@
 mod common;
 #[path = "it/draft.rs"]
 mod draft;
+#[cfg(feature = "cli")]
+mod fuzz;
+#[cfg(feature = "cli")]
+#[allow(dead_code, reason = "the tests of exports use more of it")]
+#[path = "vendor/make.rs"]
+mod make;
 mod skips;
 
 use std::path::{Path, PathBuf};

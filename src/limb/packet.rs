@@ -222,4 +222,47 @@ mod tests {
         assert_eq!(raw_value(f32::NAN.to_bits().to_le_bytes()), RawValue::FAULTY);
         assert_eq!(raw_value(0xFFFF_FFFD_u32.to_le_bytes()), RawValue::FAULTY);
     }
+
+    #[test]
+    fn whatever_comes_is_a_packet_or_a_reason() {
+        let (mut frame, mut layout, mut end) = (Vec::new(), Vec::new(), Vec::new());
+        frame_packet(&mut frame, 9, 70_000, -0.25, 0xABCD, &[RawValue::new(0.1), RawValue::MISSING]);
+        layout_packet(&mut layout, &frame, &[4, 70_000]);
+        end_packet(&mut end, 9, 12, 1.0);
+        let line = br#"{"somatic_limb":1,"boot":2,"sequence":8,"t":0.5,"frame":6,"fields":[{"field":"a"}]}"#.to_vec();
+        let mut state = 1_u64;
+        let mut next = |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % below.max(1)
+        };
+        let (mut taken, mut refused) = (0, 0);
+        for case in 0..40_000 {
+            let mut bytes = [&frame, &layout, &end, &line][case % 4].clone();
+            for _ in 0..=next(3) {
+                let at = next(bytes.len());
+                match next(5) {
+                    0 => bytes[at] ^= 1 << next(8),
+                    1 => bytes[at] = next(256) as u8,
+                    2 => bytes.truncate(at + 1),
+                    3 => bytes.extend_from_within(at..),
+                    _ => drop(bytes.drain(at..bytes.len().min(at + 1 + next(8)))),
+                }
+                bytes.push(next(256) as u8);
+            }
+            match open(&bytes) {
+                Ok((_, Packet::Frame { values, .. })) => {
+                    for four in values.chunks_exact(4) {
+                        let _ = raw_value([four[0], four[1], four[2], four[3]]);
+                    }
+                    taken += 1;
+                }
+                Ok(_) => taken += 1,
+                Err(why) => {
+                    assert!(why.len() > 10 && !why.contains('\n'), "{why}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(taken > 1000 && refused > 1000, "{taken}, {refused}");
+    }
 }

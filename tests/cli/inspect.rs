@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use serde_json::{Value, json};
-use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
 
 use super::{done, fails, file, output, text_of};
 
@@ -26,7 +26,7 @@ fn json_has_the_keys_that_others_lean_on() {
     }
     assert_eq!(keys(&body)[3..], ["findings", "lint", "near_at_rest", "coverage"]);
     let [small] = &body["lint"].as_array().unwrap()[..] else { panic!("{}", body["lint"]) };
-    assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "what"]);
+    assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "links", "what"]);
     assert_eq!((&small["kind"], &small["fields"]), (&json!("small_field"), &json!(["hand/side"])));
     assert_eq!(body["findings"], json!([small["what"]]));
     assert_eq!(body["coverage"]["links"].as_array().unwrap().len(), 5);
@@ -116,4 +116,56 @@ fn what_was_put_right_on_reading_is_said_by_inspect_and_by_run() {
     assert!(told.iter().all(|words| super::stderr(&run).contains(words)), "{}", super::stderr(&run));
     let frame: Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(frame["fields"][0]["total"], 11.0, "taxel 3 is in no field");
+}
+
+/// The triangles of a cube of half side `side` about the origin, outside out or in.
+fn cube(side: f32, is_inward: bool) -> MeshData {
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let turned = |[a, b, c]: [u32; 3]| if is_inward { [a, c, b] } else { [a, b, c] };
+    MeshData {
+        positions: (0..8_u32).map(|i| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { side } else { -side })).collect(),
+        normals: vec![[0.0, 0.0, 1.0]; 8],
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).map(turned).collect(),
+        skinning: None,
+    }
+}
+
+#[test]
+fn joints_of_a_urdf_uncover_taxels() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut glb = Glb::new();
+    let base = glb.node("base", None, DVec3::ZERO);
+    let slider = glb.node("slider", Some(base), DVec3::ZERO);
+    for (name, side, is_inward) in [("outside", 0.1, false), ("inside", 0.08, true)] {
+        let wall = glb.node(name, Some(base), DVec3::ZERO);
+        glb.mesh(wall, name, &cube(side, is_inward), None, None);
+    }
+    glb.mesh(slider, "slider", &cube(0.05, false), None, None);
+    let taxel = Taxel {
+        id: 7,
+        link: 0,
+        position_in_link: DVec3::new(0.0, 0.01, 0.05),
+        normal_in_link: DVec3::Z,
+        area: 1e-4,
+        modality: Modality::Pressure,
+    };
+    glb.taxels("taxels", Some(slider), &[taxel], None);
+    let body = folder.path().join("a.glb");
+    glb.save(somatic::OutputPath::new(&body, false, &[]).unwrap()).unwrap();
+    let urdf = r#"<robot name="r"><link name="base"/><link name="slider"/><joint name="j" type="prismatic"><parent link="base"/>
+        <child link="slider"/><axis xyz="0 0 1"/><limit lower="0.5" upper="0.6"/></joint></robot>"#;
+    let (_robot, urdf) = file("a.urdf", urdf);
+    let urdf = text_of(&urdf);
+    let kinds = |arguments: &[&str]| -> Vec<Value> {
+        let all = [&["inspect", text_of(&body), "--json"], arguments].concat();
+        let seen: Value = serde_json::from_str(&done(&all)).unwrap();
+        let lint = seen["lint"].as_array().unwrap().iter();
+        lint.filter(|finding| finding["kind"] != "no_fields").cloned().collect()
+    };
+    let [hidden] = &kinds(&[])[..] else { panic!("{:?}", kinds(&[])) };
+    assert_eq!((&hidden["kind"], &hidden["taxels"]), (&json!("hidden_taxel"), &json!([7])));
+    assert_eq!(hidden["links"], json!([{"link": "slider", "taxels": [7], "of": 1}]));
+    assert_eq!(kinds(&["--joints", urdf, "--up", "y"]), Vec::<Value>::new());
+    assert!(fails(1, &["inspect", text_of(&body), "--joints", urdf]).contains("with --up y they agree"));
+    assert!(fails(2, &["inspect", text_of(&body), "--up", "y"]).contains("--joints"));
 }

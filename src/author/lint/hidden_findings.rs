@@ -15,12 +15,12 @@ pub(super) fn hidden(body: &Body, poses: Option<&DrawnPoses>) -> Vec<Finding> {
     let seen = find(body, poses);
     let of = |reach: Reach| seen.checked.iter().filter(|(_, own)| *own == reach).map(|(index, _)| *index).collect();
     let where_looked = match seen.other_poses {
-        Some(poses) => format!(", at rest and in {poses} other poses"),
+        Some(poses) => format!(" at rest and in {poses} other poses"),
         None => String::new(),
     };
     let mut findings = Vec::new();
     let hidden: Vec<usize> = of(Reach::Hidden);
-    let what = format!("hidden inside the body: nothing can touch them{where_looked}");
+    let what = format!("hidden, where nothing can touch them{where_looked}");
     findings.extend(finding(body, &seen, FindingKind::HiddenTaxel, &hidden, &what));
     let covered: Vec<usize> = of(Reach::CoveredAtRest);
     let what = "covered at rest by another link, so that only another pose can uncover them";
