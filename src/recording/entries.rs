@@ -1,6 +1,8 @@
 //! What single records say: taxels, attachments, channels, schemas.
 
-use super::records::{Parts, Record, op};
+use std::collections::HashMap;
+
+use super::records::{Parts, Record};
 use super::{FRAMES, FRAMES_CHANNEL, TAXEL_IDS, ids_of};
 
 /// A file that lies beside the frames.
@@ -43,9 +45,17 @@ pub(super) struct Preface {
 
 /// What the metadata in `body` tell, if they are a recording's own.
 pub(super) fn preface(body: &[u8]) -> Option<Preface> {
-    let Ok(mcap::records::Record::Metadata(own)) = mcap::parse_record(op::METADATA, body) else { return None };
-    let taxels = ids_of(own.metadata.get(TAXEL_IDS).filter(|_| own.name == super::METADATA)?)?;
-    Some(Preface { taxels, frames: own.metadata.get(FRAMES_CHANNEL).and_then(|id| id.parse().ok()) })
+    // The crate's own parser makes room for strings by lengths that damage can make 4 GiB.
+    let mut parts = Parts(body);
+    let name = parts.text()?;
+    let length = parts.u32()?;
+    let mut pairs = Parts(parts.bytes(length.into())?);
+    let mut metadata: HashMap<&str, &str> = HashMap::new();
+    while !pairs.0.is_empty() {
+        metadata.insert(pairs.text()?, pairs.text()?);
+    }
+    let taxels = ids_of(metadata.get(TAXEL_IDS).filter(|_| name == super::METADATA)?)?;
+    Some(Preface { taxels, frames: metadata.get(FRAMES_CHANNEL).and_then(|id| id.parse().ok()) })
 }
 
 /// The attachment whose record begins with `head`.
@@ -83,4 +93,28 @@ pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
 /// The id of a schema, and its name.
 pub(super) fn schema(parts: &mut Parts<'_>) -> Option<(u16, String)> {
     Some((parts.u16()?, parts.text()?.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(text: &str) -> Vec<u8> {
+        [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+    }
+
+    #[test]
+    fn a_preface_is_read_and_lengths_of_damaged_ones_take_no_memory() {
+        let pairs = [text(TAXEL_IDS), text("0-2,5"), text(FRAMES_CHANNEL), text("3")].concat();
+        let body = [text(super::super::METADATA), (pairs.len() as u32).to_le_bytes().to_vec(), pairs].concat();
+        let read = preface(&body).unwrap();
+        assert_eq!((read.taxels, read.frames), (vec![0, 1, 2, 5], Some(3)));
+        for at in 0..body.len() - 3 {
+            let mut damaged = body.clone();
+            damaged[at..at + 4].copy_from_slice(&0xFFFF_FFF0_u32.to_le_bytes());
+            let used = allocation_counter::measure(|| drop(preface(&damaged)));
+            assert!(used.bytes_max < 1 << 20, "{at}: {} bytes", used.bytes_max);
+            assert!(preface(&body[..at]).is_none());
+        }
+    }
 }

@@ -48,7 +48,7 @@ pub(super) const DAE: &str = r##"<?xml version="1.0" encoding="utf-8"?>
 "##;
 
 pub(super) const OBJ: &str = "# a tetrahedron\no t\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nvn 0 0 1\nvt 0 0\ng one\n\
-    f 1 3 2\nf 1/1 2/1 4/1\nf 2//1 3//1 4//1\nf -4/1/1 -1/1/1 -2/1/1\n";
+    f 1 3 2\nf 1/1 2/1 4/1\nf 2//1 3//1 4//1\nf 1/1/1 4/1/1 3/1/1\n";
 
 pub(super) const STL: &str = "solid t\n facet normal 0 0 -1\n  outer loop\n   vertex 0 0 0\n   vertex 0 0.1 0\n   vertex 0.1 0 0\n  endloop\n \
     endfacet\n facet normal 0 -1 0\n  outer loop\n   vertex 0 0 0\n   vertex 0.1 0 0\n   vertex 0 0 0.1\n  endloop\n endfacet\nendsolid t\n";
@@ -219,7 +219,7 @@ pub(super) const NDJSON: &str = "{\"t\":0,\"values\":{\"1\":3,\"2\":4.5}}\n{\"t\
 
 pub(super) const CSV: &str = "t,1,2,9\n0,1,2,3\n0.1,4,,6\n0.2,nan,8,9\n0.3,inf,1e3,-5\n0.4,1,2,3\n";
 
-pub(super) const CSV_SKIN: &str = "id,link,x,y,z,nx,ny,nz,area,modality\n1,hand,0,0,0,0,0,1,0.0001,pressure\n2,hand,0.01,0,0,0,0,1,,0\n3,arm,0,0.2,0,0,1,0,0.0002,temperature\n";
+pub(super) const CSV_SKIN: &str = "id,link,x,y,z,nx,ny,nz,area,modality\n1,hand,0,0,0,0,0,1,0.0001,pressure\n2,hand,0.01,0,0,0,0,1,,\n3,arm,0,0.2,0,0,1,0,0.0002,temperature\n";
 
 pub(super) const CALIBRATION: &str = "[all]\nbaseline = 2\ndead_band = 1.5\np_max = 30\nunit = \"kPa\"\nnoise = 0.2\n\
     [taxel.2]\ngain = 3\n[contact]\non = 3\noff = 1\n[checks]\nisolated_ratio = 5\n";
