@@ -311,6 +311,7 @@ impl Engine {
         for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
             let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
             let curve = self.plan.curves.of(self.plan.taxels[channel].response);
+            let value = self.intake.read(taxel, value);
             let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
             to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
         }

@@ -26,10 +26,7 @@ pub(super) fn attachments(
         None => (file_name(&body.name), body_bytes(&body.name)?),
     };
     let mut files = vec![(name, BODY.to_owned(), bytes)];
-    let calibration = match &asked.calibration {
-        Some(path) => Some(text(path)?),
-        None => asked.own_calibration()?.map(|(_, text)| text.into_bytes()),
-    };
+    let calibration = asked.calibration_text()?.map(|(_, text)| text.into_bytes());
     let toml = "application/toml".to_owned();
     files.extend(calibration.map(|bytes| (CALIBRATION.to_owned(), toml.clone(), bytes)));
     if let Some(scene) = scene {

@@ -9,7 +9,8 @@ use std::time::Duration;
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
-use somatic::source::{Lines, Source, SourceSpec, VendorOptions};
+use somatic::signal::{RawValue, UnitOfP};
+use somatic::source::{Lines, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
@@ -61,7 +62,7 @@ pub(super) struct Arguments {
     /// Find each sensor's gain and how wide the layer makes a contact, from ordinary touches that move about; writes them into
     /// the calibration that --calibration names.
     #[arg(long, value_name = "RECORDING", requires = "calibration",
-        conflicts_with_all = ["sources", "plot", "press", "bits", "equalise", "mask_moved"])]
+        conflicts_with_all = ["sources", "plot", "press", "bits", "missing", "equalise", "mask_moved"])]
     skin: Option<String>,
 
     /// For --skin: the calibration with baselines and dead bands, which gains are added to.
@@ -95,6 +96,10 @@ pub(super) struct Arguments {
     /// Bits of the sensors' converter: tells where their range ends [default: where many of them stop].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=24))]
     bits: Option<u8>,
+
+    /// Raw values that are no reading, such as 0,65535: they are left out, and written down as the key `missing`.
+    #[arg(long, value_name = "RAW,...", value_delimiter = ',', allow_negative_numbers = true)]
+    missing: Vec<f64>,
 
     /// Give each sensor the gain that makes all the presses equal: for sensors that were all pressed alike.
     #[arg(long)]
@@ -169,12 +174,14 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
             .collect();
         return Ok(tell_losses(&[lost, vec![left_out(name, frames, last_s, None, &absent)]].concat()));
     }
-    let findings = survey.finish(Wishes {
+    let mut findings = survey.finish(Wishes {
         bits: arguments.bits,
         equalise: arguments.equalise,
         mask_moved: arguments.mask_moved,
     })?;
 
+    findings.missing.clone_from(&arguments.missing);
+    findings.unit = if ports.is_empty() { unit_of(&arguments.sources)? } else { UnitOfP::COUNT };
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
     let known: Vec<u32> =
@@ -188,6 +195,21 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
     Ok(code)
+}
+
+/// Makes those of `values` missing that are one of `codes`, as a calibration with these does.
+fn without(codes: &[f64], values: &mut [RawValue]) {
+    for value in values.iter_mut().filter(|value| codes.iter().any(|&code| **value == RawValue::new(code))) {
+        *value = RawValue::MISSING;
+    }
+}
+
+/// What an export's values are in, as it says itself.
+fn unit_of(sources: &[String]) -> Result<UnitOfP> {
+    match first_of(sources)? {
+        SourceSpec::Vendor(path) => Ok(VendorSource::open(path, &VendorOptions::default())?.layout().unit),
+        _ => Ok(UnitOfP::COUNT),
+    }
 }
 
 fn first_of(sources: &[String]) -> Result<SourceSpec> {
@@ -239,11 +261,12 @@ fn gather(
     while !stop.load(Ordering::Relaxed) {
         lines.into_iter().for_each(tell);
         match feed.next(Duration::from_millis(40)) {
-            Some(Arrival::Frames(frames, told)) => {
+            Some(Arrival::Frames(mut frames, told)) => {
                 told.notices.iter().for_each(|notice| say(notice));
                 taken.losses = told.losses;
-                for frame in &frames {
+                for frame in &mut frames {
                     (taken.frames, taken.last_s) = (taken.frames + 1, frame.t_s);
+                    without(&arguments.missing, &mut frame.values);
                     let since_s = frame.t_s - *begin.get_or_insert(frame.t_s);
                     if since_s < arguments.rest {
                         survey.rest(&frame.values);

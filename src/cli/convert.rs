@@ -12,12 +12,13 @@ use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
 use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
 
-use super::attached::{body_bytes, file_name};
+use super::attached::{self, body_bytes, file_name};
 use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::first_source::source_of;
 use super::interrupt::{left_out, stop_soon_on_signal};
+use super::overlaid::{How, overlaid};
 use super::stdio::{say, tell_losses};
 use super::words::count;
 
@@ -195,8 +196,19 @@ fn files(
         files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
     }
     if let Some(path) = &arguments.calibration {
-        let bytes = limits::read(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
-        files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), bytes));
+        let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
+        let own = match (export, from) {
+            (Some(export), _) => export.calibration().map(|text| (export.path().to_owned(), text)),
+            (None, SourceSpec::Mcap(file)) if arguments.body.is_none() => {
+                attached::calibration(file)?.map(|text| (file.clone(), text))
+            }
+            _ => None,
+        };
+        let text = match own {
+            Some((of, own)) => overlaid(&of, &own, path, &given, How::Laid, false)?,
+            None => given,
+        };
+        files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), text.into_bytes()));
     }
     if let SourceSpec::Sim(path) = from {
         let simulation = SimulatedSource::open(path)?;

@@ -31,6 +31,7 @@ mod keys;
 mod latency;
 mod lines;
 mod live;
+mod overlaid;
 mod paper;
 mod plan;
 mod plot;

@@ -4,6 +4,7 @@
 
 mod file;
 mod keys;
+mod overlay;
 mod skin;
 mod thresholds;
 
@@ -12,9 +13,11 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use self::overlay::LaidOver;
 pub use self::skin::SkinResponse;
 pub use self::thresholds::{ChangeCalibration, ContactThresholds};
 use super::curve::Curve;
+use super::frame::RawValue;
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, Response};
 use super::unit::Quantity;
@@ -95,6 +98,8 @@ pub struct Calibration {
     pub body: Option<String>,
     /// One entry a taxel, in the body's order.
     pub taxels: Vec<TaxelCalibration>,
+    /// By taxel, the raw values that are no reading, in single precision as raw values are; empty if no taxel has any.
+    pub missing: Vec<Vec<f32>>,
     /// The curves that [`Response::Curve`] indexes.
     pub curves: Vec<Curve>,
     /// Contact thresholds of fields that are not in `fields`.
@@ -146,6 +151,13 @@ impl Calibration {
             }
         };
         curve.map(Some)
+    }
+
+    /// Whether `value` of the taxel `index` is one of those that are no reading.
+    pub(crate) fn is_no_reading(&self, index: usize, value: RawValue) -> bool {
+        self.missing.get(index).is_some_and(|codes| {
+            !codes.is_empty() && value.number().is_some_and(|number| codes.contains(&(number as f32)))
+        })
     }
 
     /// How far `value` of the taxel `index` is from rest, raw units, positive if pressed. With constants in single precision

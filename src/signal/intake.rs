@@ -90,6 +90,7 @@ impl Intake {
         let checks = &self.calibration.checks;
         let checked =
             checks.settle_frames > 0 || checks.broken_frame_share.is_some() || checks.isolated_ratio.is_some();
+        let checked = checked || !self.calibration.missing.is_empty();
         if checked || self.max_age_s > 0.0 || self.stale.is_some() {
             return None;
         }
@@ -104,7 +105,7 @@ impl Intake {
     pub(crate) fn take(&mut self, t_s: f64, values: &[RawValue], slots: &[usize], out: &mut Vec<RawValue>) {
         self.now.fill(RawValue::MISSING);
         for (&taxel, &value) in self.taxel_of_value.iter().zip(values) {
-            self.now[taxel] = value;
+            self.now[taxel] = self.read(taxel, value);
         }
         if self.max_age_s > 0.0 {
             self.hold(t_s);
@@ -124,6 +125,11 @@ impl Intake {
             self.reject_isolated(ratio);
         }
         out.extend(slots.iter().map(|&slot| self.now[slot]));
+    }
+
+    /// `value` of `taxel`, missing if it is one of those that the calibration calls no reading.
+    pub(crate) fn read(&self, taxel: usize, value: RawValue) -> RawValue {
+        if self.calibration.is_no_reading(taxel, value) { RawValue::MISSING } else { value }
     }
 
     /// Records stale values, if they are tracked, and makes them missing.
@@ -224,6 +230,19 @@ mod tests {
         intake.forget_stale();
         take(&mut intake, &frame(0.0, &[None, None, Some(1.0)]));
         assert_eq!(intake.stale(), [Vec::<usize>::new()]);
+    }
+
+    #[test]
+    fn a_raw_value_that_is_no_reading_is_missing_and_held_as_such() {
+        let calibration = Calibration::parse("[taxel.2]\nmissing = [30000]", &[1, 2, 3]).unwrap();
+        let mut intake = Intake::new(calibration.clone(), Vec::new(), 0.0);
+        assert!(intake.picks(&[0, 1, 2]).is_none());
+        let codes = frame(0.0, &[Some(30_000.0), Some(30_000.0), None]);
+        assert_eq!(numbers(&take(&mut intake, &codes)), [Some(30_000.0), None, None]);
+        assert!(take(&mut intake, &codes)[1].is_missing());
+        let mut held = Intake::new(calibration, Vec::new(), 0.5);
+        take(&mut held, &frame(0.0, &[None, Some(7.0), None]));
+        assert_eq!(take(&mut held, &codes)[1].number(), Some(7.0));
     }
 
     #[test]

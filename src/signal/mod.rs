@@ -17,7 +17,7 @@ mod wiring;
 pub use block::FrameBlock;
 pub use board_health::BoardHealth;
 pub use calibration::{
-    Calibration, ChangeCalibration, Checks, ContactThresholds, Onset, SkinResponse, TaxelCalibration,
+    Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, Onset, SkinResponse, TaxelCalibration,
 };
 pub use curve::Curve;
 pub(crate) use curve::slope;

@@ -89,6 +89,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use somatic::signal::UnitOfP;
 
     #[test]
     fn ticks_are_round_and_within() {
@@ -108,9 +109,15 @@ mod tests {
             full: None,
             gain: 1.0,
             moved: false,
+            went_other_way: false,
         };
-        let findings =
-            Findings { sensors: vec![sensor(0, Some(200.0)), sensor(1, None)], invert: true, raw_range: None };
+        let findings = Findings {
+            sensors: vec![sensor(0, Some(200.0)), sensor(1, None)],
+            invert: true,
+            raw_range: None,
+            missing: Vec::new(),
+            unit: UnitOfP::COUNT,
+        };
         let svg = findings.svg().unwrap();
         assert!(svg.contains("never pressed") && svg.contains("2 sensors, raw values falling when pressed"));
         assert_eq!(findings.figure().panels[0].layers.len(), 4);

@@ -18,8 +18,9 @@ impl Findings {
         let sigma = median(&mut sigmas);
         let mut text = format!(
             "# From a survey of {} sensors: baselines are medians at rest, dead bands 1.5 times what one value in a\n\
-             # thousand strays from them.\n\n[all]\nbaseline = {baseline}\ndead_band = {dead_band}\ninvert = {}\n",
+             # thousand strays from them.\n\n[all]\nbaseline = {baseline}\ngain = 1\nunit = \"{}\"\ndead_band = {dead_band}\ninvert = {}\n",
             self.sensors.len(),
+            self.unit,
             self.invert
         );
         text = format!("body = {}\n\n{text}", quoted(body));
@@ -34,6 +35,9 @@ impl Findings {
         }
         if let Some([low, high]) = self.raw_range {
             line("raw_range", format!("[{low}, {high}]"));
+        }
+        if !self.missing.is_empty() {
+            line("missing", format!("{:?}", self.missing));
         }
         for found in &self.sensors {
             let mut own: Vec<(&str, String)> = Vec::new();
@@ -90,19 +94,31 @@ fn commonest(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::signal::Calibration;
+    use somatic::signal::{Calibration, UnitOfP};
 
     fn found(id: u32, baseline: Option<f64>) -> Found {
         let full = baseline.map(|baseline| baseline - 0.5);
         let sigma = Some(0.5);
-        Found { id, baseline, noise: 1.0, sigma, dead_band: 2.0, travel: Some(200.0), full, gain: 1.0, moved: false }
+        Found {
+            id,
+            baseline,
+            noise: 1.0,
+            sigma,
+            dead_band: 2.0,
+            travel: Some(200.0),
+            full,
+            gain: 1.0,
+            moved: false,
+            went_other_way: false,
+        }
     }
 
     #[test]
     fn what_is_written_is_read_as_what_was_found() {
         let mut sensors = vec![found(4, Some(250.0)), found(5, Some(250.0)), found(6, Some(243.0)), found(7, None)];
         (sensors[2].gain, sensors[2].dead_band, sensors[2].sigma) = (1.25, 5.0, Some(0.75));
-        let findings = Findings { sensors, invert: true, raw_range: Some([0.0, 255.0]) };
+        let missing = vec![-1.0, 30_000.0];
+        let findings = Findings { sensors, invert: true, raw_range: Some([0.0, 255.0]), missing, unit: UnitOfP::COUNT };
         let text = findings.calibration("the \"left\" hand");
         let read = Calibration::parse(&text, &[4, 5, 6, 7]).unwrap();
         assert_eq!(read.body.as_deref(), Some("the \"left\" hand"));
@@ -111,6 +127,7 @@ mod tests {
         assert_eq!((a, a.raw_range), (b, [0.0, 255.0]));
         assert_eq!((c.baseline, c.gain, c.dead_band, c.p_max), (243.0, -1.25, 6.25, 303.125));
         assert_eq!([a, b, c].map(|taxel| taxel.noise), [Some(0.5), Some(0.5), Some(0.75)]);
+        assert_eq!(read.missing[0], [-1.0, 30_000.0]);
         assert!(d.mask && !a.mask && !c.mask);
     }
 }

@@ -11,10 +11,11 @@
 
 mod figure;
 mod file;
+mod range;
 pub mod tuning;
 
 use somatic::error::{Error, Result};
-use somatic::signal::RawValue;
+use somatic::signal::{RawValue, UnitOfP};
 
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
@@ -34,6 +35,9 @@ const WIDE_NOISE_SHARE: f64 = 1.0 / 16.0;
 const WIDE_SHARE: f64 = 1.0 / 4.0;
 /// Noise over this many times the median is reported.
 const LOUD_RATIO: f64 = 5.0;
+
+/// A sensor's baseline and noise; `None` where it delivered nothing.
+type AtRest = Option<(f64, f64)>;
 
 /// A survey that is being made. Sensors stand in the order of the ids it was begun with, and so do the values of a frame.
 #[derive(Clone, Debug)]
@@ -69,6 +73,11 @@ impl Pressed {
         self.last = [self.last[1], value];
         self.seen += 1;
     }
+
+    /// Whether it is nearer to `baseline` than to the end of its way of `travel` when the pressing ends.
+    fn came_back(&self, baseline: f64, travel: f64) -> bool {
+        (f64::from(self.last[1]) - baseline).abs() < travel / 2.0
+    }
 }
 
 /// What is wanted of a calibration.
@@ -102,6 +111,8 @@ pub struct Found {
     pub gain: f64,
     /// Whether it moved at rest, so that the above says nothing.
     pub moved: bool,
+    /// Whether it went to the other side than the sensors' pressed one, so that its baseline is doubtful.
+    pub went_other_way: bool,
 }
 
 /// What a survey has come to.
@@ -113,6 +124,10 @@ pub struct Findings {
     pub invert: bool,
     /// The raw values that the converter can deliver, where known.
     pub raw_range: Option<[f64; 2]>,
+    /// The raw values that were left out as no reading.
+    pub missing: Vec<f64>,
+    /// What the raw values are in.
+    pub unit: UnitOfP,
 }
 
 impl Survey {
@@ -173,7 +188,7 @@ impl Survey {
         if wishes.bits.is_some_and(|bits| !(1..=24).contains(&bits)) {
             return Err(Error::usage("a converter has 1 to 24 bits"));
         }
-        let at_rest: Vec<Option<(f64, f64)>> = self.rest.iter().map(|kept| rest_of(kept)).collect();
+        let at_rest: Vec<AtRest> = self.rest.iter().map(|kept| rest_of(kept)).collect();
         if at_rest.iter().all(Option::is_none) {
             return Err(Error::failed(
                 "no sensor delivered anything at rest; is the source connected and the rest long enough?",
@@ -191,10 +206,10 @@ impl Survey {
             let band = at_rest[sensor].map_or(f64::INFINITY, |(_, noise)| dead_band(noise).max(step));
             travels[sensor][side] > MIN_TRAVEL_BANDS * band
         };
-        let votes = |side: usize| {
-            (0..self.ids.len()).filter(|&i| clear(i, side) && travels[i][side] > travels[i][1 - side]).count()
-        };
-        let (falling, rising) = (votes(0), votes(1));
+        let goes =
+            |sensor: usize, side: usize| clear(sensor, side) && travels[sensor][side] > travels[sensor][1 - side];
+        let count = |side: usize| (0..self.ids.len()).filter(|&sensor| goes(sensor, side)).count();
+        let (falling, rising) = (count(0), count(1));
         let raw_range = wishes.bits.map(|bits| [0.0, (1_u32 << bits) as f64 - 1.0]);
         // Where nothing was pressed, what was seen of the range is no measure.
         let is_range_known = raw_range.is_some() || falling + rising > 0;
@@ -220,15 +235,22 @@ impl Survey {
                 several(&ids)
             )));
         }
-        if falling + rising == 0 {
-            return Err(Error::failed("no sensor left its rest; press every sensor firmly once the rest is over"));
-        }
-        let invert = falling > rising;
+        let invert = self.falls(&at_rest, &travels, &moved, goes)?;
         let side = usize::from(!invert);
+        let [lowest, highest] = self.reach(&at_rest);
+        if let Some([low, high]) = raw_range.filter(|[low, high]| lowest < *low || highest > *high) {
+            return Err(Error::usage(format!(
+                "raw values go from {lowest} to {highest}, and a converter of {} bits gives {low} to {high}; correct --bits, \
+                 or leave it out; --missing names raw values that are no reading",
+                wishes.bits.unwrap_or_default()
+            )));
+        }
         let end = match raw_range {
             Some([low, high]) => Some(if invert { low } else { high }),
-            None => self.stop_of_many(invert, |sensor| clear(sensor, side)),
+            None => self.stop_of_many(&at_rest, invert, |sensor| clear(sensor, side)),
         };
+        // A sensor may rest far above the way that is left to its end: only with its range can it be calibrated.
+        let raw_range = raw_range.or_else(|| end.filter(|_| !invert).map(|end| range::range_to(end, lowest)));
         let pressed: Vec<Option<f64>> =
             (0..self.ids.len()).map(|sensor| clear(sensor, side).then(|| travels[sensor][side])).collect();
         let mut known: Vec<f64> = pressed.iter().copied().flatten().collect();
@@ -251,9 +273,10 @@ impl Survey {
                     _ => 1.0,
                 },
                 moved: moved[sensor],
+                went_other_way: goes(sensor, 1 - side),
             }
         });
-        Ok(Findings { sensors: sensors.collect(), invert, raw_range })
+        Ok(Findings { sensors: sensors.collect(), invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT })
     }
 
     /// How far apart the raw values of all sensors were, at rest and pressed.
@@ -263,17 +286,6 @@ impl Survey {
         let all = at_rest.chain(pressed.flat_map(|pressed| [pressed.low, pressed.high]));
         let (low, high) = all.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         (f64::from(high) - f64::from(low)).max(0.0)
-    }
-
-    /// The raw value that at least three pressed sensors, and a tenth of them, went to and never beyond.
-    fn stop_of_many(&self, invert: bool, is_pressed: impl Fn(usize) -> bool) -> Option<f64> {
-        let ends = (0..self.ids.len()).filter(|&sensor| is_pressed(sensor));
-        let mut ends: Vec<f32> =
-            ends.map(|i| if invert { self.pressed[i].low } else { self.pressed[i].high }).collect();
-        ends.sort_by(f32::total_cmp);
-        let end = if invert { *ends.first()? } else { *ends.last()? };
-        let there = ends.iter().filter(|&&other| other == end).count();
-        (there >= 3 && 10 * there >= ends.len()).then(|| end.into())
     }
 }
 
@@ -367,12 +379,16 @@ impl Findings {
             (Some([low, high]), Some(baseline)) => baseline == if self.invert { low } else { high },
             _ => false,
         };
-        let kinds: [(&str, Vec<u32>); 5] = [
+        let kinds: [(&str, Vec<u32>); 6] = [
             ("delivered nothing at rest, and are masked", ids(&|found| found.baseline.is_none())),
             ("stand at the end of their range untouched, and are masked", ids(&at_its_end)),
             (
                 "were not pressed, and so have no travel",
-                ids(&|f| f.baseline.is_some() && f.travel.is_none() && !at_its_end(f) && !f.moved),
+                ids(&|f| f.baseline.is_some() && f.travel.is_none() && !self.is_lost(f)),
+            ),
+            (
+                "go to the other side than the rest of them, and are masked (were they pressed during the rest?)",
+                ids(&|found| found.went_other_way && !found.moved && !at_its_end(found)),
             ),
             ("moved at rest, and are masked", ids(&|found| found.moved && !at_its_end(found))),
             (
@@ -390,7 +406,7 @@ impl Findings {
     /// Whether nothing can be felt through `found`.
     fn is_lost(&self, found: &Found) -> bool {
         let end = self.raw_range.map(|[low, high]| if self.invert { low } else { high });
-        found.baseline.is_none() || found.moved || found.baseline == end
+        found.baseline.is_none() || found.moved || found.went_other_way || found.baseline == end
     }
 }
 
@@ -489,6 +505,59 @@ mod tests {
         (0..150).for_each(|n| all.rest(&values(&[press_of(600.0, 90)(n).round()])));
         (0..30).for_each(|_| all.press(&values(&[900.0])));
         assert!(all.finish(Wishes::default()).unwrap_err().to_string().contains("moved during the rest"));
+    }
+
+    /// Twelve sensors that rest at 600 and rise to at most 1023; the first is at 900 during all of the rest. `pressed` of them are
+    /// pressed, one after the other, the first last.
+    fn twelve(pressed: usize) -> Survey {
+        let mut survey = Survey::new(&(0..12).collect::<Vec<u32>>());
+        (0..100).for_each(|n| {
+            let noise = [0.0, 1.0, -1.0][n % 3];
+            survey.rest(&values(&[&[900.0 + noise][..], &[600.0 + noise; 11]].concat()));
+        });
+        for sensor in (0..pressed).rev() {
+            (0..9).for_each(|n| {
+                let mut row = [600.0; 12];
+                row[sensor] = if (2..7).contains(&n) { 1023.0 } else { 600.0 };
+                survey.press(&values(&row));
+            });
+        }
+        (0..9).for_each(|_| survey.press(&values(&[600.0; 12])));
+        survey
+    }
+
+    #[test]
+    fn one_sensor_that_was_pressed_during_the_rest_does_not_turn_the_others() {
+        let found = twelve(12).finish(Wishes::default()).unwrap();
+        assert!(!found.invert && found.sensors[0].went_other_way);
+        let masked = "1 of 12 sensors go to the other side than the rest of them, and are masked (were they pressed during the rest?): 0";
+        assert_eq!(found.remarks(), [masked]);
+        assert!(found.calibration("a").contains("[taxel.0]\nmask = true"));
+        // Nothing else was pressed: it says nothing of the others.
+        let why = twelve(0).finish(Wishes::default()).unwrap_err().to_string();
+        assert!(
+            why.starts_with("1 of 12 sensors left their rest, and fell without coming back: 0; they may have"),
+            "{why}"
+        );
+        // Nor does one that moved during the rest, and is masked.
+        let mut moved = twelve(0);
+        moved.rest[0] = (0..100).map(|n| if n < 60 { 900.0 } else { 600.0 }).collect();
+        let why = moved.finish(Wishes { mask_moved: true, ..Wishes::default() }).unwrap_err().to_string();
+        assert!(why.starts_with("no sensor left its rest"), "{why}");
+    }
+
+    #[test]
+    fn a_rest_above_the_way_that_is_left_has_a_calibration_without_bits() {
+        let found = twelve(12).finish(Wishes::default()).unwrap();
+        assert_eq!(found.raw_range, Some([0.0, 1023.0]));
+        let ids: Vec<u32> = (0..12).collect();
+        let read = somatic::Calibration::parse(&found.calibration("a"), &ids).unwrap();
+        assert_eq!((read.taxels[5].baseline, read.taxels[5].p_max, read.taxels[5].gain), (600.0, 422.5, 1.0));
+        let why = twelve(12).finish(Wishes { bits: Some(8), ..Wishes::default() }).unwrap_err();
+        assert!(
+            why.is_usage() && why.to_string().starts_with("raw values go from 600 to 1023, and a converter of 8 bits"),
+            "{why}"
+        );
     }
 
     #[test]

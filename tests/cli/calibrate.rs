@@ -59,6 +59,37 @@ fn a_survey_becomes_a_calibration_under_which_rest_is_nothing_and_a_press_is_fel
     done(&[&calibrate[..], &["--force"]].concat());
 }
 
+/// Twelve barometers that rest at 100000 and fall to 60000, and say 30000 where they have no reading.
+#[test]
+fn codes_that_are_no_reading_are_left_out_and_written_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let ids: Vec<String> = (0..12).map(|id| id.to_string()).collect();
+    let mut text = format!("t,{}\n", ids.join(","));
+    for n in 0..300 {
+        let row = (0..12).map(|sensor| match (n, n % 37 == 3 * sensor, n / 20 == sensor + 3) {
+            (_, true, _) => "30000".to_owned(),
+            (100.., false, true) => "60000".to_owned(),
+            _ => (100_000 + [0, 1, -1][n % 3]).to_string(),
+        });
+        text += &format!("{},{}\n", 0.02 * n as f64, row.collect::<Vec<_>>().join(","));
+    }
+    std::fs::write(at("codes.csv"), text).unwrap();
+    let (source, toml) = (at("codes.csv"), at("codes.toml"));
+    let first = ["calibrate", "--body", "hand", "--source", &source, "--rest", "1.2", "-o", &toml];
+    done(&[&first[..], &["--missing", "30000"]].concat());
+    let written = std::fs::read_to_string(&toml).unwrap();
+    assert!(written.contains("missing = [30000.0]") && written.contains("invert = true"), "{written}");
+    let run = ["run", "--body", "hand", "--source", &source, "--calibration", &toml, "--backend", "cpu"];
+    let all = frames(&done(&[&run[..], &["--outputs", "total", "--all-fields", "--verify"]].concat()));
+    let flagged = all.iter().filter(|frame| frame["fields"].to_string().contains("incomplete")).count();
+    assert_eq!(flagged, all.len(), "of a body of forty taxels, twelve deliver anything");
+    // A pressed sensor gives 40000; a code is nothing.
+    let totals = all.iter().flat_map(|frame| frame["fields"].as_array().unwrap()).filter_map(|f| f["total"].as_f64());
+    let largest = totals.fold(0.0, f64::max);
+    assert!((39_990.0..40_010.0).contains(&largest), "{largest}");
+}
+
 #[test]
 fn a_survey_that_says_nothing_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();

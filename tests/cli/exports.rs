@@ -83,6 +83,39 @@ fn what_is_known_of_an_export_is_said() {
     assert!(text.contains("682: left 341, right 341") && text.contains("unit        mmHg"), "{text}");
 }
 
+#[test]
+fn a_calibration_is_laid_over_that_of_an_export() {
+    let (folder, path) = file("dead.toml", "[all]\ndead_band = 2\n");
+    let asked = ["--source", INSOLES, "--calibration", text_of(&path), "--outputs", "force,total", "--sink", "-"];
+    let output = output(&[&["run", "--backend", "cpu", "--header"][..], &asked].concat());
+    let said = stderr(&output);
+    let stays = format!("somatic: {INSOLES}: of its own calibration, this stays under --calibration: unit = \"mmHg\"");
+    assert_eq!(said.matches(&stays).count(), 1, "{said}");
+    let lines = frames(&String::from_utf8(output.stdout).unwrap());
+    assert_eq!(lines[0]["units"], serde_json::json!({"total": "Pa", "force": "N"}));
+    let largest = |lines: &[Value]| {
+        let fields = lines.iter().filter_map(|line| line["fields"].as_array()).flatten();
+        fields.filter_map(|field| field["force"].as_f64()).fold(0.0, f64::max)
+    };
+    // The dead band takes single cells at the edge away, and no more.
+    let own = largest(&run(&["--source", INSOLES]));
+    assert!((0.9..=1.0).contains(&(largest(&lines) / own)) && own > 100.0);
+    // In a recording of it, too, both as it is converted and as it is read.
+    let recording = folder.path().join("dead.mcap");
+    done(&["convert", INSOLES, text_of(&recording), "--calibration", text_of(&path)]);
+    assert_eq!(run(&["--source", text_of(&recording), "--outputs", "force,total"]), lines[1..]);
+    let newton = folder.path().join("newton.toml");
+    std::fs::write(&newton, "[all]\nunit = \"N\"\n").unwrap();
+    let both =
+        ["run", "--source", text_of(&recording), "--calibration", text_of(&newton), "--backend", "cpu", "--sink", "-"];
+    let said = stderr(&super::output(&both));
+    assert!(said.contains("this stays under --calibration: dead_band = 2\n"), "{said}");
+    assert!(said.contains("--calibration replaces its unit mmHg by N"), "{said}");
+    // What is wrong with the file has its own line.
+    std::fs::write(&newton, "[all]\n\nunit = \"newtn\"\n").unwrap();
+    assert!(fails(1, &both).contains("newton.toml: line 3"), "{}", fails(1, &both));
+}
+
 /// `text` as an export of its own.
 fn changed(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     file("insoles.csv", text)

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DQuat, DVec3};
 use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
 use somatic::scene::Knobs;
-use somatic::{BackendKind, Body, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene};
+use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene};
 
 use crate::common::{Flat, backends, frame, ways};
 
@@ -265,6 +265,21 @@ fn a_missing_value_is_left_out_and_told() {
     }
     for p in on_every_backend(&body, &Frame::missing(0.0, 4)) {
         assert_eq!((p.total, p.flags), (None, Flags::INCOMPLETE | Flags::NO_CONTACT));
+    }
+}
+
+#[test]
+fn a_raw_value_that_is_no_reading_is_missing() {
+    let body = field(&SQUARE);
+    let calibration = Calibration::parse("[all]\nbaseline = 1\nmissing = [30000]", &[0, 1, 2, 3]).unwrap();
+    for (way, code, is_missing) in ways().into_iter().flat_map(|way| [(way, 30_000.0, true), (way, 30_001.0, false)]) {
+        let mut engine = Engine::new(&body, at_rest(way).calibration(Some(calibration.clone()))).unwrap();
+        let frames = [frame(0.0, &[3.0, code, 1.0, 3.0]), Frame::missing(0.1, 4)];
+        let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
+        assert!(agreement.holds(), "{way:?}: {agreement}");
+        let p = percepts.get(0, 0);
+        assert_eq!((p.total == Some(4.0), p.flags.contains(Flags::INCOMPLETE)), (is_missing, is_missing), "{way:?}");
+        assert!(!p.flags.contains(Flags::FAULTY_INPUT));
     }
 }
 

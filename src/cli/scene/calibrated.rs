@@ -1,13 +1,15 @@
 //! The calibration of a run, and the outputs that it can give.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::signal::Quantity;
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{Body, Calibration, Error, Outputs, Result};
 
 use super::RunOptions;
 use crate::cli::attached;
+use crate::cli::overlaid::{How, overlaid};
 
 impl RunOptions {
     /// The outputs that are asked for; if none are, those that `calibration` and what is read can give.
@@ -41,12 +43,32 @@ impl RunOptions {
         Ok(attached::calibration(&recording)?.map(|text| (recording, text)))
     }
 
+    /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or
+    /// a recording. A simulation's own is replaced.
+    pub(in crate::cli) fn calibration_text(&self) -> Result<Option<(PathBuf, String)>> {
+        let Some(path) = &self.calibration else { return self.own_calibration() };
+        let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
+        Ok(Some((path.clone(), self.over_own(path, given)?)))
+    }
+
+    /// The calibration `given`, at `path`, laid over the one that comes with what is read.
+    fn over_own(&self, path: &Path, given: String) -> Result<String> {
+        let Some((of, own)) = self.own_calibration()? else { return Ok(given) };
+        let is_replaced = matches!(self.first_source()?, Some(SourceSpec::Sim(_)));
+        let laid = overlaid(&of, &own, path, &given, if is_replaced { How::Replaced } else { How::Laid }, self.quiet)?;
+        Ok(if is_replaced { given } else { laid })
+    }
+
     /// The calibration that is named, or that comes with what is read, for `body`, whose taxels have `ids`.
     pub(super) fn calibration_for(&self, body: &Body, ids: &[u32]) -> Result<Option<Calibration>> {
         let load = |path: &PathBuf| {
-            let calibration = Calibration::load(path, ids)?;
+            let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
+            // Alone first, so that what is wrong with the file has its line.
+            let calibration = Calibration::parse(&given, ids).map_err(|e| e.at(path.display()))?;
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
-            Ok(calibration)
+            let text = self.over_own(path, given)?;
+            Calibration::parse(&text, ids)
+                .map_err(|e| e.at("laid over the calibration of what is read").at(path.display()))
         };
         let parse = |(path, text): (PathBuf, String)| {
             Calibration::parse(&text, ids).map_err(|e| e.at("its own calibration").at(path.display()))

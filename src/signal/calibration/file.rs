@@ -63,8 +63,10 @@ impl Calibration {
         let mut all = Draft::default();
         all.apply(&file.all, &names, text)?;
         let mut drafts = vec![all; ids.len()];
+        let mut missing = vec![file.all.missing(text)?.unwrap_or_default(); ids.len()];
         let mut named: Vec<_> = file.taxel.into_iter().collect();
         named.sort_by_key(|(id, _)| id.span().start);
+        let mut table_of = HashMap::new();
         for (id, keys) in named {
             let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
                 let made_for = file.body.as_ref().map_or(String::new(), |body| format!(" (the file is for `{body}`)"));
@@ -72,11 +74,25 @@ impl Calibration {
                 let what = format!("[taxel.{name}] names a taxel that the body does not have; remove it{made_for}");
                 text.wrong(id.span(), what)
             })?;
+            if let Some(before) = table_of.insert(index, id.get_ref().clone()) {
+                let what = format!(
+                    "[taxel.{}] is taxel {}, which has the table [taxel.{before}] already; keep one of the two",
+                    id.get_ref(),
+                    ids[index]
+                );
+                return Err(text.wrong(id.span(), what));
+            }
+            if let Some(codes) = keys.missing(text)? {
+                missing[index] = codes;
+            }
             drafts[index].apply(&keys, &names, text)?;
             only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
         }
         only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
         let taxels = drafts.into_iter().map(|draft| draft.finish(&curves, text)).collect::<Result<_>>()?;
+        if missing.iter().all(Vec::is_empty) {
+            missing.clear();
+        }
         check_checks(&file.checks)?;
         file.upkeep.check()?;
         // Sums and changes have the unit that holds for all.
@@ -87,7 +103,7 @@ impl Calibration {
         let change = file.change.read(text)?.times(factor);
         let skin = file.skin.map(|keys| keys.read(text)).transpose()?;
         let File { body, checks, upkeep, .. } = file;
-        Ok(Self { body, taxels, curves, contact, fields, change, checks, upkeep, skin })
+        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, upkeep, skin })
     }
 }
 
@@ -149,6 +165,33 @@ mod tests {
         assert!(why("[skin]\ngain_spread = 0.1").contains("sigma_m"));
         assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
         assert!(why("[change]\nfield = 3").starts_with("line 2"));
+    }
+
+    #[test]
+    fn raw_values_that_are_no_reading_are_listed_for_all_and_for_single_taxels() {
+        let read = |text: &str| Calibration::parse(text, &[3, 7]).map_err(|e| without_column(&e.to_string()));
+        let both = read("[all]\nmissing = [30000, -1]\n[taxel.7]\nmissing = [0.1]").unwrap();
+        assert_eq!(both.missing, [vec![30_000.0, -1.0], vec![0.1]]);
+        let value = crate::signal::RawValue::new;
+        assert!(both.is_no_reading(0, value(30_000.0)) && !both.is_no_reading(1, value(30_000.0)));
+        assert!(both.is_no_reading(1, value(0.1)), "as raw values are, in single precision");
+        assert!(read("[all]\nmissing = []\n[taxel.3]\ngain = 2").unwrap().missing.is_empty());
+        let why = |text: &str| read(text).unwrap_err();
+        assert_eq!(why("[all]\nmissing = [1, nan]"), "line 2: `missing` has NaN; its values must be finite raw values");
+        let many = format!("[all]\nmissing = {:?}", [1; 17]);
+        assert_eq!(why(&many), "line 2: `missing` has 17 values; it may have 16");
+    }
+
+    #[test]
+    fn a_taxel_has_one_table_however_its_id_is_written() {
+        for (first, second) in [("17", "017"), ("+17", "17")] {
+            let text = format!("[taxel.\"{first}\"]\nmask = true\n[taxel.\"{second}\"]\nmask = false\n");
+            let why = without_column(&Calibration::parse(&text, &[3, 17]).unwrap_err().to_string());
+            let right = format!(
+                "line 3: [taxel.{second}] is taxel 17, which has the table [taxel.{first}] already; keep one of the two"
+            );
+            assert_eq!(why, right);
+        }
     }
 
     #[test]

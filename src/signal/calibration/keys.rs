@@ -11,6 +11,9 @@ use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
 use crate::signal::unit::UnitOfP;
 
+/// Most raw values that `missing` may list: every value of every frame is compared with each.
+const MAX_MISSING: usize = 16;
+
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Keys {
@@ -23,12 +26,29 @@ pub(super) struct Keys {
     p_max: Option<Spanned<f64>>,
     raw_range: Option<Spanned<[f64; 2]>>,
     noise: Option<Spanned<f64>>,
+    missing: Option<Spanned<Vec<Spanned<f64>>>>,
     mask: Option<bool>,
     curve: Option<Spanned<String>>,
     sensor: Option<Spanned<String>>,
     tap: Option<Spanned<i64>>,
     signal: Option<Spanned<String>>,
     full_scale_newton: Option<Spanned<f64>>,
+}
+
+impl Keys {
+    /// The raw values that are no reading, in single precision as raw values are; `None` if the key is not given.
+    pub(super) fn missing(&self, text: Text<'_>) -> Result<Option<Vec<f32>>> {
+        let Some(codes) = &self.missing else { return Ok(None) };
+        if codes.get_ref().len() > MAX_MISSING {
+            let what = format!("`missing` has {} values; it may have {MAX_MISSING}", codes.get_ref().len());
+            return Err(text.wrong(codes.span(), what));
+        }
+        let code = |code: &Spanned<f64>| match *code.get_ref() {
+            raw if raw.abs() <= MAX_MAGNITUDE => Ok(raw as f32),
+            raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
+        };
+        codes.get_ref().iter().map(code).collect::<Result<_>>().map(Some)
+    }
 }
 
 /// `[curve.NAME]`.
