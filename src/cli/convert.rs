@@ -121,6 +121,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         }
     };
     let Copied { frames, posed, last_s, is_whole } = copy(&mut *source, &mut target)?;
+    source.notices().iter().for_each(|notice| say(notice));
     let is_csv = matches!(target, Target::Csv(_));
     if !is_whole {
         let absent = match target {

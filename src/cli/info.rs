@@ -52,6 +52,8 @@ struct Known {
     attached: Vec<Attached>,
     has_end: bool,
     losses: Vec<String>,
+    /// What was understood of a table.
+    notes: Vec<String>,
     /// Of a pressure system's export.
     layout: Option<Layout>,
     /// Of a recording that has its body.
@@ -82,6 +84,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 attached: reader.attached().to_vec(),
                 has_end: reader.has_end(),
                 losses,
+                notes: Vec::new(),
                 layout: None,
                 contacts,
                 survey,
@@ -112,6 +115,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     };
     drop(bar);
     print(&if arguments.json { format!("{}\n", as_json(&known)) } else { text(&arguments.recording, &known) })?;
+    known.notes.iter().for_each(|note| say(note));
     Ok(ended(&known.losses))
 }
 
@@ -143,8 +147,9 @@ fn of_frames(
     if let Some(contacts) = &mut contacts {
         contacts.finish()?;
     }
-    let losses = source.losses();
+    let (losses, notes) = (source.losses(), source.notices());
     Ok(Known {
+        notes,
         kind,
         bytes,
         taxels: source.taxels().len(),
@@ -192,7 +197,7 @@ fn duration_s(rhythm: &Rhythm) -> Option<f64> {
 }
 
 fn as_json(known: &Known) -> Value {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts, notes } = known;
     let rhythm = &survey.rhythm;
     let topics: Vec<Value> = survey
         .topics
@@ -208,7 +213,7 @@ fn as_json(known: &Known) -> Value {
             "seconds": between_s(gap[1], gap[1] + gap[0]), "after": gap[1],
         })),
         "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
-        "ended": has_end, "losses": losses,
+        "ended": has_end, "losses": losses, "notes": notes,
         "fields": contacts.as_ref().map(Contacts::as_json),
         "unit": layout.as_ref().map(|layout| layout.unit.symbol()),
         "panels": layout.as_ref().map(|layout| layout.panels.iter().map(|panel| json!({
@@ -219,7 +224,7 @@ fn as_json(known: &Known) -> Value {
 }
 
 fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts } = known;
+    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts, .. } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", style(name).bold());
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");

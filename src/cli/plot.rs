@@ -186,5 +186,6 @@ fn gather(
         gatherer.see(&engine, &frames);
         bar.show(source.progress().unwrap_or(0.0));
     }
+    source.notices().iter().for_each(|notice| say(notice));
     Ok((Some(gatherer.finish()), source.losses()))
 }

@@ -1,9 +1,10 @@
-//! Recordings as CSV: a header `t,<taxel id>,<taxel id>,...`, then a row a frame.
+//! Recordings as CSV: a header `t,<taxel id>,<taxel id>,...`, then a row a frame. The unit of `t` is seconds unless its head says
+//! another, as `t [ms]` does, or the first time is one of our days in another unit or of the calendar.
 //!
 //! A blank cell is a missing value; `nan` and `inf` are faulty values. A pair of quotes around a cell is ignored; any other
 //! quote is an error. Rows are read one at a time, so memory does not grow with the length of a recording.
 
-use std::collections::HashMap;
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -11,6 +12,9 @@ use std::path::Path;
 use csv::{ByteRecord, ErrorKind};
 
 use super::Source;
+use super::csv_cells::{number, shortened, trimmed};
+use super::csv_header::{self, Header};
+use super::time_column::TimeColumn;
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
 
@@ -23,25 +27,31 @@ pub struct CsvSource {
     reader: csv::Reader<LimitedReader>,
     total_bytes: Option<u64>,
     row: ByteRecord,
+    /// The number of the row's line.
+    line: u64,
+    /// Rows that were looked at before their turn, with the numbers of their lines.
+    ahead: VecDeque<(ByteRecord, u64)>,
     taxels: Vec<u32>,
+    /// Columns that are no sensor, from 0, ascending.
+    left_out: Vec<usize>,
     time: Time,
     frames: u64,
+    notices: Vec<String>,
     losses: Vec<String>,
 }
 
-#[derive(Clone, Copy)]
 enum Time {
     /// The first column.
-    Column,
+    Column(TimeColumn),
     /// Frames come at this rate, the first at 0.
     Rate(f64),
 }
 
 impl Time {
     /// Columns before the first taxel's.
-    fn columns(self) -> usize {
+    fn columns(&self) -> usize {
         match self {
-            Self::Column => 1,
+            Self::Column(_) => 1,
             Self::Rate(_) => 0,
         }
     }
@@ -83,9 +93,13 @@ impl CsvSource {
             reader,
             total_bytes,
             row: ByteRecord::new(),
+            line: 0,
+            ahead: VecDeque::new(),
             taxels: Vec::new(),
-            time: Time::Column,
+            left_out: Vec::new(),
+            time: Time::Rate(1.0),
             frames: 0,
+            notices: Vec::new(),
             losses: Vec::new(),
         };
         source.read_header(rate_hz).map_err(|e| e.at(&source.name))?;
@@ -96,38 +110,38 @@ impl CsvSource {
         if !self.read_row()? {
             return Err(Error::failed("the file is empty; its first row should be `t,<taxel id>,<taxel id>,...`"));
         }
-        let has_time = trimmed(self.row.get(0).unwrap_or_default()).eq_ignore_ascii_case(b"t");
-        self.time = match (has_time, rate_hz) {
-            (true, None) => Time::Column,
-            (true, Some(_)) => {
-                return Err(Error::usage("the recording has its own times in column `t`; leave out --rate"));
+        let row = self.row.clone();
+        if csv_header::is_doubtful(&row) {
+            while self.ahead.len() < csv_header::ROWS_BELOW && self.read_row_anew()? {
+                self.ahead.push_back((self.row.clone(), self.line));
             }
-            (false, Some(rate)) if rate.is_finite() && rate > 0.0 => Time::Rate(rate),
-            (false, Some(rate)) => {
+        }
+        let below: Vec<ByteRecord> = self.ahead.iter().map(|(row, _)| row.clone()).collect();
+        let Header { time, taxels, left_out, notes } = csv_header::read(&row, &below, rate_hz.is_some())?;
+        self.time = match (time, rate_hz) {
+            (Some(column), _) => Time::Column(column),
+            (None, Some(rate)) if rate.is_finite() && rate > 0.0 => Time::Rate(rate),
+            (None, rate) => {
+                let rate = rate.unwrap_or_default();
                 return Err(Error::usage(format!("--rate {rate} is not a frame rate; give a positive number of Hz")));
             }
-            (false, None) => Time::Column,
         };
-        let mut columns = HashMap::new();
-        for (index, cell) in self.row.iter().enumerate().skip(usize::from(has_time)) {
-            let id = header_id(index + 1, cell)?;
-            if let Some(first) = columns.insert(id, index + 1) {
-                return Err(failed!("taxel {id} heads columns {first} and {}; give each taxel one column", index + 1));
-            }
-            self.taxels.push(id);
-        }
-        // Checked last, so that a file without any header gets the header's message.
-        if !has_time && rate_hz.is_none() {
-            return Err(Error::usage("the recording has no column `t`; give its frame rate with --rate HZ"));
-        }
-        if self.taxels.is_empty() {
-            return Err(Error::failed("the header names no taxel; it should be `t,<taxel id>,<taxel id>,...`"));
-        }
+        (self.taxels, self.left_out) = (taxels, left_out);
+        self.notices = notes;
         Ok(())
     }
 
     /// Reads the next row that is not blank. `false` at the end.
     fn read_row(&mut self) -> Result<bool> {
+        if let Some((row, line)) = self.ahead.pop_front() {
+            (self.row, self.line) = (row, line);
+            return Ok(true);
+        }
+        self.read_row_anew()
+    }
+
+    /// The same from the file.
+    fn read_row_anew(&mut self) -> Result<bool> {
         loop {
             self.reader.get_mut().row_bytes = 0;
             let read = self.reader.read_byte_record(&mut self.row).map_err(|e| match e.into_kind() {
@@ -138,13 +152,14 @@ impl CsvSource {
                 other => failed!("{other:?}"),
             })?;
             if !(read && self.row.len() == 1 && trimmed(&self.row[0]).is_empty()) {
+                self.line = self.line_just_read();
                 return Ok(read);
             }
         }
     }
 
     /// The line number of the row just read; the reader counts blank lines before it as part of the row.
-    fn line(&self) -> u64 {
+    fn line_just_read(&self) -> u64 {
         let read = self.reader.get_ref();
         self.reader.position().line() - u64::from(!(read.ended && read.last_byte != b'\n'))
     }
@@ -155,7 +170,8 @@ impl CsvSource {
             return None;
         }
         let (index, cell) = self.row.iter().enumerate().find(|(_, cell)| trimmed(cell).contains(&b'"'))?;
-        let taxel = index.checked_sub(self.time.columns()).and_then(|index| self.taxels.get(index));
+        let before = self.time.columns() + self.left_out.iter().filter(|&&left_out| left_out < index).count();
+        let taxel = index.checked_sub(before).and_then(|index| self.taxels.get(index));
         let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
         let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
         Some(failed!("`{word}` has a quote; numbers stand without quotes: remove it").at(place))
@@ -165,8 +181,12 @@ impl CsvSource {
         if !self.read_row()? {
             return Ok(false);
         }
-        let (found, wanted) = (self.row.len(), self.time.columns() + self.taxels.len());
-        let line = self.line();
+        let wanted = self.time.columns() + self.taxels.len() + self.left_out.len();
+        // Many programs end a row with a comma.
+        if self.row.len() > wanted && self.row.iter().skip(wanted).all(|cell| trimmed(cell).is_empty()) {
+            self.row.truncate(wanted);
+        }
+        let (found, line) = (self.row.len(), self.line);
         let at_line = |e: Error| e.at(format!("line {line}"));
         let quote = self.stray_quote();
         if found != wanted {
@@ -186,12 +206,35 @@ impl CsvSource {
         frame.clear();
         frame.values.resize(self.taxels.len(), RawValue::MISSING);
         let mut cells = self.row.iter();
-        frame.t_s = match self.time {
-            Time::Column => parse_time(cells.next().unwrap_or_default()).map_err(at_line)?,
-            Time::Rate(rate) => self.frames as f64 / rate,
+        frame.t_s = match &mut self.time {
+            Time::Column(column) => {
+                let word = trimmed(cells.next().unwrap_or_default());
+                column.read(&String::from_utf8_lossy(word), number(word)).map_err(at_line)?
+            }
+            Time::Rate(rate) => self.frames as f64 / *rate,
         };
-        for ((value, cell), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
+        let set = |value: &mut RawValue, cell: &[u8], id: &u32| -> Result<()> {
             *value = parse_value(cell).map_err(|e| at_line(e.at(format!("taxel {id}"))))?;
+            Ok(())
+        };
+        if self.left_out.is_empty() {
+            for ((value, cell), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
+                set(value, cell, id)?;
+            }
+        } else {
+            let first = self.time.columns();
+            let cells = cells.enumerate().filter(|(index, _)| self.left_out.binary_search(&(index + first)).is_err());
+            for ((value, (_, cell)), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
+                set(value, cell, id)?;
+            }
+        }
+        if let Time::Column(column) = &mut self.time {
+            if self.frames == 0
+                && let Some(unit) = column.found_out()
+            {
+                self.notices.push(format!("column 1 is read as times in {}, by the first one", unit.symbol()));
+            }
+            self.notices.extend(column.doubt());
         }
         self.frames += 1;
         Ok(true)
@@ -212,51 +255,19 @@ impl Source for CsvSource {
         Some((self.reader.position().byte() as f64 / total as f64).min(1.0))
     }
 
+    fn notices(&mut self) -> Vec<String> {
+        self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
+    }
+
     fn losses(&self) -> Vec<String> {
         self.losses.clone()
     }
-}
-
-/// The taxel id that heads column `column`, counted from 1.
-fn header_id(column: usize, cell: &[u8]) -> Result<u32> {
-    let word = String::from_utf8_lossy(trimmed(cell));
-    if let Ok(id) = word.parse() {
-        return Ok(id);
-    }
-    let remedy = if cell.starts_with(b"\xFF\xFE") || cell.starts_with(b"\xFE\xFF") {
-        "the file is UTF-16; save it as UTF-8"
-    } else if word.contains('"') {
-        "ids stand without quotes: remove the quote"
-    } else if word.contains([';', '\t']) {
-        "columns are separated by commas"
-    } else if word.contains('\r') {
-        "lines should end with a newline"
-    } else if word.eq_ignore_ascii_case("t") {
-        "t is the first column, and there is one"
-    } else if word.parse::<f64>().is_ok() {
-        "the first row should be the header `t,<taxel id>,<taxel id>,...`"
-    } else {
-        "the header is `t,<taxel id>,<taxel id>,...`, and ids are whole numbers"
-    };
-    Err(failed!("column {column} is headed `{}`, which is not a taxel id; {remedy}", shortened(&word)))
 }
 
 /// Whether `line` looks like CSV: `t`, numbers and blanks, separated by commas.
 pub(super) fn is_csv_row(line: &[u8]) -> bool {
     let is_cell = |cell: &[u8]| matches!(trimmed(cell), b"" | b"t") || number(trimmed(cell)).is_some();
     line.contains(&b',') && line.split(|&byte| byte == b',').all(is_cell)
-}
-
-fn parse_time(cell: &[u8]) -> Result<f64> {
-    let word = trimmed(cell);
-    match number(word) {
-        Some(t) if t.is_finite() => Ok(t),
-        _ if word.is_empty() => Err(Error::failed("t is blank; every row needs its time in seconds")),
-        _ => Err(failed!(
-            "t is `{}`; it should be a finite number of seconds",
-            shortened(&String::from_utf8_lossy(word))
-        )),
-    }
 }
 
 fn parse_value(cell: &[u8]) -> Result<RawValue> {
@@ -281,29 +292,6 @@ fn short_count(cell: &[u8]) -> Option<u32> {
         return None;
     }
     cell.iter().try_fold(0, |count, byte| byte.is_ascii_digit().then(|| count * 10 + u32::from(byte - b'0')))
-}
-
-/// Parses a number; `nan`, `inf` and `-inf` in any case are accepted.
-fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
-}
-
-/// `cell` without surrounding blanks and a pair of quotes.
-fn trimmed(cell: &[u8]) -> &[u8] {
-    match cell.trim_ascii() {
-        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
-        bare => bare,
-    }
-}
-
-/// As much of `word` as fits in a message.
-fn shortened(word: &str) -> String {
-    let short: String = word.chars().take(40).flat_map(char::escape_debug).collect();
-    let mut short = short.replace("\\\"", "\"");
-    if word.chars().nth(40).is_some() {
-        short.push('…');
-    }
-    short
 }
 
 /// A reader that limits the length of rows and knows whether the file ends with a newline.
@@ -405,6 +393,79 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_where_the_header_should_be_is_found_out() {
+        let usage = |text: &str, rate: Option<f64>| {
+            let error = read(text, rate).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+            error.to_string()
+        };
+        let frame = "a.csv: row 1 is a frame of";
+        for rate in [None, Some(10.0)] {
+            assert!(usage("512,300,10,7\n500,310,12,6\n490,311,13,5\n", rate).starts_with(frame));
+            assert!(
+                usage("0.0,1.5,2\n0.1,1,2\n0.2,1,3\n", rate)
+                    .contains("add --grid 1x2, which reads column 1 as the time and 2 sensors")
+            );
+            assert!(usage("5,5,0,0\n5,5,0,1\n", rate).contains("add --grid 2x2, which reads 4 sensors"));
+            assert!(
+                usage("5,5,0,walk\n5,5,1,walk\n", rate)
+                    .contains("--grid 1x3, which reads 3 sensors and leaves the words")
+            );
+            assert!(usage("2024-02-29T12:30:15Z,5,6\n", rate).contains("--grid 1x2, which reads column 1 as the time"));
+        }
+        assert!(usage("0.5,1,2\n", None).contains("give --rate HZ, and add"));
+        let eighty_one = vec!["7"; 81].join(",");
+        assert!(usage(&format!("{eighty_one}\n{eighty_one}\n"), None).contains("--grid 9x9"));
+        // Ids are ids, and it is said that they are taken for them.
+        for ids in ["4,7\n", "7,4\n"] {
+            let mut source = open(&format!("{ids}1,2\n3,4\n"), Some(20.0)).unwrap();
+            let said = source.notices();
+            assert!(
+                said.len() == 1
+                    && said[0].ends_with("is read as the taxels' ids; if it is a frame, --grid 1x2 reads it as one")
+            );
+            assert_eq!((source.taxels().len(), source.notices().len()), (2, 0));
+        }
+        assert!(open("t,4,7\n1,2,3\n", None).unwrap().notices().is_empty());
+    }
+
+    #[test]
+    fn columns_beside_the_sensors_and_commas_at_the_end_of_rows_are_no_values() {
+        let mut source = open("t,4,label,7,total\n0,1,walk,2,3\n1,3,,4,7,\n", None).unwrap();
+        assert_eq!(source.taxels(), [4, 7]);
+        let said = source.notices();
+        assert!(said[0].contains("column 3 (`label`) is no taxel and is left out") && said.len() == 2, "{said:?}");
+        let mut frame = Frame::missing(0.0, 2);
+        for values in ["[1, 2]", "[3, 4]"] {
+            assert!(source.next_frame(&mut frame).unwrap());
+            assert_eq!(format!("{:?}", frame.values), values);
+        }
+        assert!(why("t,4,label,7\n0,1,a,x\n1,2,b,3\n", None).starts_with("a.csv: line 2: taxel 7: `x` is no number"));
+        assert!(why("t,4,label,7\n0,1,a,2\"\n", None).starts_with("a.csv: line 2: column 4 (taxel 7)"));
+    }
+
+    #[test]
+    fn times_are_in_the_unit_of_their_head_or_of_their_size() {
+        let times = |text: &str| {
+            let mut source = open(text, None).unwrap();
+            let mut frame = Frame::missing(0.0, source.taxels().len());
+            let mut times = Vec::new();
+            while source.next_frame(&mut frame).unwrap() {
+                times.push(frame.t_s);
+            }
+            (times, source.notices().len())
+        };
+        assert_eq!(times("t [ms],4\n1000,1\n1050,1\n"), (vec![1.0, 1.05], 0));
+        assert_eq!(times("millis,4\n1000,1\n1050,1\n"), (vec![1.0, 1.05], 0));
+        assert_eq!(times("time,4\n0.5,1\n0.6,1\n"), (vec![0.5, 0.6], 0));
+        // What nobody said is told.
+        assert_eq!(times("t,4\n1768494979568,1\n1768494979584,1\n"), (vec![1_768_494_979.568, 1_768_494_979.584], 1));
+        assert_eq!(times("timestamp,4\n1970-01-01T00:00:01Z,1\n1970-01-01T00:00:01.5Z,1\n"), (vec![1.0, 1.5], 1));
+        assert_eq!(times("t,4\n1000,1\n1050,1\n1100,1\n"), (vec![1000.0, 1050.0, 1100.0], 1));
+        assert!(why("t [min],4\n1,1\n", None).contains("column 1: `t [min]` has no unit"));
+    }
+
+    #[test]
     fn a_ragged_last_row_is_a_loss_and_any_other_an_error() {
         for text in ["t,4,7\n0,1,2\n1,3", "t,4,7\n0,1,2\n1,3\n", "t,4,7\n0,1,2\n1,\"3"] {
             let (frames, losses) = read(text, None).unwrap();
@@ -446,7 +507,14 @@ mod tests {
         assert!(why("t,4,t\n", None).contains("first column"));
         assert!(why("t;4;7\n", None).contains("commas"));
         assert!(why("t,4\r0,1\r", None).contains("newline"));
-        assert!(why("0.0,1.5,2\n0.1,1,2\n", None).contains("first row should be the header"));
+        assert!(
+            why("t,4,a b\n0,1,2\n", None)
+                .ends_with("and remove the other columns; if they all are sensors, add --grid 1x2")
+        );
+        assert!(
+            why("File:,a\nUnits:,b\n1,2\n", None)
+                .contains("the header is `t,<taxel id>,<taxel id>,...`: head each sensor")
+        );
         let error = CsvSource::from_reader("a.csv", &b"\xFF\xFEt\0,\x004\0\n\0"[..], None, None);
         assert!(error.err().unwrap().to_string().contains("UTF-16"));
     }

@@ -87,7 +87,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_reads_back_bit_for_bit(t_s in -1e12..1e12_f64, values in prop::collection::vec(any::<f32>(), 1..40)) {
+        fn what_is_written_reads_back_bit_for_bit(t_s in -9e11..9e11_f64, values in prop::collection::vec(any::<f32>(), 1..40)) {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.csv");
             let ids: Vec<u32> = (0..values.len() as u32).collect();

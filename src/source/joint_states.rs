@@ -56,7 +56,8 @@ impl JointStates {
             return Err(Error::failed("it has no joints; write a CSV under t,<joint>,...").at(path.display()));
         }
         if states.span_s().is_none() {
-            return Err(Error::failed("it has no states, only a header").at(path.display()));
+            return Err(Error::failed("it has no states, only a header; write a row for each state under it")
+                .at(path.display()));
         }
         Ok(states)
     }
@@ -95,7 +96,7 @@ impl JointStates {
         }
         for name in header.iter().skip(1) {
             if self.index_of.contains_key(name) {
-                return Err(failed!("two columns are called `{name}`").at("header"));
+                return Err(failed!("two columns are called `{name}`; give each joint one").at("header"));
             }
             self.joint(name.to_owned());
         }

@@ -5,8 +5,11 @@
 mod bag_name;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 mod boards;
+mod column_names;
 mod csv;
+mod csv_cells;
 mod csv_file;
+mod csv_header;
 mod joint_states;
 #[cfg(feature = "zenoh")]
 mod limbs;
@@ -22,6 +25,7 @@ pub(crate) mod send_rate;
 mod serial;
 mod simulated;
 mod spec;
+mod time_column;
 mod unknown_taxels;
 mod vendor;
 

@@ -20,6 +20,9 @@ use crate::signal::{Frame, Pose, RawValue};
 /// Longest accepted line, so that invalid input does not fill the memory.
 const MAX_LINE_BYTES: u64 = 64 << 20;
 
+/// A frame, for messages.
+const EXAMPLE: &str = "{\"t\":0.5,\"values\":{\"7\":12}}";
+
 /// Frames read from NDJSON.
 pub struct NdjsonSource {
     name: String,
@@ -146,11 +149,7 @@ fn explained(error: &serde_json::Error, line: u64) -> Error {
     let text = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());
     let what = text.strip_suffix(&place).unwrap_or(&text);
-    let what = if error.is_data() {
-        what.to_owned()
-    } else {
-        format!("{what}; a frame is one line like {{\"t\":0.5,\"values\":{{\"7\":12}}}}")
-    };
+    let what = if error.is_data() { what.to_owned() } else { format!("{what}; a frame is one line like {EXAMPLE}") };
     Error::failed(what).at(format!("line {line}, column {}", error.column()))
 }
 
@@ -206,7 +205,9 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
             }
         }
         if !has_time {
-            return Err(A::Error::custom("the frame has no `t`; give its time in seconds"));
+            return Err(A::Error::custom(
+                "the frame has no `t`; give its time in seconds, as in {\"t\":0.5,\"values\":{\"7\":12}}",
+            ));
         }
         Ok(())
     }
@@ -246,9 +247,9 @@ impl Visitor<'_> for KeyVisitor {
             "values" => Ok(Key::Values),
             "pose" => Ok(Key::Pose),
             "joints" => Ok(Key::Joints),
-            other => {
-                Err(E::custom(format!("a frame has no `{other}`; its keys are `t`, `values`, `pose` and `joints`")))
-            }
+            other => Err(E::custom(format!(
+                "a frame has no `{other}`; its keys are `t`, `values`, `pose` and `joints`, as in {EXAMPLE}: put the sensors under `values`, by taxel id"
+            ))),
         }
     }
 }
@@ -295,7 +296,9 @@ impl Visitor<'_> for IdVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<u32, E> {
-        key.parse().map_err(|_| E::custom(format!("`{key}` is not a taxel id; ids are whole numbers in quotes")))
+        key.parse().map_err(|_| {
+            E::custom(format!("`{key}` is not a taxel id; ids are whole numbers in quotes, as in {EXAMPLE}"))
+        })
     }
 }
 

@@ -116,6 +116,38 @@ fn a_calibration_is_laid_over_that_of_an_export() {
     assert!(fails(1, &both).contains("newton.toml: line 3"), "{}", fails(1, &both));
 }
 
+#[test]
+fn what_was_understood_of_a_plain_table_is_said_in_a_line() {
+    let rows = "millis,a,b,c,d\n1000,512,300,10,7\n1050,500,310,12,6\n1100,500,310,12,6\n";
+    let (_folder, path) = file("millis.csv", rows);
+    let grid = ["--grid", "2x2", "--pitch", "5mm"];
+    let understood = format!("somatic: {}: column 1: the time in ms; columns 2 to 5: a 2 × 2 grid\n", path.display());
+    let info = output(&[&["info", text_of(&path), "--json"][..], &grid].concat());
+    assert_eq!((info.status.code(), stderr(&info)), (Some(0), understood.clone()));
+    let known: Value = serde_json::from_slice(&info.stdout).unwrap();
+    assert_eq!((&known["frames"], known["duration"].as_f64()), (&3.into(), Some(0.1)), "{known}");
+    let asked = [&["run", "--backend", "cpu", "--source", text_of(&path), "--outputs", "speed"][..], &grid].concat();
+    let ran = output(&asked);
+    assert_eq!((ran.status.code(), stderr(&ran)), (Some(0), understood));
+    // Without flags, the way out is named.
+    let why = fails(1, &["info", text_of(&path)]);
+    assert!(why.contains("column 2 is headed `a`") && why.contains("--grid 2x2") && why.lines().count() == 1, "{why}");
+    // A frame in place of a header, and ids in place of a frame.
+    let (_folder, path) = file("headless.csv", "512,300,10,7\n500,310,12,6\n490,311,13,5\n");
+    let why = fails(2, &["info", text_of(&path)]);
+    assert!(why.contains("give --rate HZ, and add --grid 2x2") && why.lines().count() == 1, "{why}");
+    let known: Value =
+        serde_json::from_str(&done(&["info", text_of(&path), "--rate", "10", "--grid", "2x2", "--json"])).unwrap();
+    assert_eq!(known["frames"], 3);
+    let (_folder, path) = file("headless.csv", "1,2,3,4\n512,300,10,7\n");
+    let said = output(&["info", text_of(&path), "--rate", "10"]);
+    assert!(
+        stderr(&said).contains("row 1 (1,2,3,4) is read as the taxels' ids; if it is a frame, --grid 2x2"),
+        "{}",
+        stderr(&said)
+    );
+}
+
 /// `text` as an export of its own.
 fn changed(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     file("insoles.csv", text)

@@ -135,7 +135,7 @@ fn an_exact_tie_goes_to_the_lowest_ids() {
 #[test]
 fn all_saturated_still_answers() {
     let body = field(&[[-0.5, 0.0], [0.0, 0.0], [0.5, 0.0]]);
-    let calibration = somatic::Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
+    let calibration = Calibration::parse("[all]\np_max = 100", &[0, 1, 2]).unwrap();
     for way in ways() {
         let options = at_rest(way).calibration(calibration.clone());
         let mut engine = Engine::new(&body, options).unwrap();

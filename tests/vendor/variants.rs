@@ -55,6 +55,11 @@ fn numbers(values: &[RawValue]) -> Vec<Option<f64>> {
     values.iter().map(|value| value.number().map(|value| f64::from(value as f32))).collect()
 }
 
+/// Values that are all there.
+fn singles(values: &[RawValue]) -> Vec<f32> {
+    values.iter().map(|value| value.number().unwrap() as f32).collect()
+}
+
 /// The values of `frame` of a grid, as single precision holds them.
 fn grid(frame: usize, sensor: usize, [rows, columns]: [usize; 2]) -> Vec<Option<f64>> {
     let at = |cell: usize| value(frame, sensor, cell / columns, cell % columns);
@@ -235,6 +240,54 @@ fn plain_matrices_are_read_by_line_and_by_block() {
     assert!(read_bytes("a.txt", b"1 2 3\n", &wrong).unwrap_err().to_string().contains("correct --grid"));
     let none = VendorOptions { format: Some(VendorFormat::Matrix), grid: None, ..options };
     assert!(read_bytes("a.txt", b"1 2 3\n", &none).unwrap_err().is_usage());
+}
+
+#[test]
+fn columns_of_a_plain_table_that_are_no_sensors_are_recognised_or_refused() {
+    let read = |text: &str, grid: [u32; 2]| {
+        let options = VendorOptions { grid: Some(grid), ..VendorOptions::default() };
+        read_bytes("a.txt", text.as_bytes(), &options).map_err(|e| {
+            assert!(e.to_string().lines().count() == 1 && e.is_usage(), "{e}");
+            e.to_string()
+        })
+    };
+    let times =
+        |text: &str, grid| -> Vec<f64> { read(text, grid).unwrap().frames.iter().map(|(t_s, _)| *t_s).collect() };
+    // The unit of the time is that of its name, or of a line above the table, or of the calendar.
+    let millis = "millis,a,b,c,d\n1000,512,300,10,7\n1050,500,310,12,6\n1100,500,310,12,6\n";
+    assert_eq!(times(millis, [2, 2]), [1.0, 1.05, 1.1]);
+    let plain = millis.split_once('\n').unwrap().1;
+    assert_eq!(times(&format!("t [ms]\n{plain}"), [2, 2]), [1.0, 1.05, 1.1]);
+    assert_eq!(times(&format!("t [s]\n{plain}"), [2, 2]), [1000.0, 1050.0, 1100.0]);
+    assert_eq!(times(&format!("t [ms]\n{}", plain.replace(',', " ")), [2, 2]), [1.0, 1.05, 1.1]);
+    assert!(read(plain, [2, 2]).unwrap_err().contains("column 1 is the time and rises by 50 a line"));
+    let calendar = "1970-01-01T00:00:01Z,512,300\n1970-01-01T00:00:01.5Z,500,310\n";
+    assert_eq!(times(calendar, [1, 2]), [1.0, 1.5]);
+    assert_eq!(times("1768494979568 5 6\n1768494979584 5 6\n", [1, 2]), [1_768_494_979.568, 1_768_494_979.584]);
+    assert!(read(millis, [1, 5]).unwrap_err().contains("column 1 is the time; correct --grid, as to 2x2"));
+
+    // A label is no sensor, in words or in numbers.
+    let labelled = "0.0 512 300 10 walk\n0.1 500 310 12 walk\n0.2 500 310 12 run\n";
+    let all = read(labelled, [1, 3]).unwrap();
+    assert_eq!(singles(&all.frames[2].1), [500.0, 310.0, 12.0]);
+    let rate = VendorOptions { grid: Some([1, 3]), rate_hz: Some(10.0), ..VendorOptions::default() };
+    let numbered = "512 300 10 2\n500 310 12 2\n490 311 12 2\n";
+    let all = read_bytes("a.txt", numbered.as_bytes(), &rate).unwrap();
+    assert_eq!((all.frames[2].0, singles(&all.frames[0].1)), (0.2, vec![512.0, 300.0, 10.0]));
+    assert!(
+        read("512 300 10 20\n500 310 12 21\n490 311 12 25\n", [1, 3]).unwrap_err().contains("a line has 4 columns")
+    );
+
+    // Totals are left out, and refused as sensors.
+    let row = |t: &str, first: f64| {
+        format!("{t}\t{first}\t87.34\t91.08\t24.09\t163.9\t79.86\t{:.2}\t{:.2}\n", first + 178.42, 267.85)
+    };
+    let gait = [row("0.00", 199.1), row("0.01", 199.1), row("0.02", 197.12)].concat();
+    let all = read(&gait, [1, 6]).unwrap();
+    assert_eq!(singles(&all.frames[2].1), [197.12, 87.34, 91.08, 24.09, 163.9, 79.86]);
+    let why = read(&gait, [2, 4]).unwrap_err();
+    let known = "column 1 is the time, and columns 8 and 9 are the totals of columns 2 to 4 and of columns 5 to 7";
+    assert!(why.contains(known) && why.contains("as to 2x3"), "{why}");
 }
 
 /// `SOMATIC_WRITE_EXAMPLES=1` writes it anew.

@@ -70,6 +70,7 @@ pub(super) fn calibrate(
         }
     }
     survey.add(&frames)?;
+    source.notices().iter().for_each(|notice| say(notice));
     drop(bar);
     let mut bar = Bar::new("fitted");
     let mut estimate = survey

@@ -11,6 +11,7 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Result, Scene};
 use super::super::bar::Bar;
 use super::super::input::Input;
 use super::super::scene::RunOptions;
+use super::super::stdio::say;
 
 /// Endings of recordings, which bodies do not have.
 const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"];
@@ -110,6 +111,7 @@ impl Flags {
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
         let moments = Moments::of(&mut engine, body, fields, times, &input.name, frames)?;
+        source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
         let pictures = moments.draw(body, fields, options, ids, |share| {
             bar.show_with_time_left(share);

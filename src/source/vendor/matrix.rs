@@ -1,7 +1,9 @@
-//! Plain matrices: a line for each frame with all its cells, row by row, and the time before them or not; or a block of rows
-//! for each frame, with whatever between blocks. What the file does not say is given: rows and columns, pitch, rate, unit.
+//! Plain matrices: a line for each frame with all its cells, row by row, and the time before them or not, totals and a
+//! label after them or not ([`Columns`]); or a block of rows for each frame, with whatever between blocks. What the file does not say is given: rows and columns, pitch, rate, unit.
 
+use super::super::time_column::TimeColumn;
 use super::layout::{Grid, Layout, next_value};
+use super::matrix_columns::{Columns, begins_row, is_row, recognise};
 use super::parser::{Parser, Rate};
 use super::text::Separator;
 use crate::error::{Result, failed};
@@ -14,6 +16,11 @@ pub(super) struct Matrix {
     unit: UnitOfP,
     rate: Rate,
     shape: Option<Shape>,
+    /// What the first rows showed.
+    columns: Option<Columns>,
+    time: TimeColumn,
+    /// Whether a row has been seen.
+    has_begun: bool,
     /// The next row of a block.
     row: u32,
     values: Vec<RawValue>,
@@ -21,20 +28,25 @@ pub(super) struct Matrix {
 
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
-    /// A line for each frame.
-    Line { has_time: bool },
+    /// A line for each frame, with so many columns after the sensors that are none.
+    Line { has_time: bool, left_out: usize },
     /// A block of rows for each frame.
     Block,
 }
 
 impl Matrix {
-    pub(super) fn new(separator: Separator, grid: Grid, rate: Rate, unit: UnitOfP) -> Result<Self> {
+    /// A reader of a text that begins with `head`.
+    pub(super) fn new(separator: Separator, grid: Grid, rate: Rate, unit: UnitOfP, head: &[u8]) -> Result<Self> {
         let grid = grid.check()?;
         let values = vec![RawValue::MISSING; grid.cells()];
-        Ok(Self { separator, grid, unit, rate, shape: None, row: 0, values })
+        let columns = recognise(separator, grid, head)?;
+        let time = TimeColumn::new(columns.as_ref().and_then(|columns| columns.unit));
+        let shape =
+            columns.as_ref().map(|columns| Shape::Line { has_time: columns.has_time, left_out: columns.left_out });
+        Ok(Self { separator, grid, unit, rate, shape, columns, time, has_begun: false, row: 0, values })
     }
 
-    /// How frames stand in the file, by its first line of numbers.
+    /// How frames stand in the file, by its first line of numbers, where the first rows did not show it.
     fn shape(&self, line: &[u8]) -> Result<Shape> {
         let mut cells = self.separator.cells(line).collect::<Vec<_>>();
         while cells.last().is_some_and(|word| word.is_empty()) {
@@ -43,9 +55,9 @@ impl Matrix {
         let (count, whole) = (cells.len(), self.grid.cells());
         let Grid { rows, columns, .. } = self.grid;
         match count {
-            _ if count == whole + 1 => Ok(Shape::Line { has_time: true }),
+            _ if count == whole + 1 => Ok(Shape::Line { has_time: true, left_out: 0 }),
             // A single row is a line for each frame.
-            _ if count == whole => Ok(Shape::Line { has_time: false }),
+            _ if count == whole => Ok(Shape::Line { has_time: false, left_out: 0 }),
             _ if count == columns as usize => Ok(Shape::Block),
             _ => Err(failed!(
                 "it has {count} cells: neither the {columns} columns of a row nor the {whole} cells of all {rows}; correct \
@@ -54,17 +66,19 @@ impl Matrix {
         }
     }
 
-    fn frame(&mut self, line: &[u8], has_time: bool, to: &mut Frame) -> Result<bool> {
+    fn frame(&mut self, line: &[u8], has_time: bool, left_out: usize, to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
         let time = if has_time { cells.next() } else { None };
-        let wrong = || failed!("`{}` is not a time in seconds", time.map_or(String::new(), |word| word.to_string()));
-        let t_s = time.map(|word| word.number().filter(|t| t.is_finite()).ok_or_else(wrong)).transpose()?;
+        let t_s = time.map(|word| self.time.read(&word.text(), word.number())).transpose()?;
         let count = self.values.len();
         to.clear();
         to.values.resize(count, RawValue::MISSING);
         for (index, slot) in to.values.iter_mut().enumerate() {
             let value = next_value(&mut cells).ok_or_else(|| failed!("it has {index} of {count} cells"))?;
             *slot = value.map_err(|e| e.at(format!("cell {}", index + 1)))?;
+        }
+        for _ in 0..left_out {
+            cells.next();
         }
         if let Some(more) = cells.next_filled() {
             return Err(failed!("`{more}` stands after the last of {count} cells"));
@@ -101,20 +115,24 @@ impl Matrix {
 impl Parser for Matrix {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         // Between frames anything may stand that does not begin with a number.
-        let is_between = self.row == 0 && self.shape != Some(Shape::Line { has_time: true });
-        let is_row = self.separator.cells(line).next().is_some_and(|word| word.number().is_some() || word.is_empty());
+        let has_time = matches!(self.shape, Some(Shape::Line { has_time: true, .. }));
+        let is_between = self.row == 0 && !has_time && !matches!(self.shape, Some(Shape::Line { .. }));
+        let is_row = match self.has_begun {
+            true => self.separator.cells(line).next().is_some_and(begins_row),
+            false => is_row(self.separator, line),
+        };
         let is_blank = line.trim_ascii().is_empty();
-        if is_blank && self.row == 0
-            || !is_row && (is_between && self.shape != Some(Shape::Line { has_time: false }) || self.shape.is_none())
-        {
+        let is_above = !self.has_begun && !is_row;
+        if is_blank && self.row == 0 || is_above || !is_row && is_between {
             return Ok(false);
         }
+        self.has_begun = true;
         let shape = match self.shape {
             Some(shape) => shape,
             None => *self.shape.insert(self.shape(line)?),
         };
         match shape {
-            Shape::Line { has_time } => self.frame(line, has_time, to),
+            Shape::Line { has_time, left_out } => self.frame(line, has_time, left_out, to),
             Shape::Block => self.block(line, to),
         }
     }
@@ -124,6 +142,10 @@ impl Parser for Matrix {
             0 => Ok(false),
             row => Err(failed!("the last frame has {row} of {} rows", self.grid.rows)),
         }
+    }
+
+    fn understood(&self) -> Option<String> {
+        self.columns.as_ref().map(|columns| columns.words.clone())
     }
 
     fn layout(&self) -> Layout {

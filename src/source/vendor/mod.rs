@@ -7,6 +7,7 @@ mod insoles;
 mod layout;
 mod lines;
 mod matrix;
+mod matrix_columns;
 mod novel_asc;
 mod novel_places;
 mod options;
@@ -14,6 +15,7 @@ mod parser;
 mod tekscan;
 mod text;
 mod time;
+mod totals;
 mod xsensor;
 
 use std::fmt::Write as _;
@@ -28,6 +30,7 @@ use self::insoles::Insoles;
 use self::layout::Grid;
 use self::lines::Lines;
 use self::matrix::Matrix;
+use self::matrix_columns::way_out;
 use self::novel_asc::NovelAsc;
 use self::novel_places::Places;
 use self::parser::{Parser, Rate};
@@ -53,6 +56,7 @@ pub struct VendorSource {
     first: Option<Frame>,
     scratch: Frame,
     ended: bool,
+    notices: Vec<String>,
     losses: Vec<String>,
 }
 
@@ -85,14 +89,9 @@ impl VendorSource {
         }
         let by_grid = options.grid.map(|_| VendorFormat::Matrix);
         let format = options.format.or_else(|| VendorFormat::of(head)).or(by_grid);
-        let format = format.ok_or_else(|| {
-            Error::failed(
-                "this is no recording that is known; say what it is with --format, or, if it is of plain numbers, give \
-                 the rows and columns of a frame with --grid",
-            )
-        })?;
         let separator = Separator::of(head);
-        let parser = parser(format, separator, path, options)?;
+        let format = format.ok_or_else(|| way_out(separator, head))?;
+        let parser = parser(format, separator, head, path, options)?;
         let mut source = Self {
             path: path.to_owned(),
             name: path.display().to_string(),
@@ -105,6 +104,7 @@ impl VendorSource {
             first: None,
             scratch: Frame::missing(0.0, 0),
             ended: false,
+            notices: Vec::new(),
             losses: Vec::new(),
         };
         let mut first = Frame::missing(0.0, 0);
@@ -112,7 +112,7 @@ impl VendorSource {
             let why = source
                 .losses
                 .pop()
-                .map_or("it has no frames".to_owned(), |loss| format!("it has no whole frame: {loss}"));
+                .map_or_else(|| no_frames(format).to_owned(), |loss| format!("it has no whole frame: {loss}"));
             return Err(Error::failed(why));
         }
         source.layout = source.parser.layout();
@@ -120,6 +120,7 @@ impl VendorSource {
             source.layout.unit = unit;
         }
         source.set_order()?;
+        source.notices.extend(source.parser.understood());
         source.first = Some(first);
         Ok(source)
     }
@@ -160,7 +161,7 @@ impl VendorSource {
                 }
                 Err(error) => {
                     self.ended = true;
-                    return Err(error.at(format!("line {}", self.lines.number())));
+                    return Err(with_way_out(&error).at(format!("line {}", self.lines.number())));
                 }
             }
         }
@@ -219,8 +220,32 @@ impl VendorSource {
     }
 }
 
+/// `error` of a line, with what to do about it, where it does not say so itself.
+fn with_way_out(error: &Error) -> Error {
+    let text = error.to_string();
+    let more = if text.contains("; ") { "" } else { "; correct the line, or export the file again" };
+    Error::failed(text + more)
+}
+
+/// Why a file of `format` may have no frames, and what to do.
+fn no_frames(format: VendorFormat) -> &'static str {
+    match format {
+        VendorFormat::Matrix => {
+            "it has no frames: no line begins with a number, or with a time such as 2031-05-06T07:08:09.5Z; leave only the numbers, the \
+             time before them, with commas, semicolons, tabs or blanks between"
+        }
+        _ => "it has no frames; export it again, with the tables of its frames",
+    }
+}
+
 /// The reader of `format`.
-fn parser(format: VendorFormat, separator: Separator, path: &Path, options: &VendorOptions) -> Result<Box<dyn Parser>> {
+fn parser(
+    format: VendorFormat,
+    separator: Separator,
+    head: &[u8],
+    path: &Path,
+    options: &VendorOptions,
+) -> Result<Box<dyn Parser>> {
     let VendorOptions { grid, pitch_m, unit, .. } = *options;
     let rate = Rate::new(options.rate_hz)?;
     if format != VendorFormat::Matrix && (grid.is_some() || pitch_m.is_some()) {
@@ -253,7 +278,7 @@ fn parser(format: VendorFormat, separator: Separator, path: &Path, options: &Ven
             // The pitch of rows is their height.
             let pitch_m = pitch_m.map(|[rows, columns]| [columns, rows]);
             let grid = Grid { rows, columns, pitch_m, area_m2: None };
-            Box::new(Matrix::new(separator, grid, rate, unit.unwrap_or_default())?)
+            Box::new(Matrix::new(separator, grid, rate, unit.unwrap_or_default(), head)?)
         }
     })
 }
@@ -307,6 +332,10 @@ impl Source for VendorSource {
 
     fn progress(&self) -> Option<f64> {
         self.lines.progress()
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
     }
 
     fn losses(&self) -> Vec<String> {

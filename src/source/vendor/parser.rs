@@ -18,6 +18,11 @@ pub(super) trait Parser: Send {
     /// The last frame is incomplete.
     fn end(&mut self, to: &mut Frame) -> Result<bool>;
 
+    /// What was understood of its columns, in a line, where that is not plain.
+    fn understood(&self) -> Option<String> {
+        None
+    }
+
     /// The sensors, known from the first frame on.
     fn layout(&self) -> Layout;
 }
