@@ -181,7 +181,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     })?;
 
     findings.missing.clone_from(&arguments.missing);
-    findings.unit = if ports.is_empty() { unit_of(&arguments.sources)? } else { UnitOfP::COUNT };
+    findings.unit = if ports.is_empty() { unit_of(&arguments.sources, arguments.rate)? } else { UnitOfP::COUNT };
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
     let known: Vec<u32> =
@@ -205,9 +205,11 @@ fn without(codes: &[f64], values: &mut [RawValue]) {
 }
 
 /// What an export's values are in, as it says itself.
-fn unit_of(sources: &[String]) -> Result<UnitOfP> {
+fn unit_of(sources: &[String], rate_hz: Option<f64>) -> Result<UnitOfP> {
     match first_of(sources)? {
-        SourceSpec::Vendor(path) => Ok(VendorSource::open(path, &VendorOptions::default())?.layout().unit),
+        SourceSpec::Vendor(path) => {
+            Ok(VendorSource::open(path, &VendorOptions { rate_hz, ..VendorOptions::default() })?.layout().unit)
+        }
         _ => Ok(UnitOfP::COUNT),
     }
 }
