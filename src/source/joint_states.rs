@@ -9,6 +9,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::time_column::{TimeColumn, unit_in_head};
 use crate::error::{Error, Result, failed};
 use crate::signal::FrameTime;
 
@@ -87,13 +88,15 @@ impl JointStates {
     fn read_csv(&mut self, reader: impl std::io::Read) -> Result<()> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(reader);
         let header = reader.headers().map_err(|e| Error::failed(e.to_string()))?.clone();
-        if header.get(0).map(|name| name.trim_start_matches('\u{feff}')) != Some("t") {
+        let first = header.get(0).map(|name| name.trim_start_matches('\u{feff}')).unwrap_or_default();
+        let Some(unit) = unit_in_head(first).map_err(|e| e.at("header"))? else {
             let what = match header.get(0) {
                 None | Some("") => "it is empty".to_owned(),
-                Some(other) => format!("its first column is `{other}`, not `t`"),
+                Some(_) => format!("its first column is `{first}`, not `t`"),
             };
             return Err(failed!("{what}; write a CSV under t,<joint>,...").at("header"));
-        }
+        };
+        let mut time = TimeColumn::new(unit);
         for name in header.iter().skip(1) {
             if self.index_of.contains_key(name) {
                 return Err(failed!("two columns are called `{name}`; give each joint one").at("header"));
@@ -109,9 +112,14 @@ impl JointStates {
                     .map_err(|_| failed!("column `{}` is `{text}`; write a number", &header[column]).at(at()))
             };
             if row.len() != header.len() {
-                return Err(failed!("{} cells, and the header has {}", row.len(), header.len()).at(at()));
+                return Err(failed!(
+                    "{} cells, and the header has {}; complete or delete the row",
+                    row.len(),
+                    header.len()
+                )
+                .at(at()));
             }
-            let t_s = number(0)?;
+            let t_s = time.read(&row[0], row[0].parse().ok()).map_err(|e| e.at(at()))?;
             // An empty cell is a joint of which nothing is told.
             for column in (1..header.len()).filter(|&column| !row[column].is_empty()) {
                 self.push(column - 1, t_s, number(column)?).map_err(|e| e.at(at()))?;
@@ -252,6 +260,13 @@ mod tests {
             assert_eq!(at("wrist", 3.0), Some((2.0, 2.0)), "the last stays");
             assert_eq!(at("slide", 2.0), Some((0.375, 1.0)));
             assert_eq!((at("slide", 0.5), at("wrist", -1.0)), (None, None));
+        }
+    }
+
+    #[test]
+    fn times_are_in_the_unit_of_their_head() {
+        for text in ["t [ms],a\n500,1\n1500,2\n", "time,a\n0.5,1\n1.5,2\n"] {
+            assert_eq!(read(text).unwrap().span_s(), Some([0.5, 1.5]), "{text}");
         }
     }
 
